@@ -1,0 +1,5 @@
+"""`python -m camtool` is the same as the console script `camtool`."""
+
+from camtool.cli.main import main
+
+main()

@@ -1,0 +1,76 @@
+"""What a stage noticed: enumerated, collected, never raised at the first.
+
+Every code is explained in docs/findings.md (a test keeps the two equal). Numbers are stable:
+add, never renumber. Hundreds: 1xx drawing, 2xx planning, 3xx program, 4xx motion and result.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Severity(IntEnum):
+    """How grave: an ERROR makes a command exit with 1 and write nothing."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+
+class Code(IntEnum):
+    """What was noticed; see docs/findings.md."""
+
+    UNITLESS = 101
+    IMPLAUSIBLE_SIZE = 102
+    ENTITY_SKIPPED = 103
+    GAP_OPEN = 104
+    FILE_REPAIRED = 105
+    GAP_CLOSED = 106
+    NOTHING_DRAWN = 107
+
+    CONTOUR_TOO_SMALL = 201
+    OPEN_CONTOUR_ON_LINE = 202
+    GOUGE = 203
+    OUT_OF_TRAVEL = 204
+
+    BLOCK_TOO_LONG = 301
+    FEED_ROUNDED = 302
+    ARC_MENDED = 303
+    MOVE_COLLAPSED = 304
+    MOVE_SPLIT = 305
+    FEED_ABOVE_LIMIT = 306
+    COORDINATE_TOO_LONG = 307
+
+    ARC_MISSES_END = 401
+    CONTOUR_MISSING = 402
+    EXTRA_CUT = 403
+    MANY_REVERSALS = 404
+    PLAY_NOT_KNOWN = 405
+    NO_MOTION = 406
+    RETURN_TO_MACHINE_ZERO = 407
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing noticed, with its place, the measured value and the limit where there are any.
+
+    `unit` belongs to both `measured` and `limit` ("mm", "um", "chars", "mm_min", ...).
+    """
+
+    code: Code
+    severity: Severity
+    message: str
+    where: str = ""
+    measured: float | None = None
+    limit: float | None = None
+    unit: str = ""
+
+    def __str__(self) -> str:
+        place = f" [{self.where}]" if self.where else ""
+        return f"{self.severity.name.lower()} {self.code.name}{place}: {self.message}"
+
+
+def worst(findings: tuple[Finding, ...] | list[Finding]) -> Severity:
+    """The gravest severity present; INFO when there is no finding."""
+    return max((f.severity for f in findings), default=Severity.INFO)

@@ -1,0 +1,1 @@
+"""Polylines with bulges and pure functions on them."""

@@ -1,0 +1,232 @@
+"""Polylines of lines and circular arcs: the one shape of geometry in camtool.
+
+A vertex is (x, y, bulge), in mm. The bulge of a vertex belongs to the segment that leaves it:
+
+    bulge = tan(sweep / 4),   CCW positive,   0 = straight line,   ±1 = half circle.
+
+Many polylines are held together in columns (`Polylines`), as ragged arrays: `vertices` of all
+paths one after the other, `offsets` where each begins, `closed` per path. Everything is checked
+once, here, so that no function behind needs to: finite numbers, |bulge| ≤ 1, and no segment
+shorter than `POSITION_EPS_MM`. Arrays are read-only.
+
+`Segments` is the working form of the pure functions beside this file: one row per segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import GeometryError
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+POSITION_EPS_MM = 1e-6
+"""Two positions nearer than this are one (docs/numerics.md)."""
+
+BULGE_EPS = 1e-12
+"""|bulge| may exceed 1 by rounding alone; by no more than this, and is then set to ±1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Polyline:
+    """One path: `vertices` (n, 3) of x, y, bulge in mm; n ≥ 2.
+
+    The bulge of the last vertex of an open path has no segment and is stored as 0.
+    Raises GeometryError when the numbers are no polyline.
+    """
+
+    vertices: Floats
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        vertices = _checked(self.vertices, np.array([0, len(self.vertices)]), [self.closed])
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "closed", bool(self.closed))
+
+    def __len__(self) -> int:
+        """How many segments."""
+        return len(self.vertices) - (0 if self.closed else 1)
+
+    @property
+    def start(self) -> Floats:
+        """First point (2,)."""
+        return self.vertices[0, :2]
+
+    @property
+    def end(self) -> Floats:
+        """Last point (2,): the first one when closed."""
+        return self.vertices[0 if self.closed else -1, :2]
+
+
+@dataclass(frozen=True, eq=False)
+class Polylines:
+    """Many paths in columns: `vertices` (N, 3), `offsets` (M+1,), `closed` (M,).
+
+    Path i owns vertices[offsets[i]:offsets[i+1]]. Raises GeometryError, naming path and vertex.
+    """
+
+    vertices: Floats
+    offsets: Ints
+    closed: Bools
+
+    def __post_init__(self) -> None:
+        offsets = np.array(self.offsets, dtype=np.int64)
+        closed = np.array(self.closed, dtype=np.bool_)
+        vertices = _checked(self.vertices, offsets, closed)
+        offsets.flags.writeable = closed.flags.writeable = False
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "offsets", offsets)
+        object.__setattr__(self, "closed", closed)
+
+    @classmethod
+    def of(cls, paths: Iterable[Polyline]) -> Polylines:
+        """Columns from single paths."""
+        items = list(paths)
+        counts = [len(path.vertices) for path in items]
+        stacked = np.concatenate([path.vertices for path in items]) if items else np.empty((0, 3))
+        offsets = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+        return cls(stacked, offsets, np.array([path.closed for path in items], dtype=np.bool_))
+
+    def __len__(self) -> int:
+        """How many paths."""
+        return len(self.closed)
+
+    def __getitem__(self, index: int) -> Polyline:
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"path {index} of {len(self)}")
+        index %= len(self)
+        low, high = self.offsets[index], self.offsets[index + 1]
+        return Polyline(self.vertices[low:high], bool(self.closed[index]))
+
+    def __iter__(self) -> Iterator[Polyline]:
+        return (self[index] for index in range(len(self)))
+
+    def select(self, indices: Iterable[int]) -> Polylines:
+        """The paths of these indices, in this order."""
+        return Polylines.of(self[index] for index in indices)
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Lines and arcs in columns, K rows; `path` (K,) says which polyline each came from.
+
+    `start`, `end` (K, 2) mm; `bulge` (K,). For arcs `centre` (K, 2) mm, `radius` (K,) mm and the
+    signed `sweep` (K,) rad hold; lines have centre NaN, radius inf and sweep 0. `start_angle`
+    (K,) rad is the direction from the centre to the start (NaN for lines).
+
+        s = sweep/4, b = tan s, chord c = |end − start|:
+        radius = c (1 + b²) / (4 |b|);
+        centre = midpoint + (1 − b²)/(4b) · (chord vector turned by +90°).
+    """
+
+    start: Floats
+    end: Floats
+    bulge: Floats
+    path: Ints
+    centre: Floats
+    radius: Floats
+    sweep: Floats
+    start_angle: Floats
+
+    @classmethod
+    def of(cls, lines: Polyline | Polylines) -> Segments:
+        """All segments of the paths, in order."""
+        if isinstance(lines, Polyline):
+            lines = Polylines.of([lines])
+        vertices, offsets, closed = lines.vertices, lines.offsets, lines.closed
+        path = np.repeat(np.arange(len(closed)), np.diff(offsets))
+        following = np.arange(1, len(vertices) + 1)
+        following[offsets[1:] - 1] = offsets[:-1]
+        keep = np.ones(len(vertices), dtype=np.bool_)
+        keep[offsets[1:][~closed] - 1] = False
+        return cls.between(
+            vertices[keep, :2], vertices[following[keep], :2], vertices[keep, 2], path[keep]
+        )
+
+    @classmethod
+    def between(
+        cls, start: Floats, end: Floats, bulge: Floats, path: Ints | None = None
+    ) -> Segments:
+        """Segments from their end points (K, 2) and bulges (K,)."""
+        chord = end - start
+        is_arc = bulge != 0.0
+        safe = np.where(is_arc, bulge, 1.0)
+        turned = np.column_stack([-chord[:, 1], chord[:, 0]])
+        middle = 0.5 * (start + end) + ((1.0 - safe**2) / (4.0 * safe))[:, None] * turned
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        radius = length * (1.0 + safe**2) / (4.0 * np.abs(safe))
+        centre = np.where(is_arc[:, None], middle, np.nan)
+        return cls(
+            start=start,
+            end=end,
+            bulge=bulge,
+            path=np.zeros(len(bulge), dtype=np.int64) if path is None else path,
+            centre=centre,
+            radius=np.where(is_arc, radius, np.inf),
+            sweep=4.0 * np.arctan(bulge),
+            start_angle=np.arctan2(start[:, 1] - centre[:, 1], start[:, 0] - centre[:, 0]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.bulge)
+
+    def __getitem__(self, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice) -> Segments:
+        """The chosen rows."""
+        return Segments(
+            self.start[rows],
+            self.end[rows],
+            self.bulge[rows],
+            self.path[rows],
+            self.centre[rows],
+            self.radius[rows],
+            self.sweep[rows],
+            self.start_angle[rows],
+        )
+
+    @property
+    def is_arc(self) -> Bools:
+        """(K,) true where the row is an arc."""
+        return np.asarray(self.bulge != 0.0)
+
+
+def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Floats:
+    """A read-only, normalised copy of the vertices; GeometryError when they are no polylines."""
+    array = np.array(vertices, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise GeometryError(f"vertices have shape {array.shape}, wanted (N, 3) of x, y, bulge")
+    is_closed = np.asarray(closed, dtype=np.bool_)
+    counts = np.diff(offsets)
+    if len(offsets) != len(is_closed) + 1 or offsets[0] != 0 or offsets[-1] != len(array):
+        raise GeometryError("offsets do not divide the vertices into the paths")
+    if np.any(counts < 2):
+        raise GeometryError("a path needs two points", where=f"path {np.argmax(counts < 2)}")
+    last = offsets[1:] - 1
+    array[last[~is_closed], 2] = 0.0
+    finite = np.asarray(np.isfinite(array).all(axis=1))
+    _refuse(~finite, "a number is not finite", offsets)
+    over = np.abs(array[:, 2]) > 1.0
+    _refuse(np.abs(array[:, 2]) > 1.0 + BULGE_EPS, "|bulge| above 1: split the arc", offsets)
+    array[over, 2] = np.sign(array[over, 2])
+    following = np.arange(1, len(array) + 1)
+    following[last] = offsets[:-1]
+    step = array[following, :2] - array[:, :2]
+    short = np.hypot(step[:, 0], step[:, 1]) <= POSITION_EPS_MM
+    short[last[~is_closed]] = False
+    _refuse(short, "a point is repeated", offsets)
+    array.flags.writeable = False
+    return array
+
+
+def _refuse(bad: Bools, message: str, offsets: Ints) -> None:
+    """GeometryError with path and vertex of the first bad row, if there is one."""
+    if not bad.any():
+        return
+    row = int(np.argmax(bad))
+    path = int(np.searchsorted(offsets, row, side="right")) - 1
+    raise GeometryError(message, where=f"path {path}, vertex {row - int(offsets[path])}")

@@ -1,0 +1,1 @@
+"""Drawing files to Drawing, one file per format."""

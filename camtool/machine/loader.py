@@ -1,0 +1,140 @@
+"""The one door for machine files: TOML in, `Machine` out, every fault named by file, table, key.
+
+A user's file `extends = "pic-mmh"` a target and says only what differs; a flag such as
+`--set axes.x.backlash_mm=0.2` changes single values. Both are laid over the target's own file
+before anything is checked, so that nothing can slip in unchecked.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from camtool.errors import MachineError
+from camtool.machine.model import Machine
+
+Table = dict[str, Any]
+_T = TypeVar("_T")
+
+
+def read_table(path: Path) -> Table:
+    """A TOML file as nested dicts; MachineError with line and column when it is none."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise MachineError(
+            f"cannot be read ({error.strerror})", file=str(path), mend="check the path"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise MachineError("is not UTF-8 text", file=str(path)) from error
+    except tomllib.TOMLDecodeError as error:
+        raise MachineError(f"is no TOML: {error}", file=str(path)) from error
+
+
+def build_machine(
+    base: Table,
+    base_name: str,
+    user_file: Path | None = None,
+    settings: Sequence[str] = (),
+) -> Machine:
+    """The machine of a target's table, with a user's file and `key.key=value` settings over it."""
+    table = base
+    name = base_name
+    if user_file is not None:
+        extra = read_table(user_file)
+        extends = extra.pop("extends", None)
+        if extends != base["target"]["name"]:
+            raise MachineError(
+                f"extends {extends!r}, but the target is {base['target']['name']!r}",
+                file=str(user_file),
+                where="key extends",
+                mend=f'write extends = "{base["target"]["name"]}" or change --target',
+            )
+        table, name = _laid_over(table, extra), str(user_file)
+    for setting in settings:
+        table, name = _laid_over(table, _setting(setting)), f"--set {setting}"
+    return convert(table, Machine, name)
+
+
+def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -> _T:
+    """`table` as the record `kind`; MachineError naming file, table and key when it is not."""
+    _finite(table, file, at)
+    try:
+        return msgspec.convert(table, kind)
+    except msgspec.ValidationError as error:
+        message, _, path = str(error).partition(" - at `$")
+        keys = [key for key in (at + path.rstrip("`")).split(".") if key]
+        unknown = re.search(r"unknown field `(.+?)`", message)
+        missing = re.search(r"missing required field `(.+?)`", message)
+        if unknown:
+            keys.append(unknown[1])
+            message = "unknown key"
+        elif missing:
+            keys.append(missing[1])
+            message = "key is missing"
+        *tables, key = keys or ["?"]
+        where = (f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}"
+        raise MachineError(
+            message, file=file, where=where, mend=_mend(kind, tables, unknown)
+        ) from None
+
+
+def _mend(kind: type, tables: list[str], unknown: re.Match[str] | None) -> str:
+    """For an unknown key: the keys that its table knows."""
+    if not unknown:
+        return ""
+    record: Any = kind
+    for name in tables:
+        fields = {f.name: f.type for f in msgspec.structs.fields(record)}
+        record = fields.get(name)
+    try:
+        known = ", ".join(f.encode_name for f in msgspec.structs.fields(record))
+    except TypeError:
+        return ""
+    return f"known keys: {known}"
+
+
+def _finite(value: object, file: str, at: str) -> None:
+    """TOML knows inf and nan; no machine does."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise MachineError("is not finite", file=file, where=f"key {at}")
+    items: Callable[[], Any] | None = getattr(value, "items", None)
+    if items is not None:
+        for key, item in items():
+            _finite(item, file, f"{at}.{key}" if at else str(key))
+    elif isinstance(value, list):
+        for item in value:
+            _finite(item, file, at)
+
+
+def _laid_over(below: Table, above: Table) -> Table:
+    """`below` with the values of `above`, table by table; both stay as they are."""
+    merged = dict(below)
+    for key, value in above.items():
+        old = merged.get(key)
+        both = isinstance(old, dict) and isinstance(value, dict)
+        merged[key] = _laid_over(old, value) if both else value  # type: ignore[arg-type]
+    return merged
+
+
+def _setting(text: str) -> Table:
+    """`axes.x.backlash_mm=0.2` as nested tables; a value that is no TOML value is a string."""
+    key, equals, value = text.partition("=")
+    keys = key.strip().split(".")
+    if not equals or not all(re.fullmatch(r"[A-Za-z0-9_-]+", part) for part in keys):
+        raise MachineError(
+            f"{text!r} is no setting", where="--set", mend="write --set axes.x.backlash_mm=0.2"
+        )
+    try:
+        parsed: Any = tomllib.loads(f"v = {value.strip()}")["v"]
+    except tomllib.TOMLDecodeError:
+        parsed = value.strip()
+    for part in reversed(keys):
+        parsed = {part: parsed}
+    return dict(parsed)

@@ -1,0 +1,1 @@
+"""Controller models: Toolpath and machine to Motion."""

@@ -1,0 +1,1 @@
+"""The records that planning, posts and simulation share."""

@@ -1,0 +1,170 @@
+"""The Toolpath: canonical moves and events, in columns, in the order of execution.
+
+A row is either a move (RAPID, LINE, ARC_CW, ARC_CCW) or an event (spindle, dwell, ...). Arcs lie
+in the XY plane; G02 is ARC_CW seen from +Z. A full circle is an arc whose end is its start.
+Frame: work frame (part zero), mm; feeds in mm/min. Row i starts where row i−1 ended; row 0 starts
+at `start`. Planning builds it, posts write it, a post's reader gives it back, simulation runs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.findings import Finding
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+class Kind(IntEnum):
+    """What a row does; `value` (unit) is the event's argument where it has one."""
+
+    RAPID = 0
+    LINE = 1
+    ARC_CW = 2
+    ARC_CCW = 3
+    DWELL = 10  # seconds
+    SPINDLE_CW = 11  # rev/min
+    SPINDLE_CCW = 12  # rev/min
+    SPINDLE_OFF = 13
+    TOOL_CHANGE = 14  # tool number
+    MESSAGE = 15  # index into `texts`
+    SET_ZERO = 16  # this position is part zero
+    HOME_XY = 17  # return to machine zero in X and Y
+    HOME_Z = 18  # return to machine zero in Z
+    END = 19  # end of program
+
+
+@dataclass(frozen=True)
+class Move:
+    """One row, for people: `end` and `start` (x, y, z) mm, `centre` (x, y) mm or None for rows
+    that are no arcs, `feed` mm/min or None, `value` the event's argument or None."""
+
+    index: int
+    kind: Kind
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    centre: tuple[float, float] | None
+    feed: float | None
+    value: float | None
+    source: str
+    block: int
+
+
+@dataclass(frozen=True, eq=False)
+class Toolpath:
+    """N rows in columns; arrays are read-only.
+
+    kind (N,) of Kind; end (N, 3) mm (an event repeats the position); centre (N, 2) mm, NaN where
+    no arc; feed (N,) mm/min, NaN for rapids and events; value (N,), NaN where none; source (N,)
+    index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
+    program block that the row was read from, −1 when planned; start (3,) mm. ValueError when
+    columns disagree.
+    """
+
+    kind: Ints
+    end: Floats
+    centre: Floats
+    feed: Floats
+    value: Floats
+    source: Ints
+    block: Ints
+    start: Floats
+    texts: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.kind)
+        shapes = {
+            "kind": (count,),
+            "end": (count, 3),
+            "centre": (count, 2),
+            "feed": (count,),
+            "value": (count,),
+            "source": (count,),
+            "block": (count,),
+            "start": (3,),
+        }
+        for name, shape in shapes.items():
+            dtype = np.int64 if name in ("kind", "source", "block") else np.float64
+            column = np.array(getattr(self, name), dtype=dtype)
+            if column.shape != shape:
+                raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+        if not (np.isfinite(self.end).all() and np.isfinite(self.start).all()):
+            raise ValueError("a position is not finite")
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @property
+    def starts(self) -> Floats:
+        """(N, 3) mm: where each row begins."""
+        return np.concatenate([self.start[None, :], self.end[:-1]]) if len(self) else self.end
+
+    @property
+    def is_arc(self) -> npt.NDArray[np.bool_]:
+        """(N,) true for ARC_CW and ARC_CCW."""
+        return (self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW)
+
+    @property
+    def is_motion(self) -> npt.NDArray[np.bool_]:
+        """(N,) true for RAPID, LINE and arcs."""
+        return np.asarray(self.kind <= Kind.ARC_CCW)
+
+    @property
+    def is_feed(self) -> npt.NDArray[np.bool_]:
+        """(N,) true for LINE and arcs: moves at a feed."""
+        return np.asarray((self.kind >= Kind.LINE) & (self.kind <= Kind.ARC_CCW))
+
+    def sweeps(self) -> Floats:
+        """(N,) signed sweep in rad, CCW positive; 0 where no arc, ±2π where end is start.
+
+        CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored.
+        """
+        begin, full = self.starts[:, :2], 2.0 * np.pi
+        from_ = np.arctan2(begin[:, 1] - self.centre[:, 1], begin[:, 0] - self.centre[:, 0])
+        to = np.arctan2(self.end[:, 1] - self.centre[:, 1], self.end[:, 0] - self.centre[:, 0])
+        sign = np.where(self.kind == Kind.ARC_CW, -1.0, 1.0)
+        turn = np.mod(sign * (to - from_), full)
+        same = (self.end[:, :2] == begin).all(axis=1)
+        turn = np.where(same | (turn == 0.0), full, turn)
+        return np.where(self.is_arc, sign * turn, 0.0)
+
+    def text(self, row: int) -> str:
+        """Provenance of a row ("" when it has none)."""
+        index = int(self.source[row])
+        return self.texts[index] if index >= 0 else ""
+
+    def __iter__(self) -> Iterator[Move]:
+        starts = self.starts
+        for row in range(len(self)):
+            yield Move(
+                index=row,
+                kind=Kind(int(self.kind[row])),
+                start=_triple(starts[row]),
+                end=_triple(self.end[row]),
+                centre=(
+                    (float(self.centre[row, 0]), float(self.centre[row, 1]))
+                    if self.is_arc[row]
+                    else None
+                ),
+                feed=_or_none(self.feed[row]),
+                value=_or_none(self.value[row]),
+                source=self.text(row),
+                block=int(self.block[row]),
+            )
+
+
+def _triple(row: Floats) -> tuple[float, float, float]:
+    return float(row[0]), float(row[1]), float(row[2])
+
+
+def _or_none(number: np.float64) -> float | None:
+    return None if np.isnan(number) else float(number)

@@ -1,0 +1,43 @@
+"""The Program: the bytes for one machine, and the contract of whatever writes and reads them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.findings import Finding
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Toolpath
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """`data` for the machine `target`, to be stored with `extension` (".pic").
+
+    `row_of_block` (B,) gives for each block the row of the toolpath that it came from, −1 for
+    blocks of the dialect's own (header, footer).
+    """
+
+    data: bytes
+    extension: str
+    target: str
+    row_of_block: npt.NDArray[np.int64]
+    findings: tuple[Finding, ...] = ()
+
+
+class PostProcessor(Protocol):
+    """One dialect. `read` shares no code with `write`, so a fault in one shows in the other."""
+
+    name: str
+
+    def check(self, machine: Machine) -> None:
+        """Raise MachineError when the machine's `[dialect]` table does not fit this dialect."""
+
+    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+        """The program; PostError when the machine or the dialect cannot do it."""
+
+    def read(self, data: bytes, machine: Machine) -> Toolpath:
+        """The moves as this machine's controller decodes them; ProgramError with block, column."""

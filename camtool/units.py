@@ -1,0 +1,77 @@
+"""Lengths, angles, feeds and times with their units, turned into plain floats at the door.
+
+Inside camtool everything is mm, seconds and radians; feeds are mm/min in toolpaths.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from camtool.errors import OptionError
+
+MM_PER_UNIT: dict[str, float] = {
+    "mm": 1.0,
+    "um": 0.001,
+    "µm": 0.001,
+    "μm": 0.001,
+    "cm": 10.0,
+    "m": 1000.0,
+    "in": 25.4,
+    '"': 25.4,
+    "ft": 304.8,
+    "pt": 25.4 / 72.0,
+    "pc": 25.4 / 6.0,
+    "q": 0.25,
+    "px": 25.4 / 96.0,
+}
+"""Length units that a user may write, as mm (CSS 2.1 for pt, pc, q and px at 96 dpi)."""
+
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*([^\d\s].*?)?\s*")
+
+
+def parse_length(text: str, *, name: str = "length") -> float:
+    """`"0.2mm"`, `"1/8in"`, `"200 um"` or a bare number (mm) as mm.
+
+    Raises OptionError for anything else, for infinities and for NaN.
+
+    >>> parse_length("1/8in"), parse_length("200um"), parse_length("3")
+    (3.175, 0.2, 3.0)
+    """
+    value, unit = _split(text, name)
+    factor = MM_PER_UNIT.get(unit.lower() or "mm")
+    if factor is None:
+        known = ", ".join(u for u in MM_PER_UNIT if u.isascii() and u != '"')
+        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend=f"use one of {known}")
+    return value * factor
+
+
+def parse_feed(text: str, *, name: str = "feed") -> float:
+    """`"0.8"`, `"0.8mm/min"`, `"2 in/min"` or `"0.01mm/s"` as mm/min.
+
+    >>> parse_feed("0.8mm/min"), parse_feed("0.01 mm/s")
+    (0.8, 0.6)
+    """
+    value, unit = _split(text, name)
+    length, _, per = (unit or "mm/min").partition("/")
+    minutes = {"min": 1.0, "s": 60.0}.get(per.strip())
+    factor = MM_PER_UNIT.get(length.strip().lower())
+    if minutes is None or factor is None:
+        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use mm/min or mm/s")
+    return value * factor * minutes
+
+
+def _split(text: str, name: str) -> tuple[float, str]:
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise OptionError(f"{name} {text!r} is no number", mend='write it like "0.2mm"')
+    value = float(match[1])
+    if match[2] is not None:
+        divisor = float(match[2])
+        if divisor == 0.0:
+            raise OptionError(f"{name} {text!r} divides by zero")
+        value /= divisor
+    if not math.isfinite(value):
+        raise OptionError(f"{name} {text!r} is not finite")
+    return value, match[3] or ""

@@ -1,0 +1,1 @@
+"""Motion against what was wanted: errors, findings, report."""
