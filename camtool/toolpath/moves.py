@@ -111,7 +111,7 @@ class Toolpath:
     @property
     def is_arc(self) -> npt.NDArray[np.bool_]:
         """(N,) true for ARC_CW and ARC_CCW."""
-        return (self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW)
+        return np.asarray((self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW))
 
     @property
     def is_motion(self) -> npt.NDArray[np.bool_]:

@@ -1,0 +1,14 @@
+"""Settings shared by all tests."""
+
+from hypothesis import HealthCheck, settings
+
+# No deadline: kernels compile on first use, and speed is no matter of tests here.
+settings.register_profile(
+    "default",
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+)
+settings.register_profile("nightly", parent=settings.get_profile("default"), max_examples=2000)
+settings.load_profile("default")

@@ -1,0 +1,1 @@
+"""Slow, obvious twins: what the fast code is compared with."""
