@@ -1,0 +1,66 @@
+"""What a caller may say about how a drawing is read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from camtool.errors import OptionError
+from camtool.units import MM_PER_UNIT
+
+FORMATS = ("dxf", "svg", "points")
+"""Names of the formats, each with a module of that name beside this one."""
+
+TOLERANCE_MM = 0.0005
+"""Largest distance between a curve and the arcs that stand for it (docs/numerics.md)."""
+
+GAP_MM = 0.01
+"""Open ends that lie nearer than this are joined (docs/numerics.md)."""
+
+DPI = 96.0
+"""Pixels per inch, as CSS has it."""
+
+_MM_PER_INCH = 25.4
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How to read a drawing; every field has a default that suits most files.
+
+    `units`: the unit of the file's numbers, over what the file says (a name of
+    `units.MM_PER_UNIT`). `tolerance_mm`: how far fitted arcs may lie from a curve. `gap_mm`:
+    open ends nearer than this are joined; with `chain_gaps` false only equal ends are. `dpi`:
+    pixels per inch of SVG's px. `format`: one of FORMATS, over what the content looks like.
+    Raises OptionError.
+    """
+
+    units: str | None = None
+    tolerance_mm: float = TOLERANCE_MM
+    gap_mm: float = GAP_MM
+    dpi: float = DPI
+    format: str | None = None
+    chain_gaps: bool = True
+
+    def __post_init__(self) -> None:
+        if self.units is not None and self.units.lower() not in MM_PER_UNIT:
+            known = ", ".join(u for u in MM_PER_UNIT if u.isascii() and u != '"')
+            raise OptionError(f"unknown unit {self.units!r}", mend=f"use one of {known}")
+        if self.format is not None and self.format not in FORMATS:
+            raise OptionError(
+                f"unknown drawing format {self.format!r}", mend=f"use one of {', '.join(FORMATS)}"
+            )
+        for name in ("tolerance_mm", "dpi"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise OptionError(f"{name} is {value}, it must be above 0")
+        if not (math.isfinite(self.gap_mm) and self.gap_mm >= 0.0):
+            raise OptionError(f"gap_mm is {self.gap_mm}, it must be 0 or more")
+
+    def mm_per(self, unit: str) -> float:
+        """One `unit` in mm; a px is as large as `dpi` makes it."""
+        name = unit.lower()
+        return _MM_PER_INCH / self.dpi if name == "px" else MM_PER_UNIT[name]
+
+
+DEFAULTS = ReadOptions()
+"""The options of a caller who says nothing."""
