@@ -1,0 +1,167 @@
+"""Arcs by direct search (DSM), the step-by-step method of the PIC18F8720 controller.
+
+Positions are steps relative to the arc centre. With the error D = x² + y² − R² of the present
+position, a step of sx = ±1 in X and sy = ±1 in Y changes it by
+
+    ΔX = (x + sx)² − x² = 2·x·sx + 1,      ΔY = 2·y·sy + 1,
+
+and each iteration takes the one of X alone (|D + ΔX|), Y alone (|D + ΔY|) and both
+(|D + ΔX + ΔY|) that leaves the least |D|. On ties a single axis beats the diagonal and X beats Y.
+When the coordinate that shrinks reaches 0, the next quadrant begins: that coordinate goes on and
+now grows, the other one turns round. A start on an axis belongs to the quadrant that the motion
+enters. (Thesis equations 3.4-3.14, L1009-1042, L2348-2350.)
+
+With D = 0 at the start the path stays nearer than half a step to the circle through the start.
+Let m be the larger of |x|, |y|. Where the two candidates on either side of the circle differ in D
+by 2m − 1 or 2m + 1, an odd number, the better one has |D| ≤ m − 1 outside or |D| ≤ m ≤ r inside
+(m after the step); where none straddle, |D| falls. Then e = |r − R| = |D| / (r + R) obeys
+e (2R − e) ≤ R − e inside and e (2R + e) ≤ R + e − 1 outside; both fail at e = 1/2.
+
+Exact, because every number is an integer: D and both Δ are carried along in int64, as the
+firmware carries them, and no square or root is ever taken; 2·|x| + 1 and |D| stay far below 2⁶³
+for every radius that a program can say. Compiled, because each iteration depends on the one
+before (the tie rules make no closed form) and one part takes tens of millions of them.
+
+`error` is the D that the controller starts with: 0, or x² + y² − round(R)² (the thesis leaves
+the choice open). Iteration 0 is the start itself, iteration k the position after k passes.
+
+A state is an int64 array (x, y, D, sx, sy), changed in place by `direct_search_fill`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+Ints = npt.NDArray[np.int64]
+
+
+@njit(cache=True)
+def heading(x: int, y: int, clockwise: bool) -> tuple[int, int]:
+    """Direction (sx, sy) of the motion at (x, y) on an arc about (0, 0).
+
+    Clockwise the velocity is along (y, −x). On an axis one of the two vanishes: there the
+    coordinate that is not 0 shrinks, so its direction is against its sign.
+    """
+    turn = 1 if clockwise else -1
+    along_x, along_y = turn * y, -turn * x
+    sx = -1 if along_x < 0 or (along_x == 0 and x > 0) else 1
+    sy = -1 if along_y < 0 or (along_y == 0 and y > 0) else 1
+    return sx, sy
+
+
+@njit(cache=True)
+def _advance(
+    x: int, y: int, error: int, sx: int, sy: int, delta_x: int, delta_y: int
+) -> tuple[int, int, int, int, int, int, int]:
+    """One iteration: the new x, y, D, sx, sy, ΔX, ΔY."""
+    only_x = abs(error + delta_x)
+    only_y = abs(error + delta_y)
+    both = abs(error + delta_x + delta_y)
+    if only_x > only_y:
+        move_x, move_y = only_y > both, True
+    else:
+        move_x, move_y = True, only_x > both
+    if move_x:
+        x += sx
+        error += delta_x
+        delta_x += 2
+    if move_y:
+        y += sy
+        error += delta_y
+        delta_y += 2
+    if move_y and y == 0:
+        sx = -sx
+        delta_x, delta_y = 2 * x * sx + 1, 1
+    elif move_x and x == 0:
+        sy = -sy
+        delta_x, delta_y = 1, 2 * y * sy + 1
+    return x, y, error, sx, sy, delta_x, delta_y
+
+
+@njit(cache=True)
+def direct_search_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints:
+    """The state (5,) at the start (x, y) ≠ (0, 0) of an arc."""
+    sx, sy = heading(x, y, clockwise)
+    return np.array([x, y, error, sx, sy], dtype=np.int64)
+
+
+@njit(cache=True)
+def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, bool]:
+    """Run on from `state` into `out` (n, 2) until the end is met or `out` is full.
+
+    Returns the number of rows filled and whether the last of them is the end; `state` then
+    stands where the rows end, so that the next call goes on.
+    """
+    x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
+    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
+    filled, met = 0, False
+    while filled < len(out) and not met:
+        x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
+        out[filled, 0] = x
+        out[filled, 1] = y
+        filled += 1
+        met = x == end_x and y == end_y
+    state[0], state[1], state[2], state[3], state[4] = x, y, error, sx, sy
+    return filled, met
+
+
+@njit(cache=True)
+def direct_search_path(
+    x: int, y: int, clockwise: bool, first: int, count: int, error: int = 0
+) -> Ints:
+    """(count, 2) positions after the iterations first + 1 … first + count from (x, y) ≠ (0, 0)."""
+    sx, sy = heading(x, y, clockwise)
+    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
+    out = np.empty((count, 2), dtype=np.int64)
+    for iteration in range(first + count):
+        x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
+        if iteration >= first:
+            out[iteration - first, 0] = x
+            out[iteration - first, 1] = y
+    return out
+
+
+@njit(cache=True)
+def direct_search_nearest(
+    x: int,
+    y: int,
+    clockwise: bool,
+    end_x: int,
+    end_y: int,
+    low: int,
+    high: int,
+    error: int = 0,
+) -> tuple[int, int]:
+    """The iteration in low … high (both included) nearest to the end, the first one on ties, and
+    its squared distance in steps²; (−1, −1) when the range is empty."""
+    sx, sy = heading(x, y, clockwise)
+    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
+    best, least = -1, -1
+    for iteration in range(high + 1):
+        if iteration > 0:
+            x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
+        if iteration >= low:
+            square = (x - end_x) ** 2 + (y - end_y) ** 2
+            if best < 0 or square < least:
+                best, least = iteration, square
+    return best, least
+
+
+@njit(cache=True)
+def direct_search_hits(
+    x: int, y: int, clockwise: bool, end_x: int, end_y: int, limit: int, error: int = 0
+) -> int:
+    """The first iteration, 1 … limit, at which the position equals the end, or −1.
+
+    This is the controller's stop test, done after each iteration: an end at the start is met
+    after a whole turn.
+    """
+    sx, sy = heading(x, y, clockwise)
+    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
+    for iteration in range(1, limit + 1):
+        x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
+        if x == end_x and y == end_y:
+            return iteration
+    return -1

@@ -1,0 +1,114 @@
+"""The compiled direct search against the literal loop, and against mathematics."""
+
+import math
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from camtool.kernels.direct_search import (
+    direct_search_fill,
+    direct_search_hits,
+    direct_search_nearest,
+    direct_search_path,
+    direct_search_start,
+)
+from tests.oracles.controllers import direct_search
+
+
+def twin(x: int, y: int, clockwise: bool, count: int, error: int = 0) -> np.ndarray:
+    """The first positions of the literal loop."""
+    points = list(islice(direct_search(x, y, clockwise, error), count))
+    return np.array(points, dtype=np.int64).reshape(count, 2)
+
+
+def radial_error(points: np.ndarray, radius: float) -> float:
+    """Greatest distance of the points from the circle."""
+    return float(np.abs(np.hypot(points[:, 0], points[:, 1]) - radius).max())
+
+
+@pytest.mark.parametrize("clockwise", [True, False])
+@pytest.mark.parametrize("start", [(0, 30), (30, 0), (0, -30), (-30, 0)])
+def test_circle_of_30_takes_168_iterations(start: tuple[int, int], clockwise: bool) -> None:
+    assert direct_search_hits(*start, clockwise, *start, 1000) == 168
+    assert radial_error(direct_search_path(*start, clockwise, 0, 168), 30.0) < 0.5
+
+
+@pytest.mark.parametrize("clockwise", [True, False])
+def test_every_small_start_equals_the_literal_loop(clockwise: bool) -> None:
+    for x in range(-40, 41):
+        for y in range(-40, 41):
+            if not 0 < math.hypot(x, y) <= 40:
+                continue
+            count = int(6 * math.hypot(x, y)) + 12
+            rounded = x * x + y * y - round(math.hypot(x, y)) ** 2
+            for error in {0, rounded}:
+                got = direct_search_path(x, y, clockwise, 0, count, error)
+                assert np.array_equal(got, twin(x, y, clockwise, count, error)), (x, y, error)
+
+
+def test_large_seeded_starts_equal_the_literal_loop() -> None:
+    rng = np.random.default_rng(20)
+    for radius in (300, 3000, 21_428, 714_285):
+        angle = rng.uniform(0.0, 2.0 * math.pi)
+        x, y = round(radius * math.cos(angle)), round(radius * math.sin(angle))
+        clockwise = bool(rng.integers(2))
+        count = min(6 * radius, 40_000)
+        got = direct_search_path(x, y, clockwise, 0, count)
+        assert np.array_equal(got, twin(x, y, clockwise, count)), (x, y, clockwise)
+
+
+def test_radial_error_is_below_half_a_step() -> None:
+    """Against the circle through the start; the derivation is in the kernel's header."""
+    rng = np.random.default_rng(21)
+    for _ in range(300):
+        x, y = (int(v) for v in rng.integers(-2000, 2001, 2))
+        radius = math.hypot(x, y)
+        if radius == 0.0:
+            continue
+        points = direct_search_path(x, y, bool(rng.integers(2)), 0, int(12 * radius) + 20)
+        assert radial_error(points, radius) < 0.5, (x, y)
+
+
+def test_path_starts_anywhere() -> None:
+    whole = direct_search_path(17, -29, False, 0, 200)
+    assert np.array_equal(direct_search_path(17, -29, False, 63, 50), whole[63:113])
+    assert direct_search_path(17, -29, False, 63, 0).shape == (0, 2)
+
+
+@pytest.mark.parametrize("size", [1, 7, 64, 1000])
+def test_filling_goes_on_where_it_stopped(size: int) -> None:
+    whole = direct_search_path(17, -29, False, 0, 140)
+    end = (int(whole[-1, 0]), int(whole[-1, 1]))
+    state, buffer = direct_search_start(17, -29, False), np.empty((size, 2), dtype=np.int64)
+    parts, met = [], False
+    while not met:
+        count, met = direct_search_fill(state, *end, buffer)
+        parts.append(buffer[:count].copy())
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+def test_hits_and_nearest_agree_with_the_path() -> None:
+    rng = np.random.default_rng(22)
+    missed = 0
+    for _ in range(300):
+        x, y, ex, ey = (int(v) for v in rng.integers(-60, 61, 4))
+        if (x, y) == (0, 0):
+            continue
+        path = twin(x, y, True, 500)
+        met = np.flatnonzero((path == (ex, ey)).all(axis=1))
+        assert direct_search_hits(x, y, True, ex, ey, 500) == (met[0] + 1 if len(met) else -1)
+        missed += len(met) == 0
+        with_start = np.vstack([[(x, y)], path])
+        squares = ((with_start - (ex, ey)) ** 2).sum(axis=1)
+        low, high = 30, 400
+        best = int(np.argmin(squares[low : high + 1])) + low
+        assert direct_search_nearest(x, y, True, ex, ey, low, high) == (best, squares[best])
+    assert 0 < missed < 300
+    assert direct_search_nearest(5, 0, True, 0, 5, 0, 0) == (0, 50)
+    assert direct_search_nearest(5, 0, True, 0, 5, 3, 2) == (-1, -1)
+
+
+def test_the_limit_of_hits_counts() -> None:
+    assert direct_search_hits(0, 30, True, 0, 30, 168) == 168
+    assert direct_search_hits(0, 30, True, 0, 30, 167) == -1
