@@ -1,0 +1,80 @@
+"""The command `camtool`: the group, and the one place where errors become exit codes.
+
+0 fine · 1 the job has findings of severity error · 2 wrong use or bad input · 3 a fault of ours.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+from typing import NoReturn
+
+import click
+
+from camtool import __version__
+from camtool.cli.check import check
+from camtool.cli.post import post
+from camtool.cli.preview import preview
+from camtool.cli.targets import targets
+from camtool.cli.verify import verify
+from camtool.errors import CamtoolError
+
+EXIT_BAD_INPUT = 2
+EXIT_FAULT = 3
+EXIT_INTERRUPTED = 128 + signal.SIGINT
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="camtool")
+def cli() -> None:
+    """Drawings in, the exact program of your machine out, its error known beforehand.
+
+    \b
+    camtool check   logo.dxf                    what is in the drawing
+    camtool post    logo.dxf --target pic-mmh   drawing to verified program
+    camtool verify  logo.pic --target pic-mmh   judge any program of a machine
+    camtool preview logo.dxf -o logo.svg        picture of a drawing or program
+    camtool targets                             the machines it knows
+
+    Lengths take units: 0.2mm, 1/8in, 200um; bare numbers are mm. Every command has --help.
+    """
+
+
+for _command in (post, verify, preview, check, targets):
+    cli.add_command(_command)
+
+
+def main() -> NoReturn:
+    """Run the command line; never returns. One line on stderr for every error."""
+    debug = "--debug" in sys.argv[1:]
+    try:
+        code = cli.main(prog_name="camtool", standalone_mode=False)
+        sys.exit(code if isinstance(code, int) else 0)
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(EXIT_BAD_INPUT)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("camtool: interrupted; nothing was written", err=True)
+        sys.exit(EXIT_INTERRUPTED)
+    except CamtoolError as error:
+        if debug:
+            traceback.print_exc()
+        click.echo(f"camtool: error: {error}", err=True)
+        sys.exit(error.exit_code)
+    except BrokenPipeError:
+        # The reader of our stdout went away; say nothing when Python flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        click.echo(
+            f"camtool: fault in camtool itself ({type(error).__name__}: {error}); "
+            "please report it with the output of the same command with --debug",
+            err=True,
+        )
+        sys.exit(EXIT_FAULT)

@@ -1,0 +1,115 @@
+"""`camtool preview`: picture of a drawing, a toolpath or a program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.cli.options import (
+    DrawingFlags,
+    JobFlags,
+    MachineFlags,
+    drawing_options,
+    job_options,
+    machine_options,
+    talk_options,
+)
+from camtool.cli.output import check_writable, write_all
+from camtool.cli.talk import say, say_findings
+from camtool.cli.types import picture as picture_name
+from camtool.cli.verify import read_bytes
+from camtool.errors import CamtoolError
+
+if TYPE_CHECKING:
+    from camtool.preview.draw import Scene
+
+
+@click.command(short_help="Picture of a drawing, toolpath or program.")
+@click.argument("source", metavar="FILE")
+@click.option(
+    "-o",
+    "--output",
+    metavar="PICTURE",
+    callback=picture_name,
+    required=True,
+    help="A .svg or .png file.",
+)
+@machine_options
+@click.option("--simulate", is_flag=True, help="Show the predicted path and its error too.")
+@job_options
+@drawing_options
+@talk_options
+def preview(
+    source: str,
+    output: str,
+    machine: MachineFlags,
+    simulate: bool,
+    job: JobFlags,
+    drawing: DrawingFlags,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Draw FILE: a drawing; with --target its toolpath; or a program of that target.
+
+    A file with the target's own extension (such as .pic) is taken for a program.
+    """
+    if simulate and machine.target is None:
+        raise click.UsageError("--simulate needs --target")
+    check_writable([output], [source])
+
+    from camtool.preview.render import render
+
+    scene = _scene(source, machine, simulate, job, drawing)
+    write_all({output: render(scene, output)})
+    findings = scene.drawing.findings if scene.drawing is not None else ()
+    say_findings(findings, quiet=quiet, verbose=verbose)
+    say(f"written: {output}", quiet=quiet)
+    return 0
+
+
+def _scene(
+    source: str, machine: MachineFlags, simulate: bool, job: JobFlags, drawing: DrawingFlags
+) -> Scene:
+    """What to draw: a drawing, a program, or the toolpath planned from a drawing."""
+    from camtool.pipeline import picture, post_drawing, verify_program
+    from camtool.planning.plan import plan
+
+    title = Path(source).name
+    if machine.target is None:
+        _refuse_program(source)
+        return picture(title=title, drawing=drawing.read(source))
+    target = machine.load()
+    if Path(source).suffix.lower() == target.machine.target.extension:
+        data = read_bytes(source)
+        decoded, verification = verify_program(data, target, source=source)
+        judged = verification if simulate else None
+        return picture(title=title, toolpath=decoded, verification=judged, machine=target.machine)
+    read = drawing.read(source, target.machine)
+    if not simulate:
+        toolpath = plan(read, job.job(), target.machine)
+        return picture(title=title, drawing=read, toolpath=toolpath, machine=target.machine)
+    posted = post_drawing(read, job.job(), target)
+    return picture(
+        title=title,
+        drawing=read,
+        toolpath=posted.decoded or posted.wanted,
+        verification=posted.verification,
+        machine=target.machine,
+    )
+
+
+def _refuse_program(source: str) -> None:
+    """CamtoolError when the file's extension says that it is a program and no target is given."""
+    from camtool.machine.registry import load_target, target_names
+
+    for name in target_names():
+        try:
+            extension = load_target(name).machine.target.extension
+        except CamtoolError:  # a broken plug-in harms nothing else
+            continue
+        if Path(source).suffix.lower() == extension:
+            raise CamtoolError(
+                "is a program", file=source, mend=f"say whose, such as --target {name}"
+            )

@@ -1,0 +1,33 @@
+"""What a command says to people: always on stderr, so that stdout stays for machines."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from camtool.findings import Finding
+
+
+def say(text: str, *, quiet: bool) -> None:
+    """One message, unless quiet."""
+    if not quiet:
+        click.echo(text, err=True)
+
+
+def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
+    """Errors always, warnings unless quiet, remarks when verbose; one line each."""
+    from camtool.findings import Severity
+
+    least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
+    for finding in findings:
+        if finding.severity >= least:
+            click.echo(f"camtool: {one_line(str(finding))}", err=True)
+
+
+def one_line(text: str) -> str:
+    """Text as one line of printable characters, whatever a drawing's layer names hold."""
+    return "".join(char if char.isprintable() else " " for char in text)

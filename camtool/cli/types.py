@@ -1,0 +1,38 @@
+"""Command-line values: lengths, feeds and picture names are checked at this door.
+
+These are click callbacks: text in, float (mm, mm/min) or name out, a usage error otherwise.
+"""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+import click
+
+from camtool.errors import OptionError
+from camtool.units import parse_feed, parse_length
+
+PICTURES = (".svg", ".png")
+
+
+def length(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """`0.2mm`, `1/8in`, `200um` or a bare number (mm) as mm."""
+    try:
+        return None if value is None else parse_length(value)
+    except OptionError as error:
+        raise click.BadParameter(str(error), ctx, param) from error
+
+
+def feed(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """`0.8`, `0.8mm/min`, `0.01mm/s` as mm/min."""
+    try:
+        return None if value is None else parse_feed(value)
+    except OptionError as error:
+        raise click.BadParameter(str(error), ctx, param) from error
+
+
+def picture(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The name of a picture that we can make."""
+    if value is not None and PurePath(value).suffix.lower() not in PICTURES:
+        raise click.BadParameter(f"{value!r} ends in neither .svg nor .png", ctx, param)
+    return value

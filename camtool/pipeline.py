@@ -1,0 +1,139 @@
+"""The whole way in three calls: what the commands and batches run.
+
+    post_drawing     Drawing + Job + target → program, read back, simulated and judged
+    verify_program   bytes of a program (anybody's) → judged, against a drawing if there is one
+    picture          any of the values on the way → the scene that `camtool.preview` draws
+
+Nothing here reads or writes a file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from camtool.errors import ProgramError
+from camtool.findings import Finding, Severity, worst
+
+if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
+    from camtool.machine.model import Interpolator, Machine
+    from camtool.machine.registry import LoadedTarget
+    from camtool.planning.job import Job
+    from camtool.preview.draw import Scene
+    from camtool.toolpath.moves import Toolpath
+    from camtool.toolpath.program import Program
+    from camtool.verify.verify import Verification
+
+
+@dataclass(frozen=True, eq=False)
+class Posted:
+    """What `post_drawing` made. `program` is None when planning found an error; `verification`
+    is None then, and when it was not asked for. `findings` are those of all stages."""
+
+    wanted: Toolpath
+    program: Program | None
+    decoded: Toolpath | None
+    verification: Verification | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def failed(self) -> bool:
+        """True when a finding is an error: such a program must not be written."""
+        return worst(self.findings) >= Severity.ERROR
+
+
+def post_drawing(
+    drawing: Drawing, job: Job, target: LoadedTarget, *, check: bool = True
+) -> Posted:
+    """Plan, write, read back, simulate and judge; `check=False` leaves out the last two."""
+    from camtool.planning.plan import plan
+
+    wanted = plan(drawing, job, target.machine)
+    findings = _merged(drawing.findings, wanted.findings)
+    if worst(findings) >= Severity.ERROR:
+        return Posted(wanted, None, None, None, findings)
+    program = target.post.write(wanted, target.machine)
+    decoded = target.post.read(program.data, target.machine)
+    findings = _merged(findings, program.findings, decoded.findings)
+    if not check:
+        return Posted(wanted, program, decoded, None, findings)
+    verification = _judged(
+        program.data, decoded, target.machine, wanted, drawing, source=drawing.file
+    )
+    findings = _merged(findings, verification.findings)
+    return Posted(wanted, program, decoded, verification.with_findings(findings), findings)
+
+
+def verify_program(
+    data: bytes,
+    target: LoadedTarget,
+    *,
+    source: str,
+    drawing: Drawing | None = None,
+    job: Job | None = None,
+    interpolator: Interpolator | None = None,
+) -> tuple[Toolpath, Verification]:
+    """(decoded toolpath, verification) of any program of the target; against `drawing` planned
+    with `job` when there is one. ProgramError names file, block and column."""
+    try:
+        decoded = target.post.read(data, target.machine)
+    except ProgramError as error:
+        error.file = error.file or source
+        raise
+    wanted = None
+    if drawing is not None:
+        from camtool.planning.job import Job
+        from camtool.planning.plan import plan
+
+        wanted = plan(drawing, job or Job(), target.machine)
+    return decoded, _judged(
+        data, decoded, target.machine, wanted, drawing, source=source, interpolator=interpolator
+    )
+
+
+def _judged(
+    data: bytes,
+    decoded: Toolpath,
+    machine: Machine,
+    wanted: Toolpath | None,
+    drawing: Drawing | None,
+    *,
+    source: str,
+    interpolator: Interpolator | None = None,
+) -> Verification:
+    from camtool.verify.verify import VerifyOptions, verify
+
+    options = VerifyOptions(interpolator=interpolator, source=source, size_bytes=len(data))
+    return verify(decoded, machine, wanted=wanted, drawing=drawing, options=options)
+
+
+def _merged(*groups: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """All findings once, in order."""
+    return tuple(dict.fromkeys(finding for group in groups for finding in group))
+
+
+def picture(
+    *,
+    title: str,
+    drawing: Drawing | None = None,
+    toolpath: Toolpath | None = None,
+    verification: Verification | None = None,
+    machine: Machine | None = None,
+) -> Scene:
+    """The scene of whatever is there; with a verification, the slides' path by its error."""
+    from camtool.preview.draw import Scene
+
+    trace = verification.trace if verification is not None else None
+    axes = machine.axes if machine is not None else None
+    travel = (axes.x.travel_mm, axes.y.travel_mm) if axes is not None else (None, None)
+    return Scene(
+        title=title,
+        drawing=drawing,
+        toolpath=toolpath,
+        trace_points=trace.points if trace is not None else None,
+        trace_error_mm=trace.error_mm if trace is not None else None,
+        trace_cutting=trace.cutting if trace is not None else None,
+        travel_mm=(travel[0], travel[1]) if travel[0] and travel[1] else None,
+        notes=verification.report.notes() if verification is not None else (),
+    )
