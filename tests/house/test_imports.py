@@ -1,0 +1,156 @@
+"""The house's direction: rooms import only from below, and heavy packages only where used."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BASE = {"errors", "units", "findings"}
+SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
+JUDGE = SHARED | {"importers", "planning", "simulation", "postprocessors"}
+
+# Which rooms each room may import from (besides itself); docs/overview.md draws it.
+ALLOWED = {
+    "errors": set(),
+    "units": {"errors"},
+    "findings": set(),
+    "geometry": BASE | {"kernels"},
+    "kernels": BASE,
+    "machine": BASE | {"geometry", "kernels"},
+    "toolpath": BASE | {"geometry", "kernels", "machine"},
+    "importers": SHARED,
+    "planning": SHARED,
+    "simulation": SHARED,
+    "postprocessors": SHARED,
+    "verify": JUDGE,
+    "preview": JUDGE,
+    "pipeline": JUDGE | {"verify", "preview"},
+    "cli": JUDGE | {"verify", "preview", "pipeline"},
+    "__main__": {"cli"},
+    "__init__": set(),
+}
+HEAVY = {
+    "build123d",
+    "dask",
+    "distributed",
+    "ezdxf",
+    "fontTools",
+    "HersheyFonts",
+    "numba",
+    "resvg_py",
+    "rich",
+    "scipy",
+    "shapely",
+    "svgpathtools",
+}
+
+
+def files() -> list[Path]:
+    return sorted([*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/*.py")])
+
+
+def room_of(name: str) -> str | None:
+    """The room of a module name such as camtool.geometry.fit; None for foreign modules."""
+    head, _, rest = name.partition(".")
+    if head == "camtool_postprocessors":
+        return "postprocessors"
+    return (rest.split(".")[0] or "__init__") if head == "camtool" else None
+
+
+def room_of_file(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return "postprocessors" if parts[0] == "postprocessors" else parts[1]
+
+
+def imported(tree: ast.AST) -> list[tuple[int, str]]:
+    """(line, module) of every import in the tree, wherever it stands."""
+    found: list[tuple[int, str]] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [(node.lineno, alias.name) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"relative import at line {node.lineno}"
+            module = node.module or ""
+            if module == "camtool":
+                found += [(node.lineno, f"camtool.{alias.name}") for alias in node.names]
+            else:
+                found.append((node.lineno, module))
+    return found
+
+
+def broken_rules(source: str, room: str) -> list[str]:
+    faults = []
+    for line, module in imported(ast.parse(source)):
+        target = room_of(module)
+        if target is None or target == room or module == "camtool.__version__":
+            continue
+        if target not in ALLOWED[room]:
+            faults.append(f"line {line}: {room} imports {module}")
+    return faults
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_rooms_import_from_below_only(path: Path) -> None:
+    assert broken_rules(path.read_text(encoding="utf-8"), room_of_file(path)) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "room"),
+    [
+        ("from camtool.cli.post import post", "geometry"),
+        ("import camtool.planning.plan", "importers"),
+        ("def f():\n    from camtool.simulation.simulate import simulate", "planning"),
+        ("from camtool import verify", "postprocessors"),
+    ],
+)
+def test_the_rule_can_be_broken(source: str, room: str) -> None:
+    assert broken_rules(source, room)
+
+
+def test_a_dialect_never_imports_another() -> None:
+    dialects = [path.stem for path in ROOT.glob("postprocessors/*.toml")]
+    dialects = [name.replace("-", "_") for name in dialects]
+    for path in ROOT.glob("postprocessors/*.py"):
+        own = [name for name in dialects if name in path.stem]
+        for line, module in imported(ast.parse(path.read_text(encoding="utf-8"))):
+            others = [name for name in dialects if name not in own and name in module]
+            assert not others, f"{path.name} line {line} imports {module}"
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_heavy_packages_are_imported_where_they_are_used(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    allowed = {"numba"} if room_of_file(path) == "kernels" else set()
+    top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    for line, module in imported(ast.Module(body=list(top), type_ignores=[])):
+        assert module.split(".")[0] not in HEAVY - allowed, f"line {line} imports {module}"
+
+
+def loaded_by(*arguments: str) -> set[str]:
+    """Top-level packages that a run of `camtool ARGUMENTS` has loaded when it ends."""
+    code = (
+        "import sys, atexit; sys.argv = ['camtool', *sys.argv[1:]]; "
+        "atexit.register(lambda: print('LOADED', *{m.split('.')[0] for m in sys.modules})); "
+        "from camtool.cli.main import main; main()"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=True,
+    )
+    return set(result.stdout.rpartition("LOADED")[2].split())
+
+
+def test_help_loads_nothing_heavy() -> None:
+    assert not loaded_by("--help") & (HEAVY | {"numpy", "msgspec"})
+
+
+def test_an_svg_does_not_load_the_dxf_library() -> None:
+    loaded = loaded_by("check", "samples/logo.svg")
+    assert "ezdxf" not in loaded
+    assert "numpy" in loaded

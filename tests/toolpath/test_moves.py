@@ -1,0 +1,78 @@
+"""The Toolpath record, its builder and its iterator."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+
+
+def test_left_out_coordinates_stay() -> None:
+    path = ToolpathBuilder((1.0, 2.0, 3.0)).rapid(z=5).line(4, feed=10).finish()
+    assert path.end.tolist() == [[1, 2, 5], [4, 2, 5]]
+    assert path.starts.tolist() == [[1, 2, 3], [1, 2, 5]]
+
+
+def test_iterator_gives_what_was_built() -> None:
+    builder = ToolpathBuilder()
+    builder.source = "CUT/CIRCLE 2F"
+    builder.line(1, 0, feed=2.0).arc(1, 0, centre=(0, 0), ccw=True, feed=3.0)
+    builder.source = ""
+    moves = list(builder.event(Kind.DWELL, 1.5).event(Kind.END).finish())
+    assert [move.kind for move in moves] == [Kind.LINE, Kind.ARC_CCW, Kind.DWELL, Kind.END]
+    assert moves[0].feed == 2.0
+    assert moves[0].centre is None
+    assert moves[1].centre == (0.0, 0.0)
+    assert moves[1].source == "CUT/CIRCLE 2F"
+    assert moves[2].value == 1.5
+    assert moves[2].source == ""
+    assert moves[3].end == (1.0, 0.0, 0.0)
+
+
+def test_messages_keep_their_text() -> None:
+    path = ToolpathBuilder().message("turn the part").finish()
+    assert path.texts[int(path.value[0])] == "turn the part"
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(1e-3, 2 * math.pi - 1e-3), st.booleans())
+def test_sweeps(begin: float, turn: float, ccw: bool) -> None:
+    finish = begin + (turn if ccw else -turn)
+    path = (
+        ToolpathBuilder((math.cos(begin), math.sin(begin), 0.0))
+        .arc(math.cos(finish), math.sin(finish), centre=(0, 0), ccw=ccw, feed=1)
+        .finish()
+    )
+    assert path.sweeps()[0] == pytest.approx(turn if ccw else -turn, abs=1e-9)
+
+
+@pytest.mark.parametrize("ccw", [True, False])
+def test_an_arc_that_ends_where_it_starts_is_a_full_circle(ccw: bool) -> None:
+    path = ToolpathBuilder((2.0, 1.0, 0.0)).arc(2, 1, centre=(0, 0), ccw=ccw, feed=1).finish()
+    assert path.sweeps()[0] == pytest.approx(2 * math.pi if ccw else -2 * math.pi)
+
+
+def test_an_empty_toolpath() -> None:
+    path = ToolpathBuilder().finish()
+    assert len(path) == 0
+    assert path.starts.shape == (0, 3)
+    assert path.sweeps().shape == (0,)
+    assert list(path) == []
+
+
+def test_columns_that_disagree_are_refused() -> None:
+    path = ToolpathBuilder().rapid(1, 1).finish()
+    columns = {name: getattr(path, name) for name in Toolpath.__dataclass_fields__}
+    with pytest.raises(ValueError, match="column feed"):
+        Toolpath(**{**columns, "feed": np.zeros(2)})
+    with pytest.raises(ValueError, match="not finite"):
+        Toolpath(**{**columns, "end": np.full((1, 3), np.nan)})
+
+
+def test_arrays_are_read_only() -> None:
+    path = ToolpathBuilder().rapid(1, 1).finish()
+    with pytest.raises(ValueError, match="read-only"):
+        path.end[0, 0] = 5.0
