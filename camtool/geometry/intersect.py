@@ -1,0 +1,276 @@
+"""Where lines and arcs meet: one pair exactly classified, or all pairs of two sets at once.
+
+Curves are told from their start (camtool.geometry.frames): with the left normal n there and the
+signed curvature k, a point p of the whole line or circle has k |p−start|² = 2 n·(p−start).
+
+For two curves, let R be the rounder one and F the flatter one, both written about the start of R:
+
+    R:  kR |p|² − 2 nR·p = 0         F:  kF |p|² − 2 m·p + e = 0,   m = nF + kF w,
+                                     e = kF |w|² + 2 nF·w,   w = start of F − start of R.
+
+F − (kF/kR) R is linear: the line through both common points. R cut with that line is a quadratic.
+
+Every candidate (two roots, and the four end points) is then measured: it counts when it is within
+`position_eps_mm` of both curves and within that of the range of both. So nearly tangent and
+coincident curves need no case of their own: coincident ones meet at the ends of what they share.
+The tolerance decides whether two curves meet at all and whether two meetings are one; it never
+moves a crossing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.boxes import box_pairs
+from camtool.geometry.frames import Frames, dot, turned
+from camtool.geometry.measure import point_at, segment_boxes
+from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Segments
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """One common point: (x, y) mm, and the fraction of the length of `a` and of `b` there.
+
+    `crosses` is false where the curves only touch, or where the point is an end of one of them.
+    """
+
+    point: tuple[float, float]
+    ta: float
+    tb: float
+    crosses: bool
+
+
+@dataclass(frozen=True)
+class NoIntersection:
+    """The two segments have no common point."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """They meet once without crossing: tangent, or at an end of one of them."""
+
+    at: Meeting
+
+
+@dataclass(frozen=True)
+class OneCrossing:
+    """They cross once."""
+
+    at: Meeting
+
+
+@dataclass(frozen=True)
+class TwoMeetings:
+    """They meet twice, in the order of `a`; each meeting says whether it crosses."""
+
+    first: Meeting
+    second: Meeting
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """They share the run from `begin` to `end`, in the order of `a`."""
+
+    begin: Meeting
+    end: Meeting
+
+
+Intersection = NoIntersection | Touch | OneCrossing | TwoMeetings | Overlap
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """All meetings in columns, J rows: `row_a`, `row_b` (J,), `point` (J, 2) mm, `ta`, `tb` (J,).
+
+    `ta` and `tb` are fractions of the lengths, exactly 0 or 1 at an end. A pair that shares a
+    run has two rows, one for each end of the run.
+    """
+
+    row_a: Ints
+    row_b: Ints
+    point: Floats
+    ta: Floats
+    tb: Floats
+
+    def __len__(self) -> int:
+        return len(self.row_a)
+
+    def __getitem__(self, rows: Bools | Ints) -> Crossings:
+        """The chosen rows."""
+        return Crossings(**{name: column[rows] for name, column in vars(self).items()})
+
+
+def intersect_segments(
+    a: Segments, b: Segments, *, position_eps_mm: float = POSITION_EPS_MM
+) -> Intersection:
+    """How two segments (each a `Segments` of one row) meet; every kind of result has its type.
+
+    Meetings nearer to each other than `position_eps_mm` are one, and so is a tangent contact that
+    is no deeper than that.
+    """
+    found = crossings(a, b, position_eps_mm=position_eps_mm)
+    if len(found) == 0:
+        return NoIntersection()
+    order = np.argsort(found.ta, kind="stable")
+    found = found[order]
+    touching = _touching(found, Frames.of(a), Frames.of(b), position_eps_mm)
+    meetings = [
+        Meeting((float(x), float(y)), float(ta), float(tb), not bool(touch))
+        for (x, y), ta, tb, touch in zip(found.point, found.ta, found.tb, touching, strict=True)
+    ]
+    first, last = meetings[0], meetings[-1]
+    if first is last:
+        return OneCrossing(first) if first.crosses else Touch(first)
+    if first.crosses or last.crosses:
+        return TwoMeetings(first, last)
+    middle = np.array([0.5 * (first.ta + last.ta)])
+    between = point_at(a, np.array([0]), middle)
+    if _within(between, Frames.of(b), position_eps_mm)[0][0] and _at_end(first, last):
+        return Overlap(first, last)
+    if not _at_end(first, last):
+        x, y = between[0]
+        tb = 0.5 * (first.tb + last.tb)
+        return Touch(Meeting((float(x), float(y)), float(middle[0]), tb, False))
+    return TwoMeetings(first, last)
+
+
+def crossings(
+    segments_a: Segments, segments_b: Segments, *, position_eps_mm: float = POSITION_EPS_MM
+) -> Crossings:
+    """All common points of any segment of `a` with any segment of `b` (see `Crossings`)."""
+    boxes_a, boxes_b = segment_boxes(segments_a), segment_boxes(segments_b)
+    frames_a, frames_b = Frames.of(segments_a), Frames.of(segments_b)
+    parts = [
+        _meetings(frames_a, frames_b, row_a, row_b, position_eps_mm)
+        for row_a, row_b in box_pairs(boxes_a, boxes_b, reach_mm=position_eps_mm)
+    ]
+    return _joined(parts)
+
+
+def self_crossings(
+    segments: Segments, *, position_eps_mm: float = POSITION_EPS_MM, neighbours: bool = False
+) -> Crossings:
+    """All common points of two different rows, each pair once (row_a < row_b).
+
+    The end that a row shares with the next one of its path is left out unless `neighbours`.
+    """
+    boxes, frames = segment_boxes(segments), Frames.of(segments)
+    parts = []
+    for row_a, row_b in box_pairs(boxes, boxes, reach_mm=position_eps_mm):
+        once = row_a < row_b
+        parts.append(_meetings(frames, frames, row_a[once], row_b[once], position_eps_mm))
+    found = _joined(parts)
+    if neighbours:
+        return found
+    same = segments.path[found.row_a] == segments.path[found.row_b]
+    count = np.bincount(segments.path, minlength=1)[segments.path[found.row_a]]
+    apart = found.row_b - found.row_a
+    a_first = (apart == 1) & (found.ta == 1.0) & (found.tb == 0.0)
+    b_first = (apart == count - 1) & (found.ta == 0.0) & (found.tb == 1.0)
+    return found[~(same & (a_first | b_first))]
+
+
+def _joined(parts: list[Crossings]) -> Crossings:
+    none = np.empty(0, dtype=np.int64)
+    parts = [*parts, Crossings(none, none, np.empty((0, 2)), np.empty(0), np.empty(0))]
+    return Crossings(
+        **{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])}
+    )
+
+
+def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Crossings:
+    """The common points of row_a[j] of `a` and row_b[j] of `b`, end points before crossings."""
+    frames_a, frames_b = a[row_a], b[row_b]
+    ends = [frames_a.start, frames_a.end, frames_b.start, frames_b.end]
+    candidates = [*ends, *_common_points(frames_a, frames_b)]
+    found: list[tuple[Floats, Bools, Floats, Floats]] = []
+    for points in candidates:
+        on_a, along_a = _within(points, frames_a, eps)
+        on_b, along_b = _within(points, frames_b, eps)
+        fresh = on_a & on_b
+        for earlier, valid, _, _ in found:
+            apart = np.hypot(*(points - earlier).T)
+            fresh &= ~(valid & (apart <= 2.0 * eps))
+        found.append((points, fresh, along_a, along_b))
+    return _joined(
+        [
+            Crossings(
+                row_a[fresh],
+                row_b[fresh],
+                points[fresh],
+                _fraction(along_a[fresh], frames_a.length[fresh], eps),
+                _fraction(along_b[fresh], frames_b.length[fresh], eps),
+            )
+            for points, fresh, along_a, along_b in found
+        ]
+    )
+
+
+def _within(points: Floats, frames: Frames, eps: float) -> tuple[Bools, Floats]:
+    """Which points are on their segment, and how far along; no NaN is."""
+    along = frames.along(points)
+    inside = (along >= -eps) & (along <= frames.length + eps)
+    return np.asarray(inside & (frames.gap(points) <= eps)), along
+
+
+def _fraction(along: Floats, length: Floats, eps: float) -> Floats:
+    """Fraction of the length, exactly 0 or 1 within `eps` of an end."""
+    t = np.where(along <= eps, 0.0, along / length)
+    return np.where(along >= length - eps, 1.0, t)
+
+
+def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
+    """The two points (K, 2) that the whole curves share (see the top); not finite if none.
+
+    Where they miss each other, both are the point of the common line nearest to R: the caller
+    measures how near that is.
+    """
+    rounder = np.abs(b.curvature) >= np.abs(a.curvature)
+    k_round = np.where(rounder, b.curvature, a.curvature)
+    k_flat = np.where(rounder, a.curvature, b.curvature)
+    pick = rounder[:, None]
+    n_round, n_flat = np.where(pick, b.normal, a.normal), np.where(pick, a.normal, b.normal)
+    origin, w = np.where(pick, b.start, a.start), np.where(pick, a.start - b.start, 0.0)
+    w = np.where(pick, w, b.start - a.start)
+    ratio = k_flat / np.where(k_round == 0.0, 1.0, k_round)
+    across = n_flat + k_flat[:, None] * w - ratio[:, None] * n_round
+    with np.errstate(all="ignore"):
+        height = 0.5 * k_flat * dot(w, w) + dot(n_flat, w)
+        size = np.hypot(across[:, 0], across[:, 1])
+        unit = across / size[:, None]
+        foot = (height / size)[:, None] * unit
+        direction = turned(unit)
+        # On the line foot + τ direction:  kR τ² − 2 β τ + γ = 0.
+        beta = dot(n_round, direction)
+        gamma = k_round * dot(foot, foot) - 2.0 * dot(n_round, foot)
+        root = beta**2 - k_round * gamma
+        stable = beta + np.copysign(np.sqrt(np.maximum(root, 0.0)), beta)
+        one = stable / k_round
+        two = np.where((root > 0.0) | (k_round == 0.0), gamma / stable, one)
+        one = np.where(k_round == 0.0, two, one)
+        return (
+            origin + foot + one[:, None] * direction,
+            origin + foot + two[:, None] * direction,
+        )
+
+
+def _touching(found: Crossings, a: Frames, b: Frames, eps: float) -> Bools:
+    """True for meetings at an end, and where the curves enter each other by `eps` at most.
+
+    Two curves that meet at the angle θ, with curvatures that differ by k, part again after 2θ/k,
+    and are θ²/(2k) apart at most until then.
+    """
+    at_end = np.isin(found.ta, (0.0, 1.0)) | np.isin(found.tb, (0.0, 1.0))
+    tangent_a = a[found.row_a].tangent_at(found.ta)
+    tangent_b = b[found.row_b].tangent_at(found.tb)
+    same_way = np.where(dot(tangent_a, tangent_b) < 0.0, -1.0, 1.0)
+    bend = np.abs(a.curvature[found.row_a] - same_way * b.curvature[found.row_b])
+    angle = dot(turned(tangent_a), tangent_b)
+    return np.asarray(at_end | (angle**2 <= 2.0 * bend * eps))
+
+
+def _at_end(first: Meeting, last: Meeting) -> bool:
+    """True when both meetings are at ends of a segment."""
+    return all(each.ta in (0.0, 1.0) or each.tb in (0.0, 1.0) for each in (first, last))
