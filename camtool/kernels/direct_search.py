@@ -34,21 +34,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.heading import heading
+
 Ints = npt.NDArray[np.int64]
-
-
-@njit(cache=True)
-def heading(x: int, y: int, clockwise: bool) -> tuple[int, int]:
-    """Direction (sx, sy) of the motion at (x, y) on an arc about (0, 0).
-
-    Clockwise the velocity is along (y, −x). On an axis one of the two vanishes: there the
-    coordinate that is not 0 shrinks, so its direction is against its sign.
-    """
-    turn = 1 if clockwise else -1
-    along_x, along_y = turn * y, -turn * x
-    sx = -1 if along_x < 0 or (along_x == 0 and x > 0) else 1
-    sy = -1 if along_y < 0 or (along_y == 0 and y > 0) else 1
-    return sx, sy
 
 
 @njit(cache=True)

@@ -6,7 +6,8 @@ quadrants, as the firmware keeps them. Nothing here is shared with `camtool.kern
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 
 Point = tuple[int, int]
 
@@ -78,3 +79,119 @@ def direct_search(x: int, y: int, clockwise: bool, error: int = 0) -> Iterator[P
             yield sign_x * xo, sign_y * yo
             changed = (yo if grows else xo) == 0
         quadrant = next_quadrant(quadrant, clockwise)
+
+
+def stairs(x: int, y: int, clockwise: bool, radius_square: int) -> Iterator[Point]:
+    """Positions after each iteration of the stairs, D by squares, for ever."""
+    quadrant = first_quadrant(x, y, clockwise)
+    xo, yo = abs(x), abs(y)
+    while True:
+        d = xo * xo + yo * yo - radius_square
+        grows = x_grows(quadrant, clockwise)
+        if d <= 0:
+            xo, yo = (xo + 1, yo) if grows else (xo, yo + 1)
+        else:
+            xo, yo = (xo, yo - 1) if grows else (xo - 1, yo)
+        sign_x, sign_y = SIGNS[quadrant]
+        yield sign_x * xo, sign_y * yo
+        if (yo if grows else xo) == 0:
+            quadrant = next_quadrant(quadrant, clockwise)
+
+
+def dda_line(a: int, b: int) -> Iterator[tuple[Point, bool]]:
+    """Position after each pass and whether the pass gave a pulse, until the line ends."""
+    limit = math.sqrt(a**2 + b**2)
+    qx = qy = 0.0
+    cnt_x = cnt_y = 0
+    while cnt_x < a or cnt_y < b:
+        pulse = False
+        qx = qx + a
+        if cnt_x < a and qx > limit:
+            qx = qx - limit
+            cnt_x += 1
+            pulse = True
+        qy = qy + b
+        if cnt_y < b and qy > limit:
+            qy = qy - limit
+            cnt_y += 1
+            pulse = True
+        yield (cnt_x, cnt_y), pulse
+
+
+def dda_arc(x: int, y: int, clockwise: bool) -> Iterator[tuple[Point, bool]]:
+    """Position after each pass of the circular DDA and whether it gave a pulse, for ever.
+
+    Counters and crosswise registers of the annex; a quarter whose growing counter can fill no
+    more ends with its shrinking one.
+    """
+    quadrant = first_quadrant(x, y, clockwise)
+    radius = round(math.hypot(x, y))
+    xo, yo = abs(x), abs(y)
+    while True:
+        sign_x, sign_y = SIGNS[quadrant]
+        px, py = yo, xo
+        qx = qy = 0
+        if x_grows(quadrant, clockwise):
+            cnt_x, cnt_y = xo, radius - yo
+            while cnt_y < radius:
+                pulse = False
+                qx += px
+                if qx > radius and cnt_x < radius:
+                    qx -= radius
+                    cnt_x += 1
+                    py += 1
+                    pulse = True
+                qy += py
+                if qy > radius and cnt_y < radius:
+                    qy -= radius
+                    cnt_y += 1
+                    px -= 1
+                    pulse = True
+                xo, yo = cnt_x, radius - cnt_y
+                yield (sign_x * xo, sign_y * yo), pulse
+        else:
+            cnt_x, cnt_y = radius - xo, yo
+            while cnt_x < radius:
+                pulse = False
+                qy += py
+                if qy > radius and cnt_y < radius:
+                    qy -= radius
+                    cnt_y += 1
+                    px += 1
+                    pulse = True
+                qx += px
+                if qx > radius and cnt_x < radius:
+                    qx -= radius
+                    cnt_x += 1
+                    py -= 1
+                    pulse = True
+                xo, yo = radius - cnt_x, cnt_y
+                yield (sign_x * xo, sign_y * yo), pulse
+        quadrant = next_quadrant(quadrant, clockwise)
+
+
+def play(
+    steps: Sequence[int], step: float, low: float, high: float, compensation: int, direction: int
+) -> tuple[list[float], int]:
+    """Slide positions and number of reversals, one motor step at a time from steps[0]."""
+    at = motor = steps[0]
+    slide = at * step
+    reversals = 0
+    out = []
+    for wanted in steps:
+        while at != wanted:
+            sense = 1 if wanted > at else -1
+            pulses = 1
+            if sense != direction:
+                direction = sense
+                reversals += 1
+                pulses += compensation
+            at += sense
+            for _ in range(pulses):
+                motor += sense
+                if slide < motor * step + low:
+                    slide = motor * step + low
+                if slide > motor * step + high:
+                    slide = motor * step + high
+        out.append(slide)
+    return out, reversals

@@ -1,0 +1,130 @@
+"""The play operator and the compensation against a literal loop and against mathematics."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from camtool.kernels.direct_search import direct_search_path
+from camtool.kernels.play import play_fill, play_limits, play_start
+from tests.oracles import controllers as twins
+
+STEP = 0.00014
+
+
+def run(
+    steps: np.ndarray, limits: tuple[float, float], compensation: int = 0, direction: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Slide (n,) mm and the state after, for commanded steps that begin at steps[0]."""
+    state = play_start(int(steps[0]), STEP, direction)
+    out = np.empty(len(steps))
+    play_fill(steps, np.array([STEP, *limits, float(compensation)]), state, out)
+    return out, state
+
+
+def there_and_back(*turns: int) -> np.ndarray:
+    """Every step of a walk over these turning points."""
+    parts = [np.array([turns[0]])]
+    for low, high in pairwise(turns):
+        sense = 1 if high > low else -1
+        parts.append(np.arange(low + sense, high + sense, sense))
+    return np.concatenate(parts)
+
+
+def test_preloaded_line_there_and_back() -> None:
+    """Forward the slide follows at once; back it waits for the play, and lags by it ever after."""
+    steps = there_and_back(0, 1000, 0, 1000)
+    play = 300 * STEP
+    slide, state = run(steps, play_limits(play, "preloaded", 1))
+    motor = steps * STEP
+    back = np.minimum(1000 * STEP, motor[1000:2001] + play)
+    assert slide[:1001] == pytest.approx(motor[:1001], abs=1e-15)
+    assert slide[1000:2001] == pytest.approx(back, abs=1e-15)
+    assert slide[2000:] == pytest.approx(np.maximum(play, motor[2000:]), abs=1e-15)
+    assert state[4] == 2.0
+    assert state[5] == 3000.0
+
+
+def test_conventions_differ_by_half_the_play() -> None:
+    steps = there_and_back(0, 1000, -1000, 500)
+    play = 300 * STEP
+    plus, _ = run(steps, play_limits(play, "preloaded", 1))
+    middle, _ = run(steps, play_limits(play, "centred", 1))
+    minus, _ = run(steps, play_limits(play, "preloaded", -1), direction=-1)
+    engaged = 301
+    assert plus[engaged:] - middle[engaged:] == pytest.approx(play / 2.0)
+    assert middle[engaged:] - minus[engaged:] == pytest.approx(play / 2.0)
+    assert middle[100] == 0.0
+    assert minus[299] == 0.0
+
+
+def test_exact_compensation_undoes_the_play() -> None:
+    steps = there_and_back(0, 1000, -400, 20, -7)
+    slide, state = run(steps, play_limits(300 * STEP, "preloaded", 1), compensation=300)
+    assert slide == pytest.approx(steps * STEP, abs=1e-15)
+    assert state[4] == 3.0
+
+
+def test_too_much_compensation_oversizes_by_the_excess() -> None:
+    """Back again the slide is 80 steps too far: motor −380, flank at +300."""
+    steps = there_and_back(0, 1000, 0)
+    slide, _ = run(steps, play_limits(300 * STEP, "preloaded", 1), compensation=380)
+    assert slide[1001] == pytest.approx((999 - 80) * STEP)
+    assert slide[-1] == pytest.approx(-80 * STEP)
+
+
+def test_a_first_motion_against_the_start_counts() -> None:
+    _, state = run(there_and_back(0, -10), (0.0, 0.0), compensation=5)
+    assert state[4] == 1.0
+    assert state[2] == -5.0
+    _, state = run(there_and_back(0, -10), (0.0, 0.0), compensation=5, direction=-1)
+    assert state[4] == 0.0
+
+
+def test_circle_with_play_is_four_shifted_quarters() -> None:
+    """X of a CW circle from the top: up to +R, down to −R, up to 0, with play and nothing else."""
+    radius, play = 2000, 250 * STEP
+    path = np.vstack([[(0, radius)], direct_search_path(0, radius, True, 0, 11312)])
+    x = path[:, 0].copy()
+    slide, state = run(x, play_limits(play, "preloaded", 1))
+    first, second = int(np.argmax(x)), int(np.argmin(x))
+    motor, big = x * STEP, radius * STEP
+    want = np.concatenate(
+        [
+            motor[:first],
+            np.minimum(big, motor[first:second] + play),
+            np.maximum(-big + play, motor[second:]),
+        ]
+    )
+    assert slide == pytest.approx(want, abs=1e-15)
+    assert state[4] == 2.0
+
+
+@pytest.mark.parametrize("convention", ["preloaded", "centred"])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_random_walks_equal_the_literal_loop(convention: str, direction: int) -> None:
+    rng = np.random.default_rng(40)
+    for _ in range(40):
+        steps = np.cumsum(rng.integers(-3, 4, 400))
+        limits = play_limits(float(rng.uniform(0, 40)) * STEP, convention, direction)
+        compensation = int(rng.integers(0, 50))
+        slide, state = run(steps, limits, compensation, direction)
+        want, reversals = twins.play(
+            [int(s) for s in steps], STEP, *limits, compensation, direction
+        )
+        assert np.array_equal(slide, want)
+        assert state[4] == reversals
+
+
+@pytest.mark.parametrize("size", [1, 13, 400])
+def test_chunks_do_not_matter(size: int) -> None:
+    steps = np.cumsum(np.random.default_rng(41).integers(-1, 2, 2000))
+    whole, after = run(steps, (0.0, 0.002), 9)
+    axis = np.array([STEP, 0.0, 0.002, 9.0])
+    state, parts = play_start(int(steps[0]), STEP, 1), []
+    for at in range(0, len(steps), size):
+        out = np.empty(len(steps[at : at + size]))
+        play_fill(steps[at : at + size], axis, state, out)
+        parts.append(out)
+    assert np.array_equal(np.concatenate(parts), whole)
+    assert np.array_equal(state, after)
