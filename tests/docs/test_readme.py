@@ -1,0 +1,46 @@
+"""The README holds its promises: set-up commands as CI runs them, links that lead somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
+
+
+def set_up_commands() -> list[str]:
+    blocks = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
+    return [line for block in blocks for line in block.splitlines()]
+
+
+def test_the_readme_has_exactly_two_set_up_commands() -> None:
+    commands = set_up_commands()
+    assert len(commands) == 2
+    assert all(line.startswith("python3 -m venv .venv && .venv/bin/pip") for line in commands)
+
+
+def test_ci_runs_them_as_the_readme_has_them() -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    ran = [line for line in script if line.startswith("python3 -m venv .venv")]
+    assert ran == set_up_commands()
+    assert script[-1] == set_up_commands()[-1]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_every_link_leads_somewhere(page: Path) -> None:
+    links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    for link in links:
+        if "://" not in link:
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_every_file_that_a_page_names_exists(page: Path) -> None:
+    names = re.findall(
+        r"`((?:camtool|postprocessors|tests|samples|docs)/[\w./-]*\w/?)`",
+        page.read_text(encoding="utf-8"),
+    )
+    for name in names:
+        assert (ROOT / name).exists(), f"{page.name}: {name}"
