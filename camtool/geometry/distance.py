@@ -1,0 +1,258 @@
+"""Distances to true lines and arcs, never to chords.
+
+One formula serves lines and arcs alike and needs no centre. A segment runs from A to B with the
+chord vector d, its length c and the bulge b; n is d turned by +90° and M the middle of A and B.
+
+    power(P) = 4b (P−A)·(P−B) − 2(1−b²) d×(P−A)        is 0 on the circle (b = 0: on the line);
+    distance to the circle = |power(P)| / (|4b (P−M) − (1−b²) n| + c (1+b²)).
+
+The nearest point lies within the segment, not at an end, where (P−A)·T_A ≥ 0 ≥ (P−B)·T_B with
+the tangents T_A and T_B: d turned by ∓ sweep/2. (The edges of these half planes meet in the
+centre.)
+
+Between two segments that do not cross, the least distance is met at an end of one of them, at the
+foot of an arc's centre on a line, or on the line through two centres: a few candidates, all
+measured with the formula above.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Segments
+
+POINTS_AT_A_TIME = 256
+"""How many neighbouring points `nearest` handles at a time: it bounds the memory."""
+
+PAIRS_AT_A_TIME = 1 << 18
+"""How many pairs of segments `approach` holds at a time: it bounds the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """For P points: `distance` (P,) mm to the nearest segment and its row, `segment` (P,)."""
+
+    distance: Floats
+    segment: Ints
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Least distance of two paths, mm, and where on the first path, (x, y) mm."""
+
+    distance: float
+    point: tuple[float, float]
+
+
+def points_to_segments(points: Floats, segments: Segments) -> Floats:
+    """(P, K) distance in mm of each point (P, 2) to each line or arc."""
+    return _distance(points[:, None, :], _Rows.of(segments))
+
+
+def nearest(points: Floats, segments: Segments, *, chunk: int = POINTS_AT_A_TIME) -> Nearest:
+    """The nearest segment to each point (P, 2); quick when neighbours in the list are near.
+
+    `chunk` points are handled at a time. Let r be the largest distance of a point from the
+    middle m of its chunk: a segment farther from m than  least distance of m + 2r  is nearest to
+    none of them, and is left out. ValueError when there are no segments.
+    """
+    if len(segments) == 0:
+        raise ValueError("no segments to be near to")
+    distance = np.empty(len(points))
+    segment = np.empty(len(points), dtype=np.int64)
+    rows = _Rows.of(segments)
+    for begin in range(0, len(points), chunk):
+        some = points[begin : begin + chunk]
+        middle = 0.5 * (some.min(axis=0) + some.max(axis=0))
+        reach = np.hypot(*(some - middle).T).max()
+        from_middle = _distance(middle, rows)
+        near = np.flatnonzero(from_middle <= from_middle.min() + 2.0 * reach)
+        table = _distance(some[:, None, :], rows[near])
+        best = table.argmin(axis=1)
+        segment[begin : begin + chunk] = near[best]
+        distance[begin : begin + chunk] = table[np.arange(len(some)), best]
+    return Nearest(distance, segment)
+
+
+def path_distance(a: Polyline, b: Polyline) -> float:
+    """Least distance between two paths, mm, exact with arcs; 0 where they cross."""
+    return approach(a, b).distance
+
+
+def approach(a: Polyline, b: Polyline) -> Approach:
+    """Where two paths come nearest to each other, and how near; 0 where they cross."""
+    first, second = Segments.of(a), Segments.of(b)
+    boxes, others = segment_boxes(first), segment_boxes(second)
+    from_vertices = nearest(a.vertices[:, :2], second).distance
+    best = _approach(from_vertices, a.vertices[:, :2])
+    step = max(1, PAIRS_AT_A_TIME // len(second))
+    for begin in range(0, len(first), step):
+        apart = _box_distance(boxes[begin : begin + step], others)
+        i, j = np.nonzero(apart <= best.distance)
+        if len(i):
+            found = _approach(*_between(first[i + begin], second[j]))
+            best = min(best, found, key=lambda each: each.distance)
+    return best
+
+
+def _approach(distance: Floats, points: Floats) -> Approach:
+    at = int(distance.argmin())
+    return Approach(float(distance[at]), (float(points[at, 0]), float(points[at, 1])))
+
+
+def _box_distance(boxes: Floats, others: Floats) -> Floats:
+    """(N, M) distance of boxes (N, 4) and (M, 4)."""
+    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
+    apart = np.maximum(low - high, 0.0)
+    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Segments in the form of the formula: A, B, d, 4b, 1−b², c(1+b²), T_A and T_B."""
+
+    a: Floats
+    b: Floats
+    d: Floats
+    four_b: Floats
+    flat: Floats
+    size: Floats
+    tangent_a: Floats
+    tangent_b: Floats
+
+    @classmethod
+    def of(cls, segments: Segments) -> _Rows:
+        d, bulge = segments.end - segments.start, segments.bulge
+        flat = 1.0 - bulge**2
+        # Up to the factor 1 + b², cos(sweep/2) is 1 − b² and sin(sweep/2) is 2b.
+        along, across = flat[:, None] * d, (2.0 * bulge)[:, None] * _turned(d)
+        return cls(
+            a=segments.start,
+            b=segments.end,
+            d=d,
+            four_b=4.0 * bulge,
+            flat=flat,
+            size=np.hypot(d[:, 0], d[:, 1]) * (1.0 + bulge**2),
+            tangent_a=along - across,
+            tangent_b=along + across,
+        )
+
+    def __getitem__(self, rows: Ints) -> _Rows:
+        return _Rows(**{name: column[rows] for name, column in vars(self).items()})
+
+    def power(self, points: Floats) -> Floats:
+        from_a = points - self.a
+        dots = _dot(from_a, points - self.b)
+        return np.asarray(self.four_b * dots - 2.0 * self.flat * _cross(self.d, from_a))
+
+    def expanded(self, origin: Floats) -> tuple[Floats, Floats]:
+        """power(origin + x) = 4b |x|² + linear·x + constant: its linear (N, 2), constant (N,)."""
+        a, b = self.a - origin, self.b - origin
+        linear = -self.four_b[:, None] * (a + b) - 2.0 * self.flat[:, None] * _turned(self.d)
+        return linear, self.four_b * _dot(a, b) + 2.0 * self.flat * _cross(self.d, a)
+
+    def beside(self, points: Floats) -> Bools:
+        """True where the nearest point of the whole circle or line is within the segment."""
+        after_a = _dot(points - self.a, self.tangent_a) >= 0.0
+        before_b = _dot(points - self.b, self.tangent_b) <= 0.0
+        return np.asarray(after_a & before_b)
+
+
+def _distance(points: Floats, rows: _Rows) -> Floats:
+    """Distance of points to segments; both are broadcast against each other."""
+    to_a = np.hypot(points[..., 0] - rows.a[..., 0], points[..., 1] - rows.a[..., 1])
+    to_b = np.hypot(points[..., 0] - rows.b[..., 0], points[..., 1] - rows.b[..., 1])
+    middle = 0.5 * (rows.a + rows.b)
+    normal = _turned(rows.d)
+    arm = rows.four_b[..., None] * (points - middle) - rows.flat[..., None] * normal
+    whole = np.abs(rows.power(points)) / (np.hypot(arm[..., 0], arm[..., 1]) + rows.size)
+    return np.where(rows.beside(points), whole, np.minimum(to_a, to_b))
+
+
+def _between(a: Segments, b: Segments) -> tuple[Floats, Floats]:
+    """(N,) distances of N pairs of segments and (N, 2) where on `a`; 0 for pairs that cross."""
+    rows_a, rows_b = _Rows.of(a), _Rows.of(b)
+    candidates: list[tuple[Floats, Floats]] = []
+    for points in (a.start, a.end):
+        candidates.append((_distance(points, rows_b), points))
+    for points in (b.start, b.end):
+        candidates.append((_distance(points, rows_a), points))
+    candidates.append(_toward(a, rows_a, b, rows_b))
+    candidates.append(_toward(b, rows_b, a, rows_a))
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        for points in _common_points(rows_a, rows_b):
+            crosses = rows_a.beside(points) & rows_b.beside(points)
+            candidates.append((np.where(crosses, 0.0, np.inf), points))
+    distances = np.array([distance for distance, _ in candidates])
+    best, pair = distances.argmin(axis=0), np.arange(len(a))
+    return distances[best, pair], np.array([points for _, points in candidates])[best, pair]
+
+
+def _toward(a: Segments, rows_a: _Rows, b: Segments, rows_b: _Rows) -> tuple[Floats, Floats]:
+    """From where `a` comes nearest to the centre of the arc `b`, the distance to `b`.
+
+    Infinite where `b` is a line, where the centres coincide (then ends are as near), and where
+    that point is not within `a`. Where a circle lies in the other one, the same from the other
+    side finds the nearest points.
+    """
+    centre = np.where(b.is_arc[:, None], b.centre, rows_a.a)
+    part = _dot(centre - rows_a.a, rows_a.d) / _dot(rows_a.d, rows_a.d)
+    foot = rows_a.a + part[:, None] * rows_a.d
+    arm = np.where(a.is_arc[:, None], centre - a.centre, 1.0)
+    length = np.hypot(arm[:, 0], arm[:, 1])
+    apart = length > 0.0
+    unit = arm / np.where(apart, length, 1.0)[:, None]
+    radius = np.where(a.is_arc, a.radius, 0.0)
+    points = np.where(a.is_arc[:, None], a.centre + radius[:, None] * unit, foot)
+    valid = b.is_arc & apart & rows_a.beside(points)
+    return np.where(valid, _distance(points, rows_b), np.inf), points
+
+
+def _common_points(a: _Rows, b: _Rows) -> tuple[Floats, Floats]:
+    """The two points (N, 2) that the whole lines or circles of each pair share; NaN if none.
+
+    power(x) = 4b |x|² + l·x + k, and 4b_b·power_a − 4b_a·power_b is linear: the line through both
+    points. (Two lines: power_a itself is it.) On that line, x0 + s e, the power of the rounder
+    one of both is a quadratic in s.
+    """
+    origin = a.a
+    linear_a, constant_a = a.expanded(origin)
+    linear_b, constant_b = b.expanded(origin)
+    lines = (a.four_b == 0.0) & (b.four_b == 0.0)
+    weight_a, weight_b = np.where(lines, 1.0, b.four_b), -a.four_b
+    across = weight_a[:, None] * linear_a + weight_b[:, None] * linear_b
+    constant = weight_a * constant_a + weight_b * constant_b
+    across_length = np.hypot(across[:, 0], across[:, 1])
+    unit = across / across_length[:, None]
+    foot = -(constant / across_length)[:, None] * unit
+    along = _turned(unit)
+    rounder = np.abs(b.four_b) >= np.abs(a.four_b)
+    four_b = np.where(rounder, b.four_b, a.four_b)
+    linear = np.where(rounder[:, None], linear_b, linear_a)
+    slope = 2.0 * four_b * _dot(foot, along) + _dot(linear, along)
+    value = four_b * _dot(foot, foot) + _dot(linear, foot)
+    value += np.where(rounder, constant_b, constant_a)
+    root = np.sqrt(slope**2 - 4.0 * four_b * value)
+    stable = -0.5 * (slope + np.copysign(root, slope))
+    one, two = stable / four_b, value / stable
+    return (
+        origin + foot + one[:, None] * along,
+        origin + foot + two[:, None] * along,
+    )
+
+
+def _turned(vectors: Floats) -> Floats:
+    """Vectors (..., 2) turned by +90°."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray((a * b).sum(axis=-1))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
