@@ -1,0 +1,125 @@
+"""Which closed path holds which path, exact with arcs.
+
+A point is inside a closed path when it is inside the polygon of its chords, or when it lies
+between a chord and its arc, but not both (XOR, arc by arc). A point exactly on a chord is taken
+as a hair up and to the right of it, the same way in both questions, so that no point counts twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.distance import nearest
+from camtool.geometry.measure import path_extents, point_at, signed_areas
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Bools,
+    Floats,
+    Ints,
+    Polylines,
+    Segments,
+)
+
+PAIRS_AT_A_TIME = 1 << 20
+"""How many pairs of a point and a segment `inside` holds at a time: it bounds the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nesting:
+    """For M paths: `parent` (M,), the smallest closed path that holds each one, −1 if none; and
+    `depth` (M,), how many closed paths hold it."""
+
+    parent: Ints
+    depth: Ints
+
+
+def nesting(lines: Polylines) -> Nesting:
+    """Which closed path holds which path.
+
+    Path i is in path j when its vertices and the middles of its segments lie inside j, or nearer
+    to its line than `POSITION_EPS_MM` (but not all of them: a path does not hold its double, and
+    doubles count as one). Paths that cross a closed path are not in it.
+    """
+    count = len(lines)
+    parent, depth = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    areas = np.abs(signed_areas(lines))
+    boxes = path_extents(lines)
+    segments = Segments.of(lines)
+    points, owner = _witnesses(lines, segments)
+    first_point = np.searchsorted(owner, np.arange(count + 1))
+    first_segment = np.searchsorted(segments.path, np.arange(count + 1))
+    waiting = np.ones(count, dtype=np.bool_)
+    is_double = np.zeros(count, dtype=np.bool_)
+    # From large to small: the last path found to hold another one is the smallest of them.
+    for j in sorted(np.flatnonzero(lines.closed).tolist(), key=lambda k: (-areas[k], k)):
+        waiting[j] = False
+        inner = np.flatnonzero(_box_in(boxes, boxes[j]) & (waiting | ~lines.closed))
+        if len(inner) == 0 or is_double[j]:
+            continue
+        rows = np.concatenate([np.arange(first_point[i], first_point[i + 1]) for i in inner])
+        ring = segments[first_segment[j] : first_segment[j + 1]]
+        held, on_line = _held(points[rows], owner[rows], inner, ring)
+        is_double[on_line] = True
+        parent[held] = j
+        depth[held] += 1
+    return Nesting(parent, depth)
+
+
+def inside(points: Floats, ring: Segments) -> Bools:
+    """(P,) true for the points (P, 2) within a closed path; on the line either may come out."""
+    result = np.zeros(len(points), dtype=np.bool_)
+    step = max(1, PAIRS_AT_A_TIME // max(1, len(ring)))
+    for begin in range(0, len(points), step):
+        result[begin : begin + step] = _inside(points[begin : begin + step, None, :], ring)
+    return result
+
+
+def _inside(points: Floats, ring: Segments) -> Bools:
+    chord = ring.end - ring.start
+    x, y = points[..., 0] - ring.start[:, 0], points[..., 1] - ring.start[:, 1]
+    side = chord[:, 0] * y - chord[:, 1] * x
+    upward = ring.end[:, 1] > ring.start[:, 1]
+    spans = (ring.start[:, 1] > points[..., 1]) != (ring.end[:, 1] > points[..., 1])
+    # A ray to the right meets an upward chord that has the point on its left, and so on.
+    crosses = spans & np.where(upward, side > 0.0, side < 0.0)
+    level = chord[:, 1] == 0.0
+    hair = np.where(level, np.sign(chord[:, 0]), -np.sign(chord[:, 1]))
+    on_left = np.where(side == 0.0, hair, side) > 0.0
+    # A positive bulge lies to the right of its chord. Within the circle its power is negative.
+    from_end = points - ring.end
+    power = 4.0 * ring.bulge * (x * from_end[..., 0] + y * from_end[..., 1])
+    power -= 2.0 * (1.0 - ring.bulge**2) * side
+    in_circle = np.sign(ring.bulge) * power < 0.0
+    beside_chord = in_circle & (on_left == (ring.bulge < 0.0))
+    odd = np.logical_xor.reduce(crosses ^ beside_chord, axis=1)
+    return np.asarray(odd)
+
+
+def _witnesses(lines: Polylines, segments: Segments) -> tuple[Floats, Ints]:
+    """Vertices and middles of all segments (P, 2), and the path (P,) of each, ascending."""
+    rows = np.arange(len(segments))
+    middles = point_at(segments, rows, np.full(len(rows), 0.5))
+    of_vertices = np.repeat(np.arange(len(lines)), np.diff(lines.offsets))
+    owner = np.concatenate([of_vertices, segments.path])
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate([lines.vertices[:, :2], middles])[order], owner[order]
+
+
+def _box_in(boxes: Floats, box: Floats) -> Bools:
+    """(M,) true for the boxes (M, 2, 2) that do not reach out of this one."""
+    low = boxes[:, :, 0] >= box[:, 0] - POSITION_EPS_MM
+    high = boxes[:, :, 1] <= box[:, 1] + POSITION_EPS_MM
+    return np.asarray((low & high).all(axis=1))
+
+
+def _held(points: Floats, owner: Ints, inner: Ints, ring: Segments) -> tuple[Ints, Ints]:
+    """Which paths of `inner` have all their points in the ring, and which have all on its line."""
+    on_line = nearest(points, ring).distance <= POSITION_EPS_MM
+    is_in = inside(points, ring)
+    place = np.searchsorted(inner, owner)
+    out, truly_in = np.zeros(len(inner), dtype=np.int64), np.zeros(len(inner), dtype=np.int64)
+    np.add.at(out, place, ~is_in & ~on_line)
+    np.add.at(truly_in, place, is_in & ~on_line)
+    return inner[(out == 0) & (truly_in > 0)], inner[(out == 0) & (truly_in == 0)]
