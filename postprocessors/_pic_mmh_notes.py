@@ -1,0 +1,93 @@
+"""What the writer noticed while it wrote, counted, and told as one finding each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from camtool.findings import Code, Finding, Severity
+
+
+@dataclass
+class Notes:
+    """Counts of one run of the writer; places name the first of each kind."""
+
+    dropped: int = 0
+    """Moves of less than a step."""
+    arcs_as_lines: int = 0
+    split: int = 0
+    split_place: str = ""
+    mended: int = 0
+    remainder_um: float = 0.0
+    remainder_place: str = ""
+    rounded: int = 0
+    rounded_place: str = ""
+
+    def findings(self, step_um: float) -> list[Finding]:
+        """One finding for each count that is not 0."""
+        found = []
+        if self.split:
+            found.append(
+                Finding(
+                    Code.MOVE_SPLIT,
+                    Severity.WARNING,
+                    f"{self.split} feed moves in XY and Z were split: up first, down last, "
+                    "because a block moves either XY or Z",
+                    where=self.split_place,
+                )
+            )
+        if collapsed := self.dropped + self.arcs_as_lines:
+            found.append(
+                Finding(
+                    Code.MOVE_COLLAPSED,
+                    Severity.INFO,
+                    f"{self.dropped} moves of less than a step were left out, "
+                    f"{self.arcs_as_lines} arcs too small to end as arcs were written as lines",
+                    measured=float(collapsed),
+                    unit="moves",
+                )
+            )
+        if self.mended:
+            found.append(
+                Finding(
+                    Code.ARC_MENDED,
+                    Severity.INFO,
+                    f"{self.mended} arcs end on a step that the controller really meets, and a "
+                    f"line goes on to the wanted end: at most {self.remainder_um:.2f} µm "
+                    f"({self.remainder_um / step_um:.1f} steps)",
+                    where=self.remainder_place,
+                    measured=self.remainder_um,
+                    unit="um",
+                )
+            )
+        if self.rounded:
+            found.append(
+                Finding(
+                    Code.VALUE_ROUNDED,
+                    Severity.INFO,
+                    f"{self.rounded} dwells (up) or spindle speeds (to the nearest) were rounded "
+                    "to whole numbers",
+                    where=self.rounded_place,
+                )
+            )
+        return found
+
+
+def too_long(blocks: list[str], buffer_chars: int) -> list[Finding]:
+    """One BLOCK_TOO_LONG finding when blocks do not fit the controller's buffer."""
+    lengths = [len(block) for block in blocks]
+    count = sum(length > buffer_chars for length in lengths)
+    if not count:
+        return []
+    longest = max(lengths)
+    return [
+        Finding(
+            Code.BLOCK_TOO_LONG,
+            Severity.WARNING,
+            f"{count} blocks are longer than the controller's buffer of {buffer_chars} "
+            f"characters, the longest has {longest}; use --set dialect.form=annex",
+            where=f"block {lengths.index(longest) + 1}",
+            measured=float(longest),
+            limit=float(buffer_chars),
+            unit="chars",
+        )
+    ]

@@ -1,0 +1,236 @@
+"""The writer's first stage: every number of a toolpath checked, and turned into the dialect's own.
+
+Nothing is sent from here. What this machine or its dialect cannot do is a PostError that names
+the move, its source and the value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from camtool_postprocessors._pic_mmh_format import Bools, Floats, Grid, Ints
+from camtool_postprocessors._pic_mmh_options import Dialect
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Toolpath
+
+FEED_TOLERANCE: Final = 1e-6
+"""A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""
+
+MOST_FEED_UNITS: Final = 99
+"""Two digits (L3297-3309)."""
+
+ARC_RADIUS_SPREAD_MM: Final = 0.005
+"""The radii at the start and at the end of an arc may differ by this much, no more. It is above
+what rounding centre and ends to 1 µm makes of an arc (√2 µm at each end)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """One item per row: ends (x, y, z) and centres (x, y) as units and as steps, feed words.
+
+    `centre_*` are (0, 0) and `feed_words` "" where the row has none.
+    """
+
+    grids: tuple[Grid, Grid, Grid]
+    end_units: list[list[int]]
+    end_steps: list[list[int]]
+    centre_units: list[list[int]]
+    centre_steps: list[list[int]]
+    sweeps: list[float]
+    feed_words: list[str]
+    feed_finding: Finding | None
+
+
+def numbers_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Numbers:
+    """All numbers of a toolpath; PostError for the first that cannot be said or done."""
+    x, y, z = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
+    grids = (x, y, z)
+    _check_coordinates(toolpath, grids)
+    words, finding = _feed_words(toolpath, machine)
+    centres = np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0)
+    end_units, end_steps = _both(toolpath.end, grids)
+    centre_units, centre_steps = _both(centres, grids)
+    return Numbers(
+        grids=grids,
+        end_units=end_units.tolist(),
+        end_steps=end_steps.tolist(),
+        centre_units=centre_units.tolist(),
+        centre_steps=centre_steps.tolist(),
+        sweeps=toolpath.sweeps().tolist(),
+        feed_words=words,
+        feed_finding=finding,
+    )
+
+
+def place(toolpath: Toolpath, row: int) -> str:
+    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
+    source = toolpath.text(row)
+    return f"move {row} ({source})" if source else f"move {row}"
+
+
+def _both(values_mm: Floats, grids: tuple[Grid, Grid, Grid]) -> tuple[Ints, Ints]:
+    """Columns of mm as units and as steps, each column by its own axis."""
+    columns = list(zip(grids, values_mm.T, strict=False))
+    units = [grid.units(column) for grid, column in columns]
+    steps = [grid.steps(column) for (grid, _), column in zip(columns, units, strict=True)]
+    return np.column_stack(units), np.column_stack(steps)
+
+
+def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend: str) -> None:
+    """PostError for the first bad row, if there is one."""
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise PostError(message(row), where=place(toolpath, row), mend=mend)
+
+
+def check_motion(toolpath: Toolpath, machine: Machine) -> None:
+    """What hangs on more than one number: where the path starts, and that arcs are arcs."""
+    _check_start(toolpath)
+    _check_arcs(toolpath, machine)
+
+
+def _check_start(toolpath: Toolpath) -> None:
+    if toolpath.start.any():
+        x, y, z = toolpath.start.tolist()
+        raise PostError(
+            f"the toolpath starts at ({x:g}, {y:g}, {z:g}) mm, a program starts at part zero",
+            mend="begin with a rapid from (0, 0, 0)",
+        )
+
+
+def _check_arcs(toolpath: Toolpath, machine: Machine) -> None:
+    """Arcs are planned for one interpolator, for equal steps, and must be arcs."""
+    rows = toolpath.is_arc
+    if not rows.any():
+        return
+    if machine.controller.arcs != "dsm":
+        raise PostError(
+            f"arcs are written for direct search, not for {machine.controller.arcs!r}",
+            mend="use --set controller.arcs=dsm",
+        )
+    if machine.axes.x.coded_step_mm != machine.axes.y.coded_step_mm:
+        raise PostError(
+            "this controller draws no circles when the coded steps of X and Y differ",
+            mend="set axes.x.coded_step_mm and axes.y.coded_step_mm to one value",
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        out, back = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
+        spread = np.abs(np.hypot(out[:, 0], out[:, 1]) - np.hypot(back[:, 0], back[:, 1]))
+        bad = rows & ~(spread <= ARC_RADIUS_SPREAD_MM)
+    _refuse(
+        bad,
+        toolpath,
+        lambda row: f"start and end differ by {spread[row]:g} mm in their distance to the centre",
+        "give the arc one radius",
+    )
+
+
+def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> None:
+    """Five digits of µm (L3284-3285) for every end and every arc's centre."""
+    columns = [
+        (name, toolpath.end[:, axis], np.ones(len(toolpath), dtype=np.bool_))
+        for axis, name in enumerate("XYZ")
+    ]
+    columns += [
+        (name, toolpath.centre[:, axis], toolpath.is_arc) for axis, name in enumerate("IJ")
+    ]
+    for (name, values, used), axis in zip(columns, (0, 1, 2, 0, 1), strict=True):
+        _refuse(
+            used & ~grids[axis].fits(values),
+            toolpath,
+            lambda row, name=name, values=values: (  # type: ignore[misc]
+                f"{name} = {values[row]:.6g} mm has more than five digits of µm"
+            ),
+            "keep every coordinate and arc centre within ±99.999 mm",
+        )
+
+
+def _feed_words(toolpath: Toolpath, machine: Machine) -> tuple[list[str], Finding | None]:
+    """`F08` for each feed move, and what was lost by rounding down to the word's unit.
+
+    The link carries one report per step and so bounds the step rate, feed / (60 · step)
+    (L3196-3199); F00 would make the controller divide by 0.
+    """
+    unit = machine.feed.unit_mm_min
+    most = min(MOST_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + FEED_TOLERANCE))
+    mend = f"the highest feed is {most * unit:g} mm/min, the lowest {unit:g} mm/min"
+    used = toolpath.is_feed
+    feed = np.where(used, toolpath.feed, unit)
+    highest = min(machine.max_feed_mm_min, MOST_FEED_UNITS * unit)
+    _refuse(~(feed > 0.0), toolpath, lambda row: f"feed {feed[row]:g} mm/min is no feed", mend)
+    _refuse(
+        feed > highest + FEED_TOLERANCE * unit,
+        toolpath,
+        lambda row: f"feed {feed[row]:g} mm/min is above what the link to the machine allows",
+        mend,
+    )
+    units = np.floor(feed / unit + FEED_TOLERANCE).astype(np.int64)
+    _refuse(units < 1, toolpath, lambda row: f"feed {feed[row]:g} mm/min would be F00", mend)
+    lost = feed - units * unit
+    rounded = lost > FEED_TOLERANCE * unit
+    known = {number: f"F{number:02d}" for number in np.unique(units).tolist()}
+    words = [
+        known[number] if is_used else ""
+        for number, is_used in zip(units.tolist(), used.tolist(), strict=True)
+    ]
+    if not rounded.any():
+        return words, None
+    row = int(np.argmax(lost))
+    return words, Finding(
+        Code.FEED_ROUNDED,
+        Severity.INFO,
+        f"the feed of {int(rounded.sum())} moves was rounded down to whole steps of {unit:g} "
+        f"mm/min, at most from {feed[row]:g} to {units[row] * unit:g}",
+        where=place(toolpath, row),
+        measured=float(lost[row]),
+        limit=unit,
+        unit="mm_min",
+    )
+
+
+MOST_DWELL_S: Final = 9900.0
+"""A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
+
+DWELL_DIGITS_S: Final = 99
+MOST_SPINDLE: Final = 9999
+MOST_TOOL: Final = 99
+
+
+def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
+    """The blocks of a dwell, spindle or tool event, and whether its value had to be rounded.
+
+    Dwells are whole seconds of two digits (L3359-3366), rounded up and split; spindle speeds have
+    four digits (L3418-3426), tools two (L3455-3464).
+    """
+    kind, value = Kind(int(toolpath.kind[row])), float(toolpath.value[row])
+    if kind == Kind.SPINDLE_OFF:
+        return ["M05;"], False
+    name, most = {
+        Kind.DWELL: ("dwell", MOST_DWELL_S),
+        Kind.SPINDLE_CW: ("spindle speed", MOST_SPINDLE),
+        Kind.SPINDLE_CCW: ("spindle speed", MOST_SPINDLE),
+        Kind.TOOL_CHANGE: ("tool", MOST_TOOL),
+    }[kind]
+    whole = kind != Kind.TOOL_CHANGE or value == math.floor(value)
+    if not (0.0 <= value <= most and whole):
+        raise PostError(
+            f"{name} {value:g} cannot be said",
+            where=place(toolpath, row),
+            mend=f"use a whole number from 0 to {most:g}",
+        )
+    number = math.ceil(value) if kind == Kind.DWELL else round(value)
+    if kind == Kind.DWELL:
+        full, rest = divmod(number, DWELL_DIGITS_S)
+        blocks = [f"G04P{DWELL_DIGITS_S:02d};"] * full + ([f"G04P{rest:02d};"] if rest else [])
+    elif kind == Kind.TOOL_CHANGE:
+        blocks = [f"M06T{number:02d};"]
+    else:
+        blocks = [f"{'M03' if kind == Kind.SPINDLE_CW else 'M04'}S{number:04d};"]
+    return blocks, number != value

@@ -1,0 +1,27 @@
+"""The `[dialect]` table of a pic-mmh machine: all that the writer and the reader share."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from camtool.machine.loader import convert
+from camtool.machine.model import Machine
+
+
+class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which of the thesis's two forms of a coordinate is spoken, and how long a block may be.
+
+    `form` "example": `X02969.00`, sign only when negative (L1731); "annex": `X+02969` (L3284).
+    `buffer_chars`: characters that the controller's buffer takes, `;` included (L1740-1742).
+    """
+
+    form: Literal["example", "annex"] = "example"
+    buffer_chars: Annotated[int, Meta(ge=1)] = 35
+
+
+def dialect_of(machine: Machine) -> Dialect:
+    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
+    return convert(machine.dialect, Dialect, machine.target.name, "dialect")

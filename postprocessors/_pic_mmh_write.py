@@ -1,0 +1,309 @@
+"""Writing pic-mmh: a Toolpath to the blocks that this controller decodes.
+
+Everything that can be refused by its numbers alone is refused before the first block is made
+(`_pic_mmh_numbers`). Then the rows are followed one by one, together with the controller's own
+step position: a block is sent only when it moves that position, and every arc is planned from it
+(`_pic_mmh_arcs`), so that it ends where the next row begins.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from camtool_postprocessors._pic_mmh_arcs import (
+    LEAST_RADIUS_STEPS,
+    LINE_SAGITTA,
+    Arc,
+    Landing,
+    chord_ends,
+    expected_turn_rad,
+    hits,
+    land,
+    turned_rad,
+    unwrapped_rad,
+)
+from camtool_postprocessors._pic_mmh_format import SAY, Floats, Grid
+from camtool_postprocessors._pic_mmh_notes import Notes, too_long
+from camtool_postprocessors._pic_mmh_numbers import check_motion, event_words, numbers_of, place
+from camtool_postprocessors._pic_mmh_options import dialect_of
+
+from camtool.errors import PostError
+from camtool.findings import Finding
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Move, Toolpath
+from camtool.toolpath.program import Program
+
+WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
+
+XY = tuple[int, int]
+
+
+def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    writer = _Writer(toolpath, machine)
+    writer.run()
+    return Program(
+        data="".join(f"{block}\n" for block in writer.blocks).encode("ascii"),
+        extension=machine.target.extension,
+        target=machine.target.name,
+        row_of_block=np.array(writer.rows, dtype=np.int64),
+        findings=writer.findings(),
+    )
+
+
+def format_block(move: Move, machine: Machine) -> str:
+    """One motion as the block that says it, without planning where its arc would end.
+
+    PostError when the move is no motion, or needs two blocks (XY and Z).
+    """
+    single = Toolpath(
+        kind=np.array([move.kind]),
+        end=np.array([move.end]),
+        centre=np.array([move.centre or (math.nan, math.nan)]),
+        feed=np.array([math.nan if move.feed is None else move.feed]),
+        value=np.array([math.nan]),
+        source=np.array([-1]),
+        block=np.array([-1]),
+        start=np.zeros(3),
+    )
+    flat, tall = move.end[:2] != move.start[:2], move.end[2] != move.start[2]
+    if move.kind > Kind.ARC_CCW or (tall and (flat or move.centre)):
+        raise PostError("this is not one block", where=f"move {move.index}")
+    dialect = dialect_of(machine)
+    numbers = numbers_of(single, machine, dialect)
+    say = SAY[dialect.form]
+    x, y, z = (say(units) for units in numbers.end_units[0])
+    tail = numbers.feed_words[0]
+    if tall:
+        return f"{WORD[move.kind]}Z{z}{tail};"
+    centre = "".join(
+        f"{name}{say(units)}" for name, units in zip("IJ", numbers.centre_units[0], strict=True)
+    )
+    return f"{WORD[move.kind]}X{x}Y{y}{centre if move.centre else ''}{tail};"
+
+
+class _Writer:
+    """The rows followed once; `units` and `steps` are where the controller stands (x, y, z)."""
+
+    def __init__(self, toolpath: Toolpath, machine: Machine) -> None:
+        dialect = dialect_of(machine)
+        self.blocks: list[str] = []
+        self.rows: list[int] = []
+        self._toolpath = toolpath
+        self._machine = machine
+        self._dialect = dialect
+        self._say = SAY[dialect.form]
+        check_motion(toolpath, machine)
+        self._numbers = numbers_of(toolpath, machine, dialect)
+        self._notes = Notes()
+        self._units = [0, 0, 0]
+        self._steps = [0, 0, 0]
+        self._starts = toolpath.starts[:, :2]
+
+    @property
+    def _grid(self) -> Grid:
+        """X and Y are alike wherever arcs and their lines are concerned."""
+        return self._numbers.grids[0]
+
+    def run(self) -> None:
+        """Make all blocks."""
+        kinds = [Kind(kind) for kind in self._toolpath.kind.tolist()]
+        # A program read back begins with the SET_ZERO of its own header.
+        first = 1 if kinds[:1] == [Kind.SET_ZERO] else 0
+        self._send("G54;", first - 1)
+        self._send("G90;", -1)
+        last = len(kinds) - 1 if kinds[-1:] == [Kind.END] else len(kinds)
+        for row in range(first, last):
+            kind = kinds[row]
+            if kind <= Kind.ARC_CCW:
+                self._motion(row, kind)
+            else:
+                self._event(row, kind)
+        self._send("M30;", last if last < len(kinds) else -1)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What was noticed, one finding per kind."""
+        feed = self._numbers.feed_finding
+        return (
+            *([feed] if feed else []),
+            *self._notes.findings(self._grid.step_mm * 1000.0),
+            *too_long(self.blocks, self._dialect.buffer_chars),
+        )
+
+    def _send(self, block: str, row: int) -> None:
+        self.blocks.append(block)
+        self.rows.append(row)
+
+    def _motion(self, row: int, kind: Kind) -> None:
+        """XY and Z in blocks of their own: up before XY, down after it."""
+        x, y, z = self._numbers.end_steps[row]
+        rise = z - self._steps[2]
+        is_arc = kind >= Kind.ARC_CW
+        flat = is_arc or x != self._steps[0] or y != self._steps[1]
+        if not flat and not rise:
+            self._notes.dropped += 1
+            return
+        if flat and rise and kind != Kind.RAPID:
+            self._notes.split += 1
+            self._notes.split_place = self._notes.split_place or place(self._toolpath, row)
+        if rise > 0:
+            self._send_z(row, kind)
+        if is_arc:
+            self._arc(row, kind)
+        elif flat:
+            self._send_xy(row, WORD[kind], self._numbers.end_units[row], (x, y))
+        if rise < 0:
+            self._send_z(row, kind)
+
+    def _send_z(self, row: int, kind: Kind) -> None:
+        word = "G00" if kind == Kind.RAPID else "G01"
+        self._units[2] = self._numbers.end_units[row][2]
+        self._steps[2] = self._numbers.end_steps[row][2]
+        self._send(f"{word}Z{self._say(self._units[2])}{self._numbers.feed_words[row]};", row)
+
+    def _send_xy(self, row: int, word: str, units: list[int], steps: XY, centre: str = "") -> None:
+        say = self._say
+        feed = self._numbers.feed_words[row]
+        self._units[:2] = units[:2]
+        self._steps[:2] = steps
+        self._send(f"{word}X{say(units[0])}Y{say(units[1])}{centre}{feed};", row)
+
+    def _arc(self, row: int, kind: Kind) -> None:
+        """An arc block that ends, and the line that is left; lines when it is too small."""
+        arc = self._in_steps(row, kind)
+        sweep = self._numbers.sweeps[row]
+        if arc.start == arc.end and arc.sweep_rad <= math.pi:
+            self._notes.dropped += 1  # as an arc it would become a full circle
+            return
+        landing = land(arc, self._grid) if arc.radius >= LEAST_RADIUS_STEPS else None
+        units = self._said_end(row, arc, landing) if landing else None
+        if landing is None or units is None:
+            self._notes.arcs_as_lines += 1
+            self._lines(row, self._starts[row], sweep)
+            return
+        i, j = self._numbers.centre_units[row]
+        centre = f"I{self._say(i)}J{self._say(j)}"
+        steps = (landing.at[0] + arc.centre[0], landing.at[1] + arc.centre[1])
+        self._send_xy(row, WORD[kind], units, steps, centre)
+        self._check_end(row, arc, landing)
+        if landing.at != arc.end:
+            self._mend(row, arc, landing)
+
+    def _in_steps(self, row: int, kind: Kind) -> Arc:
+        """The arc as this controller will take it from where it stands."""
+        cx, cy = self._numbers.centre_steps[row]
+        ex, ey, _ = self._numbers.end_steps[row]
+        x, y = self._steps[0] - cx, self._steps[1] - cy
+        error = 0
+        if self._machine.controller.initial_error == "rounded-radius":
+            error = x * x + y * y - round(math.hypot(x, y)) ** 2
+        return Arc(
+            start=(x, y),
+            end=(ex - cx, ey - cy),
+            centre=(cx, cy),
+            clockwise=kind == Kind.ARC_CW,
+            sweep_rad=abs(self._numbers.sweeps[row]),
+            error=error,
+        )
+
+    def _said_end(self, row: int, arc: Arc, landing: Landing) -> list[int] | None:
+        """The units that say the landing; None when a reader would take the block for another
+        arc: short arcs can turn into almost full circles by the rounding of their numbers."""
+        if landing.at == arc.start:
+            units = self._units[:2]  # the very numbers of the start, so that it reads as full
+        elif landing.at == arc.end:
+            units = self._numbers.end_units[row][:2]
+        else:
+            steps = np.array(landing.at) + np.array(arc.centre)
+            units = self._grid.nearest_units(steps).tolist()
+        start, end, centre = (
+            np.array(point, dtype=np.float64)
+            for point in (self._units[:2], units, self._numbers.centre_units[row])
+        )
+        read = turned_rad(start, end, centre, arc.clockwise)
+        meant = unwrapped_rad(read, expected_turn_rad(landing, arc.radius))
+        return units if read == meant else None
+
+    def _check_end(self, row: int, arc: Arc, landing: Landing) -> None:
+        """The numbers just sent, taken as the controller takes them, must end the arc."""
+        x, y = self._grid.steps(np.array(self._units[:2])).tolist()
+        at = (x - arc.centre[0], y - arc.centre[1])
+        if hits(arc, at, landing.iteration) != landing.iteration:
+            raise PostError(
+                "internal fault: the arc as written would not end where it was planned to",
+                where=place(self._toolpath, row),
+            )
+
+    def _mend(self, row: int, arc: Arc, landing: Landing) -> None:
+        """The rest of an arc that was left at its landing."""
+        at = (np.array(landing.at) + np.array(arc.centre)) * self._grid.step_mm
+        turn = turned_rad(self._starts[row], at, self._toolpath.centre[row], arc.clockwise)
+        turn = unwrapped_rad(turn, expected_turn_rad(landing, arc.radius))
+        left = max(0.0, arc.sweep_rad - turn)
+        rest = math.dist(landing.at, arc.end) * self._grid.step_mm * 1000.0
+        self._notes.mended += 1
+        if rest > self._notes.remainder_um:
+            self._notes.remainder_um = rest
+            self._notes.remainder_place = place(self._toolpath, row)
+        self._lines(row, at, -left if arc.clockwise else left)
+
+    def _lines(self, row: int, start: Floats, sweep_rad: float) -> None:
+        """Lines along an arc from `start` (2,) mm to the end of the row."""
+        grid = self._grid
+        sagitta = LINE_SAGITTA * grid.resolution_mm
+        ends = chord_ends(start, self._toolpath.centre[row], sweep_rad, sagitta)
+        if not grid.fits(ends[:-1]).all():
+            raise PostError(
+                "an arc that has to be written as lines leaves the five digits of a coordinate",
+                where=place(self._toolpath, row),
+                mend="keep every coordinate within ±99.999 mm",
+            )
+        units = [*grid.units(ends[:-1]).tolist(), self._numbers.end_units[row][:2]]
+        for point in units:
+            x, y = grid.steps(np.array(point)).tolist()
+            if [x, y] != self._steps[:2]:
+                self._send_xy(row, "G01", point, (x, y))
+
+    def _event(self, row: int, kind: Kind) -> None:
+        """Events of the dialect; messages have no word in it and are not sent."""
+        if kind == Kind.END:
+            raise PostError(
+                "moves follow the end of the program", where=place(self._toolpath, row)
+            )
+        if kind == Kind.HOME_XY:
+            self._send("G28X0Y0;", row)
+            self._home((0, 1))
+        elif kind == Kind.HOME_Z:
+            self._send("G28Z0;", row)
+            self._home((2,))
+        elif kind == Kind.SET_ZERO:
+            if any(self._steps):
+                raise PostError(
+                    "part zero can only be set at part zero",
+                    where=place(self._toolpath, row),
+                    mend="set it first, before any move",
+                )
+            self._send("G54;", row)
+        elif kind != Kind.MESSAGE:
+            blocks, rounded = event_words(self._toolpath, row)
+            for block in blocks:
+                self._send(block, row)
+            if rounded:
+                self._notes.rounded += 1
+                self._notes.rounded_place = self._notes.rounded_place or place(self._toolpath, row)
+        if self._numbers.end_steps[row] != self._steps:
+            raise PostError(
+                f"a {kind.name} cannot end at another place than where the controller stands then",
+                where=place(self._toolpath, row),
+                mend="give the row the position of the tool (machine zero after homing)",
+            )
+
+    def _home(self, axes: tuple[int, ...]) -> None:
+        """The controller now stands at machine zero in these axes."""
+        for axis in axes:
+            grid = self._numbers.grids[axis]
+            zero = np.array([self._machine.controller.machine_zero_mm[axis]])
+            self._units[axis] = int(grid.units(zero)[0])
+            self._steps[axis] = int(grid.steps(grid.units(zero))[0])

@@ -1,0 +1,43 @@
+"""The dialect of the micro machine tool on a PIC18F8720: `G02X02969.00Y03400.00I03012.00...;`.
+
+docs/dialects/pic-mmh.md explains the format, its contradictions and what was chosen.
+"""
+
+from __future__ import annotations
+
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Move, Toolpath
+from camtool.toolpath.program import Program
+
+
+class PicMmhPost:
+    """Writes and reads pic-mmh programs; the two share no code but the options of `[dialect]`."""
+
+    name = "pic-mmh"
+
+    def check(self, machine: Machine) -> None:
+        """Raise MachineError when the machine's `[dialect]` table does not fit."""
+        from camtool_postprocessors._pic_mmh_options import dialect_of
+
+        dialect_of(machine)
+
+    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+        """The program; PostError naming the move that cannot be said or done."""
+        from camtool_postprocessors._pic_mmh_write import write_program
+
+        return write_program(toolpath, machine)
+
+    def read(self, data: bytes, machine: Machine) -> Toolpath:
+        """The moves as the controller decodes them; ProgramError with block and column."""
+        from camtool_postprocessors._pic_mmh_read import read_program
+
+        return read_program(data, machine)
+
+    def format_block(self, move: Move, machine: Machine) -> str:
+        """One motion as its block, without planning where its arc would end."""
+        from camtool_postprocessors._pic_mmh_write import format_block
+
+        return format_block(move, machine)
+
+
+POST = PicMmhPost()
