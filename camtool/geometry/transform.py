@@ -18,7 +18,7 @@ def reverse(p: Polyline) -> Polyline:
         order = np.roll(order, 1)
     vertices = p.vertices[order]
     # The segment that left vertex i now leaves vertex i + 1 and bends the other way.
-    vertices[:, 2] = -p.vertices[(order - 1) % count, 2]
+    vertices[:, 2] = 0.0 - p.vertices[(order - 1) % count, 2]
     return Polyline(vertices, p.closed)
 
 
@@ -42,7 +42,8 @@ def rotated(p: Polyline, angle_rad: float) -> Polyline:
 
 def mirrored(p: Polyline) -> Polyline:
     """The path mirrored about the Y axis: x and every bulge change their sign."""
-    return Polyline(p.vertices * np.array([-1.0, 1.0, -1.0]), p.closed)
+    x, y, bulge = p.vertices.T
+    return Polyline(np.column_stack([0.0 - x, y, 0.0 - bulge]), p.closed)
 
 
 def scaled(p: Polyline, factor: float) -> Polyline:
