@@ -1,0 +1,63 @@
+"""What is to be judged, how, and with which tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from camtool.geometry.drawing import Drawing
+from camtool.machine.model import Interpolator, Machine
+from camtool.toolpath.moves import Toolpath
+
+COVERAGE_MM = 0.005
+"""A move is missing, or extra, when farther than this from all moves of the other side ..."""
+
+COVERAGE_STEPS = 4.0
+"""... or than so many steps of the coarser axis, where that is more."""
+
+SAMPLE_MM = 0.01
+"""Spacing of the points on decoded and wanted moves that are compared with each other."""
+
+TRACE_POINTS = 20_000
+"""Points of the slides' path that are kept for pictures."""
+
+
+@dataclass(frozen=True)
+class VerifyOptions:
+    """How to judge, and what the report says of the program.
+
+    `interpolator` None: as the machine does. `coverage_mm` None: `COVERAGE_MM` or
+    `COVERAGE_STEPS`. `blocks` None: counted from the decoded toolpath where it was read.
+    """
+
+    interpolator: Interpolator | None = None
+    source: str = ""
+    size_bytes: int | None = None
+    blocks: int | None = None
+    coverage_mm: float | None = None
+    sample_mm: float = SAMPLE_MM
+    trace_points: int = TRACE_POINTS
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is to be judged."""
+
+    decoded: Toolpath
+    machine: Machine
+    wanted: Toolpath | None
+    drawing: Drawing | None
+    options: VerifyOptions
+
+    @property
+    def step_mm(self) -> float:
+        """The finer coded step of X and Y."""
+        return min(self.machine.axes.x.coded_step_mm, self.machine.axes.y.coded_step_mm)
+
+    @property
+    def coverage_mm(self) -> float:
+        """How far moves of one side may be from those of the other."""
+        if self.options.coverage_mm is not None:
+            return self.options.coverage_mm
+        axes = self.machine.axes
+        coarse = max(axes.x.coded_step_mm, axes.y.coded_step_mm)
+        return max(COVERAGE_MM, COVERAGE_STEPS * coarse)

@@ -1,0 +1,190 @@
+"""Full circles of a toolpath, and the figures of ISO 230-4 for what became of them.
+
+About a programmed circle (centre c, radius R) the slides are seen as radii over the angle, kept
+in `ANGLE_BINS` bins: of each bin the points with the least and the largest radius and the mean
+point. Memory is that of the bins, however many steps the circle has.
+
+    F max, F min = largest, least |p − c| − R           (radial error, programmed centre)
+    G            = largest − least |p − c'|              (circular error)
+    D            = mean of |p − c| − R over the bins     (mean radial error)
+
+c' is the centre of the circle that fits the bins' mean points best by least squares of the radial
+distances; each bin counts alike, as the angle does for a ball-bar. With the centres e apart, the
+extreme of a bin is found about c and taken about c': that is wrong by no more than
+e · 2π/ANGLE_BINS, 0.9 % of e.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.polylines import Floats, Ints
+from camtool.toolpath.moves import Toolpath
+from camtool.verify.cuts import CutMoves
+from camtool.verify.runs import run_offsets, run_peaks
+
+ANGLE_BINS = 720
+"""Angle bins of a circle: half a degree each."""
+
+FIT_ROUNDS = 30
+"""The least-squares centre converges in about four rounds; more than this many are not tried."""
+
+FIT_END_MM = 1e-9
+"""The least-squares centre is found when it moves by less than this."""
+
+FEWEST_BINS = 3
+"""A circle has three unknowns."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A full circle of a toolpath: centre (x, y) mm, radius mm, direction, first and last row."""
+
+    centre_mm: tuple[float, float]
+    radius_mm: float
+    ccw: bool
+    z_mm: float
+    first_row: int
+    last_row: int
+
+
+@dataclass(frozen=True)
+class CircleFigures:
+    """What became of a circle, mm; NaN where the slides left fewer than three angles."""
+
+    circular_mm: float
+    radial_max_mm: float
+    radial_min_mm: float
+    radial_mean_mm: float
+
+
+UNSEEN = CircleFigures(math.nan, math.nan, math.nan, math.nan)
+"""Figures of a circle that nothing followed."""
+
+
+def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
+    """Runs of consecutive cutting arcs about one centre, one way round, that make a full turn.
+
+    `gap_mm` is how far centres and radii may differ, and how much of the way round may lack (a
+    post may leave a rest that a line mends).
+    """
+    toolpath = cuts.toolpath
+    arcs = np.flatnonzero(toolpath.is_arc & cuts.is_cut)
+    if len(arcs) == 0:
+        return []
+    spoke = toolpath.starts[arcs, :2] - toolpath.centre[arcs]
+    radius = np.hypot(spoke[:, 0], spoke[:, 1])
+    breaks = (
+        (np.diff(arcs) != 1)
+        | (np.diff(cuts.contour[arcs]) != 0)
+        | (np.diff(toolpath.kind[arcs]) != 0)
+        | (np.abs(np.diff(toolpath.centre[arcs], axis=0)).max(axis=1) > gap_mm)
+        | (np.abs(np.diff(radius)) > gap_mm)
+    )
+    first = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+    last = np.concatenate([first[1:], [len(arcs)]]) - 1
+    way = np.abs(np.add.reduceat(toolpath.sweeps()[arcs], first)) * radius[first]
+    full = np.flatnonzero(way >= 2.0 * np.pi * radius[first] - gap_mm)
+    return [
+        _circle(toolpath, arcs[first[run] : last[run] + 1], float(radius[first[run]]))
+        for run in full
+    ]
+
+
+def _circle(toolpath: Toolpath, run: Ints, radius: float) -> Circle:
+    row = int(run[0])
+    return Circle(
+        centre_mm=(float(toolpath.centre[row, 0]), float(toolpath.centre[row, 1])),
+        radius_mm=radius,
+        ccw=bool(toolpath.sweeps()[row] > 0.0),
+        z_mm=float(toolpath.end[row, 2]),
+        first_row=row,
+        last_row=int(run[-1]),
+    )
+
+
+class CircleBins:
+    """The slides about one programmed circle, bin by bin."""
+
+    def __init__(self, circle: Circle) -> None:
+        self._centre = np.array(circle.centre_mm)
+        self._radius = circle.radius_mm
+        self._count = np.zeros(ANGLE_BINS, dtype=np.int64)
+        self._sum = np.zeros((ANGLE_BINS, 2))
+        self._least = np.full(ANGLE_BINS, np.inf)
+        self._largest = np.full(ANGLE_BINS, -np.inf)
+        self._inner = np.zeros((ANGLE_BINS, 2))
+        self._outer = np.zeros((ANGLE_BINS, 2))
+
+    def add(self, points: Floats) -> None:
+        """Points (J, 2) mm of the slides on their way round this circle."""
+        if len(points) == 0:
+            return
+        spoke = points - self._centre
+        radius = np.hypot(spoke[:, 0], spoke[:, 1])
+        turn = np.arctan2(spoke[:, 1], spoke[:, 0]) / (2.0 * np.pi) % 1.0
+        bins = np.minimum((turn * ANGLE_BINS).astype(np.int64), ANGLE_BINS - 1)
+        self._count += np.bincount(bins, minlength=ANGLE_BINS)
+        for axis in (0, 1):
+            self._sum[:, axis] += np.bincount(bins, spoke[:, axis], minlength=ANGLE_BINS)
+        # Neighbours share a bin: of each run of them only the two extremes go on.
+        runs = run_offsets(bins, len(bins))
+        for sign, best, place in (
+            (-1.0, self._least, self._inner),
+            (1.0, self._largest, self._outer),
+        ):
+            peaks = run_peaks(sign * radius, runs)
+            order = peaks[np.lexsort((sign * radius[peaks], bins[peaks]))]
+            which = order[np.flatnonzero(np.diff(bins[order], append=ANGLE_BINS))]
+            better = which[sign * radius[which] > sign * best[bins[which]]]
+            best[bins[better]] = radius[better]
+            place[bins[better]] = spoke[better]
+
+    def figures(self) -> CircleFigures:
+        """G, F max, F min and D of what was added."""
+        seen = self._count > 0
+        if int(seen.sum()) < FEWEST_BINS:
+            return UNSEEN
+        mean = self._sum[seen] / self._count[seen, None]
+        centre = least_squares_centre(mean)
+        inner, outer = self._inner[seen] - centre, self._outer[seen] - centre
+        return CircleFigures(
+            circular_mm=float(
+                np.hypot(outer[:, 0], outer[:, 1]).max() - np.hypot(inner[:, 0], inner[:, 1]).min()
+            ),
+            radial_max_mm=float(self._largest.max()) - self._radius,
+            radial_min_mm=float(self._least.min()) - self._radius,
+            radial_mean_mm=float(np.hypot(mean[:, 0], mean[:, 1]).mean()) - self._radius,
+        )
+
+
+def least_squares_centre(points: Floats) -> Floats:
+    """Centre (2,) of the circle with the least sum of squared radial distances to points (J, 2).
+
+    Gauss-Newton from the origin: with d = |p − c| and u = (p − c)/d, the residual d − R changes by
+    −u·δc − δR, so each round solves the 3 × 3 normal equations of [u, 1] (δc, R) = d.
+    The origin must lie inside the points.
+    """
+    centre = np.zeros(2)
+    for _ in range(FIT_ROUNDS):
+        spoke = points - centre
+        distance = np.hypot(spoke[:, 0], spoke[:, 1])
+        if not distance.all():
+            break
+        u, v = (spoke / distance[:, None]).T
+        normal = np.array(
+            [
+                [(u * u).sum(), (u * v).sum(), u.sum()],
+                [(u * v).sum(), (v * v).sum(), v.sum()],
+                [u.sum(), v.sum(), float(len(u))],
+            ]
+        )
+        right = np.array([(u * distance).sum(), (v * distance).sum(), distance.sum()])
+        move = np.linalg.lstsq(normal, right, rcond=None)[0][:2]
+        centre = centre + move
+        if np.hypot(move[0], move[1]) < FIT_END_MM:
+            break
+    return centre

@@ -1,0 +1,212 @@
+"""Distances of points to the cutting moves: to their own row, or to the nearest of many.
+
+Distances are exact: to true lines and arcs, never to chords.
+
+    line a→b:  |p − a − t·d|,  d = b − a,  t = clamp((p − a)·d / d², 0, 1)
+    arc:       | |p − c| − r |  inside the wedge that the arc spans at its centre c (≤ 180°, so two
+               signs of cross products tell), otherwise the distance to its nearer end.
+
+The nearest of many is searched by groups of neighbouring points. A tree of the moves' boxes gives
+those within a margin of the group's box. When the largest distance found is within the margin, no
+move outside could be nearer; otherwise the margin grows to that distance. So the result is exact
+whatever the first margin was; a good guess only saves time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.verify.cuts import CutMoves
+from camtool.verify.runs import group_boxes, ranges
+
+PAIRS_AT_ONCE = 1 << 17
+"""Pairs of point and move that are worked on together: bounds memory, fits a processor's cache."""
+
+MARGIN_GROWTH = 4.0
+"""The margin of a search grows by this factor while nothing at all was found."""
+
+MARGIN_SLACK = 1.001
+"""A margin is set this much above the distance it must reach, so that rounding cannot matter."""
+
+ANY_CONTOUR = -1
+"""A group of points that may be compared with the moves of every contour."""
+
+
+def distance_each(points: Floats, segments: Segments) -> Floats:
+    """(J,) mm from each point (J, 2) to the segment of the same row, exact."""
+    return SegmentTable(segments).distances(points, np.arange(len(points)))
+
+
+class SegmentTable:
+    """What distances need of each segment, in columns."""
+
+    def __init__(self, segments: Segments) -> None:
+        start, end = segments.start, segments.end
+        way = end - start
+        square = (way**2).sum(axis=1)
+        turn = np.where(segments.bulge < 0.0, -1.0, 1.0)[:, None]
+        self.is_arc = segments.is_arc
+        self._ax, self._ay = np.ascontiguousarray(start.T)
+        self._bx, self._by = np.ascontiguousarray(end.T)
+        self._dx, self._dy = np.ascontiguousarray(way.T)
+        self._over = 1.0 / np.where(square > 0.0, square, 1.0)
+        self._cx, self._cy = np.ascontiguousarray(segments.centre.T)
+        self._radius = segments.radius
+        # Normals that point into the wedge from its two edges.
+        self._ux, self._uy = np.ascontiguousarray((turn * (start - segments.centre)).T)
+        self._vx, self._vy = np.ascontiguousarray((turn * (end - segments.centre)).T)
+
+    def distances(self, points: Floats, which: Ints) -> Floats:
+        """(J,) mm from each point (J, 2) to segment which[j]."""
+        arc = self.is_arc[which]
+        if arc.all():
+            return self._to_arcs(points[:, 0], points[:, 1], which)
+        if not arc.any():
+            return self._to_lines(points[:, 0], points[:, 1], which)
+        found = np.empty(len(points))
+        for rows, distances in ((arc, self._to_arcs), (~arc, self._to_lines)):
+            found[rows] = distances(points[rows, 0], points[rows, 1], which[rows])
+        return found
+
+    def _to_lines(self, x: Floats, y: Floats, which: Ints) -> Floats:
+        dx, dy = self._dx[which], self._dy[which]
+        x, y = x - self._ax[which], y - self._ay[which]
+        t = np.clip((x * dx + y * dy) * self._over[which], 0.0, 1.0)
+        return np.asarray(np.sqrt((x - t * dx) ** 2 + (y - t * dy) ** 2))
+
+    def _to_arcs(self, x: Floats, y: Floats, which: Ints) -> Floats:
+        px, py = x - self._cx[which], y - self._cy[which]
+        found = np.abs(np.sqrt(px * px + py * py) - self._radius[which])
+        outside = (self._ux[which] * py < self._uy[which] * px) | (
+            px * self._vy[which] < py * self._vx[which]
+        )
+        far = np.flatnonzero(outside)
+        if len(far):
+            row = which[far]
+            to_start = (x[far] - self._ax[row]) ** 2 + (y[far] - self._ay[row]) ** 2
+            to_end = (x[far] - self._bx[row]) ** 2 + (y[far] - self._by[row]) ** 2
+            found[far] = np.sqrt(np.minimum(to_start, to_end))
+        return np.asarray(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """Points in runs of neighbours: group g is points[offsets[g]:offsets[g+1]], never empty.
+
+    `margin` (G,) mm first guess of the distance; `contour` (G,) the only contour to compare with
+    or ANY_CONTOUR; `z` (G, 2) mm: only moves whose heights overlap this are compared.
+    """
+
+    offsets: Ints
+    margin: Floats
+    contour: Ints
+    z: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """(J,) distance mm (inf where nothing may be compared), (J,) segment (−1 then)."""
+
+    distance: Floats
+    segment: Ints
+
+
+class Target:
+    """Cutting moves that points are compared with."""
+
+    def __init__(self, cuts: CutMoves) -> None:
+        self.cuts = cuts
+        self.contour = cuts.contour[cuts.segments.path]
+        self.table = SegmentTable(cuts.segments)
+        self.boxes = segment_boxes(cuts.segments)
+        self._tree: Any = None
+
+    def own(self, points: Floats, rows: Ints) -> Floats:
+        """(J,) mm from points (J, 2) to the moves of their own toolpath rows (J,), which cut."""
+        first = self.cuts.first[rows]
+        found = self.table.distances(points, first)
+        second = np.flatnonzero(self.cuts.first[rows + 1] - first > 1)
+        if len(second):
+            other = self.table.distances(points[second], first[second] + 1)
+            found[second] = np.minimum(found[second], other)
+        return found
+
+    def nearest(self, points: Floats, groups: Groups) -> Found:
+        """The nearest move of each point (J, 2), and how far it is, exact."""
+        count = len(groups.margin)
+        found = Found(np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64))
+        if count == 0 or len(self.boxes) == 0:
+            return found
+        boxes = group_boxes(points, groups.offsets)
+        everything = self._reach(boxes)
+        margin = np.minimum(np.maximum(groups.margin * MARGIN_SLACK, POSITION_EPS_MM), everything)
+        todo = np.arange(count)
+        while len(todo):
+            pairs = self._candidates(boxes[todo], margin[todo], todo, groups)
+            worst = self._least(points, groups.offsets, todo, pairs, found)
+            done = (worst <= margin[todo]) | (margin[todo] >= everything)
+            grown = np.where(
+                np.isfinite(worst), worst * MARGIN_SLACK, margin[todo] * MARGIN_GROWTH
+            )
+            margin[todo] = np.minimum(grown, everything)
+            todo = todo[~done]
+        return found
+
+    def _reach(self, boxes: Floats) -> float:
+        """A margin, mm, that takes in every move from every group."""
+        both = np.concatenate([self.boxes, boxes])
+        span = both[:, 2:].max(axis=0) - both[:, :2].min(axis=0)
+        return float(np.hypot(span[0], span[1])) * MARGIN_SLACK + POSITION_EPS_MM
+
+    def _candidates(
+        self, boxes: Floats, margin: Floats, todo: Ints, groups: Groups
+    ) -> tuple[Ints, Ints]:
+        """Pairs (index into `todo`, move) whose boxes come within the margin, in order."""
+        import shapely
+
+        if self._tree is None:
+            self._tree = shapely.STRtree(shapely.box(*self.boxes.T))
+        wide = boxes + margin[:, None] * np.array([-1.0, -1.0, 1.0, 1.0])
+        group, move = self._tree.query(shapely.box(*wide.T))
+        wanted, z = groups.contour[todo][group], groups.z[todo][group]
+        here = self.cuts.z[move]
+        fits = (wanted == ANY_CONTOUR) | (wanted == self.contour[move])
+        fits &= (z[:, 0] <= here[:, 1]) & (here[:, 0] <= z[:, 1])
+        group, move = group[fits], move[fits]
+        order = np.lexsort((move, group))
+        return group[order], move[order]
+
+    def _least(
+        self, points: Floats, offsets: Ints, todo: Ints, pairs: tuple[Ints, Ints], found: Found
+    ) -> Floats:
+        """Fill `found` for the groups `todo`; returns the largest distance in each, mm."""
+        group, move = pairs
+        choices = np.bincount(group, minlength=len(todo))
+        begin, sizes = offsets[todo], np.diff(offsets)[todo]
+        worst = np.full(len(todo), np.inf)
+        with_choice = np.flatnonzero(choices)
+        first = np.cumsum(choices) - choices
+        work = np.cumsum(sizes[with_choice] * choices[with_choice])
+        cuts = np.searchsorted(work, np.arange(PAIRS_AT_ONCE, work[-1:].sum(), PAIRS_AT_ONCE))
+        for part in np.split(with_choice, np.unique(cuts)):
+            if len(part) == 0:
+                continue
+            samples = ranges(begin[part], sizes[part])
+            many = np.repeat(choices[part], sizes[part])
+            pair_move = move[ranges(np.repeat(first[part], sizes[part]), many)]
+            distance = self.table.distances(points[np.repeat(samples, many)], pair_move)
+            starts = np.cumsum(many) - many
+            least = np.minimum.reduceat(distance, starts)
+            # The first of the nearest, so that ties do not depend on the tree.
+            hits = np.flatnonzero(distance == np.repeat(least, many))
+            sample_of_pair = np.repeat(np.arange(len(samples)), many)[hits]
+            chosen = hits[np.flatnonzero(np.diff(sample_of_pair, prepend=-1))]
+            found.distance[samples], found.segment[samples] = least, pair_move[chosen]
+            group_starts = np.cumsum(sizes[part]) - sizes[part]
+            worst[part] = np.maximum.reduceat(least, group_starts)
+        return worst

@@ -1,0 +1,202 @@
+"""Is everything cut that was wanted, and nothing else? And which row belongs to which contour?
+
+Decoded moves are sampled and compared with the wanted moves: that gives the error of rounding,
+extra cuts, and for each decoded row the wanted contour that it belongs to. Wanted moves are
+sampled and compared with the decoded ones: that gives what is missing. Only moves at the same
+height are compared (within the coverage tolerance), so a lost pass or a wrong depth shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.polylines import Floats, Ints
+from camtool.verify.circles import Circle
+from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
+from camtool.verify.cuts import Bools, CutMoves, Samples, sample_cuts
+from camtool.verify.figures import Figure
+from camtool.verify.places import and_more, at_point, block_name
+from camtool.verify.runs import run_offsets
+
+SAMPLES_PER_GROUP = 64
+"""Neighbouring samples that share one search for near moves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """What each of the N decoded rows belongs to, in the moves that it is compared with.
+
+    `contour` (N,) of the row's middle, −1 for rows that do not cut; `only` (N,) that contour when
+    the whole row is nearest to it, else ANY_CONTOUR; `circle` (N,) index of the full circle that
+    the row follows, −1; `apart_mm` (N,) largest distance of the row's samples.
+    """
+
+    contour: Ints
+    only: Ints
+    circle: Ints
+    apart_mm: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Rows matched, the error of rounding, and CONTOUR_MISSING and EXTRA_CUT findings."""
+
+    match: Match
+    rounding: Figure
+    findings: tuple[Finding, ...]
+
+
+def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
+    """Each row belongs to itself: for programs with nothing to compare them with."""
+    circle = _circle_of_row(circles, len(cuts.contour))
+    return Match(cuts.contour, cuts.contour, circle, np.zeros(len(cuts.contour)))
+
+
+def cover(
+    decoded: Target, wanted: Target, circles: list[Circle], *, limit_mm: float, spacing_mm: float
+) -> Coverage:
+    """Compare decoded and wanted cutting moves both ways; `limit_mm` is the coverage tolerance.
+
+    `circles` are those of the wanted moves; samples are about `spacing_mm` apart.
+    """
+    samples = sample_cuts(decoded.cuts, spacing_mm)
+    found, wrong_depth = _nearest(decoded.cuts, samples, wanted, limit_mm)
+    rows = decoded.cuts.segments.path[samples.segment]
+    rounding = Figure()
+    real = np.isfinite(found.distance)
+    rounding.add(found.distance[real], samples.points[real], rows[real])
+    extra = _extra_cuts(decoded.cuts, samples, found, wrong_depth, limit_mm)
+    back = sample_cuts(wanted.cuts, spacing_mm)
+    found_back, wrong_back = _nearest(wanted.cuts, back, decoded, limit_mm)
+    missing = _missing(wanted.cuts, back, found_back, wrong_back, limit_mm)
+    match = _matched(rows, found, wanted, circles, len(decoded.cuts.contour))
+    return Coverage(match, rounding, (*missing, *extra))
+
+
+def _nearest(
+    cuts: CutMoves, samples: Samples, target: Target, limit_mm: float
+) -> tuple[Found, Bools]:
+    """Nearest target move at the same height; where there is none (second item true), at any."""
+    offsets = run_offsets(samples.segment, SAMPLES_PER_GROUP)
+    z = cuts.z[samples.segment[offsets[:-1]]] + np.array([-limit_mm, limit_mm])
+    count = len(offsets) - 1
+    margin, contour = np.full(count, limit_mm), np.full(count, ANY_CONTOUR)
+    found = target.nearest(samples.points, Groups(offsets, margin, contour, z))
+    wrong_depth = np.isinf(found.distance)
+    if wrong_depth.any():
+        rest = np.flatnonzero(wrong_depth)
+        parts = run_offsets(samples.segment[rest], SAMPLES_PER_GROUP)
+        any_z = np.tile([-np.inf, np.inf], (len(parts) - 1, 1))
+        groups = Groups(parts, margin[: len(parts) - 1], contour[: len(parts) - 1], any_z)
+        flat = target.nearest(samples.points[rest], groups)
+        found.distance[rest], found.segment[rest] = flat.distance, flat.segment
+    return found, wrong_depth
+
+
+def _matched(rows: Ints, found: Found, wanted: Target, circles: list[Circle], count: int) -> Match:
+    """Rows (S,) of the samples and what was found for these, taken together row by row."""
+    contour = np.full(count, -1, dtype=np.int64)
+    only = np.full(count, ANY_CONTOUR, dtype=np.int64)
+    circle = np.full(count, -1, dtype=np.int64)
+    apart = np.zeros(count)
+    if len(rows) == 0 or len(wanted.contour) == 0:
+        return Match(contour, only, circle, apart)
+    begin = np.concatenate([[0], np.flatnonzero(np.diff(rows)) + 1])
+    row, size = rows[begin], np.diff(np.append(begin, len(rows)))
+    nearest_contour = wanted.contour[found.segment]
+    nearest_circle = _circle_of_row(circles, len(wanted.cuts.contour))[
+        wanted.cuts.segments.path[found.segment]
+    ]
+    contour[row] = nearest_contour[begin + size // 2]
+    # At its ends a row touches its neighbours: only what lies between tells.
+    inner = np.column_stack([begin + 1, begin + size - 1]).ravel()
+    for column, nearest in ((only, nearest_contour), (circle, nearest_circle)):
+        padded = np.append(nearest, 0)
+        low = np.minimum.reduceat(padded, inner)[::2]
+        high = np.maximum.reduceat(padded, inner)[::2]
+        column[row] = np.where(low == high, low, -1)
+    apart[row] = np.maximum.reduceat(found.distance, begin)
+    return Match(contour, only, circle, apart)
+
+
+def _circle_of_row(circles: list[Circle], count: int) -> Ints:
+    of_row = np.full(count, -1, dtype=np.int64)
+    for index, circle in enumerate(circles):
+        of_row[circle.first_row : circle.last_row + 1] = index
+    return of_row
+
+
+def _extra_cuts(
+    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, limit_mm: float
+) -> Iterator[Finding]:
+    bad = wrong_depth | (found.distance > limit_mm)
+    listed = list(_by_contour(cuts, samples, found.distance, bad))
+    for number, (_, worst, share) in enumerate(listed):
+        row = int(cuts.segments.path[samples.segment[worst]])
+        at = at_point(samples.points[worst])
+        depth = ", at a depth where nothing is wanted" if wrong_depth[worst] else ""
+        how = f"{_away(found.distance[worst])} from every wanted move{depth}"
+        yield Finding(
+            Code.EXTRA_CUT,
+            Severity.ERROR,
+            f"{share:.0%} of a cut was not wanted: up to {how}"
+            + and_more(number, len(listed), "cuts"),
+            where=f"{block_name(cuts.toolpath, row)} near {at}",
+            measured=_finite(found.distance[worst]),
+            limit=limit_mm,
+            unit="mm",
+        )
+        if and_more(number, len(listed), "cuts"):
+            return
+
+
+def _missing(
+    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, limit_mm: float
+) -> Iterator[Finding]:
+    bad = wrong_depth | (found.distance > limit_mm)
+    listed = list(_by_contour(cuts, samples, found.distance, bad))
+    for number, (contour, worst, share) in enumerate(listed):
+        row = int(cuts.segments.path[samples.segment[worst]])
+        source = cuts.toolpath.text(row)
+        name = f"contour {contour + 1}" + (f" ({source})" if source else "")
+        depth = ", none of them at its depth" if wrong_depth[worst] else ""
+        how = f"up to {_away(found.distance[worst])} from every cutting move{depth}"
+        yield Finding(
+            Code.CONTOUR_MISSING,
+            Severity.ERROR,
+            f"{share:.0%} of {name} is not cut by the program: {how}"
+            + and_more(number, len(listed), "contours"),
+            where=f"{name} near {at_point(samples.points[worst])}",
+            measured=_finite(found.distance[worst]),
+            limit=limit_mm,
+            unit="mm",
+        )
+        if and_more(number, len(listed), "contours"):
+            return
+
+
+def _by_contour(
+    cuts: CutMoves, samples: Samples, distance: Floats, bad: Bools
+) -> Iterator[tuple[int, int, float]]:
+    """(contour, sample with the largest distance, share of its samples) where any is bad."""
+    contour = cuts.contour[cuts.segments.path[samples.segment]]
+    all_of = np.bincount(contour, minlength=cuts.contour_count)
+    rows = np.flatnonzero(bad)
+    order = rows[np.lexsort((rows, -distance[rows], contour[rows]))]
+    first = np.flatnonzero(np.diff(contour[order], prepend=-1))
+    counts = np.diff(np.append(first, len(order)))
+    for worst, count in zip(order[first], counts, strict=True):
+        which = int(contour[worst])
+        yield which, int(worst), float(count / all_of[which])
+
+
+def _away(distance: float) -> str:
+    return f"{distance:.3f} mm" if np.isfinite(distance) else "infinitely far"
+
+
+def _finite(distance: float) -> float | None:
+    return float(distance) if np.isfinite(distance) else None

@@ -1,0 +1,183 @@
+"""Which moves of a toolpath cut, as lines and arcs, and the contours that they form.
+
+The rule (`cutting_rows`): a row cuts when it is a feed move (LINE, ARC) that moves in XY and
+begins or ends below the stock top, z < 0. Air moves and plunges straight down are left out. A
+toolpath that never moves in Z (a bare drawing program, z ≥ 0 all along) holds no such row; when
+nothing better is known, `flat_cuts=True` makes all its feed moves in XY cut.
+
+A contour is a run of consecutive cutting rows. Events and rows that move nowhere do not end it;
+an air move, a plunge or homing does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.toolpath.moves import Kind, Toolpath
+
+Bools = npt.NDArray[np.bool_]
+
+STOCK_TOP_MM = 0.0
+"""Part zero is the stock top."""
+
+FEWEST_SAMPLES = 4
+"""Each line and arc is sampled in at least so many parts: short moves must not slip through."""
+
+MOST_SAMPLES = 200_000
+"""Long programs are sampled more coarsely, so that about so many points come together."""
+
+
+@dataclass(frozen=True, eq=False)
+class CutMoves:
+    """The cutting moves of `toolpath` (N rows) as K segments, in order.
+
+    Arcs run about the programmed centre with the radius of their start; above 180° they are two
+    segments. `segments.path` (K,) is the toolpath row; row r owns segments
+    first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) numbers the contours from 0, −1 where
+    nothing is cut. `z` (K, 2) mm: lowest and highest point of the segment's row.
+    """
+
+    toolpath: Toolpath
+    segments: Segments
+    first: Ints
+    contour: Ints
+    z: Floats
+
+    @property
+    def rows(self) -> Ints:
+        """Toolpath rows that cut, ascending."""
+        return np.flatnonzero(self.contour >= 0)
+
+    @property
+    def is_cut(self) -> Bools:
+        """(N,) true where the row cuts."""
+        return np.asarray(self.contour >= 0)
+
+    @property
+    def contour_count(self) -> int:
+        """How many contours."""
+        return int(self.contour.max(initial=-1)) + 1
+
+    def contour_ends(self) -> tuple[Ints, Ints]:
+        """First and last row of each contour (C,), (C,)."""
+        rows = self.rows
+        change = np.flatnonzero(np.diff(self.contour[rows]))
+        begin = rows[np.concatenate([[0], change + 1])] if len(rows) else rows
+        finish = rows[np.concatenate([change, [len(rows) - 1]])] if len(rows) else rows
+        return begin, finish
+
+    def closed(self, gap_mm: float) -> Bools:
+        """(C,) true where a contour ends within gap_mm of its start."""
+        begin, finish = self.contour_ends()
+        gap = self.toolpath.end[finish, :2] - self.toolpath.starts[begin, :2]
+        return np.asarray(np.hypot(gap[:, 0], gap[:, 1]) <= gap_mm)
+
+
+def moved_lengths(toolpath: Toolpath) -> Floats:
+    """(N,) mm of way in XY that each row asks for; 0 for events.
+
+    An arc's is its start radius times its sweep.
+    """
+    starts = toolpath.starts
+    straight = toolpath.end[:, :2] - starts[:, :2]
+    spoke = starts[:, :2] - toolpath.centre
+    round_way = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
+    length = np.where(toolpath.is_arc, round_way, np.hypot(straight[:, 0], straight[:, 1]))
+    return np.where(toolpath.is_motion, length, 0.0)
+
+
+def is_flat(toolpath: Toolpath) -> bool:
+    """True when the toolpath never moves in Z."""
+    return bool(np.all(toolpath.end[:, 2] == toolpath.start[2]))
+
+
+def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool) -> Bools:
+    """(N,) true for the rows that cut, by the rule of this module; none behind the END."""
+    running = np.cumsum(toolpath.kind == Kind.END) == 0
+    moves = running & toolpath.is_feed & (moved_lengths(toolpath) > POSITION_EPS_MM)
+    if flat_cuts and is_flat(toolpath):
+        return np.asarray(moves)
+    lowest = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
+    return np.asarray(moves & (lowest < STOCK_TOP_MM - POSITION_EPS_MM))
+
+
+def rapids_in_stock(toolpath: Toolpath) -> Ints:
+    """Rows of rapids that move in XY below the stock top: they cut, and at full speed."""
+    lowest = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
+    rapid = (toolpath.kind == Kind.RAPID) & (moved_lengths(toolpath) > POSITION_EPS_MM)
+    return np.flatnonzero(rapid & (lowest < STOCK_TOP_MM - POSITION_EPS_MM))
+
+
+def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
+    """The cutting moves of a toolpath as segments; `flat_cuts` as the module says."""
+    cutting = cutting_rows(toolpath, flat_cuts=flat_cuts)
+    rows = np.flatnonzero(cutting)
+    sweep = toolpath.sweeps()[rows]
+    parts = np.where(np.abs(sweep) > np.pi, 2, 1)
+    first = np.zeros(len(toolpath) + 1, dtype=np.int64)
+    first[rows + 1] = parts
+    segments = _segments(toolpath, rows, sweep, parts)
+    starts = toolpath.starts
+    low = np.minimum(starts[:, 2], toolpath.end[:, 2])
+    high = np.maximum(starts[:, 2], toolpath.end[:, 2])
+    z = np.column_stack([low, high])[segments.path]
+    return CutMoves(toolpath, segments, np.cumsum(first), _contours(toolpath, cutting), z)
+
+
+def _segments(toolpath: Toolpath, rows: Ints, sweep: Floats, parts: Ints) -> Segments:
+    """One segment per part of each row; the points between parts lie on the start's radius."""
+    row = np.repeat(rows, parts)
+    part = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
+    turn = np.repeat(sweep / parts, parts)
+    begin, end = toolpath.starts[row, :2], toolpath.end[row, :2]
+    centre = toolpath.centre[row]
+    is_arc = toolpath.is_arc[row]
+    here = np.where((is_arc & (part > 0))[:, None], _turned(begin, centre, part * turn), begin)
+    there = np.where(is_arc[:, None], _turned(begin, centre, (part + 1) * turn), end)
+    return Segments.between(here, there, np.tan(0.25 * turn), row)
+
+
+def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
+    """Points (J, 2) turned about their centres (J, 2) by angles (J,) rad."""
+    spoke = points - centre
+    cos, sin = np.cos(angle), np.sin(angle)
+    x = centre[:, 0] + cos * spoke[:, 0] - sin * spoke[:, 1]
+    y = centre[:, 1] + sin * spoke[:, 0] + cos * spoke[:, 1]
+    return np.column_stack([x, y])
+
+
+def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
+    """(N,) contour of each row: a new one begins where anything else moved in between."""
+    starts = toolpath.starts
+    rise = np.abs(toolpath.end[:, 2] - starts[:, 2]) if len(toolpath) else np.empty(0)
+    moves = toolpath.is_motion & ((moved_lengths(toolpath) > POSITION_EPS_MM) | (rise > 0.0))
+    homes = (toolpath.kind == Kind.HOME_XY) | (toolpath.kind == Kind.HOME_Z)
+    breaks = np.cumsum((moves | homes) & ~cutting)
+    contour = np.full(len(toolpath), -1, dtype=np.int64)
+    contour[cutting] = np.unique(breaks[cutting], return_inverse=True)[1]
+    return contour
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points (S, 2) mm on the segments `segment` (S,) of some CutMoves, ends included."""
+
+    points: Floats
+    segment: Ints
+
+
+def sample_cuts(cuts: CutMoves, spacing_mm: float) -> Samples:
+    """Points on the true lines and arcs, about spacing_mm apart (coarser when they would exceed
+    `MOST_SAMPLES`, but never fewer than `FEWEST_SAMPLES` parts of a segment)."""
+    from camtool.geometry.measure import point_at, segment_lengths
+
+    lengths = segment_lengths(cuts.segments)
+    spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
+    parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), FEWEST_SAMPLES)
+    segment = np.repeat(np.arange(len(parts)), parts + 1)
+    within = np.arange(len(segment)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
+    return Samples(point_at(cuts.segments, segment, within / parts[segment]), segment)

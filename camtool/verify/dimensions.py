@@ -1,0 +1,116 @@
+"""Sizes of the part and of its closed contours, wanted and predicted; and how contours close.
+
+Sizes are those of the tool centre's path: the tool's own radius is nothing that motion changes.
+
+    error_percent = (predicted − nominal) / nominal · 100
+
+is positive when the part comes out too large. (The thesis's equation 5.5, L2755, takes
+real − measured: the same figure with the other sign.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.verify.cuts import CutMoves
+
+
+@dataclass(frozen=True)
+class Size:
+    """One dimension: "part X", "contour 3 Y"; mm. `error_percent` None when nominally 0."""
+
+    name: str
+    nominal_mm: float
+    predicted_mm: float
+
+    @property
+    def error_percent(self) -> float | None:
+        """Predicted against nominal, per cent, positive when too large."""
+        if self.nominal_mm <= POSITION_EPS_MM:
+            return None
+        return (self.predicted_mm - self.nominal_mm) / self.nominal_mm * 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class RowSlides:
+    """Where the slides went in each of N rows, XY mm: `low`, `high` (N, 2), infinite where they
+    did not move; `places` (N+1, 2): where they stand before each row and after the last."""
+
+    low: Floats
+    high: Floats
+    places: Floats
+
+
+def places_between(start: Floats, row_end: Floats) -> Floats:
+    """(N+1, 2) mm: where the slides stand before each row and after the last, from where they
+    end (N, 2), NaN for rows that moved nothing."""
+    known = np.isfinite(row_end[:, 0])
+    latest = np.maximum.accumulate(np.where(known, np.arange(1, len(row_end) + 1), 0))
+    places = np.concatenate([start[None, :2], row_end])
+    return np.asarray(places[np.concatenate([[0], latest])])
+
+
+def closure_mm(cuts: CutMoves, slides: RowSlides, gap_mm: float) -> float:
+    """Largest distance between the slides' start and end on a closed contour; NaN without one.
+
+    A contour is closed when its programmed ends are within gap_mm.
+    """
+    begin, finish = cuts.contour_ends()
+    closed = cuts.closed(gap_mm)
+    if not closed.any():
+        return math.nan
+    gap = slides.places[finish[closed] + 1] - slides.places[begin[closed]]
+    return float(np.hypot(gap[:, 0], gap[:, 1]).max())
+
+
+def sizes(
+    cuts: CutMoves, slides: RowSlides, wanted: CutMoves, contour: Ints, gap_mm: float
+) -> Iterator[Size]:
+    """The whole part, then each closed contour of `wanted`, X and Y.
+
+    `contour` (N,) is the wanted contour that each row of `cuts` belongs to; contours that no row
+    belongs to are left out (a finding says so).
+    """
+    if len(cuts.rows) == 0 or len(wanted.rows) == 0:
+        return
+    low, high = _predicted(cuts, slides)
+    boxes = segment_boxes(wanted.segments)
+    yield from _pair(
+        "part",
+        boxes[:, 2:].max(axis=0) - boxes[:, :2].min(axis=0),
+        high[cuts.rows].max(axis=0) - low[cuts.rows].min(axis=0),
+    )
+    nominal = _extents(wanted.contour[wanted.segments.path], boxes[:, :2], boxes[:, 2:], wanted)
+    member = np.flatnonzero(contour >= 0)
+    predicted = _extents(contour[member], low[member], high[member], wanted)
+    for index in np.flatnonzero(wanted.closed(gap_mm) & np.isfinite(predicted[:, 0])):
+        yield from _pair(f"contour {index + 1}", nominal[index], predicted[index])
+
+
+def _predicted(cuts: CutMoves, slides: RowSlides) -> tuple[Floats, Floats]:
+    """Extents (N, 2), (N, 2) of the slides in each row, and at the start of each contour."""
+    begin, _ = cuts.contour_ends()
+    low, high = slides.low.copy(), slides.high.copy()
+    low[begin] = np.minimum(low[begin], slides.places[begin])
+    high[begin] = np.maximum(high[begin], slides.places[begin])
+    return low, high
+
+
+def _extents(contour: Ints, low: Floats, high: Floats, wanted: CutMoves) -> Floats:
+    """(C, 2) size in X and Y of the items of each contour; −inf where it has none."""
+    least = np.full((wanted.contour_count, 2), np.inf)
+    most = np.full((wanted.contour_count, 2), -np.inf)
+    np.minimum.at(least, contour, low)
+    np.maximum.at(most, contour, high)
+    return np.where(np.isfinite(most), most, 0.0) - np.where(np.isfinite(least), least, np.inf)
+
+
+def _pair(name: str, nominal: Floats, predicted: Floats) -> Iterator[Size]:
+    for axis, nominal_mm, predicted_mm in zip("XY", nominal, predicted, strict=True):
+        yield Size(f"{name} {axis}", float(nominal_mm), float(predicted_mm))

@@ -1,0 +1,140 @@
+"""Findings about the motion: arcs that never end, travel, reversals, play, no motion at all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.polylines import Floats
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verify.cuts import CutMoves, rapids_in_stock
+from camtool.verify.motion import Tally
+from camtool.verify.places import and_more, at_point, block_name
+
+AXES = "XYZ"
+
+TRAVEL_EPS_MM = 1e-6
+"""A span may exceed the travel by this much, by rounding alone."""
+
+
+def motion_findings(
+    cuts: CutMoves, machine: Machine, tally: Tally, extents: Floats
+) -> tuple[Finding, ...]:
+    """All findings that need the motion or the machine; `extents` (3, 2) mm of the toolpath."""
+    decoded = cuts.toolpath
+    return (
+        *_endless_arcs(decoded, machine, tally),
+        *_out_of_travel(machine, extents),
+        *_rapids_in_stock(decoded),
+        *_many_reversals(machine, tally),
+        *_nothing_moves(cuts),
+        *_homing(decoded, machine),
+        *_unknown_play(machine, tally),
+    )
+
+
+def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator[Finding]:
+    coded = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
+    for number, (row, place) in enumerate(tally.gave_up.items()):
+        more = and_more(number, len(tally.gave_up), "arcs")
+        missed = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
+        apart = f", passing it {missed:.1f} steps away" if math.isfinite(missed) else ""
+        yield Finding(
+            Code.ARC_MISSES_END,
+            Severity.ERROR,
+            f"the arc never stands on its end step{apart}: the real machine would run on{more}",
+            where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
+            measured=float(missed) if math.isfinite(missed) else None,
+            limit=0.0,
+            unit="steps",
+        )
+        if more:
+            return
+
+
+def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
+    for name, axis, (low, high) in zip(AXES, machine.axes, extents, strict=True):
+        span = float(high - low)
+        if axis.travel_mm is not None and span > axis.travel_mm + TRAVEL_EPS_MM:
+            yield Finding(
+                Code.OUT_OF_TRAVEL,
+                Severity.ERROR,
+                f"the program spans {span:.3f} mm of {name}, the axis has {axis.travel_mm:g} mm",
+                where=f"axis {name}, {low:.3f} to {high:.3f} mm",
+                measured=span,
+                limit=axis.travel_mm,
+                unit="mm",
+            )
+
+
+def _rapids_in_stock(decoded: Toolpath) -> Iterator[Finding]:
+    rows = rapids_in_stock(decoded)
+    for number, row in enumerate(rows):
+        more = and_more(number, len(rows), "rapids")
+        depth = float(min(decoded.starts[row, 2], decoded.end[row, 2]))
+        yield Finding(
+            Code.EXTRA_CUT,
+            Severity.ERROR,
+            f"a rapid runs through the stock, {-depth:.3f} mm below its top{more}",
+            where=f"{block_name(decoded, int(row))}, end {at_point(decoded.end[row])}",
+            measured=depth,
+            limit=0.0,
+            unit="mm",
+        )
+        if more:
+            return
+
+
+def _many_reversals(machine: Machine, tally: Tally) -> Iterator[Finding]:
+    count, limit = int(tally.cutting_reversals[:2].sum()), machine.limits.max_reversals
+    if limit is not None and count > limit:
+        yield Finding(
+            Code.MANY_REVERSALS,
+            Severity.WARNING,
+            f"X and Y reverse {count} times while cutting; small parts were seen to fail above "
+            f"{limit}",
+            measured=float(count),
+            limit=float(limit),
+            unit="reversals",
+        )
+
+
+def _nothing_moves(cuts: CutMoves) -> Iterator[Finding]:
+    decoded = cuts.toolpath
+    homes = np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z))
+    still = np.all(decoded.end == decoded.starts) if len(decoded) else True
+    if bool(still) and not decoded.is_arc.any() and not homes.any():
+        message = "the program moves nothing"
+    elif len(cuts.rows) == 0:
+        message = "the program cuts nothing: no feed move goes along below the stock top"
+    else:
+        return
+    yield Finding(Code.NO_MOTION, Severity.WARNING, message)
+
+
+def _homing(decoded: Toolpath, machine: Machine) -> Iterator[Finding]:
+    rows = np.flatnonzero(np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z)))
+    if len(rows):
+        zero = ", ".join(f"{value:g}" for value in machine.controller.machine_zero_mm)
+        yield Finding(
+            Code.RETURN_TO_MACHINE_ZERO,
+            Severity.INFO,
+            f"the program returns to machine zero, which is taken to lie at ({zero}) mm from part "
+            "zero (controller.machine_zero_mm)",
+            where=block_name(decoded, int(rows[0])),
+        )
+
+
+def _unknown_play(machine: Machine, tally: Tally) -> Iterator[Finding]:
+    for name, axis, steps in zip(AXES, machine.axes, tally.steps, strict=True):
+        if steps and axis.backlash_mm == 0.0 and axis.compensation_mm == 0.0:
+            yield Finding(
+                Code.PLAY_NOT_KNOWN,
+                Severity.INFO,
+                f"the machine file gives {name} no play: its error is predicted as if it had none",
+                where=f"axis {name}",
+            )

@@ -1,0 +1,128 @@
+"""One pass over the motion: the errors of interpolation and mechanics, and what the part becomes.
+
+Per step that cuts:  interpolation = commanded position to the decoded move of its row;
+mechanics = |slide − commanded|;  total = slide to the nearest move of the wanted contour that its
+row belongs to. Per row, whatever it does: the extents of the slides and where they end.
+Memory grows with the rows of the program, not with the steps.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from camtool.geometry.polylines import Floats, Ints
+from camtool.verify.circles import UNSEEN, Circle, CircleBins, CircleFigures
+from camtool.verify.compare import Groups, Target
+from camtool.verify.coverage import Match
+from camtool.verify.figures import Figure, LargestError
+from camtool.verify.motion import Batch
+from camtool.verify.runs import run_offsets
+from camtool.verify.trace import Trace, TraceBuffer
+
+STEPS_PER_GROUP = 128
+"""Neighbouring steps of a row that share one search for near moves."""
+
+
+class SlidePass:
+    """Takes batches in order; its figures hold for all that was added so far."""
+
+    def __init__(
+        self,
+        decoded: Target,
+        wanted: Target,
+        match: Match,
+        circles: list[Circle],
+        trace: TraceBuffer,
+    ) -> None:
+        self.interpolation = Figure()
+        self.lines, self.arcs = LargestError(), LargestError()
+        self.mechanics = Figure()
+        self.total = Figure()
+        self.trace = trace
+        count = len(match.contour)
+        self.low = np.full((count, 2), np.inf)
+        """(N, 2) mm: lowest X and Y of the slides in each row; inf where they did not move."""
+        self.high = np.full((count, 2), -np.inf)
+        """(N, 2) mm: highest X and Y of the slides in each row; −inf where they did not move."""
+        self.row_end = np.full((count, 2), np.nan)
+        """(N, 2) mm: where the slides stand after each row; NaN where they did not move."""
+        self.circle_figures: list[CircleFigures] = [UNSEEN] * len(circles)
+        self._decoded, self._wanted, self._match = decoded, wanted, match
+        self.circles = circles
+        self._bins: dict[int, CircleBins] = {}
+        self._last_row = _last_rows(match.circle, len(circles))
+
+    def add(self, batch: Batch) -> None:
+        """The next steps of the program."""
+        offsets = run_offsets(batch.row, len(batch.row))
+        rows = batch.row[offsets[:-1]]
+        self.low[rows] = np.minimum(
+            self.low[rows], np.minimum.reduceat(batch.slide, offsets[:-1], axis=0)
+        )
+        self.high[rows] = np.maximum(
+            self.high[rows], np.maximum.reduceat(batch.slide, offsets[:-1], axis=0)
+        )
+        self.row_end[rows] = batch.slide[offsets[1:] - 1]
+        cutting = self._decoded.cuts.is_cut[batch.row]
+        error = np.zeros(len(batch.row))
+        if cutting.any():
+            cut = Batch(batch.row[cutting], batch.commanded[cutting], batch.slide[cutting])
+            error[cutting] = self._errors(cut)
+            self._add_circles(cut)
+        self.trace.add(Trace(batch.slide, error, batch.row, cutting))
+
+    def finish(self) -> None:
+        """No more batches will come: close the circles."""
+        for index in list(self._bins):
+            self.circle_figures[index] = self._bins.pop(index).figures()
+
+    def _errors(self, cut: Batch) -> Floats:
+        """Count the steps (J,) that cut; returns their total error (J,) mm."""
+        row, commanded, slide = cut.row, cut.commanded, cut.slide
+        interpolation = self._decoded.own(commanded, row)
+        self.interpolation.add(interpolation, commanded, row)
+        is_arc = self._decoded.cuts.toolpath.is_arc[row]
+        self.arcs.add(interpolation[is_arc])
+        self.lines.add(interpolation[~is_arc])
+        lag = slide - commanded
+        mechanics = np.sqrt(lag[:, 0] ** 2 + lag[:, 1] ** 2)
+        self.mechanics.add(mechanics, slide, row)
+        # No way is longer than the sum of its parts: a margin within which the search succeeds.
+        bound = self._match.apart_mm[row] + interpolation + mechanics
+        total = self._nearest(slide, row, bound)
+        self.total.add(total, slide, row)
+        return total
+
+    def _nearest(self, slide: Floats, row: Ints, bound: Floats) -> Floats:
+        offsets = run_offsets(row, STEPS_PER_GROUP)
+        first = row[offsets[:-1]]
+        any_z = np.tile([-np.inf, np.inf], (len(first), 1))
+        margin = np.maximum.reduceat(bound, offsets[:-1])
+        groups = Groups(offsets, margin, self._match.only[first], any_z)
+        return self._wanted.nearest(slide, groups).distance
+
+    def _add_circles(self, cut: Batch) -> None:
+        """Give the steps to the circles that they belong to; close those that are done."""
+        if not self.circles:
+            return
+        circle = self._match.circle[cut.row]
+        offsets = run_offsets(circle, len(circle))
+        for low, high in pairwise(offsets.tolist()):
+            index = int(circle[low])
+            if index >= 0:
+                bins = self._bins.get(index) or CircleBins(self.circles[index])
+                self._bins[index] = bins
+                bins.add(cut.slide[low:high])
+        row = int(cut.row[-1])
+        for index in [index for index in self._bins if self._last_row[index] < row]:
+            self.circle_figures[index] = self._bins.pop(index).figures()
+
+
+def _last_rows(circle: Ints, count: int) -> Ints:
+    """(count,) last row (N,) that belongs to each circle."""
+    last = np.full(count, -1, dtype=np.int64)
+    rows = np.flatnonzero(circle >= 0)
+    np.maximum.at(last, circle[rows], rows)
+    return last

@@ -1,0 +1,116 @@
+"""Judge a program: run its decoded moves on the machine's model and compare with what was wanted.
+
+    decoded, wanted ─cuts─▶ lines and arcs that cut, by contour
+    decoded × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
+    decoded ─simulate─▶ chunks ─motion─▶ batches ─slides─▶ errors, circles, extents, trace
+    all of it ─▶ Report and Trace
+
+Every distance is to true lines and arcs. Memory grows with the rows of the program, not with the
+steps of the machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from camtool.findings import Finding
+from camtool.geometry.drawing import Drawing
+from camtool.machine.model import Machine
+from camtool.simulation.motion import Chunk
+from camtool.simulation.simulate import simulate
+from camtool.toolpath.extents import toolpath_extents
+from camtool.toolpath.moves import Toolpath
+from camtool.verify.case import Case, VerifyOptions
+from camtool.verify.circles import Circle, full_circles
+from camtool.verify.compare import Target
+from camtool.verify.coverage import Coverage, cover, own_match
+from camtool.verify.cuts import cut_moves, is_flat
+from camtool.verify.figures import Figure
+from camtool.verify.motion import Tally, batches
+from camtool.verify.noticed import motion_findings
+from camtool.verify.report import Report
+from camtool.verify.result import Result
+from camtool.verify.slides import SlidePass
+from camtool.verify.trace import Trace, TraceBuffer
+
+__all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """The report, all findings that are in it, and the slides' path for pictures."""
+
+    report: Report
+    trace: Trace
+    findings: tuple[Finding, ...]
+
+    def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
+        """The same with these findings, in the report too."""
+        return replace(self, report=self.report.with_findings(findings), findings=findings)
+
+
+def verify(
+    decoded: Toolpath,
+    machine: Machine,
+    *,
+    wanted: Toolpath | None = None,
+    drawing: Drawing | None = None,
+    options: VerifyOptions | None = None,
+) -> Verification:
+    """Simulate `decoded` on `machine` and judge it; against `wanted` when there is one.
+
+    `drawing` gives the fitting error and its findings. Toolpaths are in the work frame.
+    """
+    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions())
+    return judge(case, simulate(decoded, machine, interpolator=case.options.interpolator))
+
+
+def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
+    """Judge a case by the chunks of its motion, whoever made them."""
+    # Without Z on either side, all feed moves are taken to cut.
+    flat_cuts = case.wanted is None or is_flat(case.wanted)
+    decoded = Target(cut_moves(case.decoded, flat_cuts=flat_cuts))
+    wanted = decoded
+    if case.wanted is not None:
+        wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
+    circles = full_circles(wanted.cuts, case.coverage_mm)
+    coverage = _coverage(case, decoded, wanted, circles)
+    trace = TraceBuffer(case.decoded, case.step_mm, case.options.trace_points)
+    slides = SlidePass(decoded, wanted, coverage.match, circles, trace)
+    tally = Tally()
+    for batch in batches(chunks, case.decoded, decoded.cuts.is_cut, tally):
+        slides.add(batch)
+    slides.finish()
+    extents = toolpath_extents(case.decoded)
+    findings = _all_findings(
+        case, coverage, motion_findings(decoded.cuts, case.machine, tally, extents)
+    )
+    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, tally)
+    return Verification(result.report(extents, findings), trace.trace(), findings)
+
+
+def _coverage(case: Case, decoded: Target, wanted: Target, circles: list[Circle]) -> Coverage:
+    if case.wanted is None:
+        return Coverage(own_match(decoded.cuts, circles), Figure(), ())
+    return cover(
+        decoded,
+        wanted,
+        circles,
+        limit_mm=case.coverage_mm,
+        spacing_mm=case.options.sample_mm,
+    )
+
+
+def _all_findings(
+    case: Case, coverage: Coverage, motion: tuple[Finding, ...]
+) -> tuple[Finding, ...]:
+    """Findings of every stage once, in the order of the stages."""
+    groups = (
+        case.drawing.findings if case.drawing is not None else (),
+        case.wanted.findings if case.wanted is not None else (),
+        case.decoded.findings,
+        coverage.findings,
+        motion,
+    )
+    return tuple(dict.fromkeys(finding for group in groups for finding in group))
