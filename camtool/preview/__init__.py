@@ -1,1 +1,1 @@
-"""Pictures: SVG is the source, PNG is rendered from it."""
+"""Pictures: SVG is the source, PNG is rendered from it (`camtool.preview.draw`)."""

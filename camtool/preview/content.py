@@ -1,0 +1,175 @@
+"""A scene sorted into what is drawn, and the legend of what was found in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.geometry.transform import lines_moved
+from camtool.preview import legend, marks
+from camtool.preview.colours import DRAWING, FEED_PALE, OUTLINE, TRAVEL
+from camtool.preview.legend import Entry
+from camtool.preview.scene import Scene
+from camtool.preview.strokes import Chain, Strokes, chains_box, chains_of, strokes_of
+from camtool.preview.trace import Trace, trace_of
+from camtool.preview.view import View, points_box, union, window
+
+Floats = npt.NDArray[np.float64]
+
+MOST_LAYERS_NAMED = 7
+"""More layers than this are counted, not named, in the legend."""
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """`outlines` of the drawing, by layer in `groups`; `starts` (S, 2) mm are those of contours
+    that no plunge marks; `gaps` (G, 2) mm open ends; `window` (2, 2) mm is what to show."""
+
+    scene: Scene
+    groups: tuple[marks.Group, ...]
+    outlines: tuple[Chain, ...]
+    strokes: Strokes | None
+    starts: Floats
+    gaps: Floats
+    trace: Trace | None
+    window: Floats
+
+    def zero_shown(self, view: View) -> bool:
+        """Whether part zero is in the picture; one with nothing in it needs none."""
+        return not self.is_empty and view.shows(0.0, 0.0)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing at all to draw."""
+        return not (self.outlines or self.strokes or self.trace)
+
+
+def content_of(scene: Scene) -> Content:
+    """Everything that the page and its layers need to know of the scene."""
+    strokes = None if scene.toolpath is None else strokes_of(scene.toolpath)
+    trace = trace_of(scene)
+    outlines: tuple[Chain, ...] = ()
+    groups: tuple[marks.Group, ...] = ()
+    gaps = np.empty((0, 2))
+    if scene.drawing is not None:
+        outlines = chains_of(lines_moved(scene.drawing.paths, *scene.drawing_shift_mm))
+        alone = strokes is None and trace is None
+        groups = marks.groups_of(scene.drawing, outlines, alone=alone)
+        places = [gap.at_mm for gap in scene.drawing.gaps]
+        gaps = np.array(places, dtype=np.float64).reshape(-1, 2) + scene.drawing_shift_mm
+    return Content(
+        scene=scene,
+        groups=groups,
+        outlines=outlines,
+        strokes=strokes,
+        starts=_bare_starts(strokes),
+        gaps=gaps,
+        trace=trace,
+        window=_window(outlines, strokes, trace),
+    )
+
+
+def _window(outlines: tuple[Chain, ...], strokes: Strokes | None, trace: Trace | None) -> Floats:
+    part = [chains_box(outlines)]
+    around = [points_box(np.zeros((1, 2)))]
+    if trace is not None:
+        part.append(points_box(trace.points[trace.cutting]))
+    if strokes is not None:
+        part += [chains_box(strokes.feeds), chains_box(strokes.ramps), points_box(strokes.plunges)]
+        around += [chains_box(strokes.rapids), points_box(strokes.begin[None, :])]
+    whole = union(part)
+    if whole is None and strokes is None:
+        return window(None, None)
+    return window(whole, union(around))
+
+
+def _bare_starts(strokes: Strokes | None) -> Floats:
+    """(S, 2) starts of contours where no plunge is marked."""
+    if strokes is None or not strokes.feeds:
+        return np.empty((0, 2))
+    starts = np.array([chain.points[0] for chain in strokes.feeds])
+    if not len(strokes.plunges):
+        return starts
+    marked = {tuple(place) for place in _grid(strokes.plunges)}
+    return starts[[tuple(place) not in marked for place in _grid(starts)]]
+
+
+def _grid(points: Floats) -> list[list[float]]:
+    """Points as counts of the least distance that tells two positions apart."""
+    counts: list[list[float]] = np.rint(points / POSITION_EPS_MM).tolist()
+    return counts
+
+
+def entries_of(content: Content, view: View) -> list[Entry]:
+    """The legend: only what is present and within view."""
+    return [
+        *_drawing_entries(content),
+        *_toolpath_entries(content),
+        *_mark_entries(content, view),
+    ]
+
+
+def _drawing_entries(content: Content) -> list[Entry]:
+    if not content.outlines:
+        return []
+    if content.strokes is not None or content.trace is not None:
+        return [Entry(legend.line_swatch(DRAWING, 5.0), "drawing")]
+    if len(content.groups) == 1:
+        name = content.groups[0].name
+        named = f"drawing, layer {name}" if name.strip() else "drawing"
+        return [Entry(legend.line_swatch(OUTLINE, 2.8), named)]
+    named_groups = content.groups[:MOST_LAYERS_NAMED]
+    entries = [
+        Entry(legend.line_swatch(group.colour, 2.8), group.name or "(no layer)")
+        for group in named_groups
+    ]
+    more = len(content.groups) - len(named_groups)
+    return [*entries, Entry("", f"and {more} more layers")] if more else entries
+
+
+def _toolpath_entries(content: Content) -> list[Entry]:
+    entries: list[Entry] = []
+    strokes, trace = content.strokes, content.trace
+    if trace is not None:
+        entries.append(Entry(legend.map_swatch(4.0), "predicted path, by error"))
+    if strokes is None:
+        return entries
+    if strokes.feeds:
+        pale = legend.line_swatch(FEED_PALE, 2.0)
+        swatch = legend.line_swatch(*legend.FEED_SWATCH) if trace is None else pale
+        entries.append(Entry(swatch, "feed" if trace is None else "programmed path"))
+    if trace is not None:
+        return entries
+    if strokes.ramps:
+        entries.append(Entry(legend.line_swatch(*legend.RAMP_SWATCH), "ramp"))
+    if strokes.rapids:
+        entries.append(Entry(legend.line_swatch(*legend.RAPID_SWATCH), "rapid"))
+    if len(strokes.plunges):
+        entries.append(Entry(legend.dot_swatch(marks.plunge_look()), "plunge"))
+    if len(content.starts):
+        entries.append(Entry(legend.dot_swatch(marks.start_look()), "start"))
+    return entries
+
+
+def _mark_entries(content: Content, view: View) -> list[Entry]:
+    entries: list[Entry] = []
+    if any(view.shows(*place) for place in content.gaps.tolist()):
+        entries.append(Entry(legend.dot_swatch(marks.gap_look()), "open end"))
+    if content.zero_shown(view):
+        entries.append(Entry(legend.cross_swatch(), "part zero"))
+    travel = content.scene.travel_mm
+    if travel is not None and _frame_shown(travel, view):
+        name = f"travel {travel[0]:g} × {travel[1]:g} mm"
+        entries.append(Entry(legend.line_swatch(TRAVEL, 2.0), name))
+    return entries
+
+
+def _frame_shown(size: tuple[float, float], view: View) -> bool:
+    """Whether a side of the frame 0 … size crosses the window."""
+    (x0, x1), (y0, y1) = view.x_range, view.y_range
+    overlaps = x0 <= size[0] and x1 >= 0.0 and y0 <= size[1] and y1 >= 0.0
+    inside = x0 > 0.0 and x1 < size[0] and y0 > 0.0 and y1 < size[1]
+    return overlaps and not inside

@@ -1,0 +1,137 @@
+"""Pictures of drawings, toolpaths and predicted results.
+
+    draw   Scene → SVG (the source of truth)
+    png    SVG → PNG
+
+Read in this order: content.py sorts the scene into lines and marks, page.py decides where things
+lie, this file lays the layers one over the other. Equal scenes give equal bytes: no dates, no
+random ids, no fonts. Inside the group "mm" coordinates are those of the part, in mm, Y up.
+"""
+
+from __future__ import annotations
+
+from camtool.errors import OptionError
+from camtool.preview import axes, legend, marks, text
+from camtool.preview.colours import PAPER, QUIET
+from camtool.preview.content import Content, content_of
+from camtool.preview.page import Page, page_of
+from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
+from camtool.preview.svg import Look, element, number, title
+from camtool.preview.text import Style
+from camtool.preview.trace import trace_layer
+from camtool.preview.view import PAGE, View
+
+__all__ = ["Scene", "draw", "png", "scene_of_drawing", "scene_of_toolpath"]
+
+SMALLEST_PX, LARGEST_PX = 16, 20_000
+"""Widths of pictures that are allowed."""
+
+PNG_DPI = 96.0
+"""resvg's own default of 0 makes lengths in mm vanish."""
+
+TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
+
+
+def draw(scene: Scene, *, size_px: int = 1000) -> str:
+    """The scene as SVG text, `size_px` wide; OptionError when that is no sensible width."""
+    _check_width(size_px)
+    content = content_of(scene)
+    page = page_of(content)
+    box = page.view.box
+    sides = (box.left, box.top, box.width, box.height)
+    plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
+    # Named after its own sides: two pictures in one page share it only when it is the same.
+    clip = "plot-" + "-".join(number(side, 0) for side in sides)
+    root: Look = {
+        "xmlns": "http://www.w3.org/2000/svg",
+        "width": str(size_px),
+        "height": number(size_px * page.height / PAGE),
+        "viewBox": f"0 0 {number(PAGE)} {number(page.height)}",
+    }
+    picture = element(
+        "svg",
+        root,
+        title(scene.title or "camtool picture"),
+        element("rect", {"width": PAGE, "height": page.height, "fill": PAPER}),
+        page.head,
+        axes.frame(page.view, page.ticks),
+        element("clipPath", {"id": clip}, element("rect", plot)),
+        element("g", {"clip-path": f"url(#{clip})"}, *_plot(content, page.view)),
+        axes.axes(page.view, page.ticks),
+        *_beside(content, page),
+    )
+    return picture + "\n"
+
+
+def png(svg: str, width_px: int) -> bytes:
+    """The PNG of an SVG text, `width_px` wide; OptionError when that is no sensible width."""
+    _check_width(width_px)
+    import resvg_py
+
+    image = resvg_py.svg_to_bytes(
+        svg_string=svg, width=width_px, dpi=PNG_DPI, skip_system_fonts=True
+    )
+    return bytes(image)
+
+
+def _check_width(width_px: int) -> None:
+    if not SMALLEST_PX <= width_px <= LARGEST_PX:
+        raise OptionError(
+            f"a picture cannot be {width_px} pixels wide",
+            mend=f"take {SMALLEST_PX} to {LARGEST_PX}",
+        )
+
+
+def _plot(content: Content, view: View) -> list[str]:
+    """What is clipped to the plot, from the ground up."""
+    lines = [layer for layer in _lines(content, view) if layer]
+    layers = [element("g", {"id": "mm", "transform": view.matrix()}, *lines)] if lines else []
+    strokes, trace = content.strokes, content.trace
+    if strokes is not None and trace is None:
+        layers.append(marks.arrows(strokes.feeds, view))
+        layers.append(marks.dots("starts", content.starts.tolist(), view, marks.start_look()))
+        plunges = strokes.plunges.tolist()
+        layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
+    if content.zero_shown(view):
+        layers.append(marks.origin(view.page(0.0, 0.0)))
+    layers.append(marks.dots("gaps", content.gaps.tolist(), view, marks.gap_look()))
+    if content.is_empty:
+        middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
+        layers.append(text.label("nothing to draw", middle, Style(16.0, QUIET, "middle")))
+    return layers
+
+
+def _lines(content: Content, view: View) -> list[str]:
+    """The layers that are written in mm."""
+    layers: list[str] = []
+    strokes, trace, travel = content.strokes, content.trace, content.scene.travel_mm
+    if content.outlines:
+        layers.append(marks.body(content.outlines))
+    if travel is not None:
+        layers.append(marks.travel(travel, view))
+    if content.outlines:
+        alone = strokes is None and trace is None
+        width = marks.pen(view, ALONE_PEN if alone else DRAWING_PEN, content.outlines)
+        layers.append(marks.drawing(content.groups, view, width))
+    if strokes is not None:
+        if strokes.rapids and trace is None:
+            layers.append(marks.rapids(strokes.rapids, view))
+        base = FEED_PEN if trace is None else 0.6 * FEED_PEN
+        width = marks.pen(view, base, strokes.feeds)
+        if strokes.feeds:
+            layers.append(marks.feeds(strokes.feeds, view, width, pale=trace is not None))
+        if strokes.ramps and trace is None:
+            layers.append(marks.ramps(strokes.ramps, view, width))
+    if trace is not None:
+        layers.append(trace_layer(trace, view, TRACE_PEN))
+    return layers
+
+
+def _beside(content: Content, page: Page) -> list[str]:
+    """Colour bar, legend and scale bar."""
+    box, parts = page.view.box, []
+    if content.trace is not None:
+        parts.append(legend.colour_bar(content.trace.top_um, box))
+    parts.append(legend.legend(page.rows, box.left, page.legend_y))
+    parts.append(axes.scale_bar(page.view, box.right, page.legend_y))
+    return parts

@@ -1,0 +1,226 @@
+"""The layers of the plot: lines in mm (their group flips and scales), marks in page units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.drawing import Drawing
+from camtool.preview.colours import (
+    BODY,
+    DRAWING,
+    FEED,
+    FEED_PALE,
+    GAP,
+    INK,
+    LAYERS,
+    PAPER,
+    PLUNGE,
+    RAPID,
+    TRAVEL,
+)
+from camtool.preview.strokes import Chain, path_data
+from camtool.preview.svg import Look, PathData, element, number, title
+from camtool.preview.view import View
+
+Floats = npt.NDArray[np.float64]
+
+MOST_BODIES = 500
+"""The light fill shows what is closed; drawings of more paths go without."""
+
+INK_SHARE = 0.12
+"""Lines become thinner once they would cover more than this share of the plot."""
+
+THINNEST = 0.5
+
+ARROW_LENGTH, ARROW_WIDTH = 18.0, 6.5
+ARROW_EVERY = 900.0
+SHORTEST_WITH_ARROW = 90.0
+MOST_ARROWS, MOST_ON_ONE = 60, 4
+MARKS_OF_FULL_SIZE = 120
+SMALLEST_MARK = 0.3
+TIE_DECIMALS = 4
+
+
+@dataclass(frozen=True)
+class Group:
+    """Paths of one layer of the drawing, in one colour."""
+
+    name: str
+    colour: str
+    chains: tuple[Chain, ...]
+
+
+def groups_of(drawing: Drawing, chains: Sequence[Chain], *, alone: bool) -> tuple[Group, ...]:
+    """The layers in order of first use: light below a toolpath, in strong colours when alone."""
+    names = tuple(dict.fromkeys(drawing.layers))
+    members: dict[str, list[Chain]] = {name: [] for name in names}
+    for name, chain in zip(drawing.layers, chains, strict=True):
+        members[name].append(chain)
+    return tuple(
+        Group(name, LAYERS[index % len(LAYERS)] if alone else DRAWING, tuple(members[name]))
+        for index, name in enumerate(names)
+    )
+
+
+def pen(view: View, base: float, chains: Iterable[Chain]) -> float:
+    """Line width on the page: `base`, or thinner where lines are crowded."""
+    length = sum(float(chain.lengths().sum()) for chain in chains) * view.scale
+    if length == 0.0:
+        return base
+    room = INK_SHARE * view.box.width * view.box.height / length
+    return max(min(base, room), THINNEST)
+
+
+def travel(size_mm: tuple[float, float], view: View) -> str:
+    """The table's travel as a light frame."""
+    frame: Look = {"x": 0.0, "y": 0.0, "width": size_mm[0], "height": size_mm[1]}
+    line: Look = {"fill": "none", "stroke": TRAVEL, "stroke-width": view.mm(2.0)}
+    return element("g", {"id": "travel"}, element("rect", {**frame, **line}))
+
+
+def body(chains: Sequence[Chain]) -> str:
+    """A light fill of what is closed (even-odd, so that holes stay open)."""
+    closed = [chain for chain in chains if chain.closed]
+    if not closed or len(closed) > MOST_BODIES:
+        return ""
+    fill: Look = {"d": path_data(closed), "fill": BODY, "fill-rule": "evenodd"}
+    return element("g", {"id": "body"}, element("path", fill))
+
+
+def drawing(groups: Sequence[Group], view: View, width: float) -> str:
+    """The lines of the drawing, a group for each layer."""
+    layers = [
+        element(
+            "g",
+            {"stroke": group.colour},
+            title(group.name),
+            element("path", {"d": path_data(group.chains)}),
+        )
+        for group in groups
+    ]
+    return element("g", {"id": "drawing", **_line(view, width)}, *layers)
+
+
+def feeds(chains: Sequence[Chain], view: View, width: float, *, pale: bool) -> str:
+    """Moves at a feed, solid; pale and thin below a predicted path."""
+    colour = FEED_PALE if pale else FEED
+    line = {**_line(view, width), "stroke": colour}
+    return element("g", {"id": "feeds", **line}, element("path", {"d": path_data(chains)}))
+
+
+def ramps(chains: Sequence[Chain], view: View, width: float) -> str:
+    """Moves that sink while they travel, in the colour of plunges."""
+    line = {**_line(view, width), "stroke": PLUNGE}
+    return element("g", {"id": "ramps", **line}, element("path", {"d": path_data(chains)}))
+
+
+def rapids(chains: Sequence[Chain], view: View) -> str:
+    """Rapids, thin and dashed."""
+    dashes = f"{view.mm(7.0):.9g} {view.mm(5.0):.9g}"
+    line: Look = {"fill": "none", "stroke": RAPID, "stroke-width": view.mm(1.4)}
+    return element(
+        "g",
+        {"id": "rapids", **line, "stroke-dasharray": dashes},
+        element("path", {"d": path_data(chains)}),
+    )
+
+
+def _line(view: View, width: float) -> Look:
+    return {
+        "fill": "none",
+        "stroke-width": view.mm(width),
+        "stroke-linecap": "round",
+        "stroke-linejoin": "round",
+    }
+
+
+def dots(name: str, points: Iterable[tuple[float, float]], view: View, look: Look) -> str:
+    """Round marks at places in mm: each is drawn, smaller where there are very many."""
+    shown = [view.page(*point) for point in points if view.shows(*point)]
+    if not shown:
+        return ""
+    shrink = max(math.sqrt(min(MARKS_OF_FULL_SIZE / len(shown), 1.0)), SMALLEST_MARK)
+    line = {key: value for key, value in look.items() if key != "r"}
+    radius = number(float(look["r"]) * shrink)
+    marks = [element("circle", {"cx": number(x), "cy": number(y), "r": radius}) for x, y in shown]
+    return element("g", {"id": name, **line}, *marks)
+
+
+def plunge_look() -> Look:
+    """Plunges: orange discs with a white rim."""
+    return {"r": 5.0, "fill": PLUNGE, "stroke": PAPER, "stroke-width": 1.6}
+
+
+def start_look() -> Look:
+    """Starts of contours: blue rings."""
+    return {"r": 5.0, "fill": PAPER, "stroke": FEED, "stroke-width": 2.2}
+
+
+def gap_look() -> Look:
+    """Open ends: red rings."""
+    return {"r": 8.0, "fill": "none", "stroke": GAP, "stroke-width": 2.4}
+
+
+def arrows(chains: Sequence[Chain], view: View) -> str:
+    """Few arrows along the longest chains, in the direction of travel."""
+    lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
+    longest = sorted(range(len(chains)), key=lambda index: (-lengths[index], index))
+    data, count = PathData(), 0
+    for index in longest:
+        if lengths[index] < SHORTEST_WITH_ARROW or count >= MOST_ARROWS:
+            break
+        wanted = min(1 + int(lengths[index] / ARROW_EVERY), MOST_ON_ONE)
+        for place in range(wanted):
+            point, heading = _along(chains[index], place / wanted, (place + 1) / wanted)
+            if view.shows(*point):
+                _arrow(data, view.page(*point), -heading)
+                count += 1
+    look: Look = {"fill": FEED, "stroke": PAPER, "stroke-width": 0.8, "stroke-linejoin": "round"}
+    return (
+        element("g", {"id": "arrows"}, element("path", {"d": str(data), **look})) if data else ""
+    )
+
+
+def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], float]:
+    """Point and heading in the middle of the longest piece of a move between two shares of the
+    chain's length: on a straight or a smooth arc, away from corners."""
+    ends = np.cumsum(chain.lengths())
+    begins = np.concatenate([[0.0], ends[:-1]])
+    first = np.maximum(begins, low * ends[-1])
+    last = np.minimum(ends, high * ends[-1])
+    # Rounded, so that of two halves of a circle the first is taken everywhere.
+    index = int(np.argmax(np.round((last - first) / ends[-1], TIE_DECIMALS)))
+    middle = 0.5 * (first[index] + last[index])
+    return chain.at(index, float((middle - begins[index]) / (ends[index] - begins[index])))
+
+
+def _arrow(data: PathData, at: tuple[float, float], heading: float) -> None:
+    """A slim arrowhead with its middle at `at`; heading in page directions (Y down)."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    half = ARROW_LENGTH / 2.0
+    corners = ((half, 0.0), (-half, ARROW_WIDTH), (-half / 2.0, 0.0), (-half, -ARROW_WIDTH))
+    for index, (along, across) in enumerate(corners):
+        x, y = at[0] + along * cos - across * sin, at[1] + along * sin + across * cos
+        (data.line if index else data.move)(x, y)
+    data.close()
+
+
+def origin(at: tuple[float, float], size: float = 13.0) -> str:
+    """Part zero: a cross with a ring."""
+    data = PathData()
+    for dx, dy in ((size, 0.0), (0.0, size)):
+        data.move(at[0] - dx, at[1] - dy)
+        data.line(at[0] + dx, at[1] + dy)
+    line: Look = {"fill": "none", "stroke": INK, "stroke-width": 1.8}
+    ring: Look = {"cx": number(at[0]), "cy": number(at[1]), "r": 0.5 * size}
+    return element(
+        "g",
+        {"id": "part-zero", **line},
+        element("circle", ring),
+        element("path", {"d": str(data)}),
+    )

@@ -1,0 +1,73 @@
+"""The Scene: everything that one picture shows, in one frame (the work frame, mm)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.drawing import Drawing
+from camtool.toolpath.moves import Toolpath
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What to draw; whatever is None or empty is left out.
+
+    trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
+    wanted, trace_cutting (T,) where the tool cuts (everywhere when None); errors count only
+    there. travel_mm is the size of the table's travel from (0, 0). drawing_shift_mm moves the
+    drawing into the work frame. With a trace the picture is one of the part: rapids and plunges
+    are left out, feeds are pale. ValueError when the trace is incomplete or not finite.
+    """
+
+    title: str = ""
+    drawing: Drawing | None = None
+    toolpath: Toolpath | None = None
+    trace_points: Floats | None = None
+    trace_error_mm: Floats | None = None
+    trace_cutting: Bools | None = None
+    travel_mm: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
+    drawing_shift_mm: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        points, error = self.trace_points, self.trace_error_mm
+        if points is None and error is None and self.trace_cutting is None:
+            return
+        if points is None or error is None:
+            raise ValueError("a trace needs both its points and their errors")
+        cutting = self.trace_cutting
+        if cutting is None:
+            cutting = np.ones(len(points), dtype=np.bool_)
+            object.__setattr__(self, "trace_cutting", cutting)
+        if points.shape != (len(points), 2) or error.shape != cutting.shape != (len(points),):
+            raise ValueError("the columns of the trace have different lengths")
+        if not (np.isfinite(points).all() and np.isfinite(error[cutting]).all()):
+            raise ValueError("a number of the trace is not finite")
+
+
+def scene_of_drawing(drawing: Drawing) -> Scene:
+    """A drawing alone, with its size."""
+    return Scene(title=drawing.file, drawing=drawing, notes=(_size_note(drawing),))
+
+
+def scene_of_toolpath(toolpath: Toolpath, *, title: str, drawing: Drawing | None = None) -> Scene:
+    """A toolpath, over the drawing that it was planned from where there is one."""
+    moves, feeds = int(toolpath.is_motion.sum()), int(toolpath.is_feed.sum())
+    note = f"{moves} moves, {feeds} of them at a feed"
+    sizes = () if drawing is None else (_size_note(drawing),)
+    return Scene(title=title, toolpath=toolpath, drawing=drawing, notes=(*sizes, note))
+
+
+def _size_note(drawing: Drawing) -> str:
+    from camtool.geometry.measure import extents
+
+    if not len(drawing.paths):
+        return "nothing drawn"
+    (left, right), (bottom, top) = extents(drawing.paths).tolist()
+    return f"{right - left:.4g} × {top - bottom:.4g} mm"

@@ -1,0 +1,120 @@
+"""Primitives of SVG text: numbers, escaping, elements and path data.
+
+Everything is written in one way only, so that equal input gives equal bytes: fixed decimals
+without trailing zeros, attributes in the order given, one element a line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+LENGTH_DECIMALS = 2
+"""Decimals of lengths on the page (units of the viewBox, 1000 across)."""
+
+MM_DECIMALS = 9
+"""Decimals of coordinates in mm: half circles stay round when their centre is found again."""
+
+_NO_XML = "\N{REPLACEMENT CHARACTER}"
+
+Attributes = Mapping[str, str | float]
+Look = dict[str, str | float]
+
+
+def number(value: float, decimals: int = LENGTH_DECIMALS) -> str:
+    """The shortest text of `value` at these decimals; ValueError when it is not finite.
+
+    >>> number(2.50), number(-0.001), number(1e-7, 9)
+    ('2.5', '0', '0.0000001')
+    """
+    if not math.isfinite(value):
+        raise ValueError(f"{value} cannot be drawn")
+    text = f"{value:.{decimals}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def clean(text: str) -> str:
+    """`text` with what XML 1.0 cannot hold (control characters, lone surrogates) replaced."""
+    return "".join(letter if _is_xml(ord(letter)) else _NO_XML for letter in text)
+
+
+def one_line(text: str) -> str:
+    """`text` with every run of white space made one space."""
+    return " ".join(text.split())
+
+
+def escape(text: str) -> str:
+    """`text` for use between tags and inside a double-quoted attribute."""
+    escaped = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    escaped = escaped.replace('"', "&quot;")
+    # A reader would turn bare white space of an attribute into blanks.
+    return escaped.replace("\n", "&#10;").replace("\r", "&#13;").replace("\t", "&#9;")
+
+
+def element(name: str, attributes: Attributes, *children: str) -> str:
+    """One element; strings among the attributes are escaped, the children are SVG already."""
+    head = name + "".join(f' {key}="{_value(value)}"' for key, value in attributes.items())
+    inner = [child for child in children if child]
+    if not inner:
+        return f"<{head}/>"
+    return "\n".join([f"<{head}>", *inner, f"</{name}>"])
+
+
+def title(text: str) -> str:
+    """The element that names its parent to people and to screen readers."""
+    return f"<title>{escape(text)}</title>"
+
+
+def _value(value: str | float) -> str:
+    return escape(value) if isinstance(value, str) else number(value, MM_DECIMALS)
+
+
+def _is_xml(code: int) -> bool:
+    """Whether XML 1.0 (fifth edition, §2.2) allows this character."""
+    return (
+        code in (0x9, 0xA, 0xD)
+        or 0x20 <= code <= 0xD7FF
+        or 0xE000 <= code <= 0xFFFD
+        or 0x10000 <= code <= 0x10FFFF
+    )
+
+
+class PathData:
+    """The `d` of a path, command by command, coordinates at fixed decimals."""
+
+    def __init__(self, decimals: int = LENGTH_DECIMALS) -> None:
+        self._decimals = decimals
+        self._parts: list[str] = []
+
+    def __str__(self) -> str:
+        return "".join(self._parts)
+
+    def __bool__(self) -> bool:
+        return bool(self._parts)
+
+    def move(self, x: float, y: float) -> None:
+        """Begin a new stroke."""
+        self._add("M", x, y)
+
+    def line(self, x: float, y: float) -> None:
+        """Straight to here."""
+        self._add("L", x, y)
+
+    def arc(self, x: float, y: float, *, radius: float, sweep_rad: float) -> None:
+        """Circular arc to here, |sweep| < 2π; a positive sweep turns from +X towards +Y.
+
+        In SVG, large-arc says |sweep| > π, and sweep-flag 1 means growing angles.
+        """
+        size = number(radius, self._decimals)
+        large, growing = int(abs(sweep_rad) > math.pi), int(sweep_rad > 0.0)
+        end = f"{number(x, self._decimals)} {number(y, self._decimals)}"
+        self._parts.append(f"A{size} {size} 0 {large} {growing} {end}")
+
+    def close(self) -> None:
+        """Back to the beginning of the stroke."""
+        self._parts.append("Z")
+
+    def _add(self, command: str, x: float, y: float) -> None:
+        self._parts.append(f"{command}{number(x, self._decimals)} {number(y, self._decimals)}")

@@ -1,0 +1,119 @@
+"""The path of the slides, coloured by its error.
+
+Points in a row that fall into the same step of the colour map become one stroke, and all strokes
+of one step become one path, so that 20,000 points stay well below a megabyte. Larger errors are
+drawn later: what is worst lies on top.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.preview.colours import BINS, bin_colours
+from camtool.preview.scene import Scene
+from camtool.preview.svg import Look, PathData, element
+from camtool.preview.view import View
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+UM_PER_MM = 1000.0
+
+LEAST_TOP_UM = 1e-3
+"""The colour map ends here when no error is larger."""
+
+FINEST_SHARE = 1e-5
+"""Coordinates of the trace are written to this share of the window, a 25th pixel of 4000."""
+
+MERGED_SHARE = 1.25e-4
+"""Points nearer than this share of the window, half a pixel of 4000, may become one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Points (T, 2) mm, |error| (T,) µm and whether the tool cuts (T,), and the map's end."""
+
+    points: Floats
+    error_um: Floats
+    cutting: npt.NDArray[np.bool_]
+    top_um: float
+
+
+def trace_of(scene: Scene) -> Trace | None:
+    """The trace of a scene; None when there is none or it never cuts."""
+    points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
+    if points is None or error is None or cutting is None or not cutting.any():
+        return None
+    error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
+    return Trace(points, error_um, cutting, max(float(error_um.max()), LEAST_TOP_UM))
+
+
+def bins_of(trace: Trace) -> Ints:
+    """(T−1,) the step of the map for each piece of the path, by its worse end; −1: not cutting."""
+    worse = np.maximum(trace.error_um[:-1], trace.error_um[1:])
+    step = np.minimum((worse / trace.top_um * BINS).astype(np.int64), BINS - 1)
+    return np.where(trace.cutting[:-1] & trace.cutting[1:], step, -1)
+
+
+def strokes(trace: Trace, window_mm: float) -> list[list[Floats]]:
+    """For each step of the map, its strokes: arrays (n, 2) of points, n ≥ 2."""
+    keep = _kept(trace, MERGED_SHARE * window_mm)
+    chosen = Trace(
+        trace.points[keep], _worst_between(trace, keep), trace.cutting[keep], trace.top_um
+    )
+    bins = bins_of(chosen)
+    found: list[list[Floats]] = [[] for _ in range(BINS)]
+    edges = np.flatnonzero(np.diff(bins)) + 1
+    for begin, end in zip(
+        np.concatenate([[0], edges]), np.concatenate([edges, [len(bins)]]), strict=True
+    ):
+        if end > begin and bins[begin] >= 0:
+            found[int(bins[begin])].append(chosen.points[begin : end + 1])
+    return found
+
+
+def _kept(trace: Trace, apart_mm: float) -> Ints:
+    """Points to draw: those at least `apart_mm` from the one before, and all ends of cuts."""
+    cutting = trace.cutting
+    ends = np.ones(len(cutting), dtype=np.bool_)
+    ends[1:-1] = (cutting[1:-1] != cutting[:-2]) | (cutting[1:-1] != cutting[2:])
+    kept, (last_x, last_y) = [], (math.inf, math.inf)
+    for index, ((x, y), is_end) in enumerate(
+        zip(trace.points.tolist(), ends.tolist(), strict=True)
+    ):
+        if is_end or math.hypot(x - last_x, y - last_y) >= apart_mm:
+            kept.append(index)
+            last_x, last_y = x, y
+    return np.array(kept, dtype=np.int64)
+
+
+def _worst_between(trace: Trace, keep: Ints) -> Floats:
+    """(kept,) the largest error from each kept point up to the next: merging hides none."""
+    return np.maximum.reduceat(trace.error_um, keep)
+
+
+def trace_layer(trace: Trace, view: View, pen: float) -> str:
+    """The coloured path, in mm."""
+    (low, high), colours = view.x_range, bin_colours()
+    decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
+    paths = []
+    for colour, runs in zip(colours, strokes(trace, high - low), strict=True):
+        data = PathData(decimals)
+        for run in runs:
+            points = run.tolist()
+            data.move(*points[0])
+            for point in points[1:]:
+                data.line(*point)
+        if data:
+            paths.append(element("path", {"d": str(data), "stroke": colour}))
+    pen_of_all: Look = {
+        "fill": "none",
+        "stroke-width": view.mm(pen),
+        "stroke-linecap": "round",
+        "stroke-linejoin": "round",
+    }
+    return element("g", {"id": "slide-path", **pen_of_all}, *paths)

@@ -1,0 +1,167 @@
+"""Where things lie on the page: the window in mm, the box it is shown in, and nice numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+PAGE = 1000.0
+"""Width of every picture in its own units; the real size is only an attribute of the SVG."""
+
+MARGIN = 36.0
+
+LOOK_AROUND = 2.0
+"""Part zero and rapids are in the window unless they make it this many times larger."""
+
+PADDING = 0.06
+"""Room around the part, as a share of its larger side."""
+
+SMALLEST_WINDOW_MM = 1e-3
+"""A part that is a mere point gets a window of this size."""
+
+EMPTY_WINDOW_MM = 10.0
+"""Width of the window of a picture with nothing in it."""
+
+WIDEST, TALLEST = 0.34, 0.88
+"""Least and greatest height of the plot, as a share of its width."""
+
+ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle; on the page `top` < `bottom`."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    @property
+    def width(self) -> float:
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        return self.bottom - self.top
+
+
+@dataclass(frozen=True)
+class View:
+    """`scale` page units per mm; `centre` (x, y) mm is shown in the middle of `box`."""
+
+    box: Box
+    scale: float
+    centre: tuple[float, float]
+
+    def page(self, x: float, y: float) -> tuple[float, float]:
+        """Page place of a point in mm: Y is up in mm and down on the page."""
+        across = (self.box.left + self.box.right) / 2.0
+        down = (self.box.top + self.box.bottom) / 2.0
+        return (
+            across + (x - self.centre[0]) * self.scale,
+            down - (y - self.centre[1]) * self.scale,
+        )
+
+    def matrix(self) -> str:
+        """The SVG transform that does what `page` does."""
+        x, y = self.page(0.0, 0.0)
+        return f"matrix({self.scale:.9g} 0 0 {-self.scale:.9g} {x:.9g} {y:.9g})"
+
+    def mm(self, units: float) -> float:
+        """A length on the page, such as a line width, in mm; four digits are enough."""
+        return float(f"{units / self.scale:.4g}")
+
+    @property
+    def x_range(self) -> tuple[float, float]:
+        """Lowest and highest X in the box, mm."""
+        half = self.box.width / self.scale / 2.0
+        return self.centre[0] - half, self.centre[0] + half
+
+    @property
+    def y_range(self) -> tuple[float, float]:
+        """Lowest and highest Y in the box, mm."""
+        half = self.box.height / self.scale / 2.0
+        return self.centre[1] - half, self.centre[1] + half
+
+    def shows(self, x: float, y: float) -> bool:
+        """Whether a point in mm lies in the box."""
+        (x0, x1), (y0, y1) = self.x_range, self.y_range
+        return x0 <= x <= x1 and y0 <= y <= y1
+
+
+def union(boxes: Iterable[Floats | None]) -> Floats | None:
+    """The extents [[xmin, xmax], [ymin, ymax]] of all that are there."""
+    present = [box for box in boxes if box is not None]
+    if not present:
+        return None
+    stacked = np.stack(present)
+    return np.column_stack([stacked[:, :, 0].min(axis=0), stacked[:, :, 1].max(axis=0)])
+
+
+def points_box(points: Floats) -> Floats | None:
+    """The extents of points (P, 2)."""
+    if not len(points):
+        return None
+    return np.column_stack([points.min(axis=0), points.max(axis=0)])
+
+
+def window(part: Floats | None, around: Floats | None) -> Floats:
+    """What to show, mm: the part, with what is around it unless that is far away."""
+    both = union([part, around])
+    if both is None:
+        half = EMPTY_WINDOW_MM / 2.0
+        return np.array([[-half, half], [-half / 2.0, half / 2.0]])
+    if part is not None and _larger(part) > 0.0 and _larger(both) > LOOK_AROUND * _larger(part):
+        both = part
+    size = max(_larger(both), SMALLEST_WINDOW_MM)
+    pad = PADDING * size if _larger(both) > 0.0 else 0.5 * size
+    return np.asarray(both + np.array([-pad, pad]))
+
+
+def fit(shown: Floats, left: float, top: float, right: float) -> View:
+    """The view of this window in a box of that width, as high as its shape asks for."""
+    sizes = shown[:, 1] - shown[:, 0]
+    left, top, right = float(math.ceil(left)), float(math.ceil(top)), float(math.floor(right))
+    width = right - left
+    height = width * min(max(float(sizes[1] / sizes[0]), WIDEST), TALLEST)
+    scale = min(width / float(sizes[0]), height / float(sizes[1]))
+    middle = shown.mean(axis=1)
+    # Nine digits are what the matrix is written with.
+    return View(
+        Box(left, top, right, top + round(height)),
+        float(f"{scale:.9g}"),
+        (float(middle[0]), float(middle[1])),
+    )
+
+
+def _larger(box: Floats) -> float:
+    return float(np.max(box[:, 1] - box[:, 0]))
+
+
+def round_step(least: float) -> float:
+    """The smallest of 1, 2, 5 × 10ⁿ that is not below `least`."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(step * power for step in ROUND_STEPS if step * power >= least)
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2, 5 × 10ⁿ that is not above `most`."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(step * power for step in ROUND_STEPS if step * power <= most)
+
+
+def decimals_of(step: float) -> int:
+    """How many decimals the multiples of a round step need."""
+    return max(0, -math.floor(math.log10(step)))
+
+
+def multiples(low: float, high: float, step: float) -> list[float]:
+    """The multiples of `step` in low … high."""
+    return [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
