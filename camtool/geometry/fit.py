@@ -55,7 +55,7 @@ SPAN_TURN_RAD = math.pi * (1.0 + 1e-9)
 SEARCH_SHARE = 0.97
 """The share of the tolerance that the search may use up: errors peak between nodes."""
 
-MEASURE_STEPS = 8
+MEASURE_STEPS = 16
 """Points per step between nodes at which the final error is measured."""
 
 ATTEMPTS = 4
@@ -102,6 +102,8 @@ def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
             return Fit(np.append(nodes.point[0], 0.0)[None, :], 0.0, 0.0)
         spans = _spans(nodes, target)
         vertices, places = _joined(_chain(nodes, spans))
+        if len(vertices) == 1:
+            return Fit(vertices, 0.0, 0.0)
         fit = _measured(curve, nodes, spans, vertices, places)
         if fit.max_mm <= tolerance_mm:
             break

@@ -68,7 +68,10 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int = MIN_STEPS) -> No
     nodes = _NodeColumns(t, _finite(curve.point(t)), *directions.both(t))
     is_break = np.arange(len(t)) % each == 0
     for side, column in ((-1.0, nodes.arrive), (1.0, nodes.leave)):
-        column[is_break] = directions.aside(breaks, side)
+        # A derivative at a corner is the one of either side.
+        beside, at = directions.aside(breaks, side), column[is_break]
+        differs = turns(beside, at) > CORNER_ANGLE_RAD
+        column[is_break] = np.where(differs[:, None], beside, at)
     _refine(nodes, curve, directions, tolerance_mm)
     return _merged(nodes)
 

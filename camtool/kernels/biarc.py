@@ -1,7 +1,7 @@
 """Biarcs, distances to arcs, and the search for the longest biarcs along nodes on a curve.
 
 What makes it exact: no centre is ever formed, so an arc may be as flat as it likes; for a bulge of
-0 each formula becomes the one of the straight line. `tests/oracles/biarc.py` is the twin.
+0 each formula becomes the one of the straight line. `tests/oracles/arcs.py` is the twin.
 """
 
 from __future__ import annotations
