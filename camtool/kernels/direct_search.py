@@ -11,6 +11,10 @@ When the coordinate that shrinks reaches 0, the next quadrant begins: that coord
 now grows, the other one turns round. A start on an axis belongs to the quadrant that the motion
 enters. (Thesis equations 3.4-3.14, L1009-1042, L2348-2350.)
 
+The ties never decide, so that the method has every symmetry of the square: a single axis and the
+diagonal differ by the odd Δ of the other axis, and no two integers of equal size do; and where
+|D + ΔX| = |D + ΔY|, both are |x| + |y|, but the diagonal then gives ||x| − |y| ± 1|: less.
+
 With D = 0 at the start the path stays nearer than half a step to the circle through the start.
 Let m be the larger of |x|, |y|. Where the two candidates on either side of the circle differ in D
 by 2m − 1 or 2m + 1, an odd number, the better one has |D| ≤ m − 1 outside or |D| ≤ m ≤ r inside

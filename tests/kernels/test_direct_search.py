@@ -112,3 +112,25 @@ def test_hits_and_nearest_agree_with_the_path() -> None:
 def test_the_limit_of_hits_counts() -> None:
     assert direct_search_hits(0, 30, True, 0, 30, 168) == 168
     assert direct_search_hits(0, 30, True, 0, 30, 167) == -1
+
+
+@pytest.mark.parametrize("clockwise", [True, False])
+def test_the_ties_never_decide(clockwise: bool) -> None:
+    """A start turned by 90° (X and Y change places) gives the turned path; so does a mirror."""
+    for x in range(60):
+        for y in range(1, 60):
+            path = direct_search_path(x, y, clockwise, 0, 350)
+            turned = direct_search_path(-y, x, clockwise, 0, 350)
+            assert np.array_equal(turned, np.column_stack([-path[:, 1], path[:, 0]])), (x, y)
+            mirrored = direct_search_path(-x, y, not clockwise, 0, 350)
+            assert np.array_equal(mirrored, path * [-1, 1]), (x, y)
+
+
+def test_whole_circles_close_from_every_start() -> None:
+    """Seen, not proved: the path comes back to any start after one turn, on an axis or not."""
+    rng = np.random.default_rng(23)
+    starts = [(x, y) for x in range(-40, 41) for y in range(-40, 41) if (x, y) != (0, 0)]
+    starts += [(int(x), int(y)) for x, y in rng.integers(-3000, 3001, (300, 2))]
+    for x, y in starts:
+        turn = 4 * math.sqrt(2.0) * math.hypot(x, y)
+        assert direct_search_hits(x, y, True, x, y, int(turn) + 4) > turn - 4, (x, y)

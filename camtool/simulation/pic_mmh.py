@@ -1,0 +1,248 @@
+"""The controller on the PIC18F8720: lines by DDA, arcs by direct search, one step at a time.
+
+What it does with a row of the toolpath, in the order of this file:
+
+1. Millimetres become steps, each coordinate by itself: round(mm / coded step), halves away from
+   zero. Lines and arcs start where the controller stands.
+2. XY first, then Z (2.5 axes). Lines, rapids and homing are DDA lines; arcs go by
+   `controller.arcs` about the rounded centre until the position equals the rounded end.
+3. Every output takes one period 1/f, f = feed / (60 · coded step), rapids run at
+   `limits.rapid_step_rate_hz` (equation 3.1, L853-878). `time_base` "event": a pass without a
+   pulse costs nothing (annex A.3 loops back at once); "iteration": each pass takes one period.
+4. At each change of an axis's direction the compensation steps are issued, a period each.
+
+An arc whose path never equals its end would go round for ever on the real machine. Here its
+samples stop at the nearest approach to the end in the expected sweep, `ended` is False, and the
+next row goes on from the programmed end, without a reversal on the way there. An arc that starts
+at its centre has no samples and the same fate. An arc that only meets its end on its second turn
+is simulated as it runs, with that turn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camtool.errors import MachineError, ProgramError
+from camtool.kernels.lattice import to_steps
+from camtool.machine.model import Interpolator, Machine
+from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach, line_filler
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.toolpath.moves import Kind, Toolpath
+
+MAX_STEPS = 1 << 30
+"""Positions beyond this many steps (150 m at 140 nm) are refused: squares must fit 64 bits."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to simulate; see `camtool.simulation.simulate.simulate`."""
+
+    interpolator: Interpolator | None
+    ideal: bool
+    chunk_steps: int
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """A part of a row that one interpolator makes: `samples` positions of `fill`; the position of
+    the axes `columns` is origin + sign · filled; an output every `period_s`."""
+
+    fill: Filler
+    samples: int
+    columns: tuple[int, ...]
+    origin: tuple[int, ...]
+    sign: tuple[int, ...]
+    period_s: float
+    ended: bool = True
+
+
+class PicMmh:
+    """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
+
+    def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
+        self._toolpath, self._machine, self._options = toolpath, machine, options
+        self._coded_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+        if self._coded_mm[0] != self._coded_mm[1]:
+            raise MachineError(
+                f"steps of X and Y differ ({self._coded_mm[0]} and {self._coded_mm[1]} mm)",
+                where="table [axes], key coded_step_mm",
+                mend="the controller interpolates with one step size; "
+                "say the difference in real_step_mm",
+            )
+        self._ends = self._steps(toolpath.end, range(3))
+        self._centres = self._arc_centres()
+        home_mm = np.array([machine.controller.machine_zero_mm], dtype=np.float64)
+        self._home: Ints = self._steps(home_mm, range(3), named=False)[0]
+        self._position: Ints = self._steps(toolpath.start[None, :], range(3), named=False)[0]
+        self._mechanics = Mechanics(machine, self._position, ideal=options.ideal)
+        self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
+
+    def run(self) -> Iterator[Chunk]:
+        """The chunks of all rows up to the end of the program."""
+        for row, number in enumerate(self._toolpath.kind.tolist()):
+            kind = Kind(number)
+            waiting, ended = self._still(row, kind), True
+            for chunk in self._moving(row, kind):
+                ended = ended and chunk.ended
+                if len(waiting.commanded):
+                    yield waiting
+                waiting = chunk
+            yield replace(waiting, last=True, ended=ended)
+            if kind == Kind.END:
+                return
+
+    def _moving(self, row: int, kind: Kind) -> Iterator[Chunk]:
+        """Chunks of a row's motion; the controller then stands at the end that it was given."""
+        if kind in (Kind.HOME_XY, Kind.HOME_Z):
+            target = self._position.copy()
+            axes = [0, 1] if kind == Kind.HOME_XY else [2]
+            target[axes] = self._home[axes]
+        elif kind <= Kind.ARC_CCW:
+            target = self._ends[row]
+        else:
+            return
+        if kind in (Kind.ARC_CW, Kind.ARC_CCW):
+            yield from self._emit(row, self._arc(row, kind, target))
+            self._position = np.array([target[0], target[1], self._position[2]])
+            self._mechanics.place(self._position)
+        else:
+            yield from self._emit(row, self._line((0, 1), target, self._period(row, kind, 0)))
+        if target[2] != self._position[2]:
+            yield from self._emit(row, self._line((2,), target, self._period(row, kind, 2)))
+
+    def _period(self, row: int, kind: Kind, axis: int) -> float:
+        """Seconds between two outputs of a row on an axis."""
+        if kind not in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
+            return 1.0 / self._machine.limits.rapid_step_rate_hz
+        feed = float(self._toolpath.feed[row])
+        if not (math.isfinite(feed) and feed > 0.0):
+            raise ProgramError(
+                "a move at a feed without a feed above 0",
+                where=self._place(row),
+                mend="give it one (F)",
+            )
+        return 60.0 * float(self._coded_mm[axis]) / feed
+
+    def _line(self, axes: tuple[int, ...], target: Ints, period_s: float) -> _Leg:
+        """A DDA line of one or two axes from here to `target`."""
+        way = [int(target[axis] - self._position[axis]) for axis in axes]
+        a, b = abs(way[0]), abs(way[1]) if len(way) > 1 else 0
+        return _Leg(
+            fill=line_filler(a, b),
+            samples=a + b,
+            columns=axes,
+            origin=tuple(int(self._position[axis]) for axis in axes),
+            sign=tuple(-1 if part < 0 else 1 for part in way),
+            period_s=period_s,
+        )
+
+    def _arc(self, row: int, kind: Kind, target: Ints) -> _Leg:
+        """The arc of a row, about its rounded centre, as far as it will go."""
+        centre_x, centre_y = self._centres[row].tolist()
+        x, y = int(self._position[0]) - centre_x, int(self._position[1]) - centre_y
+        arc = Arc(x, y, kind == Kind.ARC_CW, int(target[0]) - centre_x, int(target[1]) - centre_y)
+        period_s = self._period(row, kind, 0)
+        origin, sign = (centre_x, centre_y), (1, 1)
+        if x == 0 and y == 0:
+            return _Leg(line_filler(0, 0), 0, (0, 1), origin, sign, period_s, ended=False)
+        controller = self._machine.controller
+        method = self._options.interpolator or controller.arcs
+        rounded = controller.initial_error == "rounded-radius"
+        samples, met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
+        fill = arc_filler(arc, method, rounded=rounded)
+        return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=met)
+
+    def _emit(self, row: int, leg: _Leg) -> Iterator[Chunk]:
+        """The samples of a leg in chunks; an empty one when it has none and never ends."""
+        left, done = leg.samples, leg.samples == 0
+        if done and not leg.ended:
+            yield _empty(row, ended=False)
+        while not done:
+            filled, passes, done = leg.fill(self._buffer[:left])
+            left -= filled
+            done = done or left == 0
+            steps = np.empty((filled, 3), dtype=np.int64)
+            steps[:] = self._position
+            for index, column in enumerate(leg.columns):
+                steps[:, column] = (
+                    leg.origin[index] + leg.sign[index] * self._buffer[:filled, index]
+                )
+            self._position = steps[-1]
+            yield self._chunk(row, leg, steps, passes, leg.ended or not done)
+
+    def _chunk(self, row: int, leg: _Leg, steps: Ints, passes: int, ended: bool) -> Chunk:
+        slide, reversals, travelled = self._mechanics.follow(steps)
+        by_event = self._machine.controller.time_base == "event"
+        periods = len(steps) if by_event else passes
+        periods += int(reversals @ self._mechanics.compensation)
+        return Chunk(
+            row=row,
+            commanded=steps * self._coded_mm,
+            slide=slide,
+            duration_s=periods * leg.period_s,
+            iterations=passes,
+            steps=travelled,
+            reversals=reversals,
+            last=False,
+            ended=ended,
+        )
+
+    def _still(self, row: int, kind: Kind) -> Chunk:
+        """A chunk of a row without motion; ProgramError for an event that cannot be followed."""
+        seconds = 0.0
+        if kind == Kind.DWELL:
+            seconds = float(self._toolpath.value[row])
+            if not (math.isfinite(seconds) and seconds >= 0.0):
+                raise ProgramError("a dwell without its seconds", where=self._place(row))
+        elif kind == Kind.SET_ZERO and self._position.any():
+            raise ProgramError(
+                "part zero is set away from part zero",
+                where=self._place(row),
+                mend="set it once, before any move",
+            )
+        return _empty(row, duration_s=seconds)
+
+    def _arc_centres(self) -> Ints:
+        """(N, 2) steps; 0 where the row is no arc."""
+        toolpath = self._toolpath
+        bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
+        if bad.any():
+            raise ProgramError("an arc without a centre", where=self._place(int(bad.argmax())))
+        return self._steps(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), range(2))
+
+    def _steps(self, points: Floats, axes: range, *, named: bool = True) -> Ints:
+        """(N, len(axes)) steps of points in mm; ProgramError beyond `MAX_STEPS`."""
+        coded_mm = self._coded_mm[list(axes)]
+        far = (np.abs(points) > MAX_STEPS * coded_mm).any(axis=1)
+        if far.any():
+            raise ProgramError(
+                "a position is beyond all that the controller can count",
+                where=self._place(int(far.argmax())) if named else None,
+            )
+        columns = [to_steps(points[:, axis], float(coded_mm[axis])) for axis in axes]
+        return np.column_stack(columns)
+
+    def _place(self, row: int) -> str:
+        """The block (from 1) that a row was read from, or the row when it was planned."""
+        block = int(self._toolpath.block[row])
+        return f"block {block + 1}" if block >= 0 else f"move {row}"
+
+
+def _empty(row: int, *, duration_s: float = 0.0, ended: bool = True) -> Chunk:
+    """A chunk without samples."""
+    return Chunk(
+        row=row,
+        commanded=np.empty((0, 3)),
+        slide=np.empty((0, 3)),
+        duration_s=duration_s,
+        iterations=0,
+        steps=np.zeros(3, dtype=np.int64),
+        reversals=np.zeros(3, dtype=np.int64),
+        last=False,
+        ended=ended,
+    )
