@@ -32,24 +32,23 @@ def order(lines: Polylines, from_point: tuple[float, float] = (0.0, 0.0)) -> Ord
     parent = nesting(lines).parent
     held = np.bincount(parent[parent >= 0], minlength=len(lines))
     points, owner, vertex = _starts(lines)
-    open_to = held[owner] == 0
     first = np.searchsorted(owner, np.arange(len(lines) + 1))
+    # Starts that may not be taken now lie infinitely far away.
+    x, y = np.where((held[owner] == 0)[:, None], points, np.inf).T.copy()
     path = np.empty(len(lines), dtype=np.int64)
     start = np.empty(len(lines), dtype=np.int64)
     at = np.array(from_point)
     for rank in range(len(lines)):
-        apart = points - at
-        squared = np.where(open_to, apart[:, 0] ** 2 + apart[:, 1] ** 2, np.inf)
-        row = int(squared.argmin())
-        chosen = int(owner[row])
+        row = int(((x - at[0]) ** 2 + (y - at[1]) ** 2).argmin())
+        chosen, holder = int(owner[row]), int(parent[owner[row]])
         path[rank], start[rank] = chosen, vertex[row]
-        open_to[first[chosen] : first[chosen + 1]] = False
+        x[first[chosen] : first[chosen + 1]] = np.inf
         at = _end(lines, chosen, points[row])
-        holder = int(parent[chosen])
         if holder >= 0:
             held[holder] -= 1
             if held[holder] == 0:
-                open_to[first[holder] : first[holder + 1]] = True
+                rows = slice(first[holder], first[holder + 1])
+                x[rows], y[rows] = points[rows].T
     return Order(path, start)
 
 

@@ -6,6 +6,7 @@ contours ──order──▶ paths in order, each from its start ──link─�
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
@@ -30,7 +31,7 @@ def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
     wanted = contours(drawing, job)
     way = order(wanted.lines)
     names = [path_name(drawing, int(wanted.source[path])) for path in way.path]
-    builder = link(ordered(wanted.lines, way), names, job, heights, feeds)
+    toolpath = link(ordered(wanted.lines, way), names, job, heights, feeds).finish()
     findings = list(wanted.findings)
     if len(wanted.lines) == 0 and len(drawing.paths) > 0:
         findings.append(
@@ -41,8 +42,8 @@ def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
                 where=drawing.file,
             )
         )
-    findings.extend(_out_of_travel(builder.finish(), machine))
-    return builder.finish(tuple(findings))
+    findings.extend(_out_of_travel(toolpath, machine))
+    return replace(toolpath, findings=tuple(findings))
 
 
 def _out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
