@@ -2,7 +2,7 @@
 
 Every reader ends here, so that a DXF and an SVG of the same part give the same Drawing:
 
-    pieces → checked numbers → no repeated points → chained within their layer → findings
+    pieces → checked numbers → no point or piece twice → chained within their layer → findings
 
 A *piece* is one entity or one subpath, in mm, Y up. A *gap* lies between two open ends.
 Tolerances: POSITION_EPS_MM (two points are one), `options.gap_mm` (two ends are joined),
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,8 +21,11 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.chain import chain
 from camtool.geometry.drawing import Drawing, FitError, Gap, Skipped, Units
 from camtool.geometry.measure import extents
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polylines
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines
 from camtool.importers.options import ReadOptions
+from camtool.importers.piece import MAX_COORDINATE_MM, Piece, cleaned
+
+__all__ = ["MAX_COORDINATE_MM", "Piece", "assemble"]
 
 SMALLEST_MM = 0.05
 """A drawing whose longer side is below this was probably read in the wrong unit."""
@@ -31,34 +33,11 @@ SMALLEST_MM = 0.05
 LARGEST_MM = 2000.0
 """A drawing whose longer side is above this was probably read in the wrong unit."""
 
-MAX_COORDINATE_MM = 1e9
-"""Beyond this doubles cannot tell positions apart that differ by POSITION_EPS_MM."""
-
 MAX_GAP_FINDINGS = 20
 """So many gaps get a finding of their own, largest first; the others are counted in one."""
 
 _SOURCES_NAMED = 3
 """So many members of a chain are named in its source."""
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """One entity: `vertices` (n, 3) of x, y, bulge in mm, and where it came from.
-
-    A closed piece may repeat its first point at its end. `source` begins with the kind of the
-    entity ("CIRCLE 2F", "path outline").
-    """
-
-    vertices: Floats
-    closed: bool
-    layer: str
-    colour: str
-    source: str
-
-    @property
-    def where(self) -> str:
-        """For messages: layer and source."""
-        return f"layer {self.layer}, {self.source}"
 
 
 def assemble(
@@ -78,7 +57,7 @@ def assemble(
     each kind of `skipped` are added here. Raises DrawingError when a number is no position or
     when nothing is left to draw.
     """
-    whole, dropped = _cleaned(pieces, file)
+    whole, dropped = cleaned(pieces, file)
     every_skip = _counted([*skipped, *dropped])
     if not whole:
         raise _nothing(every_skip, file)
@@ -86,16 +65,12 @@ def assemble(
     chained = chain(_columns(whole, file), gap_mm, [piece.layer for piece in whole])
     if not len(chained.lines):
         raise _nothing(every_skip, file)
-    order = sorted(range(len(chained.members)), key=lambda row: min(chained.members[row]))
-    in_order = order == list(range(len(order)))
-    lines = chained.lines if in_order else chained.lines.select(order)
-    members = [chained.members[row] for row in order]
-    first = [whole[row[0]] for row in members]
+    first = [whole[members[0]] for members in chained.members]
     return Drawing(
-        paths=lines,
+        paths=chained.lines,
         layers=tuple(piece.layer for piece in first),
         colours=tuple(piece.colour for piece in first),
-        sources=tuple(_source([whole[index] for index in row]) for row in members),
+        sources=tuple(_source([whole[index] for index in row]) for row in chained.members),
         file=file,
         units=units,
         fit=fit,
@@ -105,74 +80,11 @@ def assemble(
         findings=(
             *findings,
             *_skip_findings(skipped, dropped),
-            *_size_findings(lines, units),
+            *_size_findings(chained.lines, units),
             *_gap_findings(chained.closed_gaps, gap_mm, closed=True),
             *_gap_findings(chained.open_gaps, gap_mm, closed=False),
         ),
     )
-
-
-def _cleaned(pieces: Sequence[Piece], file: str) -> tuple[list[Piece], list[Skipped]]:
-    """The pieces without repeated points, and the count of what that cost."""
-    whole: list[Piece] = []
-    points: Counter[str] = Counter()
-    pointless: Counter[str] = Counter()
-    for piece in pieces:
-        _check(piece, file)
-        vertices, repeated = without_repeats(piece.vertices, piece.closed)
-        kind = piece.source.partition(" ")[0]
-        if len(vertices) < 2:
-            pointless[kind] += 1
-            continue
-        points[kind] += repeated
-        # There and back along one line encloses nothing: it is that line, once.
-        flat = piece.closed and len(vertices) == 2 and not vertices[:, 2].any()
-        closed = piece.closed and not flat
-        whole.append(Piece(vertices, closed, piece.layer, piece.colour, piece.source))
-    dropped = [Skipped(kind, n, "has no length") for kind, n in pointless.items()]
-    dropped += [Skipped(f"point of {kind}", n, "is repeated") for kind, n in points.items() if n]
-    return whole, dropped
-
-
-def _check(piece: Piece, file: str) -> None:
-    """DrawingError when a number of the piece is no position in a drawing."""
-    if not np.isfinite(piece.vertices).all():
-        raise DrawingError("a number is not finite", file=file, where=piece.where)
-    furthest = float(np.abs(piece.vertices[:, :2]).max(initial=0.0))
-    if furthest > MAX_COORDINATE_MM:
-        raise DrawingError(
-            f"a point lies {furthest:.6g} mm away, where micrometres are lost",
-            file=file,
-            where=piece.where,
-            mend="move the drawing to its origin, or name its unit with --units",
-        )
-
-
-def without_repeats(vertices: Floats, closed: bool) -> tuple[Floats, int]:
-    """The vertices (m, 3) without segments below POSITION_EPS_MM, and how many went.
-
-    A closed path's repeated first point at its end goes uncounted: it says "closed" once more.
-    """
-    steps = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
-    kept = vertices
-    if (steps <= POSITION_EPS_MM).any():
-        kept = _kept(vertices)
-    repeated = len(vertices) - len(kept)
-    if closed:
-        while len(kept) > 1 and np.hypot(*(kept[-1, :2] - kept[0, :2])) <= POSITION_EPS_MM:
-            kept = kept[:-1]
-    return kept, repeated
-
-
-def _kept(vertices: Floats) -> Floats:
-    """Each vertex that lies off the one kept before it; a bulge belongs to what leaves."""
-    rows = [vertices[0].copy()]
-    for vertex in vertices[1:]:
-        if np.hypot(vertex[0] - rows[-1][0], vertex[1] - rows[-1][1]) > POSITION_EPS_MM:
-            rows.append(vertex.copy())
-        else:
-            rows[-1][2] = vertex[2]
-    return np.array(rows)
 
 
 def _columns(pieces: Sequence[Piece], file: str) -> Polylines:

@@ -141,7 +141,9 @@ def parse_colour(text: str) -> str:
 
 def _channel(text: str) -> int:
     try:
-        value = float(text.rstrip("%")) * (2.55 if text.endswith("%") else 1.0)
+        value = float(text.rstrip("%"))
     except ValueError:  # "1.2.3"
         return 0
+    if text.endswith("%"):
+        value = value * 255.0 / 100.0
     return int(min(max(value, 0.0), 255.0) + 0.5)
