@@ -1,0 +1,63 @@
+"""A program of every kind of row, byte for byte, in both forms (`--bless` writes it anew)."""
+
+from pathlib import Path
+
+import pytest
+
+from camtool.machine.registry import load_target
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+
+GOLDEN = Path(__file__).parents[1] / "golden"
+
+
+def part() -> Toolpath:
+    """Every kind of row: a slot and a full circle, an engraved line, and all events."""
+    path = ToolpathBuilder().event(Kind.TOOL_CHANGE, 1).event(Kind.SPINDLE_CW, 1200)
+    path.event(Kind.DWELL, 2).rapid(z=0.2).rapid(1.0, 0.75).line(z=-0.02, feed=0.4)
+    path.line(2.0, 0.75, feed=0.8).arc(2.0, 1.25, centre=(2.0, 1.0), ccw=True, feed=0.8)
+    path.line(1.0, 1.25, feed=0.8).arc(1.0, 0.75, centre=(1.0, 1.0), ccw=True, feed=0.8)
+    path.rapid(z=0.2).event(Kind.SPINDLE_OFF).event(Kind.SPINDLE_CCW, 800)
+    path.rapid(-1.2, -0.3).line(z=-0.02, feed=0.4)
+    path.arc(-1.2, -0.3, centre=(-1.5, -0.4), ccw=False, feed=0.8)
+    path.arc(-1.58662, -0.70414, centre=(-1.5, -0.4), ccw=False, feed=0.8)  # needs a mend
+    path.rapid(z=0.2).message("remove the part").event(Kind.SPINDLE_OFF)
+    path.moved_to(-1.58662, -0.70414, 0.0).event(Kind.HOME_Z).moved_to(0, 0, 0).event(Kind.HOME_XY)
+    return path.event(Kind.END).finish()
+
+
+def compare(file: Path, data: bytes, *, bless: bool) -> None:
+    """`data` must be what the file holds; a missing file is a failure."""
+    if bless:
+        file.write_bytes(data)
+    if not file.exists():
+        pytest.fail(f"{file.name} is missing: look at the program, then run pytest with --bless")
+    assert data.decode("ascii") == file.read_bytes().decode("ascii")
+
+
+@pytest.mark.parametrize("form", ["example", "annex"])
+def test_program(form: str, bless: bool) -> None:
+    target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
+    data = target.post.write(part(), target.machine).data
+    compare(GOLDEN / f"pic-mmh-{form}.pic", data, bless=bless)
+
+
+def test_a_changed_byte_fails(tmp_path: Path) -> None:
+    file = tmp_path / "program.pic"
+    file.write_bytes(b"G54;\n")
+    compare(file, b"G54;\n", bless=False)
+    with pytest.raises(AssertionError):
+        compare(file, b"G90;\n", bless=False)
+
+
+def test_a_missing_file_fails_and_is_not_made(tmp_path: Path) -> None:
+    file = tmp_path / "program.pic"
+    with pytest.raises(pytest.fail.Exception, match="--bless"):
+        compare(file, b"G54;\n", bless=False)
+    assert not file.exists()
+
+
+def test_blessing_writes_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "program.pic"
+    compare(file, b"G54;\n", bless=True)
+    assert file.read_bytes() == b"G54;\n"

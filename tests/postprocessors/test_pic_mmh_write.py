@@ -1,0 +1,271 @@
+"""What the pic-mmh writer sends, block by block, and what it refuses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from camtool.errors import MachineError, PostError
+from camtool.findings import Code, Severity
+from camtool.machine.registry import load_target
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+
+THESIS = "G02X02969.00Y03400.00I03012.00J03040.00F08;"
+
+
+def written(path: ToolpathBuilder, *settings: str) -> list[str]:
+    """The blocks between header and footer."""
+    target = load_target("pic-mmh", settings=settings)
+    blocks = target.post.write(path.finish(), target.machine).data.decode("ascii").splitlines()
+    assert blocks[:2] == ["G54;", "G90;"]
+    assert blocks[-1] == "M30;"
+    return blocks[2:-1]
+
+
+def findings(path: ToolpathBuilder, *settings: str) -> dict[Code, str]:
+    target = load_target("pic-mmh", settings=settings)
+    found = target.post.write(path.finish(), target.machine).findings
+    assert len({finding.code for finding in found}) == len(found)
+    return {finding.code: finding.message for finding in found}
+
+
+def test_the_block_of_the_thesis_is_formatted_from_its_arc() -> None:
+    target = load_target("pic-mmh")
+    path = ToolpathBuilder().arc(2.969, 3.4, centre=(3.012, 3.04), ccw=False, feed=0.8).finish()
+    (move,) = path
+    assert target.post.format_block(move, target.machine) == THESIS
+
+
+@pytest.mark.parametrize(
+    ("form", "blocks"),
+    [
+        (
+            "example",
+            [
+                "G00Z00200.00;",
+                "G00X01000.00Y-02000.50;",
+                "G01Z-00020.00F08;",
+                "G01X00000.00Y-02000.50F13;",
+            ],
+        ),
+        (
+            "annex",
+            [
+                "G00Z+00200;",
+                "G00X+01000Y-02001;",
+                "G01Z-00020F08;",
+                "G01X+00000Y-02001F13;",
+            ],
+        ),
+    ],
+)
+def test_lines_in_both_forms(form: str, blocks: list[str]) -> None:
+    path = ToolpathBuilder().rapid(z=0.2).rapid(1, -2.0005).line(z=-0.02, feed=0.8)
+    path.line(-0.000001, -2.0005, feed=1.3)
+    assert written(path, f"dialect.form={form}") == blocks
+
+
+def test_events() -> None:
+    path = ToolpathBuilder().event(Kind.SPINDLE_CW, 3000).event(Kind.SPINDLE_CCW, 50)
+    path.event(Kind.DWELL, 7).event(Kind.SPINDLE_OFF).event(Kind.TOOL_CHANGE, 4)
+    path.message("not sent; G00").event(Kind.HOME_Z).event(Kind.HOME_XY)
+    assert written(path) == [
+        "M03S3000;",
+        "M04S0050;",
+        "G04P07;",
+        "M05;",
+        "M06T04;",
+        "G28Z0;",
+        "G28X0Y0;",
+    ]
+
+
+def test_after_homing_the_controller_stands_at_machine_zero() -> None:
+    path = ToolpathBuilder().line(1, 1, feed=1).moved_to(-1.4, -0.7, 0).event(Kind.HOME_XY)
+    path.line(-1.4, -0.7, feed=1).line(0, 0, feed=1)
+    blocks = written(path, "controller.machine_zero_mm=[-1.4, -0.7, 0.0]")
+    assert blocks[1:] == ["G28X0Y0;", "G01X00000.00Y00000.00F10;"]
+
+
+def test_rows_of_blocks() -> None:
+    target = load_target("pic-mmh")
+    path = ToolpathBuilder().event(Kind.SET_ZERO).line(1, 1, feed=1).line(1, 1, feed=1)
+    path.line(2, 2, 1, feed=1).event(Kind.END)
+    program = target.post.write(path.finish(), target.machine)
+    assert program.data.decode().splitlines()[0::5] == ["G54;", "M30;"]
+    assert program.row_of_block.tolist() == [0, -1, 1, 3, 3, 4]
+    assert (program.target, program.extension) == ("pic-mmh", ".pic")
+    bare = target.post.write(ToolpathBuilder().finish(), target.machine)
+    assert bare.data == b"G54;\nG90;\nM30;\n"
+    assert bare.row_of_block.tolist() == [-1, -1, -1]
+
+
+def test_up_comes_first_and_down_last() -> None:
+    path = ToolpathBuilder().rapid(1, 0, 1).rapid(2, 0, 0)
+    assert [block[3] for block in written(path)] == ["Z", "X", "X", "Z"]
+    assert findings(path) == {}
+    path.line(3, 0, -1, feed=1).arc(3, 2, centre=(3, 1), ccw=True, feed=1)
+    assert Code.MOVE_SPLIT in findings(path)
+
+
+def test_feeds_are_rounded_down_and_told() -> None:
+    path = ToolpathBuilder().line(1, 0, feed=0.19).line(2, 0, feed=0.3).line(3, 0, feed=1.394)
+    assert [block[-4:] for block in written(path)] == ["F01;", "F03;", "F13;"]
+    assert "2 moves" in findings(path)[Code.FEED_ROUNDED]
+    assert findings(ToolpathBuilder().line(1, 0, feed=0.7)) == {}
+
+
+def test_dwells_are_split_and_rounded_up() -> None:
+    path = ToolpathBuilder().event(Kind.DWELL, 200.25).event(Kind.DWELL, 0)
+    assert written(path) == ["G04P99;", "G04P99;", "G04P03;"]
+    assert Code.VALUE_ROUNDED in findings(path)
+
+
+def test_moves_of_less_than_a_step_are_left_out() -> None:
+    path = ToolpathBuilder().line(0.00001, 0, feed=1).line(0, 0, feed=1).rapid(0, 0, 0.00006)
+    assert written(path) == []
+    assert "3 moves" in findings(path)[Code.MOVE_COLLAPSED]
+
+
+def test_no_coordinate_lies_half_way_between_two_steps() -> None:
+    # 0.07 µm is half a step: said one hundredth farther out, which is the same step.
+    path = ToolpathBuilder().line(0.00007, -0.00021, feed=1)
+    assert written(path) == ["G01X00000.08Y-00000.22F10;"]
+
+
+def test_long_blocks_are_one_finding() -> None:
+    path = ToolpathBuilder().line(1, 0, feed=1).arc(1, 0, centre=(0, 0), ccw=True, feed=1)
+    path.arc(1, 0, centre=(-1, 0), ccw=True, feed=1)
+    target = load_target("pic-mmh")
+    (finding,) = target.post.write(path.finish(), target.machine).findings
+    assert finding.code == Code.BLOCK_TOO_LONG
+    assert finding.severity == Severity.WARNING
+    assert (finding.measured, finding.limit) == (44.0, 35.0)
+    assert "2 blocks" in finding.message
+    assert "dialect.form=annex" in finding.message
+    assert findings(path, "dialect.form=annex") == {}
+    assert findings(path, "dialect.buffer_chars=44") == {}
+
+
+def builder() -> ToolpathBuilder:
+    path = ToolpathBuilder()
+    path.source = "CIRCLE 2F"
+    return path
+
+
+REFUSED = {
+    "feed 0": (builder().line(1, 0, feed=0), "feed 0 mm/min"),
+    "feed not a number": (builder().line(1, 0, feed=math.nan), "is no feed"),
+    "negative feed": (builder().line(1, 0, feed=-1), "is no feed"),
+    "feed below F01": (builder().line(1, 0, feed=0.09), "F00"),
+    "feed above the link": (builder().line(1, 0, feed=1.4), "the highest feed is 1.3 mm/min"),
+    "feed without bound": (builder().line(1, 0, feed=math.inf), "the highest feed is 1.3"),
+    "X too long": (builder().rapid(100, 0), "X = 100 mm has more than five digits"),
+    "Y too long": (builder().rapid(0, -1e300), "Y = -1e+300 mm"),
+    "Z too long": (builder().rapid(z=99.999996), "Z = 100 mm"),
+    "centre too far": (
+        builder().arc(0, 0, centre=(0, 200), ccw=True, feed=1),
+        "J = 200 mm has more than five digits",
+    ),
+    "arc without centre": (
+        builder().arc(1, 0, centre=(math.nan, 0), ccw=True, feed=1),
+        "distance to the centre",
+    ),
+    "arc of two radii": (builder().arc(1, 0, centre=(0.4, 0), ccw=True, feed=1), "differ by 0.2"),
+    "spindle too fast": (builder().event(Kind.SPINDLE_CW, 10000), "spindle speed 10000"),
+    "spindle without speed": (builder().event(Kind.SPINDLE_CW), "spindle speed nan"),
+    "tool of three digits": (builder().event(Kind.TOOL_CHANGE, 100), "tool 100"),
+    "half a tool": (builder().event(Kind.TOOL_CHANGE, 1.5), "tool 1.5"),
+    "negative dwell": (builder().event(Kind.DWELL, -1), "dwell -1"),
+    "endless dwell": (builder().event(Kind.DWELL, 1e9), "dwell 1e+09"),
+    "part zero elsewhere": (builder().rapid(1, 0).event(Kind.SET_ZERO), "part zero"),
+    "moves after the end": (builder().event(Kind.END).rapid(1, 0), "follow the end"),
+    "homing to another place": (builder().rapid(1, 0).event(Kind.HOME_XY), "HOME_XY cannot end"),
+    "an event that moves": (builder().moved_to(1, 0, 0).event(Kind.DWELL, 1), "DWELL cannot"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refusals_name_the_move_and_the_value(name: str) -> None:
+    path, message = REFUSED[name]
+    with pytest.raises(PostError, match=r"^move \d \(CIRCLE 2F\): ") as caught:
+        written(path)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_annex_has_five_digits_too() -> None:
+    assert written(ToolpathBuilder().rapid(99.999, -99.999), "dialect.form=annex") == [
+        "G00X+99999Y-99999;"
+    ]
+    with pytest.raises(PostError, match=r"X = 99\.9996 mm"):
+        written(ToolpathBuilder().rapid(99.9996, 0), "dialect.form=annex")
+
+
+def test_a_path_that_starts_elsewhere_is_refused() -> None:
+    with pytest.raises(PostError, match=r"starts at \(1, 0, 0\) mm"):
+        written(ToolpathBuilder(start=(1.0, 0.0, 0.0)).rapid(2, 0))
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("controller.arcs=stairs", "controller.arcs=dsm"),
+        ("axes.x.coded_step_mm=0.0001", "coded steps of X and Y differ"),
+    ],
+)
+def test_arcs_are_planned_for_one_interpolator_and_one_step(setting: str, message: str) -> None:
+    path = ToolpathBuilder().line(1, 0, feed=0.5)
+    assert len(written(path, setting)) == 1
+    with pytest.raises(PostError) as caught:
+        written(path.arc(1, 0, centre=(0, 0), ccw=True, feed=0.5), setting)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["dialect.form=other", "dialect.buffer_chars=0", "dialect.buffer_chars=x", "dialect.forn=x"],
+)
+def test_a_dialect_table_that_does_not_fit_is_refused(setting: str) -> None:
+    with pytest.raises(MachineError, match="dialect"):
+        load_target("pic-mmh", settings=[setting])
+
+
+def test_a_block_that_needs_two_is_not_formatted() -> None:
+    target = load_target("pic-mmh")
+    both, down, dwell = ToolpathBuilder().rapid(1, 1, 1).rapid(z=0).event(Kind.DWELL, 1).finish()
+    assert target.post.format_block(down, target.machine) == "G00Z00000.00;"
+    for move in (both, dwell):
+        with pytest.raises(PostError, match="not one block"):
+            target.post.format_block(move, target.machine)
+
+
+def test_no_minus_zero_and_only_plain_characters() -> None:
+    rng = np.random.default_rng(0)
+    path = ToolpathBuilder()
+    for x, y, z in rng.normal(scale=0.0002, size=(500, 3)):
+        path.line(x, y, z, feed=1)
+    for form in ("example", "annex"):
+        text = "".join(written(path, f"dialect.form={form}"))
+        assert set(text) <= set("G01XYZF0123456789.;-+")
+        assert "-00000.00" not in text
+        assert "-00000F" not in text
+        assert "-00000Y" not in text
+
+
+def test_text_of_a_drawing_never_reaches_the_program() -> None:
+    path = ToolpathBuilder()
+    path.source = "LAYER ;M03S9999;"
+    path.line(1, 1, feed=1).message(";A;")
+    assert written(path) == ["G01X01000.00Y01000.00F10;"]
+
+
+def test_a_toolpath_is_left_as_it_is() -> None:
+    target = load_target("pic-mmh")
+    path = ToolpathBuilder().line(1, 1, feed=1).finish()
+    before = [np.array(getattr(path, name)) for name in ("end", "kind", "feed")]
+    assert isinstance(path, Toolpath)
+    target.post.write(path, target.machine)
+    for name, column in zip(("end", "kind", "feed"), before, strict=True):
+        np.testing.assert_array_equal(getattr(path, name), column)
