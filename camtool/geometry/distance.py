@@ -41,7 +41,8 @@ class Nearest:
 
 @dataclass(frozen=True)
 class Approach:
-    """Least distance of two paths, mm, and where on the first path, (x, y) mm."""
+    """Least distance of two paths, mm, and a point (x, y) of one of them that is as far from the
+    other one."""
 
     distance: float
     point: tuple[float, float]
@@ -174,7 +175,7 @@ def _distance(points: Floats, rows: _Rows) -> Floats:
 
 
 def _between(a: Segments, b: Segments) -> tuple[Floats, Floats]:
-    """(N,) distances of N pairs of segments and (N, 2) where on `a`; 0 for pairs that cross."""
+    """(N,) distances of N pairs of segments, 0 where they cross, and (N, 2) where that is."""
     rows_a, rows_b = _Rows.of(a), _Rows.of(b)
     candidates: list[tuple[Floats, Floats]] = []
     for points in (a.start, a.end):

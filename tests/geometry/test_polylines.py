@@ -1,0 +1,150 @@
+"""What is checked when a polyline is made, and the working form of its segments."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from camtool.errors import GeometryError
+from camtool.geometry.polylines import (
+    BULGE_EPS,
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+)
+from tests.strategies import polylines
+
+TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.5], [4.0, 3.0, 0.0]])
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("column", [0, 1, 2])
+def test_numbers_that_are_not_finite_are_refused(bad: float, column: int) -> None:
+    vertices = TRIANGLE.copy()
+    vertices[1, column] = bad
+    with pytest.raises(GeometryError, match="not finite") as caught:
+        Polyline(vertices, closed=True)
+    assert caught.value.where == "path 0, vertex 1"
+
+
+@pytest.mark.parametrize("bulge", [1.0 + 1e-9, -1.5, 2.0])
+def test_more_than_half_a_circle_is_refused(bulge: float) -> None:
+    with pytest.raises(GeometryError, match="split the arc"):
+        Polyline(np.array([[0.0, 0.0, bulge], [1.0, 0.0, 0.0]]))
+
+
+def test_half_a_circle_may_exceed_by_rounding_and_is_then_set_right() -> None:
+    path = Polyline(np.array([[0.0, 0.0, -1.0 - 0.5 * BULGE_EPS], [1.0, 0.0, 0.0]]))
+    assert path.vertices[0, 2] == -1.0
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_repeated_points_are_refused(closed: bool) -> None:
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0.5 * POSITION_EPS_MM, 0], [2, 1, 0]])
+    with pytest.raises(GeometryError, match="repeated") as caught:
+        Polyline(vertices, closed)
+    assert caught.value.where == "path 0, vertex 1"
+
+
+def test_the_last_point_of_a_closed_path_may_not_repeat_the_first() -> None:
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0]])
+    assert len(Polyline(vertices, closed=False)) == 3
+    with pytest.raises(GeometryError, match="repeated") as caught:
+        Polyline(vertices, closed=True)
+    assert caught.value.where == "path 0, vertex 3"
+
+
+def test_points_a_little_more_than_the_limit_apart_are_kept() -> None:
+    assert len(Polyline(np.array([[0.0, 0, 0], [1.01 * POSITION_EPS_MM, 0, 0]]))) == 1
+
+
+def test_faults_name_path_and_vertex_of_that_path() -> None:
+    good = Polyline(TRIANGLE)
+    vertices = np.concatenate([good.vertices, TRIANGLE])
+    vertices[4, 0] = math.nan
+    with pytest.raises(GeometryError) as caught:
+        Polylines(vertices, np.array([0, 3, 6]), np.array([False, True]))
+    assert caught.value.where == "path 1, vertex 1"
+
+
+@pytest.mark.parametrize(
+    ("offsets", "closed"),
+    [
+        ([0, 2], [True]),  # a vertex is left over
+        ([1, 3], [True]),  # begins late
+        ([0, 3], [True, False]),  # one path too few
+        ([0, 2, 4], [True, False]),  # reaches beyond the vertices
+    ],
+)
+def test_offsets_that_do_not_fit_are_refused(offsets: list[int], closed: list[bool]) -> None:
+    with pytest.raises(GeometryError, match="offsets"):
+        Polylines(TRIANGLE, np.array(offsets), np.array(closed))
+
+
+@pytest.mark.parametrize("offsets", [[0, 1, 3], [0, 3, 3], [0, 4, 3]])
+def test_a_path_needs_two_points(offsets: list[int]) -> None:
+    with pytest.raises(GeometryError, match="two points"):
+        Polylines(TRIANGLE, np.array(offsets), np.array([False, False]))
+
+
+@pytest.mark.parametrize("shape", [(3,), (3, 2), (2, 3, 1)])
+def test_vertices_of_another_shape_are_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(GeometryError, match="shape"):
+        Polyline(np.zeros(shape))
+
+
+def test_arrays_are_read_only_copies() -> None:
+    mine = TRIANGLE.copy()
+    paths = Polylines.of([Polyline(mine, closed=True)])
+    mine[0] = 7.0
+    assert paths.vertices[0, 0] == 0.0
+    for array in (paths.vertices, paths.offsets, paths.closed, paths[0].vertices):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+def test_the_bulge_behind_the_last_point_of_an_open_path_is_dropped() -> None:
+    vertices = np.array([[0.0, 0, 0.25], [1, 0, 0.75]])
+    assert Polyline(vertices).vertices[1, 2] == 0.0
+    assert Polyline(vertices, closed=True).vertices[1, 2] == 0.75
+
+
+def test_nothing_is_a_fine_set_of_paths() -> None:
+    nothing = Polylines.of([])
+    assert len(nothing) == 0
+    assert list(nothing) == []
+    assert len(Segments.of(nothing)) == 0
+
+
+def test_paths_are_found_by_index_and_selected_in_order() -> None:
+    a, b = Polyline(TRIANGLE), Polyline(2.0 * TRIANGLE[:2], closed=True)
+    paths = Polylines.of([a, b])
+    assert np.array_equal(paths[-1].vertices, b.vertices)
+    assert paths.select([1, 0]).closed.tolist() == [True, False]
+    with pytest.raises(IndexError):
+        paths[2]
+
+
+def test_columns_must_fit_a_toolmaker_s_eye() -> None:
+    quarter = Segments.of(Polyline(np.array([[1.0, 0, math.tan(math.pi / 8)], [0, 1, 0]])))
+    assert quarter.centre[0] == pytest.approx([0.0, 0.0], abs=1e-15)
+    assert quarter.radius[0] == pytest.approx(1.0)
+    assert quarter.sweep[0] == pytest.approx(0.5 * math.pi)
+    assert quarter.start_angle[0] == pytest.approx(0.0, abs=1e-15)
+
+
+@given(polylines())
+def test_segments_follow_each_other_and_arcs_end_where_they_should(path: Polyline) -> None:
+    segments = Segments.of(path)
+    assert len(segments) == len(path)
+    assert np.array_equal(segments.end[:-1], segments.start[1:])
+    assert np.array_equal(segments.end[-1], path.end)
+    arcs = segments[segments.is_arc]
+    angle = arcs.start_angle + arcs.sweep
+    reached = arcs.centre + arcs.radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    # A far centre costs digits: those of the radius.
+    assert (np.abs(reached - arcs.end) <= 1e-13 * (1.0 + arcs.radius)[:, None] * 10).all()
