@@ -22,6 +22,9 @@ SWATCH, SWATCH_GAP, ENTRY_GAP = 34.0, 11.0, 28.0
 LONGEST_ENTRY = 330.0
 BAR_WIDTH, BAR_GAP = 18.0, 26.0
 LEAST_BAR_SPACING = 85.0
+CLEAR_OF_TOP = 2.3
+"""Round numbers stay this many letters' heights below the largest error."""
+
 BAR_TITLE = "error (µm)"
 
 
@@ -130,7 +133,7 @@ RAMP_SWATCH = (PLUNGE, 2.8)
 def bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
     """(value µm, text) along the colour bar: round numbers, and the largest error at the top."""
     step = round_step(top_um * LEAST_BAR_SPACING / height)
-    room = top_um * 1.8 * TICK_CAP / height
+    room = top_um * CLEAR_OF_TOP * TICK_CAP / height
     labels = [
         (value, number(value, decimals_of(step)))
         for value in multiples(0.0, top_um, step)

@@ -40,7 +40,7 @@ THINNEST = 0.5
 ARROW_LENGTH, ARROW_WIDTH = 18.0, 6.5
 ARROW_EVERY = 900.0
 SHORTEST_WITH_ARROW = 90.0
-MOST_ARROWS, MOST_ON_ONE = 60, 4
+MOST_WITH_ARROW, MOST_ON_ONE = 150, 4
 MARKS_OF_FULL_SIZE = 120
 SMALLEST_MARK = 0.3
 TIE_DECIMALS = 4
@@ -167,23 +167,19 @@ def gap_look() -> Look:
 
 
 def arrows(chains: Sequence[Chain], view: View) -> str:
-    """Few arrows along the longest chains, in the direction of travel."""
+    """Few arrows, in the direction of travel: none on short chains, four at most on one."""
     lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
-    longest = sorted(range(len(chains)), key=lambda index: (-lengths[index], index))
-    data, count = PathData(), 0
-    for index in longest:
-        if lengths[index] < SHORTEST_WITH_ARROW or count >= MOST_ARROWS:
-            break
+    long = [index for index, length in enumerate(lengths) if length >= SHORTEST_WITH_ARROW]
+    data = PathData()
+    for index in long[:: 1 + len(long) // MOST_WITH_ARROW]:
         wanted = min(1 + int(lengths[index] / ARROW_EVERY), MOST_ON_ONE)
         for place in range(wanted):
             point, heading = _along(chains[index], place / wanted, (place + 1) / wanted)
             if view.shows(*point):
                 _arrow(data, view.page(*point), -heading)
-                count += 1
-    look: Look = {"fill": FEED, "stroke": PAPER, "stroke-width": 0.8, "stroke-linejoin": "round"}
-    return (
-        element("g", {"id": "arrows"}, element("path", {"d": str(data), **look})) if data else ""
-    )
+    if not data:
+        return ""
+    return element("g", {"id": "arrows"}, element("path", {"d": str(data), "fill": FEED}))
 
 
 def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], float]:

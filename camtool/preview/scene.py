@@ -19,10 +19,11 @@ class Scene:
     """What to draw; whatever is None or empty is left out.
 
     trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
-    wanted, trace_cutting (T,) where the tool cuts (everywhere when None); errors count only
-    there. travel_mm is the size of the table's travel from (0, 0). drawing_shift_mm moves the
-    drawing into the work frame. With a trace the picture is one of the part: rapids and plunges
-    are left out, feeds are pale. ValueError when the trace is incomplete or not finite.
+    wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
+    other errors do not count. travel_mm is the size of the table's travel from (0, 0).
+    drawing_shift_mm moves the drawing into the work frame. With a trace the picture is one of the
+    part: rapids and plunges are left out, feeds are pale. ValueError when the trace is incomplete
+    or not finite.
     """
 
     title: str = ""
@@ -45,7 +46,8 @@ class Scene:
         if cutting is None:
             cutting = np.ones(len(points), dtype=np.bool_)
             object.__setattr__(self, "trace_cutting", cutting)
-        if points.shape != (len(points), 2) or error.shape != cutting.shape != (len(points),):
+        count = (len(points),)
+        if points.shape != (*count, 2) or error.shape != count or cutting.shape != count:
             raise ValueError("the columns of the trace have different lengths")
         if not (np.isfinite(points).all() and np.isfinite(error[cutting]).all()):
             raise ValueError("a number of the trace is not finite")

@@ -134,13 +134,22 @@ def path_data(chains: Iterable[Chain]) -> str:
         data.move(*points[0])
         closing_line = chain.closed and chain.sweep[-1] == 0.0
         for index, sweep in enumerate(chain.sweep.tolist()):
-            if sweep != 0.0:
+            if sweep != 0.0 and not _is_flat(chain, index, sweep):
                 _arc(data, chain, index, sweep)
             elif not (closing_line and index == len(chain.sweep) - 1):
                 data.line(*points[index + 1])
         if chain.closed:
             data.close()
     return str(data)
+
+
+def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
+    """Whether an arc leaves its chord by less than what tells two positions apart.
+
+    height = chord/2 · tan(sweep/4); renderers lose their way in circles of kilometres.
+    """
+    chord = math.dist(chain.points[index], chain.points[index + 1])
+    return abs(sweep) < math.pi and 0.5 * chord * math.tan(abs(sweep) / 4.0) < POSITION_EPS_MM
 
 
 def _arc(data: PathData, chain: Chain, index: int, sweep: float) -> None:

@@ -35,7 +35,8 @@ MERGED_SHARE = 1.25e-4
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Points (T, 2) mm, |error| (T,) µm and whether the tool cuts (T,), and the map's end."""
+    """Points (T, 2) mm, |error| (T,) µm, whether the tool cut on the way there (T,); the map's
+    end."""
 
     points: Floats
     error_um: Floats
@@ -53,10 +54,13 @@ def trace_of(scene: Scene) -> Trace | None:
 
 
 def bins_of(trace: Trace) -> Ints:
-    """(T−1,) the step of the map for each piece of the path, by its worse end; −1: not cutting."""
+    """(T−1,) the step of the map for each piece of the path, by its worse end; −1: not cutting.
+
+    Whether a piece cuts is said by the point that it leads to.
+    """
     worse = np.maximum(trace.error_um[:-1], trace.error_um[1:])
     step = np.minimum((worse / trace.top_um * BINS).astype(np.int64), BINS - 1)
-    return np.where(trace.cutting[:-1] & trace.cutting[1:], step, -1)
+    return np.where(trace.cutting[1:], step, -1)
 
 
 def strokes(trace: Trace, window_mm: float) -> list[list[Floats]]:

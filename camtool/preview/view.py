@@ -23,7 +23,7 @@ PADDING = 0.06
 """Room around the part, as a share of its larger side."""
 
 SMALLEST_WINDOW_MM = 1e-3
-"""A part that is a mere point gets a window of this size."""
+"""A part smaller than this (a mere point) gets a window of this size."""
 
 EMPTY_WINDOW_MM = 10.0
 """Width of the window of a picture with nothing in it."""

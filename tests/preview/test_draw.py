@@ -1,0 +1,293 @@
+"""Whole pictures: well-formed, complete, the same every time, and nothing over anything else."""
+
+import os
+import subprocess
+import sys
+from itertools import combinations
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pytest
+
+from camtool.errors import OptionError
+from camtool.preview.colours import FEED, PLUNGE, RAPID, bin_colours
+from camtool.preview.draw import Scene, draw, png
+from camtool.preview.svg import clean
+from tests.oracles import svg_page
+from tests.oracles.png import decode
+from tests.preview.conftest import NASTY, SCENES, circle, drawing_of
+
+Box = tuple[float, float, float, float]
+
+
+def rgb(colour: str) -> list[int]:
+    return [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+
+
+def ids(root: Element) -> set[str]:
+    return {g.attrib["id"] for g in root.iter() if "id" in g.attrib}
+
+
+def plot_box(root: Element) -> Box:
+    (clip,) = root.iter(f"{svg_page.SVG}clipPath")
+    x, y, width, height = (float(clip[0].attrib[key]) for key in ("x", "y", "width", "height"))
+    return x, y, x + width, y + height
+
+
+def named(root: Element, name: str) -> Element:
+    found = svg_page.group(root, name)
+    assert found is not None
+    return found
+
+
+def test_pictures_are_well_formed_and_finite(scene: Scene) -> None:
+    svg = draw(scene)
+    root = svg_page.parse(svg)
+    assert root.tag == f"{svg_page.SVG}svg"
+    for word in ("nan", "inf", "None", "e-0", "e+0"):
+        assert not any(word in value for value in numbers(root)), word
+    for element in root.iter(f"{svg_page.SVG}path"):
+        svg_page.pieces(element.attrib["d"])
+
+
+def numbers(root: Element) -> list[str]:
+    """All attributes that hold numbers."""
+    texts = {"aria-label", "role", "id"}
+    return [v for e in root.iter() for k, v in e.attrib.items() if k not in texts]
+
+
+def test_the_same_scene_gives_the_same_bytes(scene: Scene) -> None:
+    svg = draw(scene)
+    assert draw(scene) == svg
+    assert png(svg, 120) == png(svg, 120)
+
+
+def test_no_hash_seed_and_no_fresh_process_changes_a_byte() -> None:
+    code = (
+        "import hashlib; from tests.preview.conftest import SCENES;"
+        "from camtool.preview.draw import draw;"
+        "print(hashlib.sha256(''.join(map(draw, SCENES.values())).encode()).hexdigest())"
+    )
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(found) == 1
+
+
+def test_no_two_labels_touch_and_all_are_on_the_page(scene: Scene) -> None:
+    root = svg_page.parse(draw(scene))
+    page = [float(part) for part in root.attrib["viewBox"].split()]
+    legend = svg_page.group(root, "legend")
+    swatches = [] if legend is None else swatch_boxes(legend)
+    boxes = list(svg_page.label_boxes(root).items())
+    for (name, box), (other, other_box) in combinations(boxes, 2):
+        assert apart(box, other_box), (name, other)
+    for name, box in boxes:
+        assert 0.0 < box[0] < box[2] < page[2], name
+        assert 0.0 < box[1] < box[3] < page[3], name
+        assert all(apart(box, swatch) for swatch in swatches), name
+
+
+def test_labels_stay_out_of_the_plot(scene: Scene) -> None:
+    root = svg_page.parse(draw(scene))
+    plot = plot_box(root)
+    for name, box in svg_page.label_boxes(root).items():
+        if name[0] != "nothing to draw":
+            assert apart(box, plot), name
+
+
+def test_the_scale_bar_has_room(scene: Scene) -> None:
+    root = svg_page.parse(draw(scene))
+    bar = named(root, "scale-bar")
+    (line,) = (p for p in bar if p.tag == f"{svg_page.SVG}path")
+    points = [q for piece in svg_page.pieces(line.attrib["d"]) for q in (piece.begin, piece.end)]
+    bar_box = svg_page.box(points)
+    legend = svg_page.group(root, "legend")
+    assert all(apart(bar_box, box) for box in svg_page.label_boxes(root).values())
+    assert legend is None or all(apart(bar_box, box) for box in swatch_boxes(legend))
+
+
+def swatch_boxes(legend: Element) -> list[Box]:
+    found = []
+    for g in legend:
+        move = g.get("transform", "")
+        if move.startswith("translate(") and len(g):
+            x, y = (float(part) for part in move[10:-1].split())
+            found.append((x, y - 10.0, x + 34.0, y + 10.0))
+    return found
+
+
+def apart(a: Box, b: Box) -> bool:
+    return a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "present", "absent"),
+    [
+        (
+            "drawing",
+            {"body", "drawing", "axes", "grid", "scale-bar", "legend", "part-zero", "mm"},
+            {"feeds", "rapids", "plunges", "slide-path", "error-scale", "travel", "gaps"},
+        ),
+        (
+            "toolpath",
+            {"drawing", "feeds", "rapids", "plunges", "arrows", "part-zero"},
+            {"slide-path", "error-scale", "starts", "ramps"},
+        ),
+        (
+            "result",
+            {"drawing", "feeds", "slide-path", "error-scale", "travel"},
+            {"rapids", "plunges", "arrows", "gaps"},
+        ),
+        ("ramp", {"ramps", "feeds", "starts"}, {"drawing", "plunges", "rapids"}),
+        ("line", {"gaps", "drawing"}, {"body"}),
+        ("far", {"drawing"}, {"part-zero"}),
+        ("empty", {"axes", "scale-bar"}, {"legend", "part-zero", "mm"}),
+    ],
+)
+def test_each_layer_is_a_group_and_only_what_is_there_is_drawn(
+    name: str, present: set[str], absent: set[str]
+) -> None:
+    found = ids(svg_page.parse(draw(SCENES[name])))
+    assert present <= found
+    assert not absent & found
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("drawing", {"outline", "holes", "part zero"}),
+        ("toolpath", {"drawing", "feed", "rapid", "plunge", "part zero"}),
+        (
+            "result",
+            {
+                "drawing",
+                "predicted path, by error",
+                "programmed path",
+                "part zero",
+                "travel 22 × 22 mm",
+            },
+        ),
+        ("line", {"drawing", "open end", "part zero"}),
+        ("ramp", {"feed", "ramp", "start", "part zero"}),
+        ("far", {"drawing, layer far"}),
+    ],
+)
+def test_the_legend_names_what_is_there(name: str, words: set[str]) -> None:
+    legend = named(svg_page.parse(draw(SCENES[name])), "legend")
+    assert {g.attrib["aria-label"] for g in legend if "aria-label" in g.attrib} == words
+
+
+def test_names_that_hold_anything_stay_text() -> None:
+    svg = draw(SCENES["wide"])
+    root = svg_page.parse(svg)
+    labels = [g.attrib["aria-label"] for g in root.iter() if "aria-label" in g.attrib]
+    assert clean(NASTY) in labels
+    titles = [t.text for t in root.iter(f"{svg_page.SVG}title")]
+    assert clean(NASTY) in titles
+    assert not list(root.iter(f"{svg_page.SVG}b"))
+
+
+def test_there_are_no_fonts_no_scripts_and_no_links(scene: Scene) -> None:
+    tags = {
+        element.tag.removeprefix(svg_page.SVG) for element in svg_page.parse(draw(scene)).iter()
+    }
+    assert tags <= {"svg", "title", "clipPath", "g", "rect", "path", "circle"}
+
+
+def test_coordinates_in_the_picture_are_those_of_the_part_in_mm() -> None:
+    drawing = drawing_of([circle(2.5, 1.5, 0.5)], ["0"])
+    shifted = Scene("", drawing, drawing_shift_mm=(1.0, -1.0))
+    for scene, centre in ((Scene("", drawing), (2.5, 1.5)), (shifted, (3.5, 0.5))):
+        layer = named(svg_page.parse(draw(scene)), "drawing")
+        arcs = svg_page.paths(layer)[0]
+        assert len(arcs) == 2
+        for arc in arcs:
+            assert isinstance(arc, svg_page.Arc)
+            assert arc.centre == pytest.approx(centre)
+            assert arc.radius == 0.5
+
+
+def test_lines_keep_their_width_on_the_page_whatever_the_part_measures() -> None:
+    widths = []
+    for scale in (0.1, 1.0, 100.0):
+        drawing = drawing_of([circle(scale, scale, scale)], ["0"])
+        root = svg_page.parse(draw(Scene("", drawing)))
+        factor = float(named(root, "mm").attrib["transform"][7:].split()[0])
+        widths.append(factor * float(named(root, "drawing").attrib["stroke-width"]))
+    assert widths == pytest.approx([widths[0]] * 3, rel=1e-3)
+
+
+def test_crowded_lines_are_thinner() -> None:
+    def width(count: int) -> float:
+        circles = [circle(0.0, 0.0, 1.0 + k / count) for k in range(count)]
+        root = svg_page.parse(draw(Scene("", drawing_of(circles, ["0"] * count))))
+        return float(named(root, "drawing").attrib["stroke-width"])
+
+    assert width(200) < 0.5 * width(2)
+
+
+def test_every_plunge_is_marked() -> None:
+    root = svg_page.parse(draw(SCENES["many paths"]))
+    assert len(named(root, "plunges")) == 100
+
+
+@pytest.mark.parametrize("width", [40, 250])
+def test_png_has_the_size_asked_for_and_shows_something(width: int) -> None:
+    svg = draw(SCENES["toolpath"])
+    root = svg_page.parse(svg)
+    ratio = float(root.attrib["height"]) / float(root.attrib["width"])
+    image = decode(png(svg, width))
+    assert image.shape[1] == width
+    assert image.shape[0] == pytest.approx(width * ratio, abs=1.0)
+    assert len(np.unique(image.reshape(-1, image.shape[2]), axis=0)) > 10
+
+
+@pytest.mark.parametrize(
+    ("name", "colour"),
+    [
+        ("toolpath", FEED),
+        ("toolpath", PLUNGE),
+        ("many paths", RAPID),
+        ("result", bin_colours()[0]),
+        ("result", bin_colours()[-1]),
+    ],
+)
+def test_png_shows_the_colours_of_its_layers(name: str, colour: str) -> None:
+    image = decode(png(draw(SCENES[name]), 320))[..., :3].astype(int)
+    distance = np.abs(image - rgb(colour)).max(axis=2)
+    assert (distance <= 24).sum() >= 5
+
+
+def test_the_picture_is_the_right_way_up() -> None:
+    # One small circle in the lower left corner of a large open frame.
+    frame = [circle(9.0, 9.0, 0.5), circle(1.0, 1.0, 0.1)]
+    scene = Scene("", drawing_of(frame, ["large", "small"]))
+    root = svg_page.parse(draw(scene))
+    left, top, right, bottom = (round(0.3 * side) for side in plot_box(root))
+    image = decode(png(draw(scene), 300))[..., :3].astype(int)
+    small = image[..., 0] - image[..., 2] > 60  # the second layer is red on blue-grey
+    rows, columns = np.nonzero(small[top:bottom, left:right])
+    assert rows.mean() > 0.7 * (bottom - top)
+    assert columns.mean() < 0.3 * (right - left)
+
+
+def test_size_is_an_attribute_only() -> None:
+    small, large = draw(SCENES["drawing"], size_px=500), draw(SCENES["drawing"], size_px=2000)
+    assert small.split("viewBox")[1] == large.split("viewBox")[1]
+    assert 'width="2000"' in large
+
+
+@pytest.mark.parametrize("width", [0, -5, 15, 20_001])
+def test_senseless_widths_are_refused(width: int) -> None:
+    with pytest.raises(OptionError, match="pixels wide"):
+        draw(SCENES["empty"], size_px=width)
+    with pytest.raises(OptionError, match="pixels wide"):
+        png("<svg/>", width)
