@@ -1,5 +1,6 @@
 """A program of every kind of row, byte for byte, in both forms (`--bless` writes it anew)."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,11 @@ def test_blessing_writes_the_file(tmp_path: Path) -> None:
     file = tmp_path / "program.pic"
     compare(file, b"G54;\n", bless=True)
     assert file.read_bytes() == b"G54;\n"
+
+
+def test_the_worked_example_of_the_page_is_what_is_sent() -> None:
+    page = (GOLDEN.parents[1] / "docs" / "dialects" / "pic-mmh.md").read_text(encoding="utf-8")
+    examples = re.findall(r"```pic\n(.+?)```", page, re.DOTALL)
+    assert len(examples) == 2
+    for form, example in zip(("example", "annex"), examples, strict=True):
+        assert example in (GOLDEN / f"pic-mmh-{form}.pic").read_text(encoding="ascii")
