@@ -14,31 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import Floats, Ints
+from camtool.geometry.polylines import Floats
 from camtool.verify.circles import Circle
 from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
 from camtool.verify.cuts import Bools, CutMoves, Samples, sample_cuts
 from camtool.verify.figures import Figure
+from camtool.verify.match import SAMPLES_PER_GROUP, Match, match_contours, match_rows
 from camtool.verify.places import and_more, at_point, block_name
 from camtool.verify.runs import run_offsets
-
-SAMPLES_PER_GROUP = 64
-"""Neighbouring samples that share one search for near moves."""
-
-
-@dataclass(frozen=True, eq=False)
-class Match:
-    """What each of the N decoded rows belongs to, in the moves that it is compared with.
-
-    `contour` (N,) of the row's middle, −1 for rows that do not cut; `only` (N,) that contour when
-    the whole row is nearest to it, else ANY_CONTOUR; `circle` (N,) index of the full circle that
-    the row follows, −1; `apart_mm` (N,) largest distance of the row's samples.
-    """
-
-    contour: Ints
-    only: Ints
-    circle: Ints
-    apart_mm: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +33,6 @@ class Coverage:
     findings: tuple[Finding, ...]
 
 
-def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
-    """Each row belongs to itself: for programs with nothing to compare them with."""
-    circle = _circle_of_row(circles, len(cuts.contour))
-    return Match(cuts.contour, cuts.contour, circle, np.zeros(len(cuts.contour)))
-
-
 def cover(
     decoded: Target, wanted: Target, circles: list[Circle], *, limit_mm: float, spacing_mm: float
 ) -> Coverage:
@@ -65,15 +42,16 @@ def cover(
     """
     samples = sample_cuts(decoded.cuts, spacing_mm)
     found, wrong_depth = _nearest(decoded.cuts, samples, wanted, limit_mm)
+    extra = tuple(_extra_cuts(decoded.cuts, samples, found, wrong_depth, limit_mm))
     rows = decoded.cuts.segments.path[samples.segment]
+    belongs = match_contours(decoded.cuts, samples, found, wanted, limit_mm)
+    match = match_rows(rows, belongs, found, wanted, circles, len(decoded.cuts.contour))
     rounding = Figure()
     real = np.isfinite(found.distance)
     rounding.add(found.distance[real], samples.points[real], rows[real])
-    extra = _extra_cuts(decoded.cuts, samples, found, wrong_depth, limit_mm)
     back = sample_cuts(wanted.cuts, spacing_mm)
     found_back, wrong_back = _nearest(wanted.cuts, back, decoded, limit_mm)
     missing = _missing(wanted.cuts, back, found_back, wrong_back, limit_mm)
-    match = _matched(rows, found, wanted, circles, len(decoded.cuts.contour))
     return Coverage(match, rounding, (*missing, *extra))
 
 
@@ -97,39 +75,6 @@ def _nearest(
     return found, wrong_depth
 
 
-def _matched(rows: Ints, found: Found, wanted: Target, circles: list[Circle], count: int) -> Match:
-    """Rows (S,) of the samples and what was found for these, taken together row by row."""
-    contour = np.full(count, -1, dtype=np.int64)
-    only = np.full(count, ANY_CONTOUR, dtype=np.int64)
-    circle = np.full(count, -1, dtype=np.int64)
-    apart = np.zeros(count)
-    if len(rows) == 0 or len(wanted.contour) == 0:
-        return Match(contour, only, circle, apart)
-    begin = np.concatenate([[0], np.flatnonzero(np.diff(rows)) + 1])
-    row, size = rows[begin], np.diff(np.append(begin, len(rows)))
-    nearest_contour = wanted.contour[found.segment]
-    nearest_circle = _circle_of_row(circles, len(wanted.cuts.contour))[
-        wanted.cuts.segments.path[found.segment]
-    ]
-    contour[row] = nearest_contour[begin + size // 2]
-    # At its ends a row touches its neighbours: only what lies between tells.
-    inner = np.column_stack([begin + 1, begin + size - 1]).ravel()
-    for column, nearest in ((only, nearest_contour), (circle, nearest_circle)):
-        padded = np.append(nearest, 0)
-        low = np.minimum.reduceat(padded, inner)[::2]
-        high = np.maximum.reduceat(padded, inner)[::2]
-        column[row] = np.where(low == high, low, -1)
-    apart[row] = np.maximum.reduceat(found.distance, begin)
-    return Match(contour, only, circle, apart)
-
-
-def _circle_of_row(circles: list[Circle], count: int) -> Ints:
-    of_row = np.full(count, -1, dtype=np.int64)
-    for index, circle in enumerate(circles):
-        of_row[circle.first_row : circle.last_row + 1] = index
-    return of_row
-
-
 def _extra_cuts(
     cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, limit_mm: float
 ) -> Iterator[Finding]:
@@ -138,13 +83,11 @@ def _extra_cuts(
     for number, (_, worst, share) in enumerate(listed):
         row = int(cuts.segments.path[samples.segment[worst]])
         at = at_point(samples.points[worst])
-        depth = ", at a depth where nothing is wanted" if wrong_depth[worst] else ""
-        how = f"{_away(found.distance[worst])} from every wanted move{depth}"
+        how = _away(found.distance[worst], "wanted", wrong_depth=bool(wrong_depth[worst]))
         yield Finding(
             Code.EXTRA_CUT,
             Severity.ERROR,
-            f"{share:.0%} of a cut was not wanted: up to {how}"
-            + and_more(number, len(listed), "cuts"),
+            f"{share:.0%} of a cut was not wanted: {how}" + and_more(number, len(listed), "cuts"),
             where=f"{block_name(cuts.toolpath, row)} near {at}",
             measured=_finite(found.distance[worst]),
             limit=limit_mm,
@@ -163,8 +106,7 @@ def _missing(
         row = int(cuts.segments.path[samples.segment[worst]])
         source = cuts.toolpath.text(row)
         name = f"contour {contour + 1}" + (f" ({source})" if source else "")
-        depth = ", none of them at its depth" if wrong_depth[worst] else ""
-        how = f"up to {_away(found.distance[worst])} from every cutting move{depth}"
+        how = _away(found.distance[worst], "decoded", wrong_depth=bool(wrong_depth[worst]))
         yield Finding(
             Code.CONTOUR_MISSING,
             Severity.ERROR,
@@ -194,8 +136,11 @@ def _by_contour(
         yield which, int(worst), float(count / all_of[which])
 
 
-def _away(distance: float) -> str:
-    return f"{distance:.3f} mm" if np.isfinite(distance) else "infinitely far"
+def _away(distance: float, side: str, *, wrong_depth: bool) -> str:
+    if not np.isfinite(distance):
+        return f"there are no {side} cutting moves at all"
+    depth = ", and none is at its depth" if wrong_depth else ""
+    return f"up to {distance:.3f} mm from every {side} cutting move{depth}"
 
 
 def _finite(distance: float) -> float | None:

@@ -48,9 +48,10 @@ class InterpolationFigures(msgspec.Struct, frozen=True):
 class Errors(msgspec.Struct, frozen=True):
     """Predicted errors by source, µm.
 
-    fit: drawn curves to the arcs that stand for them. rounding: moves as decoded to the wanted
-    ones. interpolation: commanded positions to the decoded moves. mechanics: slides to commanded
-    positions. total: slides to the wanted moves (to the decoded ones where nothing was wanted).
+    fit: drawn curves to the arcs that stand for them. rounding: moves as the controller holds
+    them (the dialect's digits and whole steps) to the wanted ones. interpolation: commanded
+    positions to the moves as held. mechanics: slides to commanded positions. total: slides to the
+    wanted moves (to those as held where nothing was wanted).
     """
 
     fit: MaxRms = MaxRms()

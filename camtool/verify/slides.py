@@ -15,8 +15,8 @@ import numpy as np
 from camtool.geometry.polylines import Floats, Ints
 from camtool.verify.circles import UNSEEN, Circle, CircleBins, CircleFigures
 from camtool.verify.compare import Groups, Target
-from camtool.verify.coverage import Match
 from camtool.verify.figures import Figure, LargestError
+from camtool.verify.match import Match
 from camtool.verify.motion import Batch
 from camtool.verify.runs import run_offsets
 from camtool.verify.trace import Trace, TraceBuffer
@@ -92,8 +92,9 @@ class SlidePass:
         # No way is longer than the sum of its parts: a margin within which the search succeeds.
         bound = self._match.apart_mm[row] + interpolation + mechanics
         total = self._nearest(slide, row, bound)
-        self.total.add(total, slide, row)
-        return total
+        known = np.isfinite(total)
+        self.total.add(total[known], slide[known], row[known])
+        return np.where(known, total, 0.0)
 
     def _nearest(self, slide: Floats, row: Ints, bound: Floats) -> Floats:
         offsets = run_offsets(row, STEPS_PER_GROUP)

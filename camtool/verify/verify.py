@@ -1,7 +1,8 @@
 """Judge a program: run its decoded moves on the machine's model and compare with what was wanted.
 
-    decoded, wanted ─cuts─▶ lines and arcs that cut, by contour
-    decoded × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
+    decoded ─held─▶ as the controller rounds it
+    held, wanted ─cuts─▶ lines and arcs that cut, by contour
+    held × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
     decoded ─simulate─▶ chunks ─motion─▶ batches ─slides─▶ errors, circles, extents, trace
     all of it ─▶ Report and Trace
 
@@ -24,9 +25,11 @@ from camtool.toolpath.moves import Toolpath
 from camtool.verify.case import Case, VerifyOptions
 from camtool.verify.circles import Circle, full_circles
 from camtool.verify.compare import Target
-from camtool.verify.coverage import Coverage, cover, own_match
+from camtool.verify.coverage import Coverage, cover
 from camtool.verify.cuts import cut_moves, is_flat
 from camtool.verify.figures import Figure
+from camtool.verify.held import held
+from camtool.verify.match import own_match
 from camtool.verify.motion import Tally, batches
 from camtool.verify.noticed import motion_findings
 from camtool.verify.report import Report
@@ -70,7 +73,7 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
     """Judge a case by the chunks of its motion, whoever made them."""
     # Without Z on either side, all feed moves are taken to cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
-    decoded = Target(cut_moves(case.decoded, flat_cuts=flat_cuts))
+    decoded = Target(cut_moves(held(case.decoded, case.machine), flat_cuts=flat_cuts))
     wanted = decoded
     if case.wanted is not None:
         wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
