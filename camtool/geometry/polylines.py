@@ -30,7 +30,8 @@ POSITION_EPS_MM = 1e-6
 """Two positions nearer than this are one (docs/numerics.md)."""
 
 BULGE_EPS = 1e-12
-"""|bulge| may exceed 1 by rounding alone; by no more than this, and is then set to ±1."""
+"""|bulge| may exceed 1 by rounding alone, by no more than this, and is then set to ±1; a bulge
+below this is a line: it strays from its chord c by |bulge|·c/2, less than an atom at 1 m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,6 +214,7 @@ def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Flo
     over = np.abs(array[:, 2]) > 1.0
     _refuse(np.abs(array[:, 2]) > 1.0 + BULGE_EPS, "|bulge| above 1: split the arc", offsets)
     array[over, 2] = np.sign(array[over, 2])
+    array[np.abs(array[:, 2]) < BULGE_EPS, 2] = 0.0
     following = np.arange(1, len(array) + 1)
     following[last] = offsets[:-1]
     step = array[following, :2] - array[:, :2]
