@@ -92,6 +92,56 @@ def verify_program(
     )
 
 
+def picture(
+    *,
+    title: str,
+    drawing: Drawing | None = None,
+    job: Job | None = None,
+    toolpath: Toolpath | None = None,
+    verification: Verification | None = None,
+    machine: Machine | None = None,
+) -> Scene:
+    """The scene of whatever is there; with a verification, the slides' path by its error.
+
+    `job` tells where its origin puts the drawing in the work frame.
+    """
+    from camtool.preview.scene import Scene, scene_of_drawing
+
+    if drawing is not None and toolpath is None:
+        return scene_of_drawing(drawing)
+    shift = (0.0, 0.0)
+    if drawing is not None and job is not None:
+        from camtool.planning.profile import origin_shift
+
+        shift = origin_shift(drawing, job)
+    trace = verification.trace if verification is not None else None
+    return Scene(
+        title=title,
+        drawing=drawing,
+        drawing_shift_mm=shift,
+        toolpath=toolpath,
+        trace_points=trace.points if trace is not None else None,
+        trace_error_mm=trace.error_mm if trace is not None else None,
+        trace_cutting=trace.cutting if trace is not None else None,
+        travel_mm=_travel(toolpath, machine),
+        notes=verification.report.notes() if verification is not None else (),
+    )
+
+
+def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
+    """The table's travel, mm, if the path lies in it with part zero at its lower-left corner:
+    only then is there a place where the frame can honestly be drawn."""
+    if toolpath is None or machine is None:
+        return None
+    from camtool.toolpath.extents import toolpath_extents
+
+    x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
+    (left, right), (low, high), _ = toolpath_extents(toolpath).tolist()
+    if x is None or y is None or left < 0.0 or low < 0.0 or right > x or high > y:
+        return None
+    return x, y
+
+
 def _judged(
     data: bytes,
     decoded: Toolpath,
@@ -111,29 +161,3 @@ def _judged(
 def _merged(*groups: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """All findings once, in order."""
     return tuple(dict.fromkeys(finding for group in groups for finding in group))
-
-
-def picture(
-    *,
-    title: str,
-    drawing: Drawing | None = None,
-    toolpath: Toolpath | None = None,
-    verification: Verification | None = None,
-    machine: Machine | None = None,
-) -> Scene:
-    """The scene of whatever is there; with a verification, the slides' path by its error."""
-    from camtool.preview.draw import Scene
-
-    trace = verification.trace if verification is not None else None
-    axes = machine.axes if machine is not None else None
-    travel = (axes.x.travel_mm, axes.y.travel_mm) if axes is not None else (None, None)
-    return Scene(
-        title=title,
-        drawing=drawing,
-        toolpath=toolpath,
-        trace_points=trace.points if trace is not None else None,
-        trace_error_mm=trace.error_mm if trace is not None else None,
-        trace_cutting=trace.cutting if trace is not None else None,
-        travel_mm=(travel[0], travel[1]) if travel[0] and travel[1] else None,
-        notes=verification.report.notes() if verification is not None else (),
-    )

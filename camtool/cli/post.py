@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Posted
+    from camtool.planning.job import Job
 
 
 @click.command(short_help="Drawing to verified program.")
@@ -70,14 +71,15 @@ def post(
     from camtool.pipeline import post_drawing
 
     read = drawing.read(source, target.machine)
-    posted = post_drawing(read, job.job(), target, check=not no_verify)
+    wanted = job.job()
+    posted = post_drawing(read, wanted, target, check=not no_verify)
     say_findings(posted.findings, quiet=quiet, verbose=verbose)
     if posted.failed or posted.program is None:
         say(f"camtool: error: {source}: nothing was written; mend the errors above", quiet=False)
         return 1
     files = {output: posted.program.data}
     if preview is not None:
-        files[preview] = _picture(preview, read, posted, target)
+        files[preview] = _picture(preview, read, wanted, posted, target)
     if report is not None and posted.verification is not None:
         files[report] = posted.verification.report.to_json().encode()
     write_all(files)
@@ -88,13 +90,14 @@ def post(
     return 0
 
 
-def _picture(name: str, drawing: Drawing, posted: Posted, target: LoadedTarget) -> bytes:
+def _picture(name: str, drawing: Drawing, job: Job, posted: Posted, target: LoadedTarget) -> bytes:
     from camtool.pipeline import picture
     from camtool.preview.render import render
 
     scene = picture(
         title=Path(drawing.file).name,
         drawing=drawing,
+        job=job,
         toolpath=posted.decoded,
         verification=posted.verification,
         machine=target.machine,

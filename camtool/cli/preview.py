@@ -89,11 +89,18 @@ def _scene(
     read = drawing.read(source, target.machine)
     if not simulate:
         toolpath = plan(read, job.job(), target.machine)
-        return picture(title=title, drawing=read, toolpath=toolpath, machine=target.machine)
+        return picture(
+            title=title,
+            drawing=read,
+            job=job.job(),
+            toolpath=toolpath,
+            machine=target.machine,
+        )
     posted = post_drawing(read, job.job(), target)
     return picture(
         title=title,
         drawing=read,
+        job=job.job(),
         toolpath=posted.decoded or posted.wanted,
         verification=posted.verification,
         machine=target.machine,

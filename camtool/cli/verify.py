@@ -86,6 +86,7 @@ def verify(
         scene = picture(
             title=Path(program).name,
             drawing=read,
+            job=job.job(),
             toolpath=decoded,
             verification=verification,
             machine=target.machine,
