@@ -15,11 +15,10 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
-from camtool.verify.circles import Circle
 from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
 from camtool.verify.cuts import Bools, CutMoves, Samples, sample_cuts
 from camtool.verify.figures import Figure
-from camtool.verify.match import SAMPLES_PER_GROUP, Match, match_contours, match_rows
+from camtool.verify.match import SAMPLES_PER_GROUP, Goal, Match, match_contours, match_rows
 from camtool.verify.places import and_more, at_point, block_name
 from camtool.verify.runs import run_offsets
 
@@ -33,25 +32,21 @@ class Coverage:
     findings: tuple[Finding, ...]
 
 
-def cover(
-    decoded: Target, wanted: Target, circles: list[Circle], *, limit_mm: float, spacing_mm: float
-) -> Coverage:
-    """Compare decoded and wanted cutting moves both ways; `limit_mm` is the coverage tolerance.
-
-    `circles` are those of the wanted moves; samples are about `spacing_mm` apart.
-    """
-    samples = sample_cuts(decoded.cuts, spacing_mm)
-    found, wrong_depth = _nearest(decoded.cuts, samples, wanted, limit_mm)
-    extra = tuple(_extra_cuts(decoded.cuts, samples, found, wrong_depth, limit_mm))
-    rows = decoded.cuts.segments.path[samples.segment]
-    belongs = match_contours(decoded.cuts, samples, found, wanted, limit_mm)
-    match = match_rows(rows, belongs, found, wanted, circles, len(decoded.cuts.contour))
+def cover(decoded: Target, goal: Goal, spacing_mm: float) -> Coverage:
+    """Compare decoded and wanted cutting moves both ways, on samples about `spacing_mm` apart."""
+    cuts, wanted, limit_mm = decoded.cuts, goal.target, goal.limit_mm
+    samples = sample_cuts(cuts, spacing_mm)
+    found, wrong_depth = _nearest(cuts, samples, wanted, limit_mm)
+    extra = tuple(_extra_cuts(cuts, samples, found, wrong_depth, limit_mm))
+    belongs = match_contours(cuts, samples, found, goal)
     rounding = Figure()
     real = np.isfinite(found.distance)
+    rows = cuts.segments.path[samples.segment]
     rounding.add(found.distance[real], samples.points[real], rows[real])
     back = sample_cuts(wanted.cuts, spacing_mm)
     found_back, wrong_back = _nearest(wanted.cuts, back, decoded, limit_mm)
     missing = _missing(wanted.cuts, back, found_back, wrong_back, limit_mm)
+    match = match_rows(cuts, samples, belongs, found, goal)
     return Coverage(match, rounding, (*missing, *extra))
 
 

@@ -41,17 +41,25 @@ class Match:
     apart_mm: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """The wanted moves, their full circles, and how far a decoded contour may be from its own."""
+
+    target: Target
+    circles: list[Circle]
+    limit_mm: float
+
+
 def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     """Each row belongs to itself: for programs with nothing to compare them with."""
     count = len(cuts.contour)
     return Match(cuts.contour, cuts.contour, _circle_of_row(circles, count), np.zeros(count))
 
 
-def match_contours(
-    cuts: CutMoves, samples: Samples, found: Found, wanted: Target, limit_mm: float
-) -> Ints:
+def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -> Ints:
     """(S,) the wanted contour that the sample's decoded contour belongs to, ANY_CONTOUR where
     there is none. `found` is then the nearest move of that contour: changed in place."""
+    wanted = goal.target
     mine = cuts.contour[cuts.segments.path[samples.segment]]
     belongs = np.full(len(mine), ANY_CONTOUR, dtype=np.int64)
     if len(mine) == 0 or len(wanted.contour) == 0:
@@ -65,7 +73,7 @@ def match_contours(
         choice = np.repeat(candidate[open_], np.diff(begin)[open_])
         near = _nearest_of(samples.points[which], samples.segment[which], choice, wanted)
         starts = np.cumsum(np.diff(begin)[open_]) - np.diff(begin)[open_]
-        fits = np.maximum.reduceat(near.distance, starts) <= limit_mm
+        fits = np.maximum.reduceat(near.distance, starts) <= goal.limit_mm
         fitting = np.repeat(fits, np.diff(begin)[open_])
         taken = which[fitting]
         belongs[taken] = choice[fitting]
@@ -101,10 +109,11 @@ def _nearest_of(points: Floats, segment: Ints, choice: Ints, wanted: Target) -> 
     return wanted.nearest(points, Groups(offsets, np.zeros(count), choice[offsets[:-1]], any_z))
 
 
-def match_rows(
-    rows: Ints, belongs: Ints, found: Found, wanted: Target, circles: list[Circle], count: int
-) -> Match:
-    """The samples of each row taken together: rows (S,), belongs (S,), of `count` rows in all."""
+def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, goal: Goal) -> Match:
+    """What each row of `cuts` belongs to, its samples taken together; `belongs` (S,) and `found`
+    as `match_contours` leaves them."""
+    wanted, count = goal.target, len(cuts.contour)
+    rows = cuts.segments.path[samples.segment]
     match = Match(
         contour=np.full(count, -1, dtype=np.int64),
         only=np.full(count, ANY_CONTOUR, dtype=np.int64),
@@ -117,7 +126,7 @@ def match_rows(
     begin, row = offsets[:-1], rows[offsets[:-1]]
     middle = begin + np.diff(offsets) // 2
     nearest = wanted.contour[found.segment]
-    circle = _circle_of_row(circles, len(wanted.cuts.contour))[
+    circle = _circle_of_row(goal.circles, len(wanted.cuts.contour))[
         wanted.cuts.segments.path[found.segment]
     ]
     known = belongs[begin] != ANY_CONTOUR

@@ -59,11 +59,7 @@ class Result:
             circles=self._circles(),
             findings=record.reported(findings),
             contours=self.cuts.contour_count,
-            time_split_s=record.TimeSplit(
-                cutting=certain(tally.cutting_s),
-                air=certain(tally.air_s),
-                dwell=certain(tally.dwell_s),
-            ),
+            time_split_s=_time_split(tally),
             interpolator=options.interpolator or case.machine.controller.arcs,
             camtool_version=__version__,
         )
@@ -140,6 +136,12 @@ def _blocks(case: Case) -> int | None:
 def _steps(tally: Tally) -> record.Steps:
     x, y, z = tally.steps.tolist()
     return record.Steps(x, y, z, tally.iterations)
+
+
+def _time_split(tally: Tally) -> record.TimeSplit:
+    return record.TimeSplit(
+        cutting=certain(tally.cutting_s), air=certain(tally.air_s), dwell=certain(tally.dwell_s)
+    )
 
 
 def _reversals(tally: Tally) -> record.Reversals:

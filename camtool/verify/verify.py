@@ -23,13 +23,13 @@ from camtool.simulation.simulate import simulate
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Toolpath
 from camtool.verify.case import Case, VerifyOptions
-from camtool.verify.circles import Circle, full_circles
+from camtool.verify.circles import full_circles
 from camtool.verify.compare import Target
 from camtool.verify.coverage import Coverage, cover
 from camtool.verify.cuts import cut_moves, is_flat
 from camtool.verify.figures import Figure
 from camtool.verify.held import held
-from camtool.verify.match import own_match
+from camtool.verify.match import Goal, own_match
 from camtool.verify.motion import Tally, batches
 from camtool.verify.noticed import motion_findings
 from camtool.verify.report import Report
@@ -78,7 +78,7 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
     if case.wanted is not None:
         wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
     circles = full_circles(wanted.cuts, case.coverage_mm)
-    coverage = _coverage(case, decoded, wanted, circles)
+    coverage = _coverage(case, decoded, Goal(wanted, circles, case.coverage_mm))
     trace = TraceBuffer(case.decoded, case.step_mm, case.options.trace_points)
     slides = SlidePass(decoded, wanted, coverage.match, circles, trace)
     tally = Tally()
@@ -93,16 +93,10 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
     return Verification(result.report(extents, findings), trace.trace(), findings)
 
 
-def _coverage(case: Case, decoded: Target, wanted: Target, circles: list[Circle]) -> Coverage:
+def _coverage(case: Case, decoded: Target, goal: Goal) -> Coverage:
     if case.wanted is None:
-        return Coverage(own_match(decoded.cuts, circles), Figure(), ())
-    return cover(
-        decoded,
-        wanted,
-        circles,
-        limit_mm=case.coverage_mm,
-        spacing_mm=case.options.sample_mm,
-    )
+        return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
+    return cover(decoded, goal, case.options.sample_mm)
 
 
 def _all_findings(
