@@ -19,7 +19,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from camtool_postprocessors._pic_mmh_format import Bools, Floats, Grid, Ints
+
+from ._pic_mmh_format import Bools, Floats, Grid, Ints
 
 WINDOW: Final = (0.6, 1.1)
 WINDOW_SLACK: Final = 4

@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from camtool_postprocessors._pic_mmh_options import Dialect
+
+from ._pic_mmh_options import Dialect
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

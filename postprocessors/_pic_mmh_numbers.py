@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from camtool_postprocessors._pic_mmh_format import Bools, Floats, Grid, Ints
-from camtool_postprocessors._pic_mmh_options import Dialect
 
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
+
+from ._pic_mmh_format import Bools, Floats, Grid, Ints
+from ._pic_mmh_options import Dialect
 
 FEED_TOLERANCE: Final = 1e-6
 """A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""

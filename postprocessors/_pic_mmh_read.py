@@ -12,14 +12,14 @@ import re
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
-from camtool_postprocessors._pic_mmh_grammar import fault_of, patterns
-from camtool_postprocessors._pic_mmh_options import dialect_of
-
 from camtool.errors import ProgramError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
+
+from ._pic_mmh_grammar import fault_of, patterns
+from ._pic_mmh_options import dialect_of
 
 BLANKS: Final = " \t\r\n"
 

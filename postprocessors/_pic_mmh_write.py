@@ -12,7 +12,14 @@ import math
 from typing import Final
 
 import numpy as np
-from camtool_postprocessors._pic_mmh_arcs import (
+
+from camtool.errors import PostError
+from camtool.findings import Finding
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Move, Toolpath
+from camtool.toolpath.program import Program
+
+from ._pic_mmh_arcs import (
     LEAST_RADIUS_STEPS,
     LINE_SAGITTA,
     Arc,
@@ -24,16 +31,10 @@ from camtool_postprocessors._pic_mmh_arcs import (
     turned_rad,
     unwrapped_rad,
 )
-from camtool_postprocessors._pic_mmh_format import SAY, Floats, Grid
-from camtool_postprocessors._pic_mmh_notes import Notes, too_long
-from camtool_postprocessors._pic_mmh_numbers import check_motion, event_words, numbers_of, place
-from camtool_postprocessors._pic_mmh_options import dialect_of
-
-from camtool.errors import PostError
-from camtool.findings import Finding
-from camtool.machine.model import Machine
-from camtool.toolpath.moves import Kind, Move, Toolpath
-from camtool.toolpath.program import Program
+from ._pic_mmh_format import SAY, Floats, Grid
+from ._pic_mmh_notes import Notes, too_long
+from ._pic_mmh_numbers import check_motion, event_words, numbers_of, place
+from ._pic_mmh_options import dialect_of
 
 WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
 

@@ -17,25 +17,25 @@ class PicMmhPost:
 
     def check(self, machine: Machine) -> None:
         """Raise MachineError when the machine's `[dialect]` table does not fit."""
-        from camtool_postprocessors._pic_mmh_options import dialect_of
+        from ._pic_mmh_options import dialect_of
 
         dialect_of(machine)
 
     def write(self, toolpath: Toolpath, machine: Machine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
-        from camtool_postprocessors._pic_mmh_write import write_program
+        from ._pic_mmh_write import write_program
 
         return write_program(toolpath, machine)
 
     def read(self, data: bytes, machine: Machine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block and column."""
-        from camtool_postprocessors._pic_mmh_read import read_program
+        from ._pic_mmh_read import read_program
 
         return read_program(data, machine)
 
     def format_block(self, move: Move, machine: Machine) -> str:
         """One motion as its block, without planning where its arc would end."""
-        from camtool_postprocessors._pic_mmh_write import format_block
+        from ._pic_mmh_write import format_block
 
         return format_block(move, machine)
 
