@@ -9,6 +9,7 @@ Nothing here reads or writes a file.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -55,13 +56,16 @@ def post_drawing(
         return Posted(wanted, None, None, None, findings)
     program = target.post.write(wanted, target.machine)
     decoded = target.post.read(program.data, target.machine)
-    findings = _merged(findings, program.findings, decoded.findings)
+    # What the writer said of its blocks, the reader need not say again in other words.
+    said = {finding.code for finding in program.findings}
+    repeated = {finding for finding in decoded.findings if finding.code in said}
+    findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return Posted(wanted, program, decoded, None, findings)
     verification = _judged(
         program.data, decoded, target.machine, wanted, drawing, source=drawing.file
     )
-    findings = _merged(findings, verification.findings)
+    findings = _merged(findings, verification.findings, without=repeated)
     return Posted(wanted, program, decoded, verification.with_findings(findings), findings)
 
 
@@ -158,6 +162,9 @@ def _judged(
     return verify(decoded, machine, wanted=wanted, drawing=drawing, options=options)
 
 
-def _merged(*groups: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """All findings once, in order."""
-    return tuple(dict.fromkeys(finding for group in groups for finding in group))
+def _merged(
+    *groups: tuple[Finding, ...], without: Collection[Finding] = ()
+) -> tuple[Finding, ...]:
+    """All findings once, in order, but for those `without`."""
+    every = dict.fromkeys(finding for group in groups for finding in group)
+    return tuple(finding for finding in every if finding not in without)
