@@ -27,7 +27,7 @@ from camtool.geometry.curves import (
 )
 from camtool.geometry.drawing import FitError
 from camtool.geometry.nodes import MIN_STEPS, Nodes, curve_nodes, turns
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Floats, Ints
 
 __all__ = [
     "BezierCurve",
@@ -39,6 +39,7 @@ __all__ = [
     "arc_vertices",
     "fit_curve",
     "overall",
+    "split_bulges",
 ]
 
 _Vertex = tuple[float, float, float]
@@ -125,6 +126,30 @@ def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: flo
     if abs(sweep_rad) == 2.0 * math.pi:
         vertices[-1, :2] = vertices[0, :2]
     return vertices
+
+
+def split_bulges(vertices: Floats, closed: bool) -> Floats:
+    """The same path with every arc of more than a half circle (|bulge| > 1) cut into two halves.
+
+    Vertices (n, 3), of an open path the last one without a segment; mm or any other unit.
+    """
+    large = np.abs(vertices[:, 2]) > 1.0 + BULGE_EPS
+    if not closed:
+        large[-1:] = False
+    rows = np.flatnonzero(large)
+    if not len(rows):
+        return vertices
+    bulge = vertices[rows, 2]
+    end = vertices[(rows + 1) % len(vertices), :2]
+    chord = end - vertices[rows, :2]
+    # The middle of an arc lies off its chord by bulge · chord / 2, on the right of it when CCW.
+    right = np.column_stack([chord[:, 1], -chord[:, 0]])
+    middle = 0.5 * (vertices[rows, :2] + end + bulge[:, None] * right)
+    # A whole turn less rounding would give halves just above 1.
+    half = np.clip(np.tan(0.5 * np.arctan(bulge)), -1.0, 1.0)
+    split = vertices.copy()
+    split[rows, 2] = half
+    return np.insert(split, rows + 1, np.column_stack([middle, half]), axis=0)
 
 
 def overall(fits: Iterable[Fit]) -> FitError:
