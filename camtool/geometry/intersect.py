@@ -222,7 +222,7 @@ def _fraction(along: Floats, length: Floats, eps: float) -> Floats:
 
 
 def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
-    """The two points (K, 2) that the whole curves share (see the top); not finite if none.
+    """The two points (K, 2) that the whole curves share (see the top); NaN if none.
 
     Where they miss each other, both are the point of the common line nearest to R: the caller
     measures how near that is.
@@ -232,8 +232,8 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
     k_flat = np.where(rounder, a.curvature, b.curvature)
     pick = rounder[:, None]
     n_round, n_flat = np.where(pick, b.normal, a.normal), np.where(pick, a.normal, b.normal)
-    origin, w = np.where(pick, b.start, a.start), np.where(pick, a.start - b.start, 0.0)
-    w = np.where(pick, w, b.start - a.start)
+    origin = np.where(pick, b.start, a.start)
+    w = np.where(pick, a.start, b.start) - origin
     ratio = k_flat / np.where(k_round == 0.0, 1.0, k_round)
     across = n_flat + k_flat[:, None] * w - ratio[:, None] * n_round
     with np.errstate(all="ignore"):
@@ -250,10 +250,11 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
         one = stable / k_round
         two = np.where((root > 0.0) | (k_round == 0.0), gamma / stable, one)
         one = np.where(k_round == 0.0, two, one)
-        return (
-            origin + foot + one[:, None] * direction,
-            origin + foot + two[:, None] * direction,
-        )
+        roots = np.stack([one, two])
+    # NaN, because arithmetic with infinities would warn.
+    roots = np.where(np.isfinite(roots), roots, np.nan)[:, :, None]
+    first, second = origin + foot + roots * direction
+    return first, second
 
 
 def _touching(found: Crossings, a: Frames, b: Frames, eps: float) -> Bools:

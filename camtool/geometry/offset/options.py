@@ -1,0 +1,44 @@
+"""The tolerances of an offset."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from camtool.errors import OptionError
+from camtool.geometry.polylines import POSITION_EPS_MM
+
+NODE_EPS_MM = 1e-8
+"""Ends and meetings of raw elements nearer than this are one node."""
+
+VALIDITY_EPS_MM = 2e-7
+"""How much nearer to the source than the distance a slice may be and is still kept."""
+
+CUSP_EPS_RAD = 1e-9
+"""A corner this near to a full turn back is capped on both its sides: neither is the inner one."""
+
+U_TURN_EPS_RAD = 1e-3
+"""A turn at a node this near to a full right turn is taken as a full left one."""
+
+
+@dataclass(frozen=True)
+class OffsetOptions:
+    """Tolerances, mm; see the top of the package for what each decides.
+
+    `sliver_eps_mm` must be POSITION_EPS_MM or more, because no polyline has shorter segments.
+    """
+
+    node_eps_mm: float = NODE_EPS_MM
+    validity_eps_mm: float = VALIDITY_EPS_MM
+    sliver_eps_mm: float = POSITION_EPS_MM
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise OptionError(f"{field.name} of {value} is not above 0")
+        if self.sliver_eps_mm < POSITION_EPS_MM:
+            raise OptionError(
+                f"sliver_eps_mm of {self.sliver_eps_mm} is below {POSITION_EPS_MM}",
+                mend="no polyline has shorter segments",
+            )

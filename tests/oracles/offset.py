@@ -1,0 +1,176 @@
+"""Slow, obvious twins for offsets: distances by angles about centres, insides by fine chords.
+
+Nothing here uses camtool.geometry beyond the record of a polyline.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from camtool.geometry.polylines import Polyline
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+
+GRID_MM = 1e-9
+"""shapely unites on this grid: without one it has lost whole parts of nearly equal arcs."""
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Centre, radius, begin angle and signed sweep."""
+
+    x: float
+    y: float
+    radius: float
+    begin: float
+    sweep: float
+
+    def at(self, part: Floats) -> Floats:
+        """Points at the parts (J,) of the sweep."""
+        angle = self.begin + part * self.sweep
+        return np.column_stack(
+            [self.x + self.radius * np.cos(angle), self.y + self.radius * np.sin(angle)]
+        )
+
+
+def pieces(p: Polyline) -> list[tuple[Floats, Floats, Arc | None]]:
+    """Start, end and arc (None for a line) of each segment."""
+    rows = [*p.vertices, p.vertices[0]] if p.closed else list(p.vertices)
+    return [
+        (a[:2], b[:2], _arc(a[:2], b[:2], float(a[2])) if a[2] else None)
+        for a, b in pairwise(rows)
+    ]
+
+
+def _arc(a: Floats, b: Floats, bulge: float) -> Arc:
+    sweep = 4.0 * math.atan(bulge)
+    chord = math.dist(a, b)
+    radius = 0.5 * chord / math.sin(0.5 * abs(sweep))
+    # From the middle of the chord to the centre: to the left for CCW arcs up to half a circle.
+    height = math.copysign(radius * math.cos(0.5 * sweep), bulge)
+    ux, uy = (b - a) / chord
+    x = 0.5 * (a[0] + b[0]) - uy * height
+    y = 0.5 * (a[1] + b[1]) + ux * height
+    return Arc(x, y, radius, math.atan2(a[1] - y, a[0] - x), sweep)
+
+
+def distance(points: Floats, p: Polyline) -> Floats:
+    """(P,) distance of points to the path."""
+    best = np.full(len(points), np.inf)
+    for a, b, arc in pieces(p):
+        best = np.minimum(best, np.hypot(*(points - a).T))
+        best = np.minimum(best, np.hypot(*(points - b).T))
+        if arc is None:
+            d = b - a
+            t = ((points - a) @ d) / (d @ d)
+            foot = np.hypot(*(points - a - t[:, None] * d).T)
+            best = np.where((t > 0.0) & (t < 1.0), np.minimum(best, foot), best)
+            continue
+        x, y = points[:, 0] - arc.x, points[:, 1] - arc.y
+        turn = np.arctan2(y, x) - arc.begin
+        part = np.mod(math.copysign(1.0, arc.sweep) * turn, 2.0 * math.pi)
+        foot = np.abs(np.hypot(x, y) - arc.radius)
+        best = np.where(part < abs(arc.sweep), np.minimum(best, foot), best)
+    return best
+
+
+def dense(p: Polyline, per_segment: int) -> Floats:
+    """Points along the path, equal counts in each segment, both its ends among them."""
+    part = np.linspace(0.0, 1.0, per_segment)
+    return np.concatenate(
+        [a + part[:, None] * (b - a) if arc is None else arc.at(part) for a, b, arc in pieces(p)]
+    )
+
+
+def chords(p: Polyline, most_rad: float) -> Floats:
+    """The vertices of the path with arcs as chords of at most `most_rad` sweep."""
+    points = []
+    for a, _, arc in pieces(p):
+        count = 1 if arc is None else max(2, math.ceil(abs(arc.sweep) / most_rad))
+        part = np.arange(count) / count
+        points.append(a[None, :] if arc is None else arc.at(part))
+    if not p.closed:
+        points.append(p.vertices[-1:, :2])
+    return np.concatenate(points)
+
+
+def sagitta(p: Polyline, most_rad: float) -> float:
+    """Greatest distance of the chords from their arcs, mm."""
+    radii = [arc.radius for _, _, arc in pieces(p) if arc is not None]
+    return max(radii, default=0.0) * (1.0 - math.cos(0.5 * most_rad))
+
+
+def inside(points: Floats, rings: Sequence[Floats]) -> Bools:
+    """Which points (P, 2) are in an odd number of the rings of chords."""
+    odd = np.zeros(len(points), dtype=np.bool_)
+    for ring in rings:
+        polygon = shapely.Polygon(ring)
+        shapely.prepare(polygon)
+        odd ^= shapely.contains_xy(polygon, points[:, 0], points[:, 1])
+    return odd
+
+
+def ccw(p: Polyline) -> bool:
+    """True when a closed path turns CCW."""
+    ring = chords(p, 0.1)
+    following = np.roll(ring, -1, axis=0)
+    return bool((ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0]).sum() > 0.0)
+
+
+def near_region(p: Polyline, reach_mm: float, most_rad: float) -> shapely.Geometry:
+    """All points up to `reach_mm` from the path: a disc at each vertex and a band along each
+    segment, united. (shapely's own buffer simplifies its input first, and is out by per cents
+    where many short chords come near the distance.)
+    """
+    angle = np.arange(0.0, 2.0 * math.pi, most_rad)
+    disc = reach_mm * np.column_stack([np.cos(angle), np.sin(angle)])
+    parts = [shapely.Polygon(vertex + disc) for vertex in p.vertices[:, :2]]
+    for a, b, arc in pieces(p):
+        if arc is None:
+            along = (b - a) / math.dist(a, b)
+            across = reach_mm * np.array([-along[1], along[0]])
+            parts.append(shapely.Polygon([a + across, b + across, b - across, a - across]))
+            continue
+        part = np.linspace(0.0, 1.0, max(2, math.ceil(abs(arc.sweep) / most_rad)))
+        hollow = arc.radius - reach_mm
+        centre = np.array([[arc.x, arc.y]])
+        inner = replace(arc, radius=hollow).at(part) if hollow > 0.0 else centre
+        outer = replace(arc, radius=arc.radius + reach_mm).at(part)
+        parts.append(shapely.Polygon(np.concatenate([inner, outer[::-1]])))
+    return shapely.union_all(parts, grid_size=GRID_MM)
+
+
+def offset_region(p: Polyline, distance_mm: float, most_rad: float) -> shapely.Geometry:
+    """What the offset of a simple closed path encloses, as area of shapely, arcs as chords."""
+    polygon = shapely.Polygon(chords(p, most_rad))
+    near = near_region(p, abs(distance_mm), most_rad)
+    inward = (distance_mm > 0.0) == ccw(p)
+    unite = shapely.difference if inward else shapely.union
+    return unite(polygon, near, grid_size=GRID_MM)
+
+
+def rings(region: shapely.Geometry, least_width: float) -> list[shapely.Geometry]:
+    """The rings of a region, outer and inner, without those narrower than that in the mean."""
+    parts = [part for part in shapely.get_parts(region) if part.geom_type == "Polygon"]
+    every = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+    return [r for r in every if 2.0 * shapely.Polygon(r).area > least_width * r.length]
+
+
+def far_enough(points: Floats, p: Polyline, distance_mm: float, most_rad: float) -> Bools:
+    """Which points the offset of a simple closed path shall hold inside, by the distance alone.
+
+    A positive distance of a CCW path: inside it and far enough from it. Else its complement.
+    """
+    within = inside(points, [chords(p, most_rad)])
+    near = distance(points, p) < abs(distance_mm)
+    inward = (distance_mm > 0.0) == ccw(p)
+    return within & ~near if inward else within | near
