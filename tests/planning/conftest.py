@@ -1,0 +1,17 @@
+"""The machine that the tests of planning share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from camtool.machine.loader import build_machine, read_table
+from camtool.machine.model import Machine
+
+TARGET = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
+
+
+@pytest.fixture(scope="session")
+def machine() -> Machine:
+    return build_machine(read_table(TARGET), "pic_mmh.toml")

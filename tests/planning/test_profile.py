@@ -1,0 +1,203 @@
+"""On which lines the middle of the tool runs, and what is noticed on the way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from camtool.errors import OptionError
+from camtool.findings import Code, Severity
+from camtool.geometry.distance import nearest
+from camtool.geometry.measure import extents, sample, signed_areas
+from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.geometry.transform import reverse
+from camtool.planning.job import Job
+from camtool.planning.profile import Contours, contours, origin_shift
+from tests.drawings import drawing_of
+from tests.strategies import contours as star_contours
+
+R = 0.25
+
+
+def _circle(x: float, y: float, radius: float) -> Polyline:
+    return Polyline(np.array([[x - radius, y, 1.0], [x + radius, y, 1.0]]), closed=True)
+
+
+def _box(x0: float, y0: float, x1: float, y1: float) -> Polyline:
+    return Polyline(np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0.0]]), True)
+
+
+def _line(*numbers: float) -> Polyline:
+    return Polyline(np.array([[*numbers[:2], 0.0], [*numbers[2:], 0.0]]))
+
+
+def _codes(found: Contours) -> list[Code]:
+    return [finding.code for finding in found.findings]
+
+
+def _areas(found: Contours) -> list[float]:
+    return [abs(area) for area in signed_areas(found.lines).tolist()]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_sides(turned: bool) -> None:
+    circle = reverse(_circle(0, 0, 2)) if turned else _circle(0, 0, 2)
+    for side, radius in (("on", 2.0), ("outside", 2 + R), ("inside", 2 - R), ("auto", 2 + R)):
+        found = contours(drawing_of([circle]), Job(tool_diameter_mm=2 * R, side=side))
+        assert _areas(found) == [pytest.approx(math.pi * radius**2)]
+        assert found.findings == ()
+        # The direction of the drawing is kept.
+        assert (signed_areas(found.lines)[0] < 0.0) == turned
+
+
+def test_a_point_without_width_runs_on_every_line() -> None:
+    paths = [_box(0, 0, 9, 9), _circle(4, 4, 2), _line(1, 1, 2, 1)]
+    for side in ("on", "outside", "inside", "auto"):
+        found = contours(drawing_of(paths), Job(side=side))
+        assert np.array_equal(found.lines.vertices, Polylines.of(paths).vertices)
+        assert found.source.tolist() == [0, 1, 2]
+        assert found.findings == ()
+
+
+def test_auto_goes_round_parts_and_within_holes() -> None:
+    paths = [_circle(0, 0, 1), _circle(0, 0, 3), _circle(0, 0, 5), _circle(20, 0, 1)]
+    found = contours(drawing_of(paths), Job(tool_diameter_mm=2 * R))
+    radii = [math.sqrt(area / math.pi) for area in _areas(found)]
+    assert radii == pytest.approx([1 + R, 3 - R, 5 + R, 1 + R])
+
+
+def test_only_chosen_layers_nest() -> None:
+    made = drawing_of([_circle(0, 0, 1), _circle(0, 0, 3)], ["IN", "FRAME"])
+    found = contours(made, Job(tool_diameter_mm=2 * R, layers=("IN",)))
+    assert found.source.tolist() == [0]
+    assert _areas(found) == [pytest.approx(math.pi * (1 + R) ** 2)]
+    later = contours(made, Job(tool_diameter_mm=2 * R, layers=("FR*",)))
+    assert later.source.tolist() == [1]
+
+
+def test_layers_that_are_not_there_are_named_with_those_that_are() -> None:
+    with pytest.raises(OptionError, match="FRAME, IN") as caught:
+        contours(drawing_of([_circle(0, 0, 1)] * 2, ["IN", "FRAME"]), Job(layers=("CUT",)))
+    assert caught.value.file == "test.dxf"
+
+
+def test_an_empty_drawing_has_no_contours() -> None:
+    for origin in ("drawing", "lower-left", "centre"):
+        found = contours(drawing_of([]), Job(layers=("CUT",), origin=origin))
+        assert len(found.lines) == 0
+
+
+@pytest.mark.parametrize(
+    ("side", "count"), [("auto", 0), ("on", 0), ("outside", 1), ("inside", 1)]
+)
+def test_open_paths_are_cut_on_the_line(side: str, count: int) -> None:
+    path = _line(1, 1, 2, 1)
+    found = contours(drawing_of([path]), Job(tool_diameter_mm=1.0, side=side))
+    assert np.array_equal(found.lines.vertices, path.vertices)
+    assert _codes(found) == [Code.OPEN_CONTOUR_ON_LINE] * count
+    assert all(f.where == "0/PATH 0 at X 1.0000 Y 1.0000" for f in found.findings)
+
+
+def test_a_contour_that_the_tool_does_not_fit_into_is_named() -> None:
+    found = contours(
+        drawing_of([_circle(3, 4, 1), _box(9, 9, 99, 99)]),
+        Job(tool_diameter_mm=2.5, side="inside"),
+    )
+    assert found.source.tolist() == [1]
+    (finding,) = found.findings
+    assert (finding.code, finding.severity) == (Code.CONTOUR_TOO_SMALL, Severity.WARNING)
+    assert finding.measured == pytest.approx(math.pi)
+    assert finding.where == "0/PATH 0 at X 3.0000 Y 4.0000"
+
+
+def test_a_contour_may_fall_apart() -> None:
+    dumbbell = Polyline(
+        np.array(
+            [
+                [0.0, 0, 0],
+                [3, 0, 0],
+                [3, 1.4, 0],
+                [6, 1.4, 0],
+                [6, 0, 0],
+                [9, 0, 0],
+                [9, 3, 0],
+                [6, 3, 0],
+                [6, 1.6, 0],
+                [3, 1.6, 0],
+                [3, 3, 0],
+                [0, 3, 0],
+            ]
+        ),
+        True,
+    )
+    found = contours(drawing_of([dumbbell]), Job(tool_diameter_mm=1.0, side="inside"))
+    assert found.source.tolist() == [0, 0]
+    # The tool looks a little into the neck.
+    assert _areas(found) == pytest.approx([4.0, 4.0], rel=1e-3)
+
+
+def test_parts_nearer_than_the_tool_is_wide_are_gouged() -> None:
+    paths = [_circle(0, 0, 1), _circle(2.3, 0, 1)]
+    found = contours(drawing_of(paths), Job(tool_diameter_mm=0.5))
+    assert _codes(found) == [Code.GOUGE, Code.GOUGE]
+    first = found.findings[0]
+    assert first.severity == Severity.WARNING
+    # Round the left circle the tool's middle reaches x = 1.25; the other begins at 1.3.
+    assert first.measured == pytest.approx(0.05)
+    assert first.limit == 0.25
+    assert first.where == "0/PATH 0 at X 1.2500 Y 0.0000"
+    assert "0/PATH 1" in first.message
+
+
+@pytest.mark.parametrize(
+    "paths",
+    [
+        [_circle(0, 0, 1), _circle(2.5, 0, 1)],  # just room for the tool
+        [_circle(0, 0, 1), _circle(0, 0, 1)],  # a double
+        [_circle(0, 0, 1), _line(1.2, -5, 1.2, 5)],  # an open path is no part
+        [_circle(0, 0, 1), _circle(0, 0, 3)],  # a hole in a part
+    ],
+)
+def test_no_gouge(paths: list[Polyline]) -> None:
+    assert contours(drawing_of(paths), Job(tool_diameter_mm=0.5)).findings == ()
+
+
+def test_parts_that_touch_leave_no_room_for_the_tool() -> None:
+    found = contours(drawing_of([_circle(0, 0, 1), _circle(2.0, 0, 1)]), Job(tool_diameter_mm=0.5))
+    assert [finding.measured for finding in found.findings] == [0.0, 0.0]
+
+
+def test_on_the_line_nothing_is_a_gouge() -> None:
+    paths = [_circle(0, 0, 1), _circle(2.1, 0, 1)]
+    assert contours(drawing_of(paths), Job(tool_diameter_mm=0.5, side="on")).findings == ()
+
+
+def test_origins_take_the_chosen_paths() -> None:
+    made = drawing_of([_circle(5, 7, 2), _box(-50, -50, 50, 50)], ["CUT", "FRAME"])
+    for origin, shift in (
+        ("drawing", (0.0, 0.0)),
+        ("lower-left", (-3.0, -5.0)),
+        ("centre", (-5.0, -7.0)),
+    ):
+        job = Job(origin=origin, layers=("CUT",))
+        assert origin_shift(made, job) == pytest.approx(shift)
+        box = extents(contours(made, job).lines).mean(axis=1)
+        assert box == pytest.approx(np.array([5.0, 7.0]) + shift)
+
+
+@given(star_contours())
+def test_the_tool_just_touches_the_contour_and_never_crosses_it(path: Polyline) -> None:
+    made = drawing_of([path])
+    for side in ("outside", "inside"):
+        found = contours(made, Job(tool_diameter_mm=2 * R, side=side))
+        for line in found.lines:
+            away = nearest(sample(line, 0.2), Segments.of(path)).distance
+            assert away == pytest.approx(R, abs=1e-5)
+        if len(found.lines) == 0:
+            assert _codes(found) == [Code.CONTOUR_TOO_SMALL]
+        else:
+            bigger = sum(_areas(found)) > abs(signed_areas(made.paths)[0])
+            assert bigger == (side == "outside")
