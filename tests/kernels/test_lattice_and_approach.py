@@ -87,3 +87,14 @@ def test_nearest_approach_is_on_the_right_turn() -> None:
         nearest, square = found.pop()
         assert nearest == pytest.approx(around, abs=3)
         assert square == ((path[nearest - 1] - end) ** 2).sum()
+
+
+def test_the_first_of_equally_near_samples_counts() -> None:
+    points = np.array([[3, 1], [3, 3], [1, 3], [1, 1]])
+    tracker = approach_start(1, 1, 2, 2, 1)
+    assert tracker[5] == -1
+    approach_scan(points, np.array([2, 2]), tracker, 0, 4)
+    assert (tracker[4], tracker[5]) == (1, 2)
+    tracker = approach_start(1, 1, 2, 2, 0)
+    approach_scan(points, np.array([2, 2]), tracker, 0, 4)
+    assert (tracker[4], tracker[5]) == (0, 2)
