@@ -21,7 +21,7 @@ from camtool.geometry.fit import Fit, overall
 from camtool.importers.assemble import Piece, assemble
 from camtool.importers.dxf_blocks import MAX_INSERTED, BlockSizes, block_key, matrix, places
 from camtool.importers.dxf_load import load, printable, quiet
-from camtool.importers.dxf_shapes import Frame, Unusable, reader_of
+from camtool.importers.dxf_shapes import Frame, Unusable, can_read, require, shape_of
 from camtool.importers.options import ReadOptions
 
 MAX_NESTING = 50
@@ -155,16 +155,15 @@ class _Walk:
         # An INSERT on a layer that is off still shows what its block has on other layers.
         if layer.hidden and (kind != "INSERT" or layer.frozen):
             raise Unusable(layer.hidden)
-        if entity.dxf.get("invisible", 0):
+        if _said(entity.dxf, "invisible", 0):
             raise Unusable("is invisible")
         colour = _colour(entity.dxf, layer.colour, scope.colour)
         if kind == "INSERT":
             self._insert(entity, replace(scope, layer=name, colour=colour))
             return
-        reader = reader_of(kind)
-        if reader is None:
+        if not can_read(kind):
             raise Unusable(_WHY_UNUSED.get(kind, _OTHER))
-        shape = reader(entity, scope.frame, self.tolerance_mm)
+        shape = shape_of(entity, scope.frame, self.tolerance_mm)
         source = _source(entity) + scope.within
         self.pieces.append(Piece(shape.vertices, shape.closed, name, colour, source))
         self.fits.extend(shape.fits)
@@ -172,6 +171,7 @@ class _Walk:
 
     def _insert(self, insert: Any, scope: _Scope) -> None:
         """The block of an INSERT at each place of its array."""
+        require(insert, ("name", "insert"))
         block = insert.block()
         name = block_key(insert.dxf.name)
         if block is None:
@@ -235,7 +235,7 @@ def _repaired(repairs: tuple[str, ...]) -> list[Finding]:
         Finding(
             Code.FILE_REPAIRED,
             Severity.WARNING,
-            f"the file is faulty and was repaired in {len(repairs)} places: {text}{tail}",
+            f"the file is faulty and was repaired ({len(repairs)}): {text}{tail}",
             measured=float(len(repairs)),
         )
     ]
@@ -254,7 +254,7 @@ def _colour(dxf: Any, by_layer: str, by_block: str) -> str:
 
     if dxf.hasattr("true_color"):
         return f"#{int(dxf.true_color) & 0xFFFFFF:06x}"
-    index = abs(int(dxf.get("color", _BYLAYER)))
+    index = abs(int(_said(dxf, "color", _BYLAYER)))
     if index == _BYBLOCK:
         return by_block
     if index >= _BYLAYER:
@@ -264,8 +264,13 @@ def _colour(dxf: Any, by_layer: str, by_block: str) -> str:
 
 def _name(entity: Any, scope: _Scope) -> str:
     """The layer that an entity is drawn on."""
-    name = printable(str(entity.dxf.get("layer", "0")))
+    name = printable(str(_said(entity.dxf, "layer", "0")))
     return scope.layer if scope.blocks and name == "0" else name
+
+
+def _said(dxf: Any, name: str, otherwise: Any) -> Any:
+    """An attribute where the file says it; kinds that ezdxf does not know have none."""
+    return dxf.get(name) if dxf.hasattr(name) else otherwise
 
 
 def _source(entity: Any) -> str:

@@ -47,7 +47,7 @@ def matrix(insert: Any) -> Floats:
     DrawingError for numbers that are not finite, Unusable when it has no plane.
     """
     dxf = insert.dxf
-    numbers = (*dxf.get("insert", (0, 0, 0)), *dxf.extrusion, dxf.rotation)
+    numbers = (*dxf.insert, *dxf.extrusion, dxf.rotation)
     spacing, scales = (dxf.column_spacing, dxf.row_spacing), (dxf.xscale, dxf.yscale, dxf.zscale)
     if not np.isfinite([*numbers, *spacing, *scales]).all():
         raise DrawingError(

@@ -117,12 +117,26 @@ class Shape:
 Reader = Callable[[Any, Frame, float], Shape]
 
 
-def reader_of(kind: str) -> Reader | None:
-    """The function that makes a Shape of this kind of entity, or None.
+def can_read(kind: str) -> bool:
+    """Whether entities of this kind have a shape."""
+    return kind in _READERS
 
-    It raises Unusable, and DrawingError (without file and place) for numbers that are none.
+
+def shape_of(entity: Any, frame: Frame, tolerance_mm: float) -> Shape:
+    """The entity's path in mm; it must be of a kind that can be read.
+
+    Raises Unusable, and DrawingError (without file and place) for numbers that are none.
     """
-    return _READERS.get(kind)
+    reader, needs = _READERS[entity.dxftype()]
+    require(entity, needs)
+    return reader(entity, frame, tolerance_mm)
+
+
+def require(entity: Any, names: tuple[str, ...]) -> None:
+    """Unusable when the file does not say one of these attributes: ezdxf would make one up."""
+    for name in names:
+        if not entity.dxf.hasattr(name):
+            raise Unusable(f"lacks its {name.replace('_', ' ')}")
 
 
 def _line(entity: Any, frame: Frame, _tolerance_mm: float) -> Shape:
@@ -193,6 +207,8 @@ def _polyline(entity: Any, frame: Frame, tolerance_mm: float) -> Shape:
     if entity.get_mode() not in ("AcDb2dPolyline", "AcDb3dPolyline"):
         raise Unusable("is a mesh")
     corners = [v.dxf for v in entity.vertices if not int(v.dxf.flags) & _FRAME_VERTEX]
+    for vertex in entity.vertices:
+        require(vertex, ("location",))
     points = _numbers([tuple(corner.location) for corner in corners]).reshape(-1, 3)
     if len(points) == 0:
         raise Unusable("has no vertices")
@@ -282,12 +298,12 @@ def _numbers(values: Any) -> Floats:
     return numbers
 
 
-_READERS: dict[str, Reader] = {
-    "ARC": _arc,
-    "CIRCLE": _circle,
-    "ELLIPSE": _ellipse,
-    "LINE": _line,
-    "LWPOLYLINE": _lwpolyline,
-    "POLYLINE": _polyline,
-    "SPLINE": _spline,
+_READERS: dict[str, tuple[Reader, tuple[str, ...]]] = {
+    "ARC": (_arc, ("center", "radius", "start_angle", "end_angle")),
+    "CIRCLE": (_circle, ("center", "radius")),
+    "ELLIPSE": (_ellipse, ("center", "major_axis", "ratio")),
+    "LINE": (_line, ("start", "end")),
+    "LWPOLYLINE": (_lwpolyline, ()),
+    "POLYLINE": (_polyline, ()),
+    "SPLINE": (_spline, ()),
 }

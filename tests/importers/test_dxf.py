@@ -270,7 +270,7 @@ def test_a_spline_of_fit_points_passes_through_them():
     assert off.max() <= TOLERANCE_MM * 1.001
 
 
-def test_a_spline_whose_knots_and_points_disagree_is_counted():
+def test_a_spline_with_too_few_points_is_told():
     data = text(
         "LINE 8 0 10 0 20 0 11 1 21 0",
         "SPLINE 100 AcDbEntity 8 0 100 AcDbSpline 70 8 71 3 72 2 73 2 40 0 40 1 "
@@ -279,7 +279,22 @@ def test_a_spline_whose_knots_and_points_disagree_is_counted():
     )
     found = read(data, "part.dxf", OPTIONS)
     assert found.used == {"LINE": 1}
-    assert [item.kind for item in found.skipped] == ["SPLINE"]
+    [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
+    assert "SPLINE" in finding.message
+
+
+@pytest.mark.parametrize(
+    ("entity", "lacks"),
+    [
+        ("CIRCLE 8 0 10 0 20 0", "radius"),
+        ("ARC 8 0 10 0 20 0 40 1 50 0", "end angle"),
+        ("LINE 8 0 10 0 20 0", "end"),
+    ],
+)
+def test_numbers_that_the_file_does_not_say_are_not_made_up(entity, lacks):
+    found = words(entity, "LINE 8 0 10 5 20 0 11 6 21 0")
+    assert len(found.paths) == 1
+    assert skipped(found) == {(entity.split()[0], f"lacks its {lacks}"): 1}
 
 
 def test_shapes_of_one_outline_are_joined():
