@@ -95,6 +95,7 @@ def test_the_total_is_taken_against_the_own_contour_not_against_a_neighbour() ->
     decoded = b.finish()
     found = judged(decoded, decoded, lambda points: points + np.array([0.0, 0.05]))
     assert found.report.error_um.total.max == pytest.approx(50.0, abs=1e-6)
+    assert found.report.error_um.total.rms == pytest.approx(50.0, abs=1e-6)
 
 
 def test_wanted_contours_that_overlap_are_told_apart_by_the_whole_contour() -> None:
