@@ -1,0 +1,173 @@
+"""Writes the sample drawings of camtool: logo.dxf, logo.svg, star.csv and coupon.dxf.
+
+    python samples/make_samples.py [FOLDER]
+
+Run it as often as you like: the same files come out, byte for byte. All lengths are mm.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import sys
+from pathlib import Path
+
+from dxf_writer import dxf
+from shapes import Arc, Circle, Ellipse, Insert, Layer, Line, Polyline, Shape, Sheet, Spline
+from svg_writer import svg
+
+STAR_DECIMILLIMETRES = [
+    (151, 86), (400, 265), (630, 86), (575, 431), (815, 639), (501, 642),
+    (400, 999), (294, 645), (6, 665), (220, 428), (153, 86),
+]  # fmt: skip
+"""The points that the thesis on the Matlab router prints as its example, in tenths of mm."""
+
+MIDDLE = 2.5 + 2.5j
+"""Centre of the emblem, as a complex number."""
+
+
+TILT_DEG = 30.0
+"""The emblem's inner ellipse and wave are turned by this."""
+
+
+def gear(teeth: int, tip: float, root: float, shares: tuple[float, float]) -> Polyline:
+    """A gear about the middle: straight flanks between arcs on the tip and the root circle.
+
+    `shares`: the part of the pitch that the tip and the foot of a tooth take.
+    """
+    pitch = 2.0 * math.pi / teeth
+    head, foot = shares[0] * pitch, shares[1] * pitch
+    gap = pitch - foot
+    vertices = []
+    for tooth in range(teeth):
+        middle = tooth * pitch
+        for radius, angle, sweep in (
+            (root, middle - 0.5 * foot, 0.0),
+            (tip, middle - 0.5 * head, head),
+            (tip, middle + 0.5 * head, 0.0),
+            (root, middle + 0.5 * foot, gap),
+        ):
+            point = MIDDLE + cmath.rect(radius, angle)
+            vertices.append((point.real, point.imag, math.tan(sweep / 4.0)))
+    return Polyline(vertices)
+
+
+def slot(radius: float, half_width: float, half_angle: float) -> Polyline:
+    """A slot that follows a circle about the origin, with round ends, on the X axis."""
+    reach = math.radians(half_angle)
+    inner, outer = radius - half_width, radius + half_width
+    corners = [(inner, reach), (inner, -reach), (outer, -reach), (outer, reach)]
+    along = math.tan(2.0 * reach / 4.0)
+    bulges = [-along, 1.0, along, 1.0]
+    points = [cmath.rect(r, angle) for r, angle in corners]
+    return Polyline([(z.real, z.imag, bulge) for z, bulge in zip(points, bulges, strict=True)])
+
+
+def edge() -> list[Shape]:
+    """The corner of a plate, lower left."""
+    return [
+        Line((0.06, 1.1), (0.06, 0.32)),
+        Arc((0.32, 0.32), 0.26, 180.0, 270.0),
+        Line((0.32, 0.06), (1.1, 0.06)),
+    ]
+
+
+def bracket() -> list[Shape]:
+    """A stroke along the corner of the plate, and a screw."""
+    quarter = math.tan(math.pi / 8.0)
+    bend = [(0.16, 0.92, 0.0), (0.16, 0.32, quarter), (0.32, 0.16, 0.0), (0.92, 0.16, 0.0)]
+    return [Polyline(bend, closed=False), Circle((0.45, 0.45), 0.15)]
+
+
+def around(count: int, radius: float, first: float) -> list[complex]:
+    """Points on a circle about the middle."""
+    return [
+        MIDDLE + cmath.rect(radius, math.radians(first + 360.0 * k / count)) for k in range(count)
+    ]
+
+
+def corners(block: str) -> list[Insert]:
+    """A block at all four corners: as it is, turned, turned twice, and mirrored."""
+    return [
+        Insert(block, (0.0, 0.0)),
+        Insert(block, (5.0, 0.0), 90.0),
+        Insert(block, (5.0, 5.0), 180.0),
+        Insert(block, (0.0, 5.0), 0.0, (1.0, -1.0)),
+    ]
+
+
+def xy(z: complex) -> tuple[float, float]:
+    """A complex number as a point."""
+    return z.real, z.imag
+
+
+def logo() -> Sheet:
+    """The emblem: a gear as a name plate, five millimetres wide."""
+    m = xy(MIDDLE)
+    cut: list[Shape] = [
+        gear(24, 2.36, 2.1, (0.34, 0.56)),
+        Circle(m, 1.9),
+        *(Circle(xy(z), 0.15) for z in around(6, 1.56, 30.0)),
+        *(Insert("SLOT", m, 60.0 * k) for k in range(6)),
+    ]
+    tilt = cmath.rect(1.0, math.radians(TILT_DEG))
+    wave = [-0.62 - 0.06j, -0.52 + 0.26j, -0.2 + 0.5j, 0j, 0.2 - 0.5j, 0.52 - 0.26j, 0.62 + 0.06j]
+    engrave: list[Shape] = [
+        Circle(m, 1.22),
+        gear(16, 1.1, 0.94, (0.3, 0.56)),
+        Ellipse(m, 0.78, 0.56, TILT_DEG),
+        Spline([xy(MIDDLE + z * tilt) for z in wave]),
+        *(Circle(xy(MIDDLE + side * (0.28 + 0.14j) * tilt), 0.15) for side in (-1.0, 1.0)),
+        *corners("BRACKET"),
+    ]
+    cut += corners("EDGE")
+    layers = [Layer("CUT", 5, "#0000ff", cut), Layer("ENGRAVE", 1, "#ff0000", engrave)]
+    blocks: dict[str, list[Shape]] = {
+        "SLOT": [slot(1.56, 0.1, 15.0)],
+        "EDGE": edge(),
+        "BRACKET": bracket(),
+    }
+    return Sheet("camtool emblem", (5.0, 5.0), layers, blocks)
+
+
+def coupon() -> Sheet:
+    """Two parallel lines per axis, joined at one end: their distance shows the play of the axis.
+
+    2.5 mm across X and 1.2 mm across Y, as the PIC machine was measured.
+    """
+    across_x = Polyline(
+        [(1.0, 1.0, 0.0), (1.0, 6.0, 0.0), (3.5, 6.0, 0.0), (3.5, 1.0, 0.0)], False
+    )
+    across_y = Polyline(
+        [(4.5, 2.9, 0.0), (9.0, 2.9, 0.0), (9.0, 4.1, 0.0), (4.5, 4.1, 0.0)], False
+    )
+    layers = [Layer("X", 5, "#0000ff", [across_x]), Layer("Y", 1, "#ff0000", [across_y])]
+    return Sheet("backlash coupon", (10.0, 7.0), layers, {})
+
+
+def star() -> str:
+    """The star as CSV."""
+    rows = [
+        "# The example star of the thesis on the Matlab router (lines 3196-3228 of its text),",
+        "# there in tenths of a millimetre, here in mm.",
+        "x,y",
+        *(f"{x / 10:.1f},{y / 10:.1f}" for x, y in STAR_DECIMILLIMETRES),
+    ]
+    return "\n".join([*rows, ""])
+
+
+def main(folder: Path) -> None:
+    """Write all samples into the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = {
+        "logo.dxf": dxf(logo()),
+        "logo.svg": svg(logo()),
+        "star.csv": star(),
+        "coupon.dxf": dxf(coupon()),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="ascii", newline="\n")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
