@@ -198,5 +198,6 @@ def test_every_path_is_in_one_chain_whatever_is_drawn(paths: list[Polyline]) -> 
     # Everything lies within a few gaps here, so that anything may be joined with anything.
     found = chain(Polylines.of(paths), GAP)
     assert sorted(i for of in found.members for i in of) == list(range(len(paths)))
-    assert all(gap.size_mm <= GAP for gap in found.closed_gaps)
+    # Two ways to round the same distance may differ in the last digit.
+    assert all(gap.size_mm <= GAP * (1.0 + 1e-12) for gap in found.closed_gaps)
     assert all(gap.size_mm > POSITION_EPS_MM for gap in found.closed_gaps)
