@@ -14,8 +14,9 @@ NODE_EPS_MM = 1e-8
 VALIDITY_EPS_MM = 2e-7
 """How much nearer to the source than the distance a slice may be and is still kept."""
 
-CUSP_EPS_RAD = 1e-9
-"""A corner this near to a full turn back is capped on both its sides: neither is the inner one."""
+CUSP_EPS_RAD = 1e-3
+"""A corner this near to a full turn back is capped on both its sides: rounding, or arcs that cross
+again beside the corner, decide which side is the inner one."""
 
 U_TURN_EPS_RAD = 1e-3
 """A turn at a node this near to a full right turn is taken as a full left one."""

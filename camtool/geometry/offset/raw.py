@@ -36,23 +36,50 @@ def raw_offset(p: Polyline, distance_mm: float, options: OffsetOptions) -> RawOf
     left_over = 1.0 - distance_mm * frames.curvature
     keep = (left_over > 0.0) & _longer(start, end, options.node_eps_mm)
 
-    following = np.roll(np.arange(len(segments)), -1)
-    tangent = frames.tangent[following]
-    turn = np.arctan2(dot(turned(end_tangent), tangent), dot(end_tangent, tangent))
-    turn = np.where(turn >= np.pi - CUSP_EPS_RAD, -np.pi, turn)
-    join_end = segments.end + distance_mm * turned(tangent)
-    outer = (turn < 0.0) & _longer(end, join_end, options.node_eps_mm)
-
     rows = np.arange(len(segments))
-    source = np.concatenate([rows[keep], rows[outer]])
-    join = np.concatenate([np.zeros(keep.sum(), np.bool_), np.ones(outer.sum(), np.bool_)])
+    shifted = Segments.between(start[keep], end[keep], segments.bulge[keep])
+    corner, joins = _joins(frames, end_tangent, distance_mm, options)
+    source = np.concatenate([rows[keep], corner])
+    join = np.repeat([False, True], [len(shifted), len(joins)])
     order = np.lexsort([join, source])
     elements = Segments.between(
-        np.concatenate([start[keep], end[outer]])[order],
-        np.concatenate([end[keep], join_end[outer]])[order],
-        np.concatenate([segments.bulge[keep], np.tan(0.25 * turn[outer])])[order],
+        np.concatenate([shifted.start, joins.start])[order],
+        np.concatenate([shifted.end, joins.end])[order],
+        np.concatenate([shifted.bulge, joins.bulge])[order],
     )
     return RawOffset(elements, source[order], join[order])
+
+
+def _joins(
+    frames: Frames, end_tangent: Floats, distance_mm: float, options: OffsetOptions
+) -> tuple[Ints, Segments]:
+    """Arcs about the outer corners, and the segment before each; two where one is above π.
+
+    Where a path turns straight back, rounding alone says whether it turns left or right. It is
+    then taken to turn right: an arc too much is invalid, or leads nowhere, and goes later.
+    """
+    tangent = np.roll(frames.tangent, -1, axis=0)
+    turn = np.arctan2(dot(turned(end_tangent), tangent), dot(end_tangent, tangent))
+    turn = np.where(turn >= np.pi - CUSP_EPS_RAD, turn - 2.0 * np.pi, turn)
+    parts = np.where(turn < -np.pi, 2, np.where(turn < 0.0, 1, 0))
+    corner = np.repeat(np.arange(len(turn)), parts)
+    second = np.concatenate([[False], corner[1:] == corner[:-1]])
+    sweep = turn[corner] / parts[corner]
+    begin = np.where(second, sweep, 0.0)
+    normal = turned(end_tangent[corner])
+    start = frames.end[corner] + distance_mm * _rotated(normal, begin)
+    last = parts[corner] == second + 1
+    middle = frames.end[corner] + distance_mm * _rotated(normal, sweep)
+    after = frames.end[corner] + distance_mm * turned(tangent[corner])
+    end = np.where(last[:, None], after, middle)
+    long = _longer(start, end, options.node_eps_mm)
+    arcs = Segments.between(start[long], end[long], np.tan(0.25 * sweep[long]))
+    return corner[long], arcs
+
+
+def _rotated(vectors: Floats, angle: Floats) -> Floats:
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return np.asarray(cosine * vectors + sine * turned(vectors))
 
 
 def _longer(start: Floats, end: Floats, eps: float) -> Bools:

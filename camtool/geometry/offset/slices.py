@@ -16,6 +16,9 @@ MIDDLE = (0.5,)
 ALONG = (0.03, 0.2, 0.35, 0.65, 0.8, 0.97)
 """Where on a slice its distance is measured; the middle first, as it settles most of them."""
 
+POINTS_AT_A_TIME = 64
+"""How many neighbouring points are measured at a time: fewer are nearer to each other."""
+
 SKEW = (1.0, 0.6180339887498949)
 """Direction along which points are sorted: drawings have many points of equal x or equal y."""
 
@@ -131,6 +134,6 @@ def valid_slices(
         t0, t1 = slices.t0[rows, None], slices.t1[rows, None]
         t = (t0 + (t1 - t0) * part).ravel()
         points = point_at(elements, np.repeat(slices.element[rows], len(part)), t)
-        distance = nearest(points, source).distance.reshape(-1, len(part))
-        valid[rows] = (distance >= least).all(axis=1)
+        distance = nearest(points, source, chunk=POINTS_AT_A_TIME).distance
+        valid[rows] = (distance >= least).reshape(-1, len(part)).all(axis=1)
     return valid
