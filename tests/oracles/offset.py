@@ -174,3 +174,98 @@ def far_enough(points: Floats, p: Polyline, distance_mm: float, most_rad: float)
     near = distance(points, p) < abs(distance_mm)
     inward = (distance_mm > 0.0) == ccw(p)
     return within & ~near if inward else within | near
+
+
+EXACT_MM = 1e-6
+"""No point of an offset may be farther than this from the true offset curve."""
+
+CHORD_RAD = 0.02
+"""Sweep of the chords that stand for arcs where shapely judges."""
+
+
+def distance_complaints(results: Sequence[Polyline], p: Polyline, distance_mm: float) -> list[str]:
+    """What is wrong with the distance of the results from their source, whatever that is."""
+    found = []
+    for each in results:
+        apart = distance(dense(each, 33), p) - abs(distance_mm)
+        if apart.min() < -EXACT_MM:
+            found.append(f"{-apart.min()} mm too near")
+        if apart.max() > EXACT_MM:
+            found.append(f"{apart.max()} mm too far")
+    return found
+
+
+def complaints(
+    results: Sequence[Polyline], p: Polyline, distance_mm: float, rng: np.random.Generator
+) -> list[str]:
+    """Everything that is wrong with the offset of a simple closed path."""
+    found = distance_complaints(results, p, distance_mm)
+    found += [f"result {i} is open" for i, each in enumerate(results) if not each.closed]
+    if found:
+        return found
+    sag = max(sagitta(each, CHORD_RAD) for each in (p, *results))
+    sag += abs(distance_mm) * (1.0 - math.cos(0.5 * CHORD_RAD))
+    found += _place_complaints(results, p, distance_mm, sag, rng)
+    area = abs(sum(_area(each) for each in results))
+    region = offset_region(p, distance_mm, CHORD_RAD)
+    length = sum(_length(each) for each in (p, *results))
+    if abs(area - region.area) > 1e-6 * region.area + length * (2.0 * sag + EXACT_MM):
+        found.append(f"area of {area} mm² where shapely has {region.area} mm²")
+    return found + _count_complaints(results, p, distance_mm, 4.0 * (sag + EXACT_MM))
+
+
+def _place_complaints(
+    results: Sequence[Polyline],
+    p: Polyline,
+    distance_mm: float,
+    sag: float,
+    rng: np.random.Generator,
+) -> list[str]:
+    """Points all over the place, and close beside the results, that are on the wrong side."""
+    source = chords(p, CHORD_RAD)
+    low = source.min(axis=0) - 1.1 * abs(distance_mm)
+    high = source.max(axis=0) + 1.1 * abs(distance_mm)
+    beside = [dense(each, 7) for each in results]
+    beside = [b + 0.003 * rng.normal(size=b.shape) * (high - low).max() for b in beside]
+    points = np.concatenate([rng.uniform(low, high, (500, 2)), *beside])
+    apart = distance(points, p)
+    unclear = 2.0 * (sag + EXACT_MM)
+    points = points[(np.abs(apart - abs(distance_mm)) > unclear) & (apart > unclear)]
+    wanted = far_enough(points, p, distance_mm, CHORD_RAD)
+    got = inside(points, [chords(each, CHORD_RAD) for each in results])
+    wrong = np.flatnonzero(wanted != got)
+    return (
+        [f"{len(wrong)} points, {points[wrong[0]]} first, on the wrong side"] if len(wrong) else []
+    )
+
+
+def _count_complaints(
+    results: Sequence[Polyline], p: Polyline, distance_mm: float, slack: float
+) -> list[str]:
+    """A wrong number of rings, where a little more or less distance would not change it."""
+    if slack > 0.5 * abs(distance_mm):
+        return []
+    counts = {
+        len(rings(offset_region(p, distance_mm + change, CHORD_RAD), 2.0 * slack))
+        for change in (-slack, 0.0, slack)
+    }
+    wide = [each for each in results if abs(_area(each)) > slack * _length(each)]
+    if len(counts) == 1 and counts != {len(wide)}:
+        return [f"{len(wide)} rings where shapely has {counts}"]
+    return []
+
+
+def _area(p: Polyline) -> float:
+    """Signed area, arcs as arcs: the chords' and r²/2 (sweep − sin sweep) for each arc."""
+    total = 0.0
+    for a, b, arc in pieces(p):
+        total += 0.5 * (a[0] * b[1] - a[1] * b[0])
+        if arc is not None:
+            total += 0.5 * arc.radius**2 * (arc.sweep - math.sin(arc.sweep))
+    return float(total)
+
+
+def _length(p: Polyline) -> float:
+    return sum(
+        math.dist(a, b) if arc is None else arc.radius * abs(arc.sweep) for a, b, arc in pieces(p)
+    )
