@@ -200,8 +200,13 @@ MOST_DWELL_S: Final = 9900.0
 """A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
 
 DWELL_DIGITS_S: Final = 99
+"""Seconds that the two digits of one G04 can say (L3359-3366)."""
+
 MOST_SPINDLE: Final = 9999
+"""Rev/min that the four digits of S can say (L3418-3426)."""
+
 MOST_TOOL: Final = 99
+"""Tools that the two digits of T can say (L3455-3464)."""
 
 
 def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:

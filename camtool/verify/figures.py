@@ -27,6 +27,7 @@ LARGEST_MM = 2.0**20
 """Errors above this (a kilometre) share the last bin of the percentile."""
 
 PERCENTILE = 0.95
+"""Which percentile of the errors the report calls p95."""
 
 _SHIFT = 52 - MANTISSA_BITS
 
