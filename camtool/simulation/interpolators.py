@@ -22,9 +22,6 @@ from camtool.simulation.motion import Ints
 Filler: TypeAlias = Callable[[Ints], tuple[int, int, bool]]
 """(n, 2) buffer → rows filled, passes run, and whether the end is met with the last row."""
 
-QUADRANTS_SEARCHED = 8
-"""Two full turns: an arc that has not met its end by then never will be taken to."""
-
 SEARCH_ROWS = 1 << 14
 """Positions that the search for the end looks at in one go (256 KiB, stays in the cache)."""
 
@@ -80,8 +77,9 @@ def arc_filler(arc: Arc, method: Interpolator, *, rounded: bool) -> Filler:
 def arc_reach(arc: Arc, fill: Filler) -> tuple[int, bool]:
     """How many positions a fresh filler gives until the stop test is met, and True.
 
-    When it is not met within two full turns: how many until the nearest approach to the end in
-    the expected sweep (a quadrant more or less), and False. Bounded in time and memory.
+    When it is not met in the expected sweep and a quadrant more: how many until the nearest
+    approach to the end there, and False. The controller then goes round at least once more, if it
+    ever stops. Bounded in time and memory.
     """
     expected = expected_quadrants(arc.x, arc.y, arc.clockwise, arc.end_x, arc.end_y)
     low, high = expected - 1, expected + 1
@@ -93,7 +91,7 @@ def arc_reach(arc: Arc, fill: Filler) -> tuple[int, bool]:
         filled, _, met = fill(buffer)
         approach_scan(buffer[:filled], end, tracker, low, high)
         entered, seen, nearest = int(tracker[2]), int(tracker[3]), int(tracker[4])
-        if entered > QUADRANTS_SEARCHED:
+        if entered > high:
             return nearest, False
         if met:
             return seen, True

@@ -11,11 +11,10 @@ What it does with a row of the toolpath, in the order of this file:
    pulse costs nothing (annex A.3 loops back at once); "iteration": each pass takes one period.
 4. At each change of an axis's direction the compensation steps are issued, a period each.
 
-An arc whose path never equals its end would go round for ever on the real machine. Here its
-samples stop at the nearest approach to the end in the expected sweep, `ended` is False, and the
-next row goes on from the programmed end, without a reversal on the way there. An arc that starts
-at its centre has no samples and the same fate. An arc that only meets its end on its second turn
-is simulated as it runs, with that turn.
+An arc that passes its end without standing on it goes round again on the real machine, mostly for
+ever. Here its samples stop at the nearest approach to the end in the expected sweep, `ended` is
+False, and the next row goes on from the programmed end, without a reversal on the way there. An
+arc that starts at its centre has no samples and the same fate.
 """
 
 from __future__ import annotations

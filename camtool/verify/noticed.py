@@ -46,7 +46,7 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
         yield Finding(
             Code.ARC_MISSES_END,
             Severity.ERROR,
-            f"the arc never stands on its end step{apart}: the real machine would run on{more}",
+            f"the arc does not stop at its end{apart}: the real machine would run on{more}",
             where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
             measured=float(missed) if math.isfinite(missed) else None,
             limit=0.0,

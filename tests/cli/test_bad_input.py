@@ -93,7 +93,7 @@ def test_post_refuses(
         (["post", "a.csv", "-t", "pic-mmh", "-o", "a.csv"], ["input itself"]),
         (["post", "a.csv", "-t", "pic-mmh", "-o", "/dev/full"], ["/dev/full", "No space"]),
         (["verify", "none.pic", "-t", "pic-mmh"], ["none.pic"]),
-        (["verify", "a.csv", "-t", "pic-mmh"], ["a.csv", "block 1", "column 1"]),
+        (["verify", "a.csv", "-t", "pic-mmh"], ["a.csv", "block 1", "column"]),
         (["preview", "a.pic", "-o", "a.png"], ["a.pic", "--target"]),
         (["preview", "a.csv", "-o", "a.gif"], [".svg"]),
         (["preview", "a.csv", "-o", "a.svg", "--simulate"], ["--target"]),

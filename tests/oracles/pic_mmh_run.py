@@ -1,7 +1,7 @@
 """A whole program on the PIC18F8720 and its slides, literally: one row, one pass, one step.
 
-Written from the rules of the machine alone; for small programs whose arcs meet their ends within
-two turns. Shares the literal interpolators of `tests.oracles.controllers`, nothing else.
+Written from the rules of the machine alone; for small programs whose arcs meet their ends.
+Shares the literal interpolators of `tests.oracles.controllers`, nothing else.
 """
 
 from __future__ import annotations
