@@ -1,0 +1,351 @@
+"""Parallel offsets: hand-made cases, what failed once, and the stages one by one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from camtool.errors import GeometryError, OptionError
+from camtool.geometry.measure import length, path_extents, point_at, signed_area
+from camtool.geometry.offset import OffsetOptions, offset, offset_open, offset_stages
+from camtool.geometry.offset.slices import merge_points
+from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from tests.oracles.contours import (
+    C_SHAPE,
+    CIRCLE,
+    CRESCENT,
+    DUMBBELL,
+    ELL,
+    FILLETED,
+    KEYHOLE,
+    LENS,
+    NOTCH,
+    OBLONG,
+    QUARTER,
+    SLOT,
+    SPIKE,
+    SQUARE,
+    closed,
+    comb,
+    gear,
+    opened,
+    spiral,
+    star,
+)
+from tests.oracles.offset import complaints, distance, distance_complaints
+
+Case = tuple[str, Polyline, float, int]
+
+# name, source (all CCW), distance, how many results: the reason
+CASES: list[Case] = [
+    ("circle in", CIRCLE, 3.0, 1),  # two half arcs stay two half arcs
+    ("circle out", CIRCLE, -3.0, 1),
+    ("circle, just before it collapses", CIRCLE, 10.0 - 1e-4, 1),
+    ("circle, at its radius", CIRCLE, 10.0, 0),  # both arcs vanish exactly
+    ("circle, beyond its radius", CIRCLE, 10.5, 0),  # both arcs would be inverted
+    ("slot in", SLOT, 2.0, 1),
+    ("slot out", SLOT, -2.0, 1),
+    ("slot, at half its width", SLOT, 5.0, 0),  # collapses to a line
+    ("slot, beyond half its width", SLOT, 6.0, 0),
+    ("square in", SQUARE, 2.0, 1),  # four inner corners
+    ("square out", SQUARE, -2.0, 1),  # four joins
+    ("square, to its centre", SQUARE, 5.0, 0),  # four lines through one point
+    ("oblong, to its axis", OBLONG, 5.0, 0),  # two coincident lines, opposite
+    ("oblong, by a hair beyond", OBLONG, 5.0 + 1e-8, 0),  # wrong by less than is measured
+    ("oblong, by a hair before", OBLONG, 5.0 - 1e-8, 0),  # right, and narrower than a sliver
+    ("fillets shrink", FILLETED, 1.0, 1),
+    ("fillets vanish exactly", FILLETED, 2.0, 1),  # lines meet where four arcs have no radius
+    ("fillets inverted", FILLETED, 2.5, 1),  # lines cross before their ends
+    ("fillets grow", FILLETED, -3.0, 1),
+    ("reflex corner, inside", ELL, 1.0, 1),  # one join within
+    ("reflex corner, arms exactly closed", ELL, 2.0, 1),  # lines coincide, a join touches them
+    ("reflex corner, arms gone", ELL, 2.05, 1),  # the join meets both sides in cusps
+    ("dumbbell, joined", DUMBBELL, 0.5, 1),
+    ("dumbbell, bar exactly closed", DUMBBELL, 1.0, 2),  # its two sides run to and fro
+    ("dumbbell, in two", DUMBBELL, 2.0, 2),
+    ("dumbbell, outside", DUMBBELL, -4.0, 1),  # the gaps beside the bar go
+    ("C, mouth open", C_SHAPE, -0.5, 1),
+    ("C, mouth exactly closed", C_SHAPE, -1.0, 1),
+    ("C, mouth closed", C_SHAPE, -1.5, 1),
+    ("C, its back exactly closed", C_SHAPE, 2.0, 2),  # two arms that a line joins
+    ("keyhole, without its shaft", KEYHOLE, 1.5, 1),
+    ("keyhole, its shaft exactly closed", KEYHOLE, 1.0, 1),
+    ("lens of two vertices", LENS, 1.0, 1),  # both ends are corners of two arcs
+    ("lens, out", LENS, -2.0, 1),
+    ("crescent", CRESCENT, 0.3, 1),  # horns thinner than the distance
+    ("crescent, out", CRESCENT, -1.0, 1),
+    ("star in", star(7, 5.0, 10.0), 1.0, 1),
+    ("star out", star(7, 5.0, 10.0), -3.0, 1),
+    ("gear in", gear(40, 9.0, 10.0), 0.1, 1),
+    ("gear in, teeth gone", gear(40, 9.0, 10.0), 1.0, 1),  # joins about 80 root corners remain
+    ("gear out", gear(40, 9.0, 10.0), -0.1, 1),
+    ("gear out, gaps closed", gear(40, 9.0, 10.0), -2.0, 1),  # 40 cusps
+    ("comb in", comb(12), 0.4, 1),
+    ("comb, teeth exactly closed", comb(12), 0.5, 1),  # every tooth collapses to a line
+    ("comb, bar exactly closed", comb(12), 1.0, 10),  # a crumb under each tooth but the last two
+    ("comb out", comb(12), -0.4, 1),
+    ("comb out, gaps exactly closed", comb(12), -0.5, 1),
+    ("comb out, gaps gone", comb(12), -2.0, 1),
+    ("spiral in", spiral(4), 0.9, 1),
+    ("spiral, band exactly closed", spiral(4), 1.0, 0),  # concentric arcs coincide, opposite
+    ("spiral out", spiral(4), -0.9, 1),
+    ("spiral out, gaps gone", spiral(4), -1.1, 2),  # and the hole it winds about
+    ("spike, out", SPIKE, -1.0, 1),  # nearly a full turn back at its tip
+    ("spike, in", SPIKE, 1.0, 1),  # a spike narrower than the distance
+    ("notch as a half circle, in", NOTCH, 0.4, 1),
+    ("notch, at its radius, out", NOTCH, -0.5, 1),  # an arc vanishes exactly, others go on
+]
+
+# name, source, distance, how many results: what was wrong
+PAST_FAILURES: list[Case] = [
+    # A half circle met a line at a full turn back but for 1.5e-8 rad, with a loop of 2e-8 mm: the
+    # corner was taken for an inner one, had no join, and all of the contour was lost.
+    (
+        "cusp that turns left by a hair",
+        closed(
+            (1.999999986364, 0.999999996544),
+            (1.999999989962, -0.000000015093, -1),
+            (3.000000014494, 0.00000001197),
+            (3.000000029789, 2.999999999181),
+            (0.999999994568, 3.000000009156, -0.414213562373),
+            (1.000000011301, 1.000000000013),
+        ),
+        -0.5,
+        1,
+    ),
+]
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+@pytest.mark.parametrize(
+    ("p", "d", "count"),
+    [pytest.param(*case[1:], id=case[0]) for case in CASES + PAST_FAILURES],
+)
+def test_cases(p: Polyline, d: float, count: int) -> None:
+    results = offset(p, d)
+    assert len(results) == count
+    assert complaints(results, p, d, rng()) == []
+    # The outermost runs the way of the source.
+    assert sum(signed_area(each) for each in results) >= 0.0
+
+
+def figures(results: list[Polyline], factor: float = 1.0) -> list[tuple[float, ...]]:
+    """Area, length and extents of each, sorted; signs and order of axes left out."""
+    found = []
+    for each in results:
+        width, height = np.diff(path_extents(Polylines.of([each]))[0], axis=1)[:, 0]
+        sizes = (abs(signed_area(each)) / factor**2, length(each) / factor)
+        found.append((*sizes, *sorted((float(width / factor), float(height / factor)))))
+    return sorted(found)
+
+
+CHANGES: list[tuple[str, Callable[[Polyline], Polyline], float, float]] = [
+    ("reversed", reverse, -1.0, 1.0),
+    ("turned by 90°", lambda p: rotated(p, 0.5 * math.pi), 1.0, 1.0),
+    ("mirrored", mirrored, -1.0, 1.0),
+    ("scaled up", lambda p: scaled(p, 37.0), 37.0, 37.0),
+    ("scaled down", lambda p: scaled(p, 0.1), 0.1, 0.1),
+    ("moved far away", lambda p: moved(p, 12345.678, -9876.543), 1.0, 1.0),
+]
+
+
+@pytest.mark.parametrize(
+    ("p", "d"), [pytest.param(*case[1:3], id=case[0]) for case in CASES + PAST_FAILURES]
+)
+def test_changed_sources_change_nothing_else(p: Polyline, d: float) -> None:
+    wanted = figures(offset(p, d))
+    changed = [(name, change(p), d * sign, by) for name, change, sign, by in CHANGES]
+    step = max(1, len(p) // 7)
+    changed += [(f"from vertex {i}", rolled(p, i), d, 1.0) for i in range(1, len(p), step)]
+    for name, source, distance_mm, factor in changed:
+        got = figures(offset(source, distance_mm), factor)
+        assert len(got) == len(wanted), name
+        if wanted:
+            assert np.allclose(got, wanted, rtol=1e-6, atol=2e-5), name
+
+
+def test_turned_sources_by_any_angle() -> None:
+    for name, p, d, _ in CASES:
+        if "exactly" in name or "hair" in name or "collapses" in name:
+            continue
+        wanted, got = offset(p, d), offset(rotated(p, 0.7), d)
+        assert len(got) == len(wanted), name
+        areas = [sorted(signed_area(each) for each in some) for some in (got, wanted)]
+        assert np.allclose(*areas, rtol=1e-9, atol=1e-7), name
+
+
+def test_circle_stays_a_circle_about_its_centre() -> None:
+    for d in (3.0, -3.0, 9.999):
+        (result,) = offset(CIRCLE, d)
+        segments = Segments.of(result)
+        assert len(result) == 2
+        assert np.abs(segments.centre).max() < 1e-9
+        assert segments.radius == pytest.approx(10.0 - d, abs=1e-9)
+
+
+def test_slot_stays_two_lines_and_two_arcs() -> None:
+    for d in (2.0, -2.0):
+        (result,) = offset(SLOT, d)
+        assert len(result) == 4
+        assert np.count_nonzero(result.vertices[:, 2]) == 2
+
+
+def test_outer_corners_are_round_and_inner_ones_sharp() -> None:
+    (inner,), (outer,) = offset(SQUARE, 1.0), offset(SQUARE, -1.0)
+    assert signed_area(inner) == pytest.approx(64.0, abs=1e-9)
+    assert signed_area(outer) == pytest.approx(140.0 + math.pi, abs=1e-9)
+    assert len(inner) == 4
+    assert len(outer) == 8
+
+
+def test_a_hole_that_closes_off_runs_the_other_way() -> None:
+    mouth = closed((0, 0), (12, 0), (12, 5), (10, 5), (10, 2), (2, 2), (2, 10), (10, 10), (10, 7),
+                   (12, 7), (12, 12), (0, 12))  # fmt: skip
+    results = offset(mouth, -1.2)
+    assert sorted(signed_area(each) > 0.0 for each in results) == [False, True]
+    assert complaints(results, mouth, -1.2, rng()) == []
+
+
+def test_no_distance_gives_the_source_and_no_number_an_error() -> None:
+    assert offset(SLOT, 0.0) == [SLOT]
+    assert offset(SLOT, 1e-7) == [SLOT]
+    for bad in (math.nan, math.inf, -math.inf):
+        with pytest.raises(GeometryError, match="finite"):
+            offset(SLOT, bad)
+    with pytest.raises(GeometryError, match="closed"):
+        offset_open(SLOT, 1.0)
+
+
+def test_options_refuse_what_no_polyline_can_be() -> None:
+    with pytest.raises(OptionError, match="sliver"):
+        OffsetOptions(sliver_eps_mm=1e-9)
+    with pytest.raises(OptionError, match="node"):
+        OffsetOptions(node_eps_mm=0.0)
+
+
+BOW = closed((0, 0), (10, 10), (10, 0), (0, 10))
+TWICE = closed((0, 0, 1), (10, 0, 1), (0, 0, 1), (10, 0, 1))
+THERE_AND_BACK = closed((0, 0), (10, 0))
+CROSSING_ARCS = closed((0, 0, 1), (10, 0), (2, -8, -0.6), (4, 6, 0.9), (9, -9))
+TOUCHING = closed((0, 0), (10, 0), (10, 10), (5, 0), (0, 10))
+
+
+@pytest.mark.parametrize("p", [BOW, TWICE, THERE_AND_BACK, CROSSING_ARCS, TOUCHING])
+@pytest.mark.parametrize("d", [1e-5, 0.1, 0.5, 1.0, 2.5, 5.0, 40.0])
+def test_sources_that_cross_themselves(p: Polyline, d: float) -> None:
+    for signed in (d, -d):
+        results = offset(p, signed)
+        assert all(each.closed for each in results)
+        assert distance_complaints(results, p, signed) == []
+
+
+def test_bow_gives_the_lobe_on_each_side() -> None:
+    left, right = offset(BOW, 1.0), offset(BOW, -1.0)
+    assert [signed_area(each) > 0.0 for each in left] == [True]
+    assert [signed_area(each) > 0.0 for each in right] == [False]
+
+
+OPEN_LINE = opened((0, 0), (10, 0))
+OPEN_HALF = opened((0, 0, 1), (10, 0))
+OPEN_CORNER = opened((0, 0), (10, 0), (10, 10))
+OPEN_HOOK = opened((0, 0), (10, 0), (10, 3), (6, 3), (6, 1))
+OPEN_TAIL = opened((10, 0, 1), (-10, 0, 1), (10, 0), (14, 0))
+OPEN_WAVE = opened((0, 0, 1), (4, 0, -1), (8, 0, 1), (12, 0, -1), (16, 0))
+
+# source, distance, how many open and closed results, length: the reason
+OPEN_CASES = [
+    (OPEN_LINE, 1.0, 1, 0, 10.0),  # no caps
+    (OPEN_LINE, -1.0, 1, 0, 10.0),
+    (OPEN_HALF, 2.0, 1, 0, 3.0 * math.pi),
+    (OPEN_HALF, -2.0, 1, 0, 7.0 * math.pi),
+    (OPEN_HALF, 5.0, 0, 0, 0.0),  # its arc vanishes exactly
+    (OPEN_HALF, 6.0, 0, 0, 0.0),  # nothing on that side is far enough from its ends
+    (OPEN_CORNER, 1.0, 1, 0, 18.0),
+    (OPEN_CORNER, -1.0, 1, 0, 20.0 + 0.5 * math.pi),
+    (OPEN_HOOK, -1.0, 1, 0, 19.0 + 1.5 * math.pi),
+    (OPEN_TAIL, 1.0, 1, 1, 18.0 * math.pi + 14.0 - 120.0**0.5),  # a ring, and its tail
+    (OPEN_WAVE, 1.0, 1, 0, 8.0 * math.pi),  # arcs shrink and grow in turn
+    (OPEN_WAVE, 2.0, 1, 0, 8.0 * math.pi),  # two of them vanish exactly, two go on
+]
+
+
+@pytest.mark.parametrize(("p", "d", "opens", "closes", "total"), OPEN_CASES)
+@pytest.mark.parametrize("back", [False, True])
+def test_open_sources(
+    p: Polyline, d: float, opens: int, closes: int, total: float | None, back: bool
+) -> None:
+    p, d = (reverse(p), -d) if back else (p, d)
+    results = offset(p, d)
+    assert distance_complaints(results, p, d) == []
+    assert (sum(not r.closed for r in results), sum(r.closed for r in results)) == (opens, closes)
+    if total is not None:
+        assert sum(length(r) for r in results) == pytest.approx(total, abs=1e-6)
+    for each in results:
+        beside = nearest_turns(each, p)
+        assert (beside > 0.0).all() if d > 0.0 else (beside < 0.0).all()
+
+
+def nearest_turns(result: Polyline, p: Polyline) -> np.ndarray:
+    """Sign of the side of the source (finely stepped) on which each segment's middle lies."""
+    segments, source = Segments.of(result), Segments.of(p)
+    middle = point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
+    rows, t = (
+        np.repeat(np.arange(len(source)), 400),
+        np.tile((np.arange(400) + 0.5) / 400, len(source)),
+    )
+    here, ahead = point_at(source, rows, t), point_at(source, rows, t + 1e-6)
+    apart = middle[:, None, :] - here[None, :, :]
+    k = np.hypot(apart[..., 0], apart[..., 1]).argmin(axis=1)
+    way, to = (ahead - here)[k], apart[np.arange(len(k)), k]
+    return way[:, 0] * to[:, 1] - way[:, 1] * to[:, 0]
+
+
+def test_open_ends_stay_where_the_normals_point() -> None:
+    (result,) = offset_open(OPEN_HOOK, -1.0)
+    assert result.start == pytest.approx((0.0, -1.0), abs=1e-12)
+    assert result.end == pytest.approx((5.0, 1.0), abs=1e-12)
+
+
+def test_stages_can_be_looked_at() -> None:
+    stages = offset_stages(DUMBBELL, 2.0, options=OffsetOptions())
+    raw = stages.raw
+    assert np.count_nonzero(~raw.join) == 12
+    assert np.count_nonzero(raw.join) == 4  # its reflex corners
+    joins = Segments.of(DUMBBELL).end[raw.source[raw.join]]
+    assert raw.elements.centre[raw.join] == pytest.approx(joins, abs=1e-9)
+    assert len(stages.slices) > len(raw.elements)
+    assert len(stages.valid) == len(stages.slices)
+    assert sorted(np.concatenate(stages.loops)) == list(range(len(stages.kept)))
+    # Each slice is nowhere too near, or nowhere far enough.
+    for slices, valid in (
+        (stages.slices[stages.valid], True),
+        (stages.slices[~stages.valid], False),
+    ):
+        for t in (0.1, 0.5, 0.9):
+            at = slices.t0 + t * (slices.t1 - slices.t0)
+            points = point_at(raw.elements, slices.element, at)
+            assert ((distance(points, DUMBBELL) > 2.0 - 1e-9) == valid).all()
+
+
+def test_merged_points_are_the_groups_of_near_ones() -> None:
+    chain = np.array([[0, 0], [5, 5], [0, 0.9], [0, 1.8], [5, 5.5], [9, 9.0]])
+    node, nodes = merge_points(chain, 1.0)
+    assert node.tolist() == [0, 1, 0, 0, 1, 2]
+    assert nodes.tolist() == [[0, 0], [5, 5], [9, 9]]
+
+
+def test_arcs_of_a_rounded_polygon_keep_their_centres() -> None:
+    (result,) = offset(FILLETED, -1.0)
+    segments = Segments.of(result)
+    arcs = segments[segments.is_arc]
+    assert len(result) == 8
+    assert np.abs(np.abs(arcs.centre - [10, 5]) - [8, 3]).max() < 1e-9
+    assert arcs.radius == pytest.approx(3.0, abs=1e-9)
+    assert arcs.bulge == pytest.approx(QUARTER, abs=1e-12)
