@@ -153,7 +153,15 @@ def test_a_fault_of_ours_is_said_to_be_one(
     assert "fault in camtool itself (ZeroDivisionError: oh)" in capsys.readouterr().err
 
 
-def test_debug_shows_the_traceback(camtool: Run) -> None:
-    done = camtool("check", "none.dxf", "--debug")
+def test_debug_shows_the_traceback(camtool_process: Run) -> None:
+    done = camtool_process("check", "none.dxf", "--debug")
     assert done.returncode == 2
     assert b"Traceback" in done.stderr
+
+
+def test_a_real_process_gives_the_same_codes(camtool_process: Run, tmp_path: Path) -> None:
+    (tmp_path / "large.csv").write_bytes(LINE_100)
+    assert camtool_process("post", "large.csv", "-t", "pic-mmh").returncode == 1
+    assert camtool_process("post", "none.csv", "-t", "pic-mmh").returncode == 2
+    assert camtool_process("--version").returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["large.csv"]

@@ -26,9 +26,9 @@ REPORT_KEYS = {
 }
 
 
-def test_the_main_job(camtool: Run, samples: Path, tmp_path: Path) -> None:
+def test_the_main_job(camtool_process: Run, samples: Path, tmp_path: Path) -> None:
     logo = samples / "logo.dxf"
-    posted = camtool(
+    posted = camtool_process(
         "post",
         logo,
         "--target",
@@ -47,7 +47,9 @@ def test_the_main_job(camtool: Run, samples: Path, tmp_path: Path) -> None:
     assert program.endswith(b"M30;\n")
     assert (tmp_path / "a.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
-    verified = camtool("verify", "a.pic", "--target", "pic-mmh", "--against", logo, "--json", "-")
+    verified = camtool_process(
+        "verify", "a.pic", "--target", "pic-mmh", "--against", logo, "--json", "-"
+    )
     assert verified.returncode == 0, verified.stderr.decode()
     report = json.loads(verified.stdout)
     assert set(report) >= REPORT_KEYS

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -130,6 +131,13 @@ def test_heavy_packages_are_imported_where_they_are_used(path: Path) -> None:
     tops = ast.Module(body=list(top), type_ignores=[])
     for line, module in imported(tops, neighbours=room_of_file(path) == "postprocessors"):
         assert module.split(".")[0] not in HEAVY - allowed, f"line {line} imports {module}"
+
+
+def test_every_package_is_shipped() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    listed = set(settings["tool"]["setuptools"]["packages"]) - {"camtool_postprocessors"}
+    there = {path.parent.relative_to(ROOT) for path in ROOT.glob("camtool/**/__init__.py")}
+    assert listed == {".".join(path.parts) for path in there}
 
 
 def loaded_by(*arguments: str) -> set[str]:
