@@ -184,7 +184,10 @@ def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Cro
     """The common points of row_a[j] of `a` and row_b[j] of `b`, end points before crossings."""
     frames_a, frames_b = a[row_a], b[row_b]
     ends = [frames_a.start, frames_a.end, frames_b.start, frames_b.end]
-    candidates = [*ends, *_common_points(frames_a, frames_b)]
+    common = [
+        _if_apart(each, frames_a, frames_b, eps) for each in _common_points(frames_a, frames_b)
+    ]
+    candidates = [*ends, *common]
     found: list[tuple[Floats, Bools, Floats, Floats]] = []
     for points in candidates:
         on_a, along_a = _within(points, frames_a, eps)
@@ -257,6 +260,25 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
     return first, second
 
 
+def _if_apart(points: Floats, a: Frames, b: Frames, eps: float) -> Floats:
+    """The points (K, 2), but NaN where the curves stay within `eps` of each other all along.
+
+    There rounding alone would place a crossing; the ends of what they share are found as ends.
+    """
+    angle, bend = _angle_and_bend(points, a, b)
+    shorter = np.minimum(a.length, b.length)
+    together = np.abs(angle) * shorter + 0.5 * bend * shorter**2 <= eps
+    return np.where(together[:, None], np.nan, points)
+
+
+def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Floats]:
+    """Sine of the angle at common points (K, 2), and how much more one curve bends, 1/mm."""
+    tangent_a = a.tangent_at(a.along(points) / a.length)
+    tangent_b = b.tangent_at(b.along(points) / b.length)
+    same_way = np.where(dot(tangent_a, tangent_b) < 0.0, -1.0, 1.0)
+    return dot(turned(tangent_a), tangent_b), np.abs(a.curvature - same_way * b.curvature)
+
+
 def _touching(found: Crossings, a: Frames, b: Frames, eps: float) -> Bools:
     """True for meetings at an end, and where the curves enter each other by `eps` at most.
 
@@ -264,11 +286,7 @@ def _touching(found: Crossings, a: Frames, b: Frames, eps: float) -> Bools:
     and are θ²/(2k) apart at most until then.
     """
     at_end = np.isin(found.ta, (0.0, 1.0)) | np.isin(found.tb, (0.0, 1.0))
-    tangent_a = a[found.row_a].tangent_at(found.ta)
-    tangent_b = b[found.row_b].tangent_at(found.tb)
-    same_way = np.where(dot(tangent_a, tangent_b) < 0.0, -1.0, 1.0)
-    bend = np.abs(a.curvature[found.row_a] - same_way * b.curvature[found.row_b])
-    angle = dot(turned(tangent_a), tangent_b)
+    angle, bend = _angle_and_bend(found.point, a[found.row_a], b[found.row_b])
     return np.asarray(at_end | (angle**2 <= 2.0 * bend * eps))
 
 

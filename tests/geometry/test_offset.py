@@ -276,7 +276,19 @@ OPEN_CASES = [
 ]
 
 
-@pytest.mark.parametrize(("p", "d", "opens", "closes", "total"), OPEN_CASES)
+# Two runs of a path lay on each other, and rounding made them cross anywhere between their ends:
+# one of them was cut there and the other was not, and half of the run went missing.
+BACK_ON_ITSELF = opened(
+    (1.8955462094538549, -2.8433193141807824),
+    (0.9477731047269274, 0.9477731047269274),
+    (-0.9477731047269274, 2.8433193141807824),
+    (0, 1.8955462094538549),
+    (0.9477731047269274, 0),
+)
+OPEN_PAST_FAILURES = [(BACK_ON_ITSELF, 0.049584540538628, 2, 0, 6.7288316 + 2.8284351)]
+
+
+@pytest.mark.parametrize(("p", "d", "opens", "closes", "total"), OPEN_CASES + OPEN_PAST_FAILURES)
 @pytest.mark.parametrize("back", [False, True])
 def test_open_sources(
     p: Polyline, d: float, opens: int, closes: int, total: float | None, back: bool

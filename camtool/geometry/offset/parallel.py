@@ -74,7 +74,8 @@ def offset_open(
         return [p]
     if distance_mm < 0.0:
         return [reverse(r) for r in offset_open(reverse(p), -distance_mm, options=options)]
-    stages = offset_stages(there_and_back(p), distance_mm, options=options)
+    around = there_and_back(p)
+    stages = offset_stages(around, distance_mm, options=options, both_sides=True)
     elements, kept = stages.raw.elements, stages.kept
     around_end = stages.raw.join & (stages.raw.source == len(p) - 1)
     ahead = (stages.raw.source < len(p)) & ~around_end
@@ -86,13 +87,18 @@ def offset_open(
     return _clean(found, options)
 
 
-def offset_stages(p: Polyline, distance_mm: float, *, options: OffsetOptions) -> Stages:
-    """All stages of the offset of a closed path to the left, by a distance above 0."""
+def offset_stages(
+    p: Polyline, distance_mm: float, *, options: OffsetOptions, both_sides: bool = False
+) -> Stages:
+    """All stages of the offset of a closed path to the left, by a distance above 0.
+
+    `both_sides` says that the left of the path is all there is around it (`there_and_back`).
+    """
     source = Segments.of(p)
     raw = raw_offset(p, distance_mm, options)
     # Only where a path meets itself can what is on its right end what is on its left.
     others = None
-    if len(self_crossings(source)):
+    if not both_sides and len(self_crossings(source)):
         others = raw_offset(reverse(p), distance_mm, options).elements
     slices = slice_elements(raw.elements, others, options)
     valid = valid_slices(slices, raw.elements, source, distance_mm, options)

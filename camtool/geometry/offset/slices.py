@@ -16,7 +16,7 @@ MIDDLE = (0.5,)
 ALONG = (0.03, 0.2, 0.35, 0.65, 0.8, 0.97)
 """Where on a slice its distance is measured; the middle first, as it settles most of them."""
 
-POINTS_AT_A_TIME = 64
+POINTS_AT_A_TIME = 128
 """How many neighbouring points are measured at a time: fewer are nearer to each other."""
 
 SKEW = (1.0, 0.6180339887498949)
