@@ -73,7 +73,8 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
             if node in seen:
                 begin = seen[node]
                 loops.append(np.array(path[begin:], dtype=np.int64))
-                for row in path[begin + 1 :]:
+                # This node too: what is left of the path ends here and may leave it once more.
+                for row in path[begin:]:
                     del seen[int(slices.from_node[row])]
                 del path[begin:]
                 if begin == 0:
