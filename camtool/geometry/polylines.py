@@ -50,6 +50,14 @@ class Polyline:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "closed", bool(self.closed))
 
+    @classmethod
+    def _trusted(cls, vertices: Floats, closed: bool) -> Polyline:
+        """Vertices that were checked before, read-only."""
+        path = object.__new__(cls)
+        object.__setattr__(path, "vertices", vertices)
+        object.__setattr__(path, "closed", closed)
+        return path
+
     def __len__(self) -> int:
         """How many segments."""
         return len(self.vertices) - (0 if self.closed else 1)
@@ -87,12 +95,19 @@ class Polylines:
 
     @classmethod
     def of(cls, paths: Iterable[Polyline]) -> Polylines:
-        """Columns from single paths."""
+        """Columns from single paths, which were checked when they were made."""
         items = list(paths)
-        counts = [len(path.vertices) for path in items]
-        stacked = np.concatenate([path.vertices for path in items]) if items else np.empty((0, 3))
-        offsets = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-        return cls(stacked, offsets, np.array([path.closed for path in items], dtype=np.bool_))
+        counts = np.array([0] + [len(path.vertices) for path in items], dtype=np.int64)
+        columns = (
+            np.concatenate([path.vertices for path in items]) if items else np.empty((0, 3)),
+            np.cumsum(counts),
+            np.array([path.closed for path in items], dtype=np.bool_),
+        )
+        lines = object.__new__(cls)
+        for name, column in zip(("vertices", "offsets", "closed"), columns, strict=True):
+            column.flags.writeable = False
+            object.__setattr__(lines, name, column)
+        return lines
 
     def __len__(self) -> int:
         """How many paths."""
@@ -103,7 +118,7 @@ class Polylines:
             raise IndexError(f"path {index} of {len(self)}")
         index %= len(self)
         low, high = self.offsets[index], self.offsets[index + 1]
-        return Polyline(self.vertices[low:high], bool(self.closed[index]))
+        return Polyline._trusted(self.vertices[low:high], bool(self.closed[index]))
 
     def __iter__(self) -> Iterator[Polyline]:
         return (self[index] for index in range(len(self)))
