@@ -9,7 +9,7 @@ import click
 
 from camtool.cli.options import DrawingFlags, drawing_options, talk_options
 from camtool.cli.output import check_writable, write_all
-from camtool.cli.talk import one_line, say_findings
+from camtool.cli.talk import one_line, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def check(
 ) -> int:
     """Say what is in DRAWING: units and why, size, layers, entities, gaps, smallest features."""
     check_writable([report, preview], [source])
+    say_first_run(quiet=quiet)
     read = drawing.read(source)
     facts = _facts(read)
     files: dict[str, bytes] = {}

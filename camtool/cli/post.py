@@ -17,7 +17,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.talk import say, say_findings
+from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 
 if TYPE_CHECKING:
@@ -70,6 +70,7 @@ def post(
 
     from camtool.pipeline import post_drawing
 
+    say_first_run(quiet=quiet)
     read = drawing.read(source, target.machine)
     wanted = job.job()
     posted = post_drawing(read, wanted, target, check=not no_verify)

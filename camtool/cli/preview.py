@@ -17,7 +17,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import check_writable, write_all
-from camtool.cli.talk import say, say_findings
+from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 from camtool.cli.verify import read_bytes
 from camtool.errors import CamtoolError
@@ -61,6 +61,7 @@ def preview(
 
     from camtool.preview.render import render
 
+    say_first_run(quiet=quiet)
     scene = _scene(source, machine, simulate, job, drawing)
     write_all({output: render(scene, output)})
     findings = scene.drawing.findings if scene.drawing is not None else ()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -31,3 +33,17 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
 def one_line(text: str) -> str:
     """Text as one line of printable characters, whatever a drawing's layer names hold."""
     return "".join(char if char.isprintable() else " " for char in text)
+
+
+def say_first_run(*, quiet: bool) -> None:
+    """A word before the long silence in which the kernels are compiled, once per installation.
+
+    Their compiled form lies beside them; where that folder cannot be written it lies elsewhere,
+    and then nothing is said.
+    """
+    import camtool.kernels
+
+    folder = Path(str(camtool.kernels.__file__)).parent
+    compiled = any((folder / "__pycache__").glob("*.nbi"))
+    if not compiled and os.access(folder, os.W_OK) and "NUMBA_CACHE_DIR" not in os.environ:
+        say("camtool: first run: compiling the kernels, which takes a while, once", quiet=quiet)

@@ -19,7 +19,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.talk import say, say_findings
+from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 from camtool.errors import ProgramError
 
@@ -69,6 +69,7 @@ def verify(
     from camtool.findings import Severity, worst
     from camtool.pipeline import picture, verify_program
 
+    say_first_run(quiet=quiet)
     data = read_bytes(program)
     read = drawing.read(against, target.machine) if against else None
     decoded, verification = verify_program(
