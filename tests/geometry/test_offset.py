@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from camtool.errors import GeometryError, OptionError
-from camtool.geometry.measure import length, path_extents, point_at, signed_area
+from camtool.geometry.distance import points_to_segments
+from camtool.geometry.measure import (
+    length,
+    path_extents,
+    point_at,
+    segment_lengths,
+    signed_area,
+)
 from camtool.geometry.offset import OffsetOptions, offset, offset_open, offset_stages
 from camtool.geometry.offset.slices import merge_points
 from camtool.geometry.polylines import Polyline, Polylines, Segments
@@ -346,8 +353,21 @@ def test_stages_can_be_looked_at() -> None:
     ):
         for t in (0.1, 0.5, 0.9):
             at = slices.t0 + t * (slices.t1 - slices.t0)
-            points = point_at(raw.elements, slices.element, at)
+            points = point_at(stages.trimmed.elements, slices.element, at)
             assert ((distance(points, DUMBBELL) > 2.0 - 1e-9) == valid).all()
+
+
+def test_trimming_takes_only_what_is_too_near() -> None:
+    p, d = gear(40, 9.0, 10.0), 2.0
+    stages = offset_stages(reverse(p), d, options=OffsetOptions())
+    before, after = stages.raw.elements, stages.trimmed.elements
+    shorter = segment_lengths(before).sum() - segment_lengths(after).sum()
+    assert shorter > 0.3 * segment_lengths(before).sum()
+    rows, t = np.repeat(np.arange(len(before)), 200), np.tile(np.linspace(0, 1, 200), len(before))
+    points = point_at(before, rows, t)
+    far = points[distance(points, p) >= d]
+    assert len(far) > 40
+    assert points_to_segments(far, after).min(axis=1).max() < 1e-9
 
 
 def test_merged_points_are_the_groups_of_near_ones() -> None:

@@ -141,11 +141,11 @@ def missing(results: list[Polyline], p: Polyline, d: float) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", RANDOM)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_thousands(kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     judged = 0
-    while judged < 300:
+    while judged < 250:
         shape = RANDOM[kind](rng)
         if shape is None:
             continue
@@ -173,7 +173,7 @@ def test_thousands_with_vertices_a_hair_off() -> None:
     # Coincidences that rounding has spoilt, by 1e-12 to 3e-5 mm.
     rng = np.random.default_rng(7)
     judged = 0
-    while judged < 600:
+    while judged < 400:
         shape = RANDOM["cells"](rng)
         if shape is None:
             continue

@@ -20,6 +20,7 @@ from camtool.geometry.offset.stitch import (
     without_dead_ends,
     without_doubles,
 )
+from camtool.geometry.offset.trim import trim_raw
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polyline, Segments
 from camtool.geometry.transform import reverse
 
@@ -31,6 +32,7 @@ class Stages:
     """What each stage of one offset to the left gave: to print, to draw, to test."""
 
     raw: RawOffset
+    trimmed: RawOffset
     slices: Slices
     valid: Bools
     kept: Slices
@@ -54,7 +56,7 @@ def offset(
     if distance_mm < 0.0:
         return [reverse(r) for r in offset(reverse(p), -distance_mm, options=options)]
     stages = offset_stages(p, distance_mm, options=options)
-    elements = stages.raw.elements
+    elements = stages.trimmed.elements
     found = (path_of(rows, stages.kept, elements, closed=True) for rows in stages.loops)
     return _clean(((vertices, True) for vertices in found), options)
 
@@ -76,9 +78,9 @@ def offset_open(
         return [reverse(r) for r in offset_open(reverse(p), -distance_mm, options=options)]
     around = there_and_back(p)
     stages = offset_stages(around, distance_mm, options=options, both_sides=True)
-    elements, kept = stages.raw.elements, stages.kept
-    around_end = stages.raw.join & (stages.raw.source == len(p) - 1)
-    ahead = (stages.raw.source < len(p)) & ~around_end
+    elements, kept = stages.trimmed.elements, stages.kept
+    around_end = stages.trimmed.join & (stages.trimmed.source == len(p) - 1)
+    ahead = (stages.trimmed.source < len(p)) & ~around_end
     found = [
         (path_of(run, kept, elements, closed=closed), closed)
         for loop in stages.loops
@@ -94,17 +96,17 @@ def offset_stages(
 
     `both_sides` says that the left of the path is all there is around it (`there_and_back`).
     """
-    source = Segments.of(p)
     raw = raw_offset(p, distance_mm, options)
+    trimmed = trim_raw(raw, p, distance_mm, options)
+    elements, others = trimmed.elements, None
     # Only where a path meets itself can what is on its right end what is on its left.
-    others = None
-    if not both_sides and len(self_crossings(source)):
-        others = raw_offset(reverse(p), distance_mm, options).elements
-    slices = slice_elements(raw.elements, others, options)
-    valid = valid_slices(slices, raw.elements, source, distance_mm, options)
-    kept = without_doubles(slices[valid], raw.elements, options)
-    kept = without_dead_ends(kept)
-    return Stages(raw, slices, valid, kept, trace_loops(kept, raw.elements))
+    if not both_sides and len(self_crossings(Segments.of(p))):
+        right = raw_offset(reverse(p), distance_mm, options)
+        others = trim_raw(right, p, distance_mm, options).elements
+    slices = slice_elements(elements, others, options)
+    valid = valid_slices(slices, elements, p, distance_mm, options)
+    kept = without_dead_ends(without_doubles(slices[valid], elements, options))
+    return Stages(raw, trimmed, slices, valid, kept, trace_loops(kept, elements))
 
 
 def there_and_back(p: Polyline) -> Polyline:

@@ -1,4 +1,4 @@
-"""Stages 2 and 3: the raw offset cut wherever it meets itself, and which slices are kept."""
+"""Stages 3 and 4: the raw offset cut wherever it meets itself, and which slices are kept."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from camtool.geometry.distance import nearest
 from camtool.geometry.intersect import Crossings, crossings, self_crossings
 from camtool.geometry.measure import point_at
+from camtool.geometry.offset.marks import at_most, marks_of
 from camtool.geometry.offset.options import OffsetOptions
-from camtool.geometry.polylines import Bools, Floats, Ints, Segments
+from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Segments
 
 MIDDLE = (0.5,)
 ALONG = (0.03, 0.2, 0.35, 0.65, 0.8, 0.97)
@@ -113,27 +114,29 @@ def _groups(count: int, one: Ints, two: Ints) -> Ints:
 
 
 def valid_slices(
-    slices: Slices,
-    elements: Segments,
-    source: Segments,
-    distance_mm: float,
-    options: OffsetOptions,
+    slices: Slices, elements: Segments, p: Polyline, distance_mm: float, options: OffsetOptions
 ) -> Bools:
-    """(S,) true where no measured point is nearer to the source than the distance − eps.
+    """(S,) true where no measured point is nearer to the source p than the distance − eps.
 
     The raw offset changes between valid and invalid only where it meets itself, so that one point
     would do; several guard against slices that are hardly too near anywhere.
     """
     least = distance_mm - options.validity_eps_mm
-    valid = np.ones(len(slices), dtype=np.bool_)
+    valid = at_most(_points(slices, elements, MIDDLE), marks_of(p)) >= least
+    source = Segments.of(p)
     for fractions in (MIDDLE, ALONG):
         rows = np.flatnonzero(valid)
         if len(rows) == 0:
             break
-        part = np.array(fractions)
-        t0, t1 = slices.t0[rows, None], slices.t1[rows, None]
-        t = (t0 + (t1 - t0) * part).ravel()
-        points = point_at(elements, np.repeat(slices.element[rows], len(part)), t)
+        points = _points(slices[rows], elements, fractions)
         distance = nearest(points, source, chunk=POINTS_AT_A_TIME).distance
-        valid[rows] = (distance >= least).reshape(-1, len(part)).all(axis=1)
+        valid[rows] = (distance >= least).reshape(-1, len(fractions)).all(axis=1)
     return valid
+
+
+def _points(slices: Slices, elements: Segments, fractions: tuple[float, ...]) -> Floats:
+    """(S · F, 2) points of the slices at these fractions of each, slice by slice."""
+    part = np.array(fractions)
+    t0, t1 = slices.t0[:, None], slices.t1[:, None]
+    t = (t0 + (t1 - t0) * part).ravel()
+    return point_at(elements, np.repeat(slices.element, len(part)), t)

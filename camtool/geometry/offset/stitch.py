@@ -1,4 +1,4 @@
-"""Stages 4 and 5: kept slices joined to loops, and loops made clean paths."""
+"""Stages 5 and 6: kept slices joined to loops, and loops made clean paths."""
 
 from __future__ import annotations
 
