@@ -56,7 +56,7 @@ SPAN_TURN_RAD = math.pi * (1.0 + 1e-9)
 SEARCH_SHARE = 0.97
 """The share of the tolerance that the search may use up: errors peak between nodes."""
 
-MEASURE_STEPS = 16
+MEASURE_STEPS = 32
 """Points per step between nodes at which the final error is measured."""
 
 ATTEMPTS = 4
