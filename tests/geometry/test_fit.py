@@ -57,10 +57,13 @@ def _smooth(fit, curve):
     chords = np.hypot(*np.diff(fit.vertices[:, :2], axis=0).T)
     long = np.minimum(chords[:-1], chords[1:]) > 1e-3
     turned = arcs.kinks(fit.vertices)[away & long]
+    # A straight curve may fold back; a fold that it has not would be off by more than _check lets.
+    turned = turned[turned < math.pi - JOINT_ANGLE_RAD]
     assert turned.max(initial=0.0) <= JOINT_ANGLE_RAD
 
 
 @given(controls)
+@example([(2.0, 2.0), (2.0, 1.6875), (2.0, 0.0), (2.0, 2.0)])  # folds back on itself
 def test_random_beziers(control):
     curve = BezierCurve(np.array(control))
     fit = fit_curve(curve, TOLERANCE_MM)
