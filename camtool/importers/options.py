@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from camtool.errors import OptionError
 from camtool.units import MM_PER_UNIT
 
-FORMATS = ("dxf", "svg", "points")
+FORMATS = ("dxf", "svg", "points", "solid")
 """Names of the formats, each with a module of that name beside this one."""
+
+TEXTS = ("skip", "outline", "stroke")
+"""What becomes of text: left out, the outlines of its font, or the lines of an engraving font."""
 
 TOLERANCE_MM = 0.0005
 """Largest distance between a curve and the arcs that stand for it (docs/numerics.md)."""
@@ -24,13 +27,32 @@ _MM_PER_INCH = 25.4
 
 
 @dataclass(frozen=True)
+class Selection:
+    """Which entities are read; empty fields choose all.
+
+    `layers` and `exclude_layers`: patterns with `*`, `?` and `[…]`, in any case. `colours`:
+    "#rrggbb". `line_types`: patterns like those of layers (DASHED, CENTER*).
+    """
+
+    layers: tuple[str, ...] = ()
+    exclude_layers: tuple[str, ...] = ()
+    colours: tuple[str, ...] = ()
+    line_types: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class ReadOptions:
     """How to read a drawing; every field has a default that suits most files.
 
     `units`: the unit of the file's numbers, over what the file says (a name of
     `units.MM_PER_UNIT`). `tolerance_mm`: how far fitted arcs may lie from a curve. `gap_mm`:
-    open ends nearer than this are joined; with `chain_gaps` false only equal ends are. `dpi`:
-    pixels per inch of SVG's px. `format`: one of FORMATS, over what the content looks like.
+    open ends nearer than this are joined; with `chain_gaps` false only equal ends are;
+    `across_layers` joins ends of different layers too. `dpi`: pixels per inch of SVG's px.
+    `format`: one of FORMATS, over what the content looks like. `select`: which entities.
+
+    `text`: one of TEXTS. `recognise_arcs`: chords on one circle become arcs again. `layout`: a
+    layout of a DXF by name instead of model space; `dimensions`: read the lines of dimensions.
+    `section_z_mm`: where a solid is cut; `allow_scripts`: run a build123d script to get a solid.
     Raises OptionError.
     """
 
@@ -40,6 +62,14 @@ class ReadOptions:
     dpi: float = DPI
     format: str | None = None
     chain_gaps: bool = True
+    across_layers: bool = False
+    select: Selection = Selection()
+    text: str = "skip"
+    recognise_arcs: bool = False
+    layout: str | None = None
+    dimensions: bool = False
+    section_z_mm: float | None = None
+    allow_scripts: bool = False
 
     def __post_init__(self) -> None:
         if self.units is not None and self.units.lower() not in MM_PER_UNIT:
@@ -49,6 +79,13 @@ class ReadOptions:
             raise OptionError(
                 f"unknown drawing format {self.format!r}", mend=f"use one of {', '.join(FORMATS)}"
             )
+        if self.text not in TEXTS:
+            raise OptionError(
+                f"text is {self.text!r}, which is none of the ways to read it",
+                mend=f"use one of {', '.join(TEXTS)}",
+            )
+        if self.section_z_mm is not None and not math.isfinite(self.section_z_mm):
+            raise OptionError(f"section_z_mm is {self.section_z_mm}, it must be a height")
         for name in ("tolerance_mm", "dpi"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):

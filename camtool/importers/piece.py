@@ -25,7 +25,7 @@ class Piece:
     """One entity: `vertices` (n, 3) of x, y, bulge in mm, and where it came from.
 
     A closed piece may repeat its first point at its end. `source` begins with the kind of the
-    entity ("CIRCLE 2F", "path outline").
+    entity ("CIRCLE 2F", "path outline"). `line_type` as a DXF names it, "" elsewhere.
     """
 
     vertices: Floats
@@ -33,6 +33,7 @@ class Piece:
     layer: str
     colour: str
     source: str
+    line_type: str = ""
 
     @property
     def where(self) -> str:

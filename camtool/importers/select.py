@@ -1,0 +1,125 @@
+"""Which pieces of a drawing are read: by layer, colour and line type.
+
+A pattern has `*`, `?` and `[…]` and is the same in any case, as names in CAD are. A pattern that
+chooses nothing is an error that names what there is: a misspelt layer must not cut everything,
+or nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from fnmatch import translate
+
+from camtool.errors import DrawingError, OptionError
+from camtool.geometry.drawing import Skipped
+from camtool.importers.options import Selection
+from camtool.importers.piece import Piece
+
+NAMED = 12
+"""So many names are listed when a pattern chooses none of them."""
+
+NO_LINE_TYPE = "continuous"
+"""The line type of an entity that names none."""
+
+
+def selected(
+    pieces: Sequence[Piece], wanted: Selection, file: str
+) -> tuple[list[Piece], list[Skipped]]:
+    """The chosen pieces in order, and how many of each kind were left out, and why.
+
+    DrawingError when a pattern (save of `exclude_layers`) matches no piece at all.
+    """
+    if wanted == Selection():
+        return list(pieces), []
+    rules = _rules(wanted, pieces, file)
+    kept: list[Piece] = []
+    gone: Counter[tuple[str, str]] = Counter()
+    for piece in pieces:
+        reason = next((reason for reason, holds in rules if not holds(piece)), None)
+        if reason is None:
+            kept.append(piece)
+        else:
+            gone[piece.kind, reason] += 1
+    return kept, [Skipped(kind, count, why) for (kind, why), count in gone.items()]
+
+
+_Rule = tuple[str, Callable[[Piece], bool]]
+
+
+def _rules(wanted: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]:
+    """What a chosen piece must fulfil, with the reason for leaving out one that does not."""
+    rules: list[_Rule] = []
+    layers = matching(wanted.layers, (piece.layer for piece in pieces), "layer", file)
+    if layers is not None:
+        rules.append(("is on a layer that was not asked for", lambda piece: piece.layer in layers))
+    away = {piece.layer for piece in pieces if _any(wanted.exclude_layers, piece.layer)}
+    if wanted.exclude_layers:
+        rules.append(("is on an excluded layer", lambda piece: piece.layer not in away))
+    types = matching(wanted.line_types, map(_line_type, pieces), "line type", file)
+    if types is not None:
+        rules.append(
+            ("has a line type that was not asked for", lambda piece: _line_type(piece) in types)
+        )
+    colours = matching(wanted.colours, (piece.colour for piece in pieces), "colour", file)
+    if colours is not None:
+        rules.append(
+            ("has a colour that was not asked for", lambda piece: piece.colour in colours)
+        )
+    return rules
+
+
+def matching(
+    patterns: Sequence[str], names: Iterable[str], what: str, file: str
+) -> set[str] | None:
+    """The names that any pattern matches, None without patterns.
+
+    DrawingError for a pattern that matches none, listing the names there are.
+    """
+    if not patterns:
+        return None
+    known = list(dict.fromkeys(names))
+    for pattern in patterns:
+        if not any(_any((pattern,), name) for name in known):
+            listed = ", ".join(sorted(known)[:NAMED]) + (" …" if len(known) > NAMED else "")
+            raise DrawingError(
+                f"no {what} matches {pattern!r}", file=file, mend=f"it has {listed or 'none'}"
+            )
+    return {name for name in known if _any(patterns, name)}
+
+
+def _any(patterns: Sequence[str], name: str) -> bool:
+    return any(
+        re.fullmatch(translate(pattern.casefold()), name.casefold()) for pattern in patterns
+    )
+
+
+def _line_type(piece: Piece) -> str:
+    return piece.line_type or NO_LINE_TYPE
+
+
+_HEX = re.compile(r"#(?:[0-9a-f]{3}|[0-9a-f]{6})")
+
+
+def colour_named(text: str) -> str:
+    """ "#rrggbb" of "#rgb", "#rrggbb", a colour name of SVG or a colour number of AutoCAD (1–255).
+
+    OptionError when it is none of these.
+    """
+    word = text.strip().lower()
+    if _HEX.fullmatch(word):
+        return word if len(word) > 4 else "#" + "".join(2 * digit for digit in word[1:])
+    if word.isdecimal() and 1 <= int(word) <= 255:
+        from ezdxf.colors import aci2rgb
+
+        # 7 is the foreground: white on a black screen, black on paper, and read as black.
+        number = int(word)
+        return "#000000" if number == 7 else "#{:02x}{:02x}{:02x}".format(*aci2rgb(number))
+    from camtool.importers.svg_colours import NAMES
+
+    if word in NAMES:
+        return NAMES[word]
+    raise OptionError(
+        f"unknown colour {text!r}", mend="give #rrggbb, a name such as red, or 1 to 255"
+    )
