@@ -36,6 +36,55 @@ class Gap:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """A single point, such as the centre of a hole to drill: (x, y) mm, and where it came from."""
+
+    at_mm: tuple[float, float]
+    layer: str
+    colour: str
+    source: str
+    line_type: str = ""
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A place (x, y) mm where more than two open ends meet: how many, and the layer of one."""
+
+    at_mm: tuple[float, float]
+    ends: int
+    layer: str
+
+
+@dataclass(frozen=True)
+class SelfCrossing:
+    """A place (x, y) mm where the closed path of this index crosses itself."""
+
+    at_mm: tuple[float, float]
+    path: int
+    layer: str
+
+
+@dataclass(frozen=True)
+class Healing:
+    """What was mended on reading, counted, lengths in mm.
+
+    `duplicates`: pieces drawn twice as a whole and left out; `overlaps`: stretches of pieces that
+    lie on others and were left out; `tiny_merged`: segments too short to matter that went into
+    their neighbours; `arcs_recognised`: arcs made of chords. `branches` and `crossings` are the
+    places where the drawing leaves a choice, or is wrong.
+    """
+
+    duplicates: int = 0
+    duplicates_mm: float = 0.0
+    overlaps: int = 0
+    overlaps_mm: float = 0.0
+    tiny_merged: int = 0
+    arcs_recognised: int = 0
+    branches: tuple[Branch, ...] = ()
+    crossings: tuple[SelfCrossing, ...] = ()
+
+
+@dataclass(frozen=True)
 class FitError:
     """Distance between fitted arcs and the true curves, mm; zeros when nothing was fitted."""
 
@@ -48,8 +97,10 @@ class Drawing:
     """Exact lines and arcs in mm, Y up, drawing frame.
 
     `layers`, `colours` ("#rrggbb" or "") and `sources` (entity handle or element id, such as
-    "CIRCLE 2F") have one item per path. `used` counts the entities of each kind that became
-    geometry; `skipped` the others, with the reason.
+    "CIRCLE 2F") have one item per path, and so has `line_types` ("" is continuous; left out, all
+    are). `used` counts the entities of each kind that became geometry; `skipped` the others, with
+    the reason. `marks` are single points; a drawing of marks alone has no paths. `gaps` stay
+    open, `closed_gaps` were bridged.
     """
 
     paths: Polylines
@@ -63,9 +114,15 @@ class Drawing:
     skipped: tuple[Skipped, ...] = ()
     gaps: tuple[Gap, ...] = ()
     findings: tuple[Finding, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    closed_gaps: tuple[Gap, ...] = ()
+    healing: Healing = field(default_factory=Healing)
+    line_types: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.paths)
-        for name in ("layers", "colours", "sources"):
+        if not self.line_types:
+            object.__setattr__(self, "line_types", ("",) * count)
+        for name in ("layers", "colours", "sources", "line_types"):
             if len(getattr(self, name)) != count:
                 raise ValueError(f"{name}: {len(getattr(self, name))} items for {count} paths")

@@ -6,9 +6,22 @@ from typing import Any
 
 import numpy as np
 
+from camtool.errors import GeometryError
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.measure import path_lengths
-from camtool.geometry.polylines import Segments
+from camtool.geometry.measure import extents, path_lengths
+from camtool.geometry.polylines import Floats, Segments
+
+
+def drawing_extents(drawing: Drawing) -> Floats:
+    """(2, 2) [[xmin, xmax], [ymin, ymax]] of paths and marks, mm; GeometryError without any."""
+    boxes = [extents(drawing.paths)] if len(drawing.paths) else []
+    if drawing.marks:
+        points = np.array([mark.at_mm for mark in drawing.marks])
+        boxes.append(np.column_stack([points.min(axis=0), points.max(axis=0)]))
+    if not boxes:
+        raise GeometryError("nothing is drawn: nothing has no extents")
+    both = np.stack(boxes)
+    return np.column_stack([both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)])
 
 
 def drawing_facts(drawing: Drawing) -> dict[str, Any]:

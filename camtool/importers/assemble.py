@@ -13,15 +13,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from camtool.errors import DrawingError, GeometryError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.chain import chain
-from camtool.geometry.drawing import Drawing, FitError, Gap, Skipped, Units
-from camtool.geometry.measure import extents
+from camtool.geometry.drawing import Drawing, FitError, Gap, Mark, Skipped, Units
+from camtool.geometry.facts import drawing_extents
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines
+from camtool.importers.marks import cleaned_marks, selected_with_marks
 from camtool.importers.options import ReadOptions
 from camtool.importers.piece import MAX_COORDINATE_MM, Piece, cleaned
 
@@ -50,23 +52,26 @@ def assemble(
     skipped: list[Skipped],
     findings: list[Finding],
     options: ReadOptions,
+    marks: Sequence[Mark] = (),
 ) -> Drawing:
     """The Drawing of these pieces, in the order in which their first members came.
 
     `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for
-    each kind of `skipped` are added here. Raises DrawingError when a number is no position or
-    when nothing is left to draw.
+    each kind of `skipped` are added here. A drawing of `marks` alone has no paths. Raises
+    DrawingError when a number is no position or when nothing is left to draw.
     """
+    pieces, marks, unwanted = selected_with_marks(pieces, marks, options.select, file)
     whole, dropped = cleaned(pieces, file)
+    points, repeated = cleaned_marks(marks, file)
+    dropped = [*unwanted, *dropped, *repeated]
     every_skip = _counted([*skipped, *dropped])
-    if not whole:
+    if not whole and not points:
         raise _nothing(every_skip, file)
     gap_mm = max(options.gap_mm, POSITION_EPS_MM) if options.chain_gaps else POSITION_EPS_MM
-    chained = chain(_columns(whole, file), gap_mm, [piece.layer for piece in whole])
-    if not len(chained.lines):
-        raise _nothing(every_skip, file)
+    layers = [""] * len(whole) if options.across_layers else [piece.layer for piece in whole]
+    chained = chain(_columns(whole, file), gap_mm, layers)
     first = [whole[members[0]] for members in chained.members]
-    return Drawing(
+    drawing = Drawing(
         paths=chained.lines,
         layers=tuple(piece.layer for piece in first),
         colours=tuple(piece.colour for piece in first),
@@ -77,19 +82,25 @@ def assemble(
         used=dict(used),
         skipped=tuple(every_skip),
         gaps=tuple(chained.open_gaps),
-        findings=(
-            *findings,
-            *_skip_findings(skipped, dropped),
-            *_size_findings(chained.lines, units),
-            *_gap_findings(chained.closed_gaps, gap_mm, closed=True),
-            *_gap_findings(chained.open_gaps, gap_mm, closed=False),
-        ),
+        marks=points,
+        closed_gaps=tuple(chained.closed_gaps),
+        line_types=tuple(piece.line_type for piece in first),
     )
+    told = (
+        *findings,
+        *_skip_findings(skipped, dropped),
+        *_size_findings(drawing),
+        *_gap_findings(chained.closed_gaps, gap_mm, closed=True),
+        *_gap_findings(chained.open_gaps, gap_mm, closed=False),
+    )
+    return replace(drawing, findings=told)
 
 
 def _columns(pieces: Sequence[Piece], file: str) -> Polylines:
     """All pieces as Polylines; a fault is named by its piece."""
     counts = [len(piece.vertices) for piece in pieces]
+    if not pieces:
+        return Polylines.of([])
     try:
         return Polylines(
             np.concatenate([piece.vertices for piece in pieces]),
@@ -141,11 +152,13 @@ def _skip_findings(skipped: list[Skipped], dropped: list[Skipped]) -> list[Findi
     ]
 
 
-def _size_findings(lines: Polylines, units: Units) -> list[Finding]:
+def _size_findings(drawing: Drawing) -> list[Finding]:
     """IMPLAUSIBLE_SIZE when the longer side fits a wrong unit better than a part."""
-    box = extents(lines)
+    units, box = drawing.units, drawing_extents(drawing)
     width, height = (float(side) for side in box[:, 1] - box[:, 0])
     longest = max(width, height)
+    if len(drawing.paths) == 0 and len(drawing.marks) < 2:
+        return []
     if SMALLEST_MM <= longest <= LARGEST_MM:
         return []
     small = longest < SMALLEST_MM

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def cleaned(pieces: Sequence[Piece], file: str) -> tuple[list[Piece], list[Skipp
             gone[piece.kind, "is drawn twice"] += 1
             continue
         seen.add(key)
-        whole.append(Piece(vertices, closed, piece.layer, piece.colour, piece.source))
+        whole.append(replace(piece, vertices=vertices, closed=closed))
     return whole, [Skipped(kind, count, why) for (kind, why), count in gone.items()]
 
 
