@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.options import DrawingFlags, drawing_options, talk_options
+from camtool.cli.drawing import DrawingFlags, drawing_options
+from camtool.cli.options import talk_options
 from camtool.cli.output import check_writable, write_all
 from camtool.cli.talk import one_line, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import (
-    DrawingFlags,
     JobFlags,
     MachineFlags,
-    drawing_options,
     job_options,
     machine_options,
     talk_options,
@@ -71,8 +70,8 @@ def post(
     from camtool.pipeline import post_drawing
 
     say_first_run(quiet=quiet)
-    read = drawing.read(source, target.machine)
-    wanted = job.job()
+    wanted = job.job(drawing)
+    read = drawing.read(source, target.machine, wanted)
     posted = post_drawing(read, wanted, target, check=not no_verify)
     say_findings(posted.findings, quiet=quiet, verbose=verbose)
     if posted.failed or posted.program is None:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import (
-    DrawingFlags,
     JobFlags,
     MachineFlags,
-    drawing_options,
     job_options,
     machine_options,
     talk_options,
@@ -87,21 +86,22 @@ def _scene(
         decoded, verification = verify_program(data, target, source=source)
         judged = verification if simulate else None
         return picture(title=title, toolpath=decoded, verification=judged, machine=target.machine)
-    read = drawing.read(source, target.machine)
+    wanted = job.job(drawing)
+    read = drawing.read(source, target.machine, wanted)
     if not simulate:
-        toolpath = plan(read, job.job(), target.machine)
+        toolpath = plan(read, wanted, target.machine)
         return picture(
             title=title,
             drawing=read,
-            job=job.job(),
+            job=wanted,
             toolpath=toolpath,
             machine=target.machine,
         )
-    posted = post_drawing(read, job.job(), target)
+    posted = post_drawing(read, wanted, target)
     return picture(
         title=title,
         drawing=read,
-        job=job.job(),
+        job=wanted,
         toolpath=posted.decoded or posted.wanted,
         verification=posted.verification,
         machine=target.machine,

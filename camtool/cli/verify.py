@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
+from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import (
     INTERPOLATORS,
-    DrawingFlags,
     JobFlags,
     MachineFlags,
-    drawing_options,
     job_options,
     machine_options,
     talk_options,
@@ -71,13 +70,14 @@ def verify(
 
     say_first_run(quiet=quiet)
     data = read_bytes(program)
-    read = drawing.read(against, target.machine) if against else None
+    wanted = job.job(drawing)
+    read = drawing.read(against, target.machine, wanted) if against else None
     decoded, verification = verify_program(
         data,
         target,
         source=program,
         drawing=read,
-        job=job.job(),
+        job=wanted,
         interpolator=cast("Interpolator | None", interpolator),
     )
     files: dict[str, bytes] = {}
@@ -87,7 +87,7 @@ def verify(
         scene = picture(
             title=Path(program).name,
             drawing=read,
-            job=job.job(),
+            job=wanted,
             toolpath=decoded,
             verification=verification,
             machine=target.machine,

@@ -10,12 +10,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from fnmatch import translate
 
 from camtool.errors import DrawingError, OptionError
 from camtool.geometry.drawing import Skipped
 from camtool.importers.options import Selection
 from camtool.importers.piece import Piece
+from camtool.patterns import matches
 
 NAMED = 12
 """So many names are listed when a pattern chooses none of them."""
@@ -54,7 +54,7 @@ def _rules(wanted: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]
     layers = matching(wanted.layers, (piece.layer for piece in pieces), "layer", file)
     if layers is not None:
         rules.append(("is on a layer that was not asked for", lambda piece: piece.layer in layers))
-    away = {piece.layer for piece in pieces if _any(wanted.exclude_layers, piece.layer)}
+    away = {piece.layer for piece in pieces if matches(wanted.exclude_layers, piece.layer)}
     if wanted.exclude_layers:
         rules.append(("is on an excluded layer", lambda piece: piece.layer not in away))
     types = matching(wanted.line_types, map(_line_type, pieces), "line type", file)
@@ -81,18 +81,12 @@ def matching(
         return None
     known = list(dict.fromkeys(names))
     for pattern in patterns:
-        if not any(_any((pattern,), name) for name in known):
+        if not any(matches((pattern,), name) for name in known):
             listed = ", ".join(sorted(known)[:NAMED]) + (" …" if len(known) > NAMED else "")
             raise DrawingError(
                 f"no {what} matches {pattern!r}", file=file, mend=f"it has {listed or 'none'}"
             )
-    return {name for name in known if _any(patterns, name)}
-
-
-def _any(patterns: Sequence[str], name: str) -> bool:
-    return any(
-        re.fullmatch(translate(pattern.casefold()), name.casefold()) for pattern in patterns
-    )
+    return {name for name in known if matches(patterns, name)}
 
 
 def _line_type(piece: Piece) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
 from camtool.errors import OptionError
+from camtool.patterns import matches
 
 SIDES = ("on", "outside", "inside", "auto")
 """Where the tool runs: on the line, around it, within it, or as the nesting says."""
@@ -55,7 +55,7 @@ class Job:
 
     def takes(self, layer: str) -> bool:
         """Whether the paths of this layer are cut."""
-        return not self.layers or any(fnmatchcase(layer, pattern) for pattern in self.layers)
+        return not self.layers or matches(self.layers, layer)
 
 
 def _above_zero(name: str, value: float | None, unit: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BASE = {"errors", "units", "findings"}
+BASE = {"errors", "units", "findings", "patterns"}
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
 JUDGE = SHARED | {"importers", "planning", "simulation", "postprocessors"}
 
@@ -18,6 +18,7 @@ ALLOWED = {
     "errors": set(),
     "units": {"errors"},
     "findings": set(),
+    "patterns": set(),
     "geometry": BASE | {"kernels"},
     "kernels": BASE,
     "machine": BASE | {"geometry", "kernels"},
