@@ -33,12 +33,22 @@ def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
     names = [path_name(drawing, int(wanted.source[path])) for path in way.path]
     toolpath = link(ordered(wanted.lines, way), names, job, heights, feeds).finish()
     findings = list(wanted.findings)
-    if len(wanted.lines) == 0 and len(drawing.paths) > 0:
+    if drawing.marks:
+        findings.append(
+            Finding(
+                Code.ENTITY_SKIPPED,
+                Severity.WARNING,
+                f"{len(drawing.marks)} single points are not cut: a profile follows lines",
+                measured=float(len(drawing.marks)),
+            )
+        )
+    if len(wanted.lines) == 0 and (len(drawing.paths) > 0 or drawing.marks):
         findings.append(
             Finding(
                 Code.NOTHING_DRAWN,
                 Severity.ERROR,
-                "no contour is left to cut: use a smaller tool, or --side on",
+                "no contour is left to cut"
+                + (": use a smaller tool, or --side on" if len(drawing.paths) else ""),
                 where=drawing.file,
             )
         )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.geometry.transform import lines_moved
 from camtool.preview import legend, marks
@@ -14,26 +15,47 @@ from camtool.preview.colours import DRAWING, FEED_PALE, OUTLINE, TRAVEL
 from camtool.preview.legend import Entry
 from camtool.preview.scene import Scene
 from camtool.preview.strokes import Chain, Strokes, chains_box, chains_of, strokes_of
+from camtool.preview.svg import Look
 from camtool.preview.trace import Trace, trace_of
 from camtool.preview.view import View, points_box, union, window
 
 Floats = npt.NDArray[np.float64]
+
+NOWHERE: Floats = np.empty((0, 2))
 
 MOST_LAYERS_NAMED = 7
 """More layers than this are counted, not named, in the legend."""
 
 
 @dataclass(frozen=True, eq=False)
+class Places:
+    """Places (P, 2) mm of a drawing: open ends, drill centres, and what is wrong or unclear."""
+
+    gaps: Floats
+    points: Floats
+    doubts: Floats
+
+    def looks(self) -> list[tuple[str, str, Floats, Look]]:
+        """(id, name for people, places, look) of each kind."""
+        return [
+            ("gaps", "open end", self.gaps, marks.gap_look()),
+            ("points", "point", self.points, marks.point_look()),
+            ("doubts", "crossing or branch", self.doubts, marks.doubt_look()),
+        ]
+
+
+@dataclass(frozen=True, eq=False)
 class Content:
     """`outlines` of the drawing, by layer in `groups`; `starts` (S, 2) mm are those of contours
-    that no plunge marks; `gaps` (G, 2) mm open ends; `window` (2, 2) mm is what to show."""
+    that no plunge marks; `places` are those that the drawing notes; `window` (2, 2) mm is what to
+    show."""
 
     scene: Scene
     groups: tuple[marks.Group, ...]
     outlines: tuple[Chain, ...]
     strokes: Strokes | None
     starts: Floats
-    gaps: Floats
+    places: Places
     trace: Trace | None
     window: Floats
 
@@ -44,7 +66,7 @@ class Content:
     @property
     def is_empty(self) -> bool:
         """Whether there is nothing at all to draw."""
-        return not (self.outlines or self.strokes or self.trace)
+        return not (self.outlines or len(self.places.points) or self.strokes or self.trace)
 
 
 def content_of(scene: Scene) -> Content:
@@ -53,27 +75,41 @@ def content_of(scene: Scene) -> Content:
     trace = trace_of(scene)
     outlines: tuple[Chain, ...] = ()
     groups: tuple[marks.Group, ...] = ()
-    gaps = np.empty((0, 2))
+    places = Places(NOWHERE, NOWHERE, NOWHERE)
     if scene.drawing is not None:
         outlines = chains_of(lines_moved(scene.drawing.paths, *scene.drawing_shift_mm))
         alone = strokes is None and trace is None
         groups = marks.groups_of(scene.drawing, outlines, alone=alone)
-        places = [gap.at_mm for gap in scene.drawing.gaps]
-        gaps = np.array(places, dtype=np.float64).reshape(-1, 2) + scene.drawing_shift_mm
+        places = _places(scene.drawing, scene.drawing_shift_mm)
     return Content(
         scene=scene,
         groups=groups,
         outlines=outlines,
         strokes=strokes,
         starts=_bare_starts(strokes),
-        gaps=gaps,
+        places=places,
         trace=trace,
-        window=_window(outlines, strokes, trace),
+        window=_window(outlines, places.points, strokes, trace),
     )
 
 
-def _window(outlines: tuple[Chain, ...], strokes: Strokes | None, trace: Trace | None) -> Floats:
-    part = [chains_box(outlines)]
+def _places(drawing: Drawing, shift_mm: tuple[float, float]) -> Places:
+    def moved(points: list[tuple[float, float]]) -> Floats:
+        return np.array(points, dtype=np.float64).reshape(-1, 2) + shift_mm
+
+    doubts = [crossing.at_mm for crossing in drawing.healing.crossings]
+    doubts += [branch.at_mm for branch in drawing.healing.branches]
+    return Places(
+        gaps=moved([gap.at_mm for gap in drawing.gaps]),
+        points=moved([mark.at_mm for mark in drawing.marks]),
+        doubts=moved(doubts),
+    )
+
+
+def _window(
+    outlines: tuple[Chain, ...], points: Floats, strokes: Strokes | None, trace: Trace | None
+) -> Floats:
+    part = [chains_box(outlines), points_box(points)]
     around = [points_box(np.zeros((1, 2)))]
     if trace is not None:
         part.append(points_box(trace.points[trace.cutting]))
@@ -156,8 +192,9 @@ def _toolpath_entries(content: Content) -> list[Entry]:
 
 def _mark_entries(content: Content, view: View) -> list[Entry]:
     entries: list[Entry] = []
-    if any(view.shows(*place) for place in content.gaps.tolist()):
-        entries.append(Entry(legend.dot_swatch(marks.gap_look()), "open end"))
+    for _, name, places, look in content.places.looks():
+        if any(view.shows(*place) for place in places.tolist()):
+            entries.append(Entry(legend.dot_swatch(look), name))
     if content.zero_shown(view):
         entries.append(Entry(legend.cross_swatch(), "part zero"))
     travel = content.scene.travel_mm

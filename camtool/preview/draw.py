@@ -94,7 +94,8 @@ def _plot(content: Content, view: View) -> list[str]:
         layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
     if content.zero_shown(view):
         layers.append(marks.origin(view.page(0.0, 0.0)))
-    layers.append(marks.dots("gaps", content.gaps.tolist(), view, marks.gap_look()))
+    for name, _, places, look in content.places.looks():
+        layers.append(marks.dots(name, places.tolist(), view, look))
     if content.is_empty:
         middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
         layers.append(text.label("nothing to draw", middle, Style(16.0, QUIET, "middle")))

@@ -166,6 +166,16 @@ def gap_look() -> Look:
     return {"r": 8.0, "fill": "none", "stroke": GAP, "stroke-width": 2.4}
 
 
+def point_look() -> Look:
+    """Single points, such as centres of holes: small dark discs."""
+    return {"r": 4.0, "fill": INK, "stroke": PAPER, "stroke-width": 1.2}
+
+
+def doubt_look() -> Look:
+    """Crossings and branches, where a contour is not clear: filled red discs."""
+    return {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
+
+
 def arrows(chains: Sequence[Chain], view: View) -> str:
     """Few arrows, in the direction of travel: none on short chains, four at most on one."""
     lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]

@@ -70,6 +70,6 @@ def _size_note(drawing: Drawing) -> str:
     from camtool.geometry.measure import extents
 
     if not len(drawing.paths):
-        return "nothing drawn"
+        return f"{len(drawing.marks)} points" if drawing.marks else "nothing drawn"
     (left, right), (bottom, top) = extents(drawing.paths).tolist()
     return f"{right - left:.4g} × {top - bottom:.4g} mm"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Severity
+from camtool.geometry.drawing import Mark
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import reverse
@@ -183,3 +185,11 @@ def test_every_contour_is_cut_once_at_depth_and_rapids_stay_up(
         mine = np.array([toolpath.text(row) == f"0/PATH {index}" for row in range(len(toolpath))])
         assert size[mine & cutting].sum() == pytest.approx(wanted, rel=1e-6)
     assert math.isclose(np.abs(ends[-1] - [0.0, 0.0, SAFE]).max(), 0.0)
+
+
+def test_single_points_are_named_and_alone_they_are_nothing_to_cut(machine: Machine) -> None:
+    point = Mark((1.0, 2.0), "DRILL", "", "POINT 1")
+    circle = replace(drawing_of([_circle(2, 1, 1)], ["CUT"]), marks=(point,))
+    assert [f.code for f in plan(circle, Job(), machine).findings] == [Code.ENTITY_SKIPPED]
+    alone = replace(drawing_of([], []), marks=(point,))
+    assert _errors(plan(alone, Job(), machine)) == [Code.NOTHING_DRAWN]

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import combinations
 from xml.etree.ElementTree import Element
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from camtool.errors import OptionError
+from camtool.geometry.drawing import Branch, Gap, Healing, Mark, SelfCrossing
 from camtool.preview.colours import FEED, PLUNGE, RAPID, bin_colours
 from camtool.preview.draw import Scene, draw, png
 from camtool.preview.svg import clean
@@ -291,3 +293,22 @@ def test_senseless_widths_are_refused(width: int) -> None:
         draw(SCENES["empty"], size_px=width)
     with pytest.raises(OptionError, match="pixels wide"):
         png("<svg/>", width)
+
+
+def test_points_open_ends_and_doubts_of_a_drawing_are_marked() -> None:
+    drawing = replace(
+        drawing_of([circle(5.0, 5.0, 3.0)], ["0"]),
+        marks=(Mark((1.0, 2.0), "0", "", "POINT 1"), Mark((2.0, 2.0), "0", "", "POINT 2")),
+        gaps=(Gap((3.0, 3.0), 0.1, "0"),),
+        healing=Healing(
+            crossings=(SelfCrossing((4.0, 4.0), 0, "0"),), branches=(Branch((5.0, 5.0), 3, "0"),)
+        ),
+    )
+    root = svg_page.parse(draw(Scene(drawing=drawing)))
+    assert [len(named(root, name)) for name in ("points", "gaps", "doubts")] == [2, 1, 2]
+
+
+def test_points_alone_are_a_picture() -> None:
+    alone = replace(drawing_of([], []), marks=(Mark((1.0, 2.0), "0", "", "POINT 1"),))
+    root = svg_page.parse(draw(Scene(drawing=alone)))
+    assert len(named(root, "points")) == 1
