@@ -36,7 +36,10 @@ def check(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Say what is in DRAWING: units and why, size, layers, entities, gaps, smallest features."""
+    """Say what an importer sees in DRAWING (- is stdin).
+
+    Units and why, size, layers, entities used and not used, gaps, and the smallest features.
+    """
     check_writable([report, preview], [source])
     say_first_run(quiet=quiet)
     read = drawing.read(source)

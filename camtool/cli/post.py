@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @click.command(short_help="Drawing to verified program.")
 @click.argument("source", metavar="DRAWING")
 @machine_options
-@click.option("-o", "--output", metavar="FILE", help="The program; - is stdout. [DRAWING.ext]")
+@click.option("-o", "--output", metavar="FILE", help="The program; - is stdout.  [DRAWING.ext]")
 @click.option(
     "--preview",
     metavar="FILE",
@@ -53,7 +53,7 @@ def post(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Turn DRAWING into the program of a machine, verified before it is written.
+    """Turn DRAWING (- is stdin) into the program of a machine, verified before it is written.
 
     The program is read back from its bytes, run through a model of the machine's own controller
     and mechanics, and compared with the drawing. Exit code 1 (and no file) when something is
@@ -64,7 +64,7 @@ def post(
             "--json is the report of the verification that --no-verify leaves out"
         )
     target = machine.load()
-    output = output or Path(source).stem + target.machine.target.extension
+    output = output or _name_for(source, target.machine.target.extension)
     check_writable([output, preview, report], [source])
 
     from camtool.pipeline import post_drawing
@@ -88,6 +88,11 @@ def post(
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(posted.program.data)} bytes)", quiet=quiet)
     return 0
+
+
+def _name_for(source: str, extension: str) -> str:
+    """The program's name when none is given: the drawing's, here; stdin goes to stdout."""
+    return STDOUT if source == STDOUT else Path(source).stem + extension
 
 
 def _picture(name: str, drawing: Drawing, job: Job, posted: Posted, target: LoadedTarget) -> bytes:
