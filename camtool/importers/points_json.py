@@ -1,31 +1,28 @@
-"""Points as JSON; the forms are described in `points`."""
+"""Points as JSON, one of
+
+[[x, y], ...]                   one stroke
+[[[x, y], ...], ...]            strokes
+{"units": "mm", "strokes": [{"points": [[x, y], ...], "closed": true, "layer": "CUT"}]}
+"""
 
 from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
 from typing import Any, NoReturn
 
+import numpy as np
+
 from camtool.errors import DrawingError
+from camtool.importers.points_stroke import Stroke, Table
 from camtool.units import MM_PER_UNIT
 
 _FILE_KEYS = ("units", "strokes")
 _STROKE_KEYS = ("points", "closed", "layer")
 
 
-@dataclass(frozen=True)
-class JsonStroke:
-    """Points of one stroke in the file's unit; `closed` None when the file does not say."""
-
-    points: list[tuple[float, float]]
-    source: str
-    closed: bool | None
-    layer: str
-
-
-def parse_json(text: str, file: str) -> tuple[str | None, list[JsonStroke]]:
-    """The unit that the file names (or None) and its strokes; DrawingError naming the field."""
+def parse_json(text: str, file: str) -> Table:
+    """The strokes of a JSON text and its unit; DrawingError naming the field."""
     try:
         value = json.loads(text, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
@@ -38,6 +35,13 @@ def parse_json(text: str, file: str) -> tuple[str | None, list[JsonStroke]]:
     return _Walker(file).document(value)
 
 
+def _stroke(
+    points: list[tuple[float, float]], index: int, closed: bool | None = None, layer: str = "0"
+) -> Stroke:
+    rows = np.array(points, dtype=np.float64).reshape(-1, 2)
+    return Stroke(rows, f"{index + 1}", closed, layer)
+
+
 def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is not finite")
 
@@ -48,23 +52,20 @@ class _Walker:
     def __init__(self, file: str) -> None:
         self.file = file
 
-    def document(self, value: object) -> tuple[str | None, list[JsonStroke]]:
+    def document(self, value: object) -> Table:
         if isinstance(value, dict):
             self._known(value, _FILE_KEYS, "")
             rows = self._list(value.get("strokes"), "strokes")
             strokes = [self._stroke(row, f"strokes[{i}]", i) for i, row in enumerate(rows)]
-            return self._unit(value.get("units")), strokes
+            return Table(strokes, self._unit(value.get("units")))
         rows = self._list(value, "the file")
         # [x, y] holds numbers, a stroke holds lists.
         first = rows[0] if rows else None
         if isinstance(first, list) and first and isinstance(first[0], list):
-            return None, [
-                JsonStroke(self._points(row, f"[{i}]"), f"{i + 1}", None, "0")
-                for i, row in enumerate(rows)
-            ]
-        return None, [JsonStroke(self._points(rows, ""), "1", None, "0")]
+            return Table([_stroke(self._points(row, f"[{i}]"), i) for i, row in enumerate(rows)])
+        return Table([_stroke(self._points(rows, ""), 0)])
 
-    def _stroke(self, value: object, where: str, index: int) -> JsonStroke:
+    def _stroke(self, value: object, where: str, index: int) -> Stroke:
         if not isinstance(value, dict):
             self._fail("is no object", where)
         self._known(value, _STROKE_KEYS, where)
@@ -75,7 +76,7 @@ class _Walker:
         if not isinstance(layer, str) or not layer.isprintable():
             self._fail("is no text", f"{where}.layer")
         points = self._points(value.get("points"), f"{where}.points")
-        return JsonStroke(points, f"{index + 1}", closed, layer)
+        return _stroke(points, index, closed, layer)
 
     def _points(self, value: object, where: str) -> list[tuple[float, float]]:
         points: list[tuple[float, float]] = []
