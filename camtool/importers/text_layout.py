@@ -1,0 +1,94 @@
+"""Letters put side by side on a plane of their own: x along the line, y up, in drawing units."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from enum import IntFlag
+
+import numpy as np
+
+from camtool.geometry.polylines import Floats
+from camtool.importers.text_fonts import Font
+
+RULE_SHARE = 0.07
+"""Thickness of an underline or a fraction bar in outlines, as a share of the letters' height."""
+
+RULE_DROP = 0.2
+"""How far an underline lies below the baseline, an overline above the capitals (same share)."""
+
+
+class Rule(IntFlag):
+    """Lines along a text."""
+
+    NONE = 0
+    UNDER = 1
+    THROUGH = 2
+    OVER = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How letters look: `height` of a capital, `slant` = tan(oblique angle)."""
+
+    font: Font
+    height: float
+    width_factor: float = 1.0
+    slant: float = 0.0
+    tracking: float = 1.0
+    rules: Rule = Rule.NONE
+
+    def advance(self, character: str) -> float:
+        """From this letter to the next."""
+        letter = self.font.letter(character)
+        share = self.font.blank if letter is None else letter.advance
+        return share * self.height * self.width_factor * self.tracking
+
+    def width(self, text: str) -> float:
+        """Of a whole text on one line."""
+        return sum(self.advance(character) for character in text)
+
+
+@dataclass(eq=False)
+class Ink:
+    """What has been drawn: contours of parts (k, 2), and the characters that fonts lack."""
+
+    contours: list[tuple[list[Floats], bool]] = field(default_factory=list)
+    missing: Counter[str] = field(default_factory=Counter)
+
+    def write(self, text: str, look: Look, at: tuple[float, float]) -> float:
+        """Draw `text` with its baseline's left end at `at`; the x where the next text begins."""
+        x, y = at
+        across = look.height * look.width_factor
+        # (x, y) of a letter ↦ (across·x + height·slant·y, height·y)
+        form = np.array([[across, 0.0], [look.height * look.slant, look.height]])
+        for character in text:
+            letter = look.font.letter(character)
+            if letter is None:
+                self.missing[character] += 1
+            else:
+                for parts, closed in letter.contours:
+                    self.contours.append(([part @ form + (x, y) for part in parts], closed))
+            x += look.advance(character)
+        self._rules(look, (at[0], x), y)
+        return x
+
+    def _rules(self, look: Look, span: tuple[float, float], baseline: float) -> None:
+        shares = {Rule.UNDER: -RULE_DROP, Rule.THROUGH: 0.5, Rule.OVER: 1.0 + RULE_DROP}
+        for rule, share in shares.items():
+            if look.rules & rule and span[1] > span[0]:
+                y = baseline + share * look.height
+                self.line(look, (span[0], y), (span[1], y))
+
+    def line(self, look: Look, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """A straight line: one stroke, or a thin bar among outlines."""
+        ends = np.array([start, end], dtype=np.float64)
+        if not look.font.outlines:
+            self.contours.append(([ends], False))
+            return
+        along = ends[1] - ends[0]
+        half = 0.5 * RULE_SHARE * look.height / float(np.hypot(*along))
+        aside = half * np.array([-along[1], along[0]])
+        corners = np.array([ends[0] - aside, ends[1] - aside, ends[1] + aside, ends[0] + aside])
+        parts = [corners[[k, (k + 1) % 4]] for k in range(4)]
+        self.contours.append((parts, True))
