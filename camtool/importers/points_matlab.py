@@ -86,7 +86,7 @@ class _Job:
         return np.cumsum([np.array(first, dtype=np.float64), *steps], axis=0), lengths[1]
 
     def _is_sideways(self) -> bool:
-        """Whether pairs stand as (n, 2); a (2, 2) is as the others are, else as the router has it."""
+        """Whether pairs stand as (n, 2); a (2, 2) is as the others, else as the router has it."""
         votes: dict[bool, Value] = {}
         for name in _PAIRS:
             value = self.values.get(name)

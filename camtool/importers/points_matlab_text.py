@@ -130,6 +130,10 @@ class _Parser:
                     break
                 if rows[-1]:
                     rows.append([])
+            elif token.kind == "end":
+                self._fail("an array is not closed", token)
+            elif token.text.lstrip("+-").lower() in ("nan", "inf"):
+                self._fail(f"{token.text} is not finite", token)
             elif token.text != ",":
                 self._fail(f"{_shown(token)} stands in an array", token, _ONLY_NUMBERS)
         return np.array([row for row in rows if row], dtype=np.float64).reshape(-1, len(rows[0]))

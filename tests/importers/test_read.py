@@ -55,8 +55,8 @@ def test_the_content_decides_and_the_name_hints(content: bytes, suffix: str, wan
         (b"AC1027", "save it as DXF"),
         (b"\x89PNG\r\n", "trace it"),
         (b"\xff\xd8\xff\xe0", "trace it"),
-        (b"words, and more words", "give DXF, SVG or points"),
-        (b"\x00\x01\x02 1,2", "give DXF, SVG or points"),
+        (b"words, and more words", "--format"),
+        (b"\x00\x01\x02 1,2", "--format"),
     ],
 )
 def test_what_is_no_drawing_is_told_what_to_do(content: bytes, mend: str, tmp_path: Path) -> None:

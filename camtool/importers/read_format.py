@@ -1,0 +1,217 @@
+"""Which format the content of a file has; its extension is a hint where the content is silent.
+
+    binary DXF   the sentinel of AutoCAD Binary DXF
+    ASCII DXF    the first line is a group code alone: 0 or 999
+    SVG          XML whose first element is `svg`, plain or packed by gzip
+    solid        STEP (ISO-10303-21), BREP of OpenCASCADE; a script by its extension .py
+    points       NumPy's .npy and .npz, JSON (`[` or `{`), the router's arrays (`xy = `), or a
+                 first line of two numbers
+
+What is known to be something else (G-code, a mesh, PDF, DWG, pictures of pixels, other XML and
+other archives) is refused with what to do about it.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+
+from camtool.errors import DrawingError
+from camtool.importers.options import FORMATS
+
+BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
+
+HEAD_BYTES = 4096
+"""How much of a file decides on its format."""
+
+XML_HEAD_BYTES = 1 << 20
+"""How far into an XML file its first element is looked for, behind comments and a DOCTYPE."""
+
+_EXTENSIONS = {
+    ".dxf": "dxf",
+    ".svg": "svg",
+    ".svgz": "svg",
+    ".csv": "points",
+    ".tsv": "points",
+    ".txt": "points",
+    ".dat": "points",
+    ".xy": "points",
+    ".json": "points",
+    ".npy": "points",
+    ".npz": "points",
+    ".m": "points",
+    ".step": "solid",
+    ".stp": "solid",
+    ".brep": "solid",
+    ".brp": "solid",
+    ".py": "solid",
+}
+
+_GZIP = b"\x1f\x8b"
+_ZIP = b"PK\x03\x04"
+_EXPORT = "export SVG or DXF from the program that made it"
+_TRACE = "trace it and save SVG or DXF"
+
+_OTHERS = {
+    rb"PK[\x05\x07]": ("is an empty or split ZIP archive", "unpack it first"),
+    rb"%PDF-": ("is a PDF", _EXPORT),
+    rb"AC10\d\d": ("is a DWG", "save it as DXF"),
+    rb"\x89PNG|\xff\xd8\xff|GIF8|II\*\x00|MM\x00\*|BM.{4}\x00\x00\x00\x00": (
+        "is a picture of pixels",
+        _TRACE,
+    ),
+    rb"RIFF.{4}WEBP": ("is a picture of pixels", _TRACE),
+    rb"%!PS": ("is PostScript", _EXPORT),
+    rb"\xd0\xcf\x11\xe0": (
+        "is a file of a CAD or office program's own",
+        "export STEP or DXF from the program that made it",
+    ),
+    rb"solid[ \t][^\n]*\n\s*facet\b": ("is a mesh (STL)", "export STEP, or a DXF of its outline"),
+    rb"(?:IN|PU|PD|PA|SP\d)[\d,; ]*;": ("is a plotter file (HPGL)", _EXPORT),
+    rb"[^\n]{72}S {0,6}\d{1,7}\s": ("is IGES", "export STEP from the program that made it"),
+}
+"""First bytes of what people hand over by mistake, and what to do about it."""
+
+_ZIPPED = {
+    b"word/": ("is a document", _EXPORT),
+    b"xl/": ("is a spreadsheet", "save it as CSV"),
+    b"Document.xml": ("is a FreeCAD file", "export STEP or DXF from FreeCAD"),
+    b"3D/": ("is a mesh (3MF)", "export STEP, or a DXF of its outline"),
+}
+
+_DXF_START = re.compile(r"\s*(?:0|999)[ \t]*(?:\r\n|\n|\r)")
+_STEP_START = re.compile(r"\s*(?:/\*(?:(?!\*/).)*\*/\s*)*ISO-10303-21\s*;", re.DOTALL)
+_BREP_START = re.compile(r"\s*(?:DBRep_DrawableShape|CASCADE Topology V\d|Open CASCADE Topology)")
+_ROUTER = re.compile(
+    r"^[ \t]*(?:l?xy|velxy|[xy]_points|l[xy]|vel[xy]|size_of_array|first_point[xy])[ \t]*=",
+    re.MULTILINE,
+)
+_COMMENT = re.compile(r"[ \t]*(?:[#%;(][^\n]*)?(?:\n|$)")
+_G_BLOCK = re.compile(r"\s*/?\s*(?:[NO]\d+\s*)?(?:[GM]\s?\d{1,3}(?!\d)|[XYZIJFST]-?\d)", re.I)
+_G_CODE = re.compile(r"^\s*/?\s*(?:[NO]\d+\s*)?[GM]\s?\d{1,3}(?!\w*[ \t]*[,\t])", re.I | re.M)
+_TWO_FIELDS = re.compile(r"[^\S\n]*[-+.\w]+[^\S\n]*[,;\s][^\S\n]*[-+.\w]+")
+_XML_BEFORE = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE(?:[^\[>]|\[.*?\]\s*(?=>))*>", re.S)
+_XML_ELEMENT = re.compile(r"<(?:[\w.-]+:)?([A-Za-z_][\w.-]*)")
+
+
+def find_format(data: bytes, suffix: str, file: str) -> str:
+    """One of FORMATS for this content; DrawingError when it is none of them."""
+    suffix = suffix.lower()
+    name = _by_bytes(data, file) or _by_text(data, suffix, file)
+    if name is None:
+        raise DrawingError(
+            "is no drawing that camtool knows",
+            file=file,
+            mend="give DXF, SVG, points, STEP or BREP, "
+            f"or name the format: --format ({', '.join(FORMATS)})",
+        )
+    return name
+
+
+def _by_bytes(data: bytes, file: str) -> str | None:
+    """The format whose first bytes these are; DrawingError for what is no drawing."""
+    from camtool.importers.points_numpy import NPY_START, is_npz
+
+    if data.startswith(BINARY_DXF):
+        return "dxf"
+    if data.startswith(NPY_START) or is_npz(data):
+        return "points"
+    if data.startswith(_GZIP):
+        if _xml_root(text_head(_unpacked_head(data))) == "svg":
+            return "svg"
+        raise DrawingError("is compressed with gzip", file=file, mend="unpack it first (gunzip)")
+    if data.startswith(_ZIP):
+        what, mend = next(
+            (told for sign, told in _ZIPPED.items() if sign in data[:HEAD_BYTES]),
+            ("is a ZIP archive", "unpack it first"),
+        )
+        raise DrawingError(what, file=file, mend=mend)
+    for pattern, (what, mend) in _OTHERS.items():
+        if re.match(pattern, data[:HEAD_BYTES], re.DOTALL):
+            raise DrawingError(what, file=file, mend=mend)
+    return None
+
+
+def _by_text(data: bytes, suffix: str, file: str) -> str | None:
+    """The format of a text, by its first signs and then by the extension."""
+    head = text_head(data)
+    if _DXF_START.match(head):
+        return "dxf"
+    if _STEP_START.match(head) or _BREP_START.match(head):
+        return "solid"
+    start = head.lstrip()[:1]
+    if start == "<":
+        return _xml(text_head(data, XML_HEAD_BYTES), file)
+    if suffix == ".py":
+        return "solid"
+    if start in ("[", "{") or _ROUTER.search(head):
+        return "points"
+    _refuse_program(head, file)
+    if suffix in _EXTENSIONS:
+        return _EXTENSIONS[suffix]
+    return "points" if _looks_like_points(head) else None
+
+
+def text_head(data: bytes, size: int = HEAD_BYTES) -> str:
+    """The first characters of a text in UTF-8 or UTF-16 (by its mark), whatever bytes follow."""
+    head = data[:size]
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return head.decode("utf-16", errors="replace").lstrip("\ufeff")
+    # XML in UTF-16 may go without a mark.
+    if head.startswith((b"<\x00", b"\x00<")):
+        name = "utf-16-le" if head[0] else "utf-16-be"
+        return head.decode(name, errors="replace")
+    return head.decode("utf-8", errors="replace").lstrip("\ufeff")
+
+
+def _xml(head: str, file: str) -> str:
+    """ "svg", or DrawingError when the first element is another one."""
+    root = _xml_root(head)
+    if root in ("svg", None):
+        return "svg"
+    raise DrawingError(
+        f"is XML of another kind (its first element is {root!r}), no SVG", file=file, mend=_EXPORT
+    )
+
+
+def _xml_root(head: str) -> str | None:
+    """The name of the first element, without its prefix; None when none is to be seen."""
+    at = 0
+    while found := _XML_BEFORE.match(head, at):
+        at = found.end()
+    element = _XML_ELEMENT.match(head, at)
+    # A head that was cut within a comment or a DOCTYPE shows no element.
+    return element[1].lower() if element else None
+
+
+def _unpacked_head(data: bytes) -> bytes:
+    """The first bytes of what gzip packed, as many as are whole."""
+    try:
+        return zlib.decompressobj(31).decompress(data[: 16 * HEAD_BYTES], XML_HEAD_BYTES)
+    except zlib.error:
+        return b""
+
+
+def _refuse_program(head: str, file: str) -> None:
+    """DrawingError when the first line that is no comment is a block of a machine program."""
+    at = 0
+    while at < len(head) and (comment := _COMMENT.match(head, at)):
+        if comment.end() == at:
+            break
+        at = comment.end()
+    if _G_BLOCK.match(head, at) and _G_CODE.search(head):
+        raise DrawingError(
+            "is a machine program (G-code), no drawing",
+            file=file,
+            mend="camtool verify judges programs; give the drawing that it was made from",
+        )
+
+
+def _looks_like_points(head: str) -> bool:
+    """Whether the first line that is no comment holds two fields, and all of it is text."""
+    if "\x00" in head or "\ufffd" in head:
+        return False
+    for line in head.splitlines():
+        if line.strip() and not line.lstrip().startswith(("#", "%")):
+            return _TWO_FIELDS.match(line) is not None and any(sign.isdigit() for sign in head)
+    return False
