@@ -1,20 +1,28 @@
 """Smooth curves, as something that gives points and tangents for many parameters at once.
 
 `fit` asks no more of a curve than the protocol `Curve`; the classes here are the ones that
-drawings hold.
+drawings hold. Those that are rational Bézier curves, piece by piece, say so (`Pieced`): they are
+fitted by compiled kernels, many times faster.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from camtool.errors import GeometryError
 from camtool.geometry.polylines import Floats
+
+MAX_PIECE_RAD = 0.5 * math.pi
+"""One piece of an ellipse covers no more: its weights would spread its points too unevenly."""
+
+JUMP_SHARE = 1e-9
+"""Pieces of a spline that lie apart by more than this share of its size are no curve."""
 
 
 class Curve(Protocol):
@@ -36,6 +44,25 @@ class Curve(Protocol):
 
     def tangent(self, t: Floats) -> Floats:
         """Derivatives (n, 2) at parameters (n,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Rational Bézier pieces end to end: `control` (m, p + 1, 3) of x·w, y·w, w about the
+    `origin` (2,) mm, and the exact `ends` (2, 2) mm of the whole curve."""
+
+    control: Floats
+    origin: Floats
+    ends: Floats
+
+
+@runtime_checkable
+class Pieced(Protocol):
+    """A curve made of rational Bézier pieces."""
+
+    def pieces(self) -> Pieces:
+        """The pieces, in the order of the parameter."""
         ...
 
 
@@ -81,6 +108,12 @@ class BezierCurve:
         """Derivatives (n, 2)."""
         return (len(self.control) - 1.0) * _bernstein(np.diff(self.control, axis=0), t)
 
+    def pieces(self) -> Pieces:
+        """Itself."""
+        rows = np.ones((1, len(self.control), 3))
+        rows[0, :, :2] = self.control - self.control[0]
+        return Pieces(rows, self.control[0], self.control[[0, -1]])
+
 
 @dataclass(frozen=True, eq=False)
 class EllipseCurve:
@@ -116,6 +149,21 @@ class EllipseCurve:
         along = np.cos(angle) * np.asarray(self.minor) - np.sin(angle) * np.asarray(self.major)
         return np.asarray(np.copysign(1.0, self.end - self.start) * along)
 
+    def pieces(self) -> Pieces:
+        """Quarters or less: over a half angle h a rational parabola of weights 1, cos h, 1.
+
+        Its middle control point is the meeting of the end tangents, (cos m, sin m) / cos h.
+        """
+        count = max(1, math.ceil(abs(self.end - self.start) / MAX_PIECE_RAD))
+        angle = self.start + (self.end - self.start) * np.arange(2 * count + 1) / (2.0 * count)
+        along = np.cos(angle)[:, None] * np.asarray(self.major)
+        rows = np.ones((2 * count + 1, 3))
+        rows[:, :2] = along + np.sin(angle)[:, None] * np.asarray(self.minor)
+        rows[1::2, 2] = math.cos(0.5 * (self.end - self.start) / count)
+        control = np.stack([rows[0:-1:2], rows[1::2], rows[2::2]], axis=1)
+        origin = np.array(self.centre, dtype=np.float64)
+        return Pieces(control, origin, origin + rows[[0, -1], :2])
+
     def _angle(self, t: Floats) -> Floats:
         return np.asarray(self.start + np.copysign(1.0, self.end - self.start) * t)
 
@@ -148,6 +196,16 @@ class SplineCurve:
             raise GeometryError("a weight is not positive")
         for name, column in (("knots", knots), ("control", control), ("weights", weights)):
             object.__setattr__(self, name, column)
+        inner = knots[1:-1]
+        repeated = inner[self.degree :] == inner[: len(inner) - self.degree]
+        if repeated.any() and self._jumps():
+            raise GeometryError("a knot is repeated so often that the curve falls apart")
+
+    def _jumps(self) -> bool:
+        pieces = self.pieces().control
+        points = pieces[:, :, :2] / pieces[:, :, 2:]
+        gaps = np.abs(points[1:, 0] - points[:-1, -1]).max(initial=0.0)
+        return bool(gaps > JUMP_SHARE * np.ptp(self.control, axis=0).max())
 
     @property
     def breaks(self) -> Floats:
@@ -164,6 +222,30 @@ class SplineCurve:
         value, slope = self._homogeneous(t, 0), self._homogeneous(t, 1)
         weight = value[:, 2:]
         return np.asarray((slope[:, :2] * weight - value[:, :2] * slope[:, 2:]) / weight**2)
+
+    def pieces(self) -> Pieces:
+        """The Bézier points of each span a..b between knots: the blossom at (a … a, b … b).
+
+        de Boor's triangle with an argument of its own at each level is the blossom.
+        """
+        degree, knots, origin = self.degree, self.knots, self.control[0]
+        weights = np.asarray(self.weights)[:, None]
+        points = np.concatenate([(self.control - origin) * weights, weights], axis=1)
+        inner = knots[degree : len(points) + 1]
+        cell = degree + np.flatnonzero(np.diff(inner) > 0.0)
+        ends = knots[cell], knots[cell + 1]
+        control = np.empty((len(cell), degree + 1, 3))
+        for column in range(degree + 1):
+            rows = [points[cell - degree + j] for j in range(degree + 1)]
+            for level in range(1, degree + 1):
+                t = ends[1 if level <= column else 0]
+                for j in range(degree, level - 1, -1):
+                    left, right = knots[cell - degree + j], knots[cell + 1 + j - level]
+                    share = ((t - left) / (right - left))[:, None]
+                    rows[j] = (1.0 - share) * rows[j - 1] + share * rows[j]
+            control[:, column] = rows[degree]
+        tips = control[[0, -1], [0, -1]]
+        return Pieces(control, origin, origin + tips[:, :2] / tips[:, 2:])
 
     def _homogeneous(self, t: Floats, order: int) -> Floats:
         """de Boor's triangle for all t at once: (n, 3) of x·w, y·w, w or their derivatives.

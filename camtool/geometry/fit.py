@@ -23,11 +23,20 @@ from camtool.geometry.curves import (
     Curve,
     EllipseCurve,
     FunctionCurve,
+    Pieced,
+    Pieces,
     SplineCurve,
 )
 from camtool.geometry.drawing import FitError
-from camtool.geometry.nodes import MIN_STEPS, Nodes, curve_nodes, turns
-from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Floats, Ints
+from camtool.geometry.nodes import curve_nodes
+from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Floats
+from camtool.kernels.fit_limits import (
+    ATTEMPTS,
+    MEASURE_STEPS,
+    MIN_STEPS,
+    SEARCH_SHARE,
+    SPAN_TURN_RAD,
+)
 
 __all__ = [
     "BezierCurve",
@@ -38,29 +47,10 @@ __all__ = [
     "SplineCurve",
     "arc_vertices",
     "fit_curve",
+    "fit_curves",
     "overall",
     "split_bulges",
 ]
-
-_Vertex = tuple[float, float, float]
-
-STRAIGHT_SAGITTA_MM = 1e-7
-"""An arc that leaves its chord by no more is a line."""
-
-SAME_ARC_MM = 1e-8
-"""Neighbours that leave a common arc or line by no more become one."""
-
-SPAN_TURN_RAD = math.pi * (1.0 + 1e-9)
-"""A biarc covers no more turning than a half circle (and rounding)."""
-
-SEARCH_SHARE = 0.97
-"""The share of the tolerance that the search may use up: errors peak between nodes."""
-
-MEASURE_STEPS = 32
-"""Points per step between nodes at which the final error is measured."""
-
-ATTEMPTS = 4
-"""How often a fit whose measured error is too large is done again, each time finer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +68,6 @@ class Fit:
     length_mm: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Spans:
-    """Biarcs between the nodes `ends` (s + 1,); `pairs` (s, 4) joint x, y and both bulges."""
-
-    ends: Ints
-    pairs: Floats
-
-
 def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
     """Arcs and lines within `tolerance_mm` of the curve, G1 wherever the curve is.
 
@@ -96,20 +78,14 @@ def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
         raise GeometryError(
             f"a fitting tolerance of {tolerance_mm} mm is not above {POSITION_EPS_MM} mm"
         )
-    target, steps = SEARCH_SHARE * tolerance_mm, MIN_STEPS
-    for _ in range(ATTEMPTS):
-        nodes = curve_nodes(curve, tolerance_mm, steps)
-        if len(nodes) == 1:
-            return Fit(np.append(nodes.point[0], 0.0)[None, :], 0.0, 0.0)
-        spans = _spans(nodes, target)
-        vertices, places = _joined(_chain(nodes, spans))
-        if len(vertices) == 1:
-            return Fit(vertices, 0.0, 0.0)
-        fit = _measured(curve, nodes, spans, vertices, places)
-        if fit.max_mm <= tolerance_mm:
-            break
-        target, steps = target * SEARCH_SHARE * tolerance_mm / fit.max_mm, 2 * steps
-    return fit
+    if isinstance(curve, Pieced):
+        return _fit_pieces(curve.pieces(), tolerance_mm)
+    return _fit_any(curve, tolerance_mm)
+
+
+def fit_curves(curves: Iterable[Curve], tolerance_mm: float) -> list[Fit]:
+    """`fit_curve` of each."""
+    return [fit_curve(curve, tolerance_mm) for curve in curves]
 
 
 def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: float) -> Floats:
@@ -162,99 +138,39 @@ def overall(fits: Iterable[Fit]) -> FitError:
     return FitError(max(fit.max_mm for fit in items), math.sqrt(square))
 
 
-def _spans(nodes: Nodes, target_mm: float) -> _Spans:
-    """The longest spans one after the other, none across a corner."""
-    from camtool.kernels.biarc import longest_spans
+def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
+    """Rational pieces, all in one kernel."""
+    from camtool.kernels.fit_bezier import fit_pieces
 
-    steps = turns(nodes.leave[:-1], nodes.arrive[1:])
-    turned = np.concatenate([[0.0], np.cumsum(steps)])
-    ends, pairs = longest_spans(
-        nodes.point, nodes.leave, nodes.arrive, nodes.corner, turned, target_mm, SPAN_TURN_RAD
-    )
-    return _Spans(ends, pairs)
-
-
-def _chain(nodes: Nodes, spans: _Spans) -> Floats:
-    """Two segments for each span, vertices (2·spans + 1, 3); lines where there is no biarc."""
-    ends = nodes.point[spans.ends]
-    pairs = np.where(np.isnan(spans.pairs), 0.0, spans.pairs)
-    missing = np.isnan(spans.pairs[:, 0])
-    pairs[missing, :2] = 0.5 * (ends[:-1] + ends[1:])[missing]
-    rows = np.zeros((2 * len(pairs) + 1, 3))
-    rows[::2, :2] = ends
-    rows[:-1:2, 2] = pairs[:, 2]
-    rows[1::2, :2] = pairs[:, :2]
-    rows[1::2, 2] = pairs[:, 3]
-    lengths = np.hypot(*np.diff(rows[:, :2], axis=0).T)
-    flat = np.abs(rows[:-1, 2]) * 0.5 * lengths <= STRAIGHT_SAGITTA_MM
-    rows[:-1, 2][flat] = 0.0
-    return rows
+    if not np.isfinite(pieces.control).all():
+        raise GeometryError("a point or a tangent of a curve is not finite")
+    vertices, judged = fit_pieces(np.ascontiguousarray(pieces.control), tolerance_mm)
+    vertices[:, :2] += pieces.origin
+    return _checked(vertices, judged, pieces.ends)
 
 
-def _joined(rows: Floats) -> tuple[Floats, Ints]:
-    """Neighbours on one circle or line become one; also where each old segment is now."""
-    vertices: list[_Vertex] = [_row(rows[0])]
-    places = np.zeros(len(rows) - 1, dtype=np.int64)
-    for index in range(len(rows) - 1):
-        begin, end = vertices[-1], _row(rows[index + 1])
-        bulge = float(rows[index, 2])
-        if math.dist(begin[:2], end[:2]) <= POSITION_EPS_MM:
-            # Too short for a segment: its end takes the place of its begin.
-            places[index] = max(len(vertices) - 2, 0)
-            continue
-        vertices[-1] = (begin[0], begin[1], bulge)
-        if len(vertices) > 1:
-            common = _common(vertices[-2], vertices[-1], end)
-            if common is not None:
-                vertices.pop()
-                vertices[-1] = (*vertices[-1][:2], common)
-        places[index] = len(vertices) - 1
-        vertices.append((end[0], end[1], 0.0))
-    vertices[-1] = (*_row(rows[-1])[:2], 0.0)
-    return np.array(vertices), places
+def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
+    """The same steps as the kernel `fit_pieces` takes, for a curve given by functions."""
+    from camtool.kernels.fit_bezier import fit_nodes
+
+    target, steps = SEARCH_SHARE * tolerance_mm, MIN_STEPS
+    for _ in range(ATTEMPTS):
+        nodes = curve_nodes(curve, tolerance_mm, steps)
+        if len(nodes) == 1:
+            return Fit(np.append(nodes.point[0], 0.0)[None, :], 0.0, 0.0)
+        share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
+        t = (nodes.t[:-1, None] + share * np.diff(nodes.t)[:, None]).ravel()
+        samples = curve.point(np.append(t, nodes.t[-1]))
+        columns = (nodes.point, nodes.arrive, nodes.leave, nodes.corner)
+        vertices, judged = fit_nodes(columns, samples, target, tolerance_mm)
+        if not judged[0] > tolerance_mm:
+            break
+        target, steps = target * SEARCH_SHARE * tolerance_mm / judged[0], 2 * steps
+    return _checked(vertices, judged, nodes.point[[0, -1]])
 
 
-def _common(one: _Vertex, two: _Vertex, end: _Vertex) -> float | None:
-    """The bulge of the one arc or line that both segments lie on, or None."""
-    from camtool.kernels.biarc import distance_to_arc
-
-    first, second = one[2], two[2]
-    if first * second < 0.0 or (first == 0.0) != (second == 0.0):
-        return None
-    sweep = 4.0 * (math.atan(first) + math.atan(second))
-    if abs(sweep) > SPAN_TURN_RAD or math.dist(one[:2], end[:2]) <= POSITION_EPS_MM:
-        return None
-    bulge = min(max(math.tan(sweep / 4.0), -1.0), 1.0)
-    for probe in (_middle(one, two), two[:2], _middle(two, end)):
-        if distance_to_arc(*probe, *one[:2], *end[:2], bulge) > SAME_ARC_MM:
-            return None
-    return bulge
-
-
-def _middle(a: _Vertex, b: _Vertex) -> tuple[float, float]:
-    """The point halfway along the segment that leaves `a` for `b`: sagitta = bulge · chord / 2."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    return 0.5 * (a[0] + b[0] + a[2] * dy), 0.5 * (a[1] + b[1] - a[2] * dx)
-
-
-def _row(row: Floats) -> _Vertex:
-    return float(row[0]), float(row[1]), float(row[2])
-
-
-def _measured(curve: Curve, nodes: Nodes, spans: _Spans, vertices: Floats, places: Ints) -> Fit:
-    """The error at many points between the nodes, each against the arcs of its own span."""
-    from camtool.kernels.biarc import arc_distances
-
-    share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
-    t = (nodes.t[:-1, None] + share * np.diff(nodes.t)[:, None]).ravel()
-    points = curve.point(np.append(t, nodes.t[-1]))
-    owner = np.repeat(np.arange(len(spans.pairs)), np.diff(spans.ends) * MEASURE_STEPS)
-    error = np.full(len(t), np.inf)
-    for place in (places[2 * owner], places[2 * owner + 1]):
-        begin, end = vertices[place], vertices[place + 1]
-        found = arc_distances(points[:-1], begin[:, :2], end[:, :2], begin[:, 2])
-        error = np.minimum(error, found)
-    weight = np.hypot(*np.diff(points, axis=0).T)
-    length = float(weight.sum())
-    mean = float((weight * error**2).sum()) / length if length > 0.0 else 0.0
-    return Fit(vertices, float(error.max()), math.sqrt(mean), length)
+def _checked(vertices: Floats, judged: tuple[float, float, float], ends: Floats) -> Fit:
+    if not (np.isfinite(vertices).all() and math.isfinite(judged[0] + judged[2])):
+        raise GeometryError("a point or a tangent of a curve is not finite")
+    vertices[-1, :2], vertices[0, :2] = ends[1], ends[0]
+    return Fit(vertices, *judged)

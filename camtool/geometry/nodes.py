@@ -15,26 +15,18 @@ import numpy as np
 from camtool.errors import GeometryError
 from camtool.geometry.curves import Curve
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints
+from camtool.kernels.fit_limits import (
+    ASIDE_FROM,
+    ASIDE_TO,
+    CORNER_ANGLE_RAD,
+    MAX_NODES,
+    MIN_STEPS,
+    STEP_ERROR_SHARE,
+    STEP_TURN_RAD,
+    VANISHING_TANGENT,
+)
 
-CORNER_ANGLE_RAD = 1e-6
-"""Tangents before and after a node that differ by more make it a corner."""
-
-STEP_TURN_RAD = 0.5
-"""No step between two nodes turns by more, save at a corner."""
-
-STEP_ERROR_SHARE = 1.0 / 4096.0
-"""A step's biarc is off by no more than this share of the tolerance: some 16 steps an arc pair."""
-
-VANISHING_TANGENT = 1e-9
-"""Shorter than this share of the longest tangent, a tangent has no direction: look beside it."""
-
-MIN_STEPS = 32
-"""Steps that every curve is cut into at first."""
-
-MAX_NODES = 200_000
-"""No more refining above this many nodes."""
-
-_ASIDE = tuple(10.0**k for k in range(-9, -2))
+_ASIDE = tuple(10.0**k for k in range(ASIDE_FROM, ASIDE_TO))
 """How far aside (share of the way to the next break) to look for the direction of a tangent."""
 
 
@@ -139,9 +131,12 @@ def _refine(
         middle = 0.5 * (low + high)
         halves = (middle > low) & (middle < high)
         rows, low, middle = rows[halves], low[halves], middle[halves]
-        # A point off the middle as well: over an inflexion the error in the middle is zero.
-        point, other = np.split(_finite(curve.point(np.append(middle, 0.5 * (low + middle)))), 2)
-        bad = _too_coarse(nodes, rows, np.stack([point, other]), tolerance_mm)
+        # Points off the middle as well: over an inflexion the error in the middle is zero.
+        high = nodes.t[rows + 1]
+        probes = np.concatenate([middle, 0.5 * (low + middle), 0.5 * (middle + high)])
+        points = _finite(curve.point(probes)).reshape(3, -1, 2)
+        point = points[0]
+        bad = _too_coarse(nodes, rows, points, tolerance_mm)
         rows, middle, point = rows[bad], middle[bad], point[bad]
         before, after = directions.both(middle)
         nodes.t = np.insert(nodes.t, rows + 1, middle)

@@ -8,7 +8,8 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from camtool.kernels.biarc import biarc, distance_to_arc, longest_span, span_error
+from camtool.kernels.biarc import biarc, distance_to_arc, span_error
+from camtool.kernels.spans import longest_span
 from tests.oracles import arcs
 
 number = st.floats(-10.0, 10.0, allow_subnormal=False)
