@@ -103,11 +103,7 @@ class Polylines:
             np.cumsum(counts),
             np.array([path.closed for path in items], dtype=np.bool_),
         )
-        lines = object.__new__(cls)
-        for name, column in zip(("vertices", "offsets", "closed"), columns, strict=True):
-            column.flags.writeable = False
-            object.__setattr__(lines, name, column)
-        return lines
+        return cls._trusted(*columns)
 
     def __len__(self) -> int:
         """How many paths."""
@@ -124,8 +120,25 @@ class Polylines:
         return (self[index] for index in range(len(self)))
 
     def select(self, indices: Iterable[int]) -> Polylines:
-        """The paths of these indices, in this order."""
-        return Polylines.of(self[index] for index in indices)
+        """The paths of these indices, in this order; IndexError for one that is not there."""
+        chosen = np.fromiter((int(index) for index in indices), dtype=np.int64)
+        bad = (chosen < -len(self)) | (chosen >= len(self))
+        if bad.any():
+            raise IndexError(f"path {chosen[np.argmax(bad)]} of {len(self)}")
+        chosen %= max(len(self), 1)
+        counts = np.diff(self.offsets)[chosen]
+        offsets = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(counts)])
+        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[chosen] - offsets[:-1], counts)
+        return Polylines._trusted(self.vertices[rows], offsets, self.closed[chosen])
+
+    @classmethod
+    def _trusted(cls, vertices: Floats, offsets: Ints, closed: Bools) -> Polylines:
+        """Columns that were checked before; they become read-only."""
+        lines = object.__new__(cls)
+        for name, column in (("vertices", vertices), ("offsets", offsets), ("closed", closed)):
+            column.flags.writeable = False
+            object.__setattr__(lines, name, column)
+        return lines
 
 
 @dataclass(frozen=True, eq=False)
