@@ -91,6 +91,7 @@ def _made(glyphs: dict[str, Glyph]) -> dict[str, Glyph]:
     left = min(x for stroke in u.strokes for x, _ in stroke)
     mu = Glyph((*u.strokes, ((left, -5.0), (left, 16.0))), u.advance)
     ring = tuple((8.0 + x, -9.0 + y) for x, y in (*_CIRCLE, _CIRCLE[0]))
+    bullet = tuple((8.0 + x, y) for x, y in (*_CIRCLE, _CIRCLE[0]))
     middle = tuple((5.0 + 0.35 * x, 1.0 + 0.35 * y) for x, y in (*_CIRCLE, _CIRCLE[0]))
     slash = ((zero.advance - 1.0, -14.0), (1.0, 11.0))
     dots = tuple((stroke, 9.0 * k) for k in range(3) for stroke in glyphs["."].strokes)
@@ -100,6 +101,7 @@ def _made(glyphs: dict[str, Glyph]) -> dict[str, Glyph]:
         "×": Glyph((((4, -5), (16, 7)), ((4, 7), (16, -5))), 20.0),
         "·": Glyph((middle,), 10.0),
         "°": Glyph((ring,), 15.0),
+        "•": Glyph((bullet,), 16.0),
         "±": Glyph((*plus.strokes, ((4, 9), (22, 9))), plus.advance),
         "ø": Glyph((*zero.strokes, slash), zero.advance),
         "Ø": Glyph((*zero.strokes, slash), zero.advance),

@@ -9,21 +9,23 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from camtool.geometry.polylines import Floats
-from camtool.importers.dxf_shapes import Unusable, require
+from camtool.importers.dxf_frames import Unusable, require
 from camtool.importers.text_fonts import Wanted, font_for
-from camtool.importers.text_layout import Ink, Look, Rule
+from camtool.importers.text_layout import Ink, Look, Rule, finite, numbered, slant
 from camtool.importers.text_mtext import write_mtext
 
 MAX_CHARACTERS = 20_000
 """Of one text entity, codes included; CAD programs write 250 into TEXT and about 2000 into MTEXT
 by hand."""
 
+_CARET = re.compile(r"\^([ @-_])")
 _CODE = re.compile(r"%%(\d{3}|[cdpkou%])", re.IGNORECASE)
 _SIGNS = {"c": "Ø", "d": "°", "p": "±", "%": "%"}
 _RULES = {"u": Rule.UNDER, "o": Rule.OVER, "k": Rule.THROUGH}
@@ -96,33 +98,33 @@ def _text(entity: Any, mode: str) -> TextShape:
     if style is not None and int(style.dxf.flags) & _STACKED_LETTERS:
         raise Unusable("has its letters one below the other")
     font, substituted = font_for(_wanted(style), mode)
-    height, factor, oblique = _numbers(dxf.height, dxf.width, dxf.oblique)
-    look = Look(font, height, factor, _slant(oblique))
+    height, factor, oblique = finite(dxf.height, dxf.width, dxf.oblique)
+    look = Look(font, height, factor, slant(oblique))
     width = sum(look.width(run) for run, _ in runs)
     if not (width > 0.0 and height > 0.0):
         raise Unusable("has no size")
     place, stretch = _place(entity, width)
-    look = replace(look, height=height * stretch[1], width_factor=factor * stretch[0] / stretch[1])
+    size, share = finite(height * stretch[1], factor * stretch[0] / stretch[1])
+    look = replace(look, height=size, width_factor=share)
     ink = Ink()
     x, y = _start(entity, look, width * stretch[0])
     for run, rules in runs:
-        x = ink.write(run, replace(look, rules=rules), (x, y))
+        end = ink.write(run, look, (x, y))
+        ink.rule(replace(look, rules=rules), (x, end), y)
+        x = end
     return _shape(ink, place, font.name, substituted)
 
 
 def _runs(raw: str) -> list[tuple[str, Rule]]:
     """The text without its codes: %%c %%d %%p %%% %%nnn are signs; %%u %%o %%k begin and end
     lines along it."""
-    from ezdxf.tools.text import caret_decode
-
     rules, runs, at = Rule.NONE, [], 0
-    text = "".join(c if c >= " " else " " for c in caret_decode(raw))
+    text = "".join(c if c >= " " else " " for c in _CARET.sub(_control, raw))
     for code in [*_CODE.finditer(text), None]:
         run = text[at : code.start() if code else None]
         if code:
-            at, name = code.end(), code[1].lower()
-            sign = _SIGNS.get(name) or (_numbered(name) if name.isdecimal() else "")
-            run += sign
+            at = code.end()
+            run += _sign(code[1].lower())
         if run:
             runs.append((run, rules))
         if code:
@@ -130,9 +132,16 @@ def _runs(raw: str) -> list[tuple[str, Rule]]:
     return runs
 
 
-def _numbered(digits: str) -> str:
-    """%%nnn: a character of Windows' western code page."""
-    return bytes([int(digits) & 0xFF]).decode("cp1252", errors="replace")
+def _sign(code: str) -> str:
+    """The sign of a code, "" when it is none."""
+    if code.isdecimal():
+        return numbered(code)
+    return _SIGNS.get(code, "")
+
+
+def _control(match: re.Match[str]) -> str:
+    """^I is a tab and so on; "^ " is the caret itself."""
+    return "^" if match[1] == " " else chr(ord(match[1]) - ord("@"))
 
 
 def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
@@ -140,9 +149,9 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
     dxf = entity.dxf
     mirror = int(dxf.text_generation_flag)
     signs = [-1.0 if mirror & _BACKWARD else 1.0, -1.0 if mirror & _UPSIDE_DOWN else 1.0]
-    insert = _numbers(*dxf.insert)
-    second = _numbers(*dxf.get("align_point", dxf.insert))
-    (turn,) = _numbers(math.radians(dxf.rotation))
+    insert = finite(*dxf.insert)
+    second = finite(*dxf.get("align_point", dxf.insert))
+    (turn,) = finite(math.radians(dxf.rotation))
     stretch, at = (1.0, 1.0), second
     halign = int(dxf.halign)
     if halign in (_ALIGNED, _FIT):
@@ -157,6 +166,8 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
     elif halign == 0 and int(dxf.valign) == 0:
         at = insert
     cosine, sine = math.cos(turn), math.sin(turn)
+    if not any(finite(*dxf.extrusion)):
+        raise Unusable("has an extrusion of 0")
     ocs = entity.ocs()
     u, v, origin = (
         np.array(tuple(ocs.to_wcs(vector)), dtype=np.float64)
@@ -188,7 +199,7 @@ def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
     require(entity, ("insert", "char_height"))
     content = _checked(entity.all_columns_raw_content())
     style = _style(entity, document)
-    height, factor, oblique, *_ = _numbers(
+    height, factor, oblique, *_ = finite(
         entity.dxf.char_height,
         style.dxf.width if style else 1.0,
         style.dxf.oblique if style else 0.0,
@@ -199,21 +210,28 @@ def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
         raise Unusable("has no size")
     wanted = _wanted(style)
     font, _ = font_for(wanted, mode)
-    look = Look(font, height, factor, _slant(oblique))
+    look = Look(font, height, factor, slant(oblique))
     ink, fonts = write_mtext(entity, content, look, (wanted, mode))
-    ucs = entity.ucs()
-    axes = [np.array(tuple(v), dtype=np.float64) for v in (entity.dxf.insert, ucs.ux, ucs.uy)]
     names = dict.fromkeys(name for name, _ in fonts)
     others = dict.fromkeys(other for _, other in fonts if other)
-    return _shape(ink, _Place(*axes), ", ".join(names), ", ".join(others))
+    return _shape(ink, _block(entity), ", ".join(names), ", ".join(others))
+
+
+def _block(entity: Any) -> _Place:
+    """The plane of an MTEXT, its insertion point at (0, 0)."""
+    insert = np.array(finite(*entity.dxf.insert))
+    normal, along = (finite(*v) for v in (entity.dxf.extrusion, entity.get_text_direction()))
+    up = np.cross(normal, along)
+    sizes = math.hypot(*along), math.hypot(*up)
+    if not min(sizes) > 0.0:
+        raise Unusable("has no direction")
+    return _Place(insert, np.array(along) / sizes[0], up / sizes[1])
 
 
 def _shape(ink: Ink, place: _Place, font: str, substituted: str) -> TextShape:
     contours = place.contours(ink)
     if not contours and not ink.missing:
         raise Unusable("is empty")
-    if not all(np.isfinite(part).all() for contour in contours for part in contour.parts):
-        raise Unusable("has numbers that are not finite")
     missing = "".join(sorted(ink.missing.elements()))
     return TextShape(contours, font, substituted, missing)
 
@@ -223,19 +241,7 @@ def _checked(raw: str) -> str:
         raise Unusable("is empty")
     if len(raw) > MAX_CHARACTERS:
         raise Unusable(f"has more than {MAX_CHARACTERS} characters")
-    return raw
-
-
-def _numbers(*values: float) -> tuple[float, ...]:
-    numbers = tuple(float(value) for value in values)
-    if not all(map(math.isfinite, numbers)):
-        raise Unusable("has numbers that are not finite")
-    return numbers
-
-
-def _slant(oblique_deg: float) -> float:
-    """tan of the oblique angle, which CAD programs keep within ±85°."""
-    return math.tan(math.radians(max(-85.0, min(85.0, oblique_deg))))
+    return unicodedata.normalize("NFC", raw)
 
 
 def _style(entity: Any, document: Any) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.geometry import strokes
 from camtool.geometry.polylines import Floats
-from camtool.importers.dxf_shapes import Unusable
+from camtool.importers.dxf_frames import Unusable
 
 SUBSTITUTES = ("DejaVu Sans", "Liberation Sans", "Arial", "Helvetica", "Noto Sans", "Open Sans")
 """Families that stand in for a font that is not installed, the first that is installed."""
@@ -54,6 +54,8 @@ _SHAPE_FONTS = frozenset(
 )
 _BOLD, _REGULAR, _NORMAL_WIDTH = 700, 400, 5
 _FONTS_KEPT = 8  # fonts whose letters stay in memory
+_LETTERS_KEPT = 4096  # of each
+_CHOICES_KEPT = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +99,7 @@ class Wanted:
         return (self.family or self.file or "txt") + looks
 
 
+@lru_cache(maxsize=_CHOICES_KEPT)
 def font_for(wanted: Wanted, mode: str) -> tuple[Font, str]:
     """The font to draw with, and the wanted one's name when that is not it ("" otherwise).
 
@@ -131,6 +134,7 @@ def _strokes(character: str) -> strokes.Strokes:
     return glyph.strokes if glyph else ()
 
 
+@lru_cache(maxsize=_LETTERS_KEPT)
 def _stroke_letter(character: str) -> Letter | None:
     glyph = strokes.glyph(character)
     if glyph is None:
@@ -219,7 +223,7 @@ def _outline_font(path: str) -> Font | None:
     capital = float(size.cap_height)
     if not capital > 0.0:
         return None
-    letter = lru_cache(maxsize=None)(partial(_outline, glyphs, capital))
+    letter = lru_cache(maxsize=_LETTERS_KEPT)(partial(_outline, glyphs, capital))
     name = f"{glyphs.font_name} ({PurePath(path).name})"
     return Font(name, True, letter, float(size.descender_height) / capital, blank / capital)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections import Counter
 from dataclasses import dataclass, field
 from enum import IntFlag
@@ -9,6 +11,7 @@ from enum import IntFlag
 import numpy as np
 
 from camtool.geometry.polylines import Floats
+from camtool.importers.dxf_frames import Unusable
 from camtool.importers.text_fonts import Font
 
 RULE_SHARE = 0.07
@@ -16,6 +19,34 @@ RULE_SHARE = 0.07
 
 RULE_DROP = 0.2
 """How far an underline lies below the baseline, an overline above the capitals (same share)."""
+
+
+NUMBERED = re.compile(r"%%(\d{3})", re.ASCII)
+"""A character by its number."""
+
+MAX_NUMBER = 1e60
+"""Sizes and places beyond it are refused: products of a few of them would not be finite."""
+
+MAX_OBLIQUE_DEG = 85.0
+"""Letters lean no further; CAD programs refuse more."""
+
+
+def finite(*values: float) -> tuple[float, ...]:
+    """The values as floats; Unusable when one is none or beyond all bounds."""
+    numbers = tuple(float(value) for value in values)
+    if not all(abs(number) <= MAX_NUMBER for number in numbers):
+        raise Unusable("has numbers that are not finite or beyond all bounds")
+    return numbers
+
+
+def slant(oblique_deg: float) -> float:
+    """tan of an oblique angle."""
+    return math.tan(math.radians(max(-MAX_OBLIQUE_DEG, min(MAX_OBLIQUE_DEG, oblique_deg))))
+
+
+def numbered(digits: str) -> str:
+    """What %%nnn stands for: a character of Windows' western code page."""
+    return bytes([int(digits) & 0xFF]).decode("cp1252", errors="replace")
 
 
 class Rule(IntFlag):
@@ -70,10 +101,10 @@ class Ink:
                 for parts, closed in letter.contours:
                     self.contours.append(([part @ form + (x, y) for part in parts], closed))
             x += look.advance(character)
-        self._rules(look, (at[0], x), y)
         return x
 
-    def _rules(self, look: Look, span: tuple[float, float], baseline: float) -> None:
+    def rule(self, look: Look, span: tuple[float, float], baseline: float) -> None:
+        """The lines that `look` draws along a text from x to x."""
         shares = {Rule.UNDER: -RULE_DROP, Rule.THROUGH: 0.5, Rule.OVER: 1.0 + RULE_DROP}
         for rule, share in shares.items():
             if look.rules & rule and span[1] > span[0]:

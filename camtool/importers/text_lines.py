@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 from camtool.importers.text_layout import Ink, Look
 
@@ -210,13 +210,27 @@ def draw(ink: Ink, line: Line, width: float, at: tuple[float, float]) -> None:
     gaps = sum(cell.glue is Glue.SPACE for _, cell in line.cells)
     widened = spare / gaps if line.stretch and gaps and spare > 0.0 else 0.0
     shift = at[0] + line.share * spare
+    ruled: list[tuple[float, float, Cell]] = []
     for x, cell in line.cells:
+        start = shift + x
         if cell.glue is Glue.NONE:
             lift = 0.5 * cell.lift * (line.height - cell.height)
-            _draw_cell(ink, cell, (shift + x, at[1] + lift))
-        elif cell.look.rules:
-            ink.write(" ", cell.look, (shift + x, at[1]))
+            _draw_cell(ink, cell, (start, at[1] + lift))
         shift += widened * (cell.glue is Glue.SPACE)
+        ruled.append((start, shift + x + cell.width, cell))
+    _rule(ink, ruled, at[1])
+
+
+def _rule(ink: Ink, cells: Sequence[tuple[float, float, Cell]], baseline: float) -> None:
+    """Underlines and the like, each in one piece along cells that look alike."""
+
+    def manner(placed: tuple[float, float, Cell]) -> tuple[int, float]:
+        return int(placed[2].look.rules), placed[2].look.height
+
+    for (rules, _), group in groupby(cells, manner):
+        run = list(group)
+        if rules:
+            ink.rule(run[0][2].look, (run[0][0], run[-1][1]), baseline)
 
 
 def _draw_cell(ink: Ink, cell: Cell, at: tuple[float, float]) -> None:

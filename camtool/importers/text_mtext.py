@@ -7,13 +7,14 @@ the first line's capitals and the baseline of the last line. Frames and backgrou
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from camtool.importers.dxf_shapes import Unusable
+from camtool.importers.dxf_frames import Unusable
 from camtool.importers.text_fonts import Wanted, font_for
-from camtool.importers.text_layout import Ink, Look, Rule
+from camtool.importers.text_layout import NUMBERED, Ink, Look, Rule, finite, numbered, slant
 from camtool.importers.text_lines import (
     Cell,
     Columns,
@@ -28,6 +29,9 @@ from camtool.importers.text_lines import (
 TAB_HEIGHTS = 4.0
 """Distance of tab stops where a text sets none, in heights of a capital."""
 
+_STACK_CARET = re.compile(r"(\\S[^;\\^]*)\^(?! )")
+_BARE_CARET = re.compile(r"\^(?![ @-_])")
+_ESCAPED = re.compile(r"[\\{}]")
 _EXACT_SPACING = 2
 _SHARES = (0.0, 0.5, 1.0)
 _TAB_SHARES = {"r": 1.0, "c": 0.5}
@@ -52,8 +56,7 @@ def write_mtext(
     lines = [line for paragraph in paragraphs for line in wrapped(paragraph, columns.width)]
     if not any(line.cells for line in lines):
         raise Unusable("is empty")
-    if not all(map(math.isfinite, (n for line in lines for n in (line.right, line.height)))):
-        raise Unusable("has numbers that are not finite")
+    finite(*(size for line in lines for size in (line.right, line.height)))
     width = columns.width or max(line.right for line in lines)
     exact = int(entity.dxf.get("line_spacing_style", 1)) == _EXACT_SPACING
     pitch = Pitch(float(entity.dxf.line_spacing_factor), look.height if exact else 0.0)
@@ -68,6 +71,13 @@ def write_mtext(
     return ink, reader.fonts
 
 
+def _plain(content: str) -> str:
+    """Codes that MTextParser takes for others: carets that are no control code, and %%nnn."""
+    content = _STACK_CARET.sub(r"\1^ ", content)
+    content = _BARE_CARET.sub("^ ", content)
+    return NUMBERED.sub(lambda match: _ESCAPED.sub(r"\\\g<0>", numbered(match[1])), content)
+
+
 def _columns(entity: Any) -> Columns:
     """Width, gutter and heights; one column as high as need be where the entity sets none."""
     width = max(0.0, float(entity.dxf.get("width", 0.0)))
@@ -77,10 +87,8 @@ def _columns(entity: Any) -> Columns:
     heights = [float(height) for height in said.heights]
     if not heights and said.defined_height:
         heights = [abs(float(said.defined_height))] * max(1, int(said.count))
-    numbers = (float(said.width), float(said.gutter_width), *heights)
-    if not all(map(math.isfinite, numbers)):
-        raise Unusable("has numbers that are not finite")
-    return Columns(max(0.0, numbers[0]), max(0.0, numbers[1]), tuple(heights[:-1]))
+    width, gutter, *heights = finite(said.width, said.gutter_width, *heights)
+    return Columns(max(0.0, width), max(0.0, gutter), tuple(heights[:-1]))
 
 
 class _Reader:
@@ -104,7 +112,7 @@ class _Reader:
         cells: list[Cell] = []
         ended, context = False, start
         breaks = (TokenType.NEW_PARAGRAPH, TokenType.NEW_COLUMN, TokenType.WRAP_AT_DIMLINE)
-        for token in MTextParser(content, start):
+        for token in MTextParser(_plain(content), start):
             context, ended = token.ctx, token.type in breaks
             if ended:
                 last = token.type == TokenType.NEW_COLUMN
@@ -162,12 +170,16 @@ class _Reader:
             self._known[key] = replace(self._look, font=font), other
             self.fonts.append((font.name, other))
         look, _ = self._known[key]
+        sizes = context.cap_height, context.width_factor, context.char_tracking_factor
+        height, factor, tracking = finite(*sizes)
+        if not min(sizes) > 0.0:
+            raise Unusable("has letters of no size")
         rules = Rule.UNDER * context.underline | Rule.THROUGH * context.strike_through
         return replace(
             look,
-            height=float(context.cap_height),
-            width_factor=float(context.width_factor),
-            slant=math.tan(math.radians(max(-85.0, min(85.0, context.oblique)))),
-            tracking=float(context.char_tracking_factor),
+            height=height,
+            width_factor=factor,
+            slant=slant(*finite(context.oblique)),
+            tracking=tracking,
             rules=Rule(rules | Rule.OVER * context.overline),
         )
