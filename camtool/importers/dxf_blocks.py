@@ -14,7 +14,7 @@ import numpy as np
 
 from camtool.errors import DrawingError
 from camtool.geometry.polylines import Floats
-from camtool.importers.dxf_shapes import Unusable
+from camtool.importers.dxf_frames import Unusable
 
 MAX_INSERTED = 100_000
 """No drawing may grow by more entities than this through its blocks."""

@@ -279,8 +279,9 @@ def test_a_spline_with_too_few_points_is_told():
     )
     found = read(data, "part.dxf", OPTIONS)
     assert found.used == {"LINE": 1}
-    [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
-    assert "SPLINE" in finding.message
+    assert skipped(found) == {
+        ("SPLINE", "has no curve: 2 control points are too few for degree 3"): 1
+    }
 
 
 @pytest.mark.parametrize(
@@ -470,11 +471,9 @@ def test_what_is_no_line_is_counted_by_kind():
     space.add_line((0, 0), (1, 0))
     space.add_text("M30;")
     space.add_text("G00")
-    space.add_point((1, 1))
     space.add_hatch()
-    space.add_solid([(0, 0), (1, 0), (1, 1)])
     space.add_ray((0, 0), (1, 1))
-    space.add_3dface([(0, 0), (1, 0), (1, 1)])
+    space.add_3dface([(0, 0), (1, 0), (1, 1, 1)])
     space.add_blockref("MISSING", (0, 0))
     doc.layout("Layout1").add_line((0, 0), (1, 1))
     found = drawn(doc)
@@ -482,9 +481,7 @@ def test_what_is_no_line_is_counted_by_kind():
     assert counts.pop("INSERT", 1) == 1  # or deleted by the audit, which is told as a repair
     assert counts == {
         "TEXT": 2,
-        "POINT": 1,
         "HATCH": 1,
-        "SOLID": 1,
         "RAY": 1,
         "3DFACE": 1,
         "entity": 1,
@@ -572,8 +569,9 @@ def test_units_of_the_file(code, name, mm):
     ("header", "said"),
     [
         ("9 $ACADVER 1 AC1009", "no $INSUNITS"),
-        ("9 $ACADVER 1 AC1009 9 $INSUNITS 70 0 9 $MEASUREMENT 70 0", "$INSUNITS 0"),
-        ("9 $ACADVER 1 AC1009 9 $INSUNITS 70 99", "$INSUNITS 99"),
+        ("9 $ACADVER 1 AC1009 9 $INSUNITS 70 0", "$INSUNITS 0"),
+        ("9 $ACADVER 1 AC1009 9 $INSUNITS 70 99", "$INSUNITS 99, which is no unit"),
+        ("9 $ACADVER 1 AC1009 9 $INSUNITS 70 3 9 $MEASUREMENT 70 0", "$INSUNITS 3 (miles"),
     ],
 )
 def test_a_file_without_a_unit_is_taken_as_mm_with_a_warning(header, said):
@@ -583,7 +581,23 @@ def test_a_file_without_a_unit_is_taken_as_mm_with_a_warning(header, said):
     assert finding.severity is Severity.WARNING
     assert said in finding.message
     assert "--units" in finding.message
-    assert ("inches" in finding.message) == ("$MEASUREMENT" in header)
+
+
+@pytest.mark.parametrize("code", ["", "9 $INSUNITS 70 0 "])
+@pytest.mark.parametrize(
+    ("measurement", "name", "mm", "severity"),
+    [(0, "in", 25.4, Severity.WARNING), (1, "mm", 1.0, Severity.INFO)],
+)
+def test_without_a_unit_the_system_of_measurement_is_the_hint(
+    code, measurement, name, mm, severity
+):
+    header = f"9 $ACADVER 1 AC1009 {code}9 $MEASUREMENT 70 {measurement}"
+    found = read(text("CIRCLE 8 0 10 2 20 0 40 1", header=header), "a.dxf", OPTIONS)
+    assert (found.units.name, found.units.mm_per_unit) == (name, mm)
+    [finding] = [one for one in found.findings if one.code is Code.UNIT_GUESSED]
+    assert finding.severity is severity
+    assert "--units" in finding.message
+    assert Code.UNITLESS not in codes(found)
 
 
 def test_the_callers_unit_wins():
@@ -629,7 +643,8 @@ def test_all_versions_ascii_and_binary(version, fmt, tmp_path):
         (b"\x00\x01\x02" * 99, "is no DXF"),
         (b"AutoCAD Binary DXF\r\n\x1a\x00", "is no DXF"),
         (b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\n0\n", "is cut off"),
-        (b"0\nSECTION\nnonsense\nEOF\n0\nEOF\n", "cannot be read as DXF"),
+        (b"0\nSECTION\nnonsense\nEOF\n0\nEOF\n", "line 3: 'nonsense' is no group code"),
+        (b"0\nSECTION\n2\nENTITIES\n0\nSEQEND\n0\nEOF\n", "holds no lines or curves"),
         (b"0\nSECTION\n2\nENTITIES\n0\nENDSEC\n0\nEOF\n", "holds no lines or curves"),
     ],
 )
@@ -681,24 +696,33 @@ def test_a_drawing_too_far_away_is_named():
 
 
 def test_repairs_are_told_the_first_few_in_full():
-    doc = document()
-    for y in range(5):
-        doc.modelspace().add_line((0, y), (1, y), dxfattribs={"linetype": "NOPE"})
-    found = drawn(doc)
+    whole = text("LINE 8 0 10 0 20 0 11 1 21 0", header=MM)
+    trash = b"".join(b"0\nTRASH%d\n" % k for k in range(5))
+    found = read(whole.replace(b"0\nEOF", trash + b"0\nEOF"), "test.dxf", OPTIONS)
     [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
-    assert len(found.paths) == 5
+    assert len(found.paths) == 1
     assert finding.severity is Severity.WARNING
-    assert finding.measured == 5.0
-    assert finding.message.count("linetype") == 3
-    assert finding.message.endswith("and 2 more")
+    assert finding.measured >= 5.0
+    assert finding.message.count("stands outside the sections") == 3
+    assert finding.message.endswith(f"and {finding.measured - 3:.0f} more")
 
 
 def test_a_missing_section_end_is_repaired_and_told():
     data = text("LINE 8 0 10 0 20 0 11 1 21 0", header=MM).replace(b"0\nENDSEC\n0\nEOF", b"0\nEOF")
     found = read(data, "part.dxf", OPTIONS)
     [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
-    assert "ENDSEC" in finding.message
-    assert finding.measured == 1.0
+    assert "section ENTITIES has no end (ENDSEC)" in finding.message
+
+
+def test_a_file_that_ends_behind_its_entities_is_whole_enough():
+    data = text("LINE 8 0 10 0 20 0 11 1 21 0", header=MM)
+    for end in (b"0\nEOF", b"0\nSECTION\n2\nOBJECTS\n0\nDICTIONARY\n5\n3"):
+        found = read(data.replace(b"0\nEOF\n", end[:-1]), "part.dxf", OPTIONS)
+        [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
+        assert "end mark EOF is missing" in finding.message
+        assert len(found.paths) == 1
+    with pytest.raises(DrawingError, match="cut off"):
+        read(data.replace(b"0\nENDSEC\n0\nEOF\n", b"0\nENDSE"), "part.dxf", OPTIONS)
 
 
 def test_nothing_is_logged_or_printed_and_the_logger_is_left_alone(caplog, capfd):
@@ -707,7 +731,7 @@ def test_nothing_is_logged_or_printed_and_the_logger_is_left_alone(caplog, capfd
     data = text("LINE 8 0 10 0 20 0 11 1 21 0", header="9 $ACADVER 1 AC1003")
     read(data, "part.dxf", OPTIONS)
     with pytest.raises(DrawingError):
-        read(b"0\nSECTION\nnonsense\nEOF\n0\nEOF\n", "part.dxf", OPTIONS)
+        read(b"0\nSECTION\n2\nHEADER\n0\nENDSEC\n0\nEOF\n", "part.dxf", OPTIONS)
     assert (logger.propagate, list(logger.handlers), logger.level) == before
     assert caplog.records == []
     assert capfd.readouterr() == ("", "")
@@ -725,10 +749,20 @@ SAMPLE = _sample()
 ENTITIES = SAMPLE.index(b"ENTITIES")
 
 
-@given(st.integers(0, len(SAMPLE) - 8))
+ALL_ENTITIES = SAMPLE.index(b"ENDSEC", ENTITIES) + len(b"ENDSEC")
+
+
+@given(st.integers(0, ALL_ENTITIES - 1))
 def test_a_file_that_is_cut_off_is_refused(end):
     with pytest.raises(DrawingError, match=r"cut off|no DXF|empty"):
         read(SAMPLE[:end], "part.dxf", OPTIONS)
+
+
+@given(st.integers(ALL_ENTITIES, len(SAMPLE) - 5))
+def test_a_file_that_is_cut_off_behind_its_entities_has_all_of_them(end):
+    found = read(SAMPLE[:end], "part.dxf", OPTIONS)
+    assert found.used == read(SAMPLE, "part.dxf", OPTIONS).used
+    assert Code.FILE_REPAIRED in codes(found)
 
 
 LINES = SAMPLE.split(b"\n")
