@@ -11,6 +11,7 @@ import math
 import re
 import unicodedata
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -81,11 +82,16 @@ class _Place:
     v: Floats
 
     def contours(self, ink: Ink) -> list[Contour]:
-        axes = np.array([self.u, self.v])
-        return [
-            Contour([part @ axes + self.origin for part in parts], closed)
-            for parts, closed in ink.contours
-        ]
+        if not ink.points:
+            return []
+        points = np.concatenate(ink.points) @ np.array([self.u, self.v]) + self.origin
+        contours, at = [], 0
+        for counts, closed in ink.contours:
+            ends = list(accumulate(counts, initial=at))
+            parts = [points[start:end] for start, end in pairwise(ends)]
+            contours.append(Contour(parts, closed))
+            at = ends[-1]
+        return contours
 
 
 def _text(entity: Any, mode: str) -> TextShape:

@@ -60,10 +60,19 @@ _CHOICES_KEPT = 64
 
 @dataclass(frozen=True, eq=False)
 class Letter:
-    """Contours of parts (k, 2), k = 2, 3 or 4 control points, closed or not; `advance` onward."""
+    """`points` (n, 2) of all parts; each contour is the count of points (2 to 4) of its parts."""
 
-    contours: tuple[tuple[tuple[Floats, ...], bool], ...]
+    points: Floats
+    contours: tuple[tuple[int, ...], ...]
     advance: float
+
+    @classmethod
+    def of(cls, contours: list[list[Floats]], advance: float) -> Letter:
+        """From contours of parts (k, 2)."""
+        parts = [part for contour in contours for part in contour]
+        points = np.concatenate(parts) if parts else np.empty((0, 2))
+        counts = tuple(tuple(len(part) for part in contour) for contour in contours)
+        return cls(points, counts, advance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +153,8 @@ def _stroke_letter(character: str) -> Letter | None:
         points = np.array(stroke, dtype=np.float64)
         points[:, 1] = strokes.BASELINE - points[:, 1]
         points /= strokes.CAP_UNITS
-        contours.append((_lines(points), False))
-    return Letter(tuple(contours), glyph.advance / strokes.CAP_UNITS)
-
-
-def _lines(points: Floats) -> tuple[Floats, ...]:
-    return tuple(points[k : k + 2] for k in range(len(points) - 1))
+        contours.append([points[k : k + 2] for k in range(len(points) - 1)])
+    return Letter.of(contours, glyph.advance / strokes.CAP_UNITS)
 
 
 @dataclass(frozen=True, order=True)
@@ -244,5 +249,5 @@ def _outline(glyphs: Any, capital: float, character: str) -> Letter | None:
                 parts.append((part - base) / capital)
             at = command.end
         if parts:
-            contours.append((tuple(parts), True))
-    return Letter(tuple(contours), float(glyphs.get_glyph_width(character)) / capital)
+            contours.append(parts)
+    return Letter.of(contours, float(glyphs.get_glyph_width(character)) / capital)

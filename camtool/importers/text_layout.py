@@ -82,9 +82,11 @@ class Look:
 
 @dataclass(eq=False)
 class Ink:
-    """What has been drawn: contours of parts (k, 2), and the characters that fonts lack."""
+    """What has been drawn: `points` (n, 2) of all parts in turn; each contour as the counts of
+    points of its parts, and whether it is closed; the characters that fonts lack."""
 
-    contours: list[tuple[list[Floats], bool]] = field(default_factory=list)
+    points: list[Floats] = field(default_factory=list)
+    contours: list[tuple[tuple[int, ...], bool]] = field(default_factory=list)
     missing: Counter[str] = field(default_factory=Counter)
 
     def write(self, text: str, look: Look, at: tuple[float, float]) -> float:
@@ -98,8 +100,9 @@ class Ink:
             if letter is None:
                 self.missing[character] += 1
             else:
-                for parts, closed in letter.contours:
-                    self.contours.append(([part @ form + (x, y) for part in parts], closed))
+                self.points.append(letter.points @ form + (x, y))
+                closed = look.font.outlines
+                self.contours.extend((counts, closed) for counts in letter.contours)
             x += look.advance(character)
         return x
 
@@ -115,11 +118,12 @@ class Ink:
         """A straight line: one stroke, or a thin bar among outlines."""
         ends = np.array([start, end], dtype=np.float64)
         if not look.font.outlines:
-            self.contours.append(([ends], False))
+            self.points.append(ends)
+            self.contours.append(((2,), False))
             return
         along = ends[1] - ends[0]
         half = 0.5 * RULE_SHARE * look.height / float(np.hypot(*along))
         aside = half * np.array([-along[1], along[0]])
         corners = np.array([ends[0] - aside, ends[1] - aside, ends[1] + aside, ends[0] + aside])
-        parts = [corners[[k, (k + 1) % 4]] for k in range(4)]
-        self.contours.append((parts, True))
+        self.points.append(corners[[0, 1, 1, 2, 2, 3, 3, 0]])
+        self.contours.append(((2, 2, 2, 2), True))
