@@ -3,13 +3,11 @@
     ( x' )   ( a c ) ( x )   ( e )
     ( y' ) = ( b d ) ( y ) + ( f )
 
-Source: Scalable Vector Graphics 1.1, chapter 7 (coordinate systems, transform lists, viewBox
-and preserveAspectRatio).
+Source: Scalable Vector Graphics 1.1, 7.7 and 7.8 (viewBox and preserveAspectRatio).
 """
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 
@@ -21,10 +19,9 @@ from camtool.geometry.polylines import Floats
 MAX_NUMBER = 1e12
 """Numbers beyond this belong to no drawing; their products could overflow."""
 
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+NUMBER = re.compile(r"(?>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", re.ASCII)
 
 BETWEEN = " \t\r\n\f,"
-_FUNCTION = re.compile(r"\s*,?\s*([A-Za-z]+)\s*\(([^()]*)\)\s*")
 _ALIGN = re.compile(r"(?:defer\s+)?(none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(meet|slice))?")
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 
@@ -57,11 +54,22 @@ class Affine:
 
     def points(self, points: Floats) -> Floats:
         """(n, 2) positions mapped."""
-        return np.asarray(self.vectors(points) + np.array([self.e, self.f]))
+        x, y = points[:, 0], points[:, 1]
+        mapped = np.empty((len(points), 2))
+        mapped[:, 0] = self.a * x + self.c * y + self.e
+        mapped[:, 1] = self.b * x + self.d * y + self.f
+        return mapped
 
     def vectors(self, vectors: Floats) -> Floats:
         """(n, 2) directions mapped: without the shift."""
         return np.asarray(vectors @ np.array([[self.a, self.b], [self.c, self.d]]))
+
+    @property
+    def inverse(self) -> Affine:
+        """The map back; the determinant must not be 0."""
+        size = self.determinant
+        a, b, c, d = self.d / size, -self.b / size, -self.c / size, self.a / size
+        return Affine(a, b, c, d, -(a * self.e + c * self.f), -(b * self.e + d * self.f))
 
     def checked(self) -> Affine:
         """This map; DrawingError when its numbers have run out of all bounds."""
@@ -83,7 +91,7 @@ def scaling(x: float, y: float) -> Affine:
 def parse_number(text: str, name: str) -> float:
     """One number; DrawingError naming the attribute."""
     if not NUMBER.fullmatch(text):
-        raise DrawingError(f"{name} {_short(text)} is no number")
+        raise DrawingError(f"{name} {short(text)} is no number")
     return in_bounds(float(text), name)
 
 
@@ -99,58 +107,11 @@ def parse_numbers(text: str, name: str) -> list[float]:
     rest = NUMBER.sub(" ", text).strip(BETWEEN)
     rest = rest.replace(",", " ").strip()
     if rest:
-        raise DrawingError(f"{name} holds {_short(rest)}, which is no number")
+        raise DrawingError(f"{name} holds {short(rest)}, which is no number")
     values = [float(number) for number in NUMBER.findall(text)]
     furthest = max(values, key=abs, default=0.0)
     in_bounds(furthest, name)
     return values
-
-
-def parse_transform(text: str) -> Affine:
-    """A transform list: matrix, translate, scale, rotate, skewX, skewY; DrawingError."""
-    whole = Affine()
-    at = 0
-    while text[at:].strip(BETWEEN):
-        match = _FUNCTION.match(text, at)
-        if match is None:
-            raise DrawingError(f"transform {_short(text[at:])} is no transform")
-        at = match.end()
-        numbers = parse_numbers(match[2], f"transform {match[1]}")
-        whole = (whole @ _single(match[1], numbers)).checked()
-    return whole
-
-
-def _single(name: str, n: list[float]) -> Affine:
-    """One function of a transform list."""
-    match name, len(n):
-        case "matrix", 6:
-            return Affine(*n)
-        case "translate", 1 | 2:
-            return translation(n[0], n[1] if len(n) == 2 else 0.0)
-        case "scale", 1 | 2:
-            return scaling(n[0], n[-1])
-        case "rotate", 1:
-            return _rotation(n[0])
-        case "rotate", 3:
-            return translation(n[1], n[2]) @ _rotation(n[0]) @ translation(-n[1], -n[2])
-        case "skewX", 1:
-            return Affine(c=math.tan(math.radians(n[0])))
-        case "skewY", 1:
-            return Affine(b=math.tan(math.radians(n[0])))
-    raise DrawingError(f"transform {name} with {len(n)} numbers is no transform")
-
-
-_QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
-
-
-def _rotation(degrees: float) -> Affine:
-    """Quarter turns are exact, so that a turned square stays one."""
-    quarter, rest = divmod(degrees, 90.0)
-    if rest == 0.0:
-        cosine, sine = _QUARTERS[int(quarter) % 4]
-    else:
-        cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    return Affine(cosine, sine, -sine, cosine)
 
 
 @dataclass(frozen=True)
@@ -184,7 +145,7 @@ def view_box_map(box: Box, onto: Box, align: str) -> Affine:
     """
     match = _ALIGN.fullmatch(align or "xMidYMid")
     if match is None:
-        raise DrawingError(f"preserveAspectRatio {_short(align)} is not known")
+        raise DrawingError(f"preserveAspectRatio {short(align)} is not known")
     sx, sy = onto.width / box.width, onto.height / box.height
     x, y = onto.x, onto.y
     if match[1] != "none":
@@ -194,6 +155,6 @@ def view_box_map(box: Box, onto: Box, align: str) -> Affine:
     return Affine(sx, 0.0, 0.0, sy, x - sx * box.x, y - sy * box.y).checked()
 
 
-def _short(text: str) -> str:
+def short(text: str) -> str:
     """A quoted beginning of a text, for messages."""
     return repr(text if len(text) <= 24 else text[:21] + "...")

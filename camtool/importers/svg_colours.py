@@ -1,4 +1,12 @@
-"""The colour names of SVG; source: Scalable Vector Graphics 1.1, 4.4."""
+"""Colours of SVG as "#rrggbb".
+
+Source: Scalable Vector Graphics 1.1, 4.4 for the names; CSS Color Module 3, chapter 4.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import re
 
 _TABLE = """
 aliceblue f0f8ff antiquewhite faebd7 aqua 00ffff aquamarine 7fffd4 azure f0ffff beige f5f5dc
@@ -35,3 +43,47 @@ yellowgreen 9acd32
 _WORDS = _TABLE.split()
 NAMES = {name: f"#{value}" for name, value in zip(_WORDS[::2], _WORDS[1::2], strict=True)}
 """Name to "#rrggbb"."""
+
+_HEX = re.compile(r"#([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})")
+_PART = r"[+-]?(?>\d{1,9}\.?\d{0,18}|\.\d{1,18})"
+_RGB = re.compile(rf"rgba?\(\s*({_PART}%?)[\s,]+({_PART}%?)[\s,]+({_PART}%?)\s*(?:[,/][^)]*)?\)")
+_HSL = re.compile(
+    rf"hsla?\(\s*({_PART})(?:deg)?[\s,]+({_PART})%[\s,]+({_PART})%\s*(?:[,/][^)]*)?\)"
+)
+_LINK = re.compile(r"url\([^)]*\)\s*")
+_SHORT_HEX = 4
+
+
+def parse_colour(text: str) -> str:
+    """A CSS colour as "#rrggbb"; "" for what is none of a known form (gradients, var()).
+
+    >>> parse_colour("red"), parse_colour("#0af"), parse_colour("rgb(100%, 0%, 16)")
+    ('#ff0000', '#00aaff', '#ff0010')
+    >>> parse_colour("hsl(120, 100%, 25%)"), parse_colour("url(#fade) teal")
+    ('#008000', '#008080')
+    """
+    # What follows a gradient, or goes before an ICC profile, is the colour for who knows neither.
+    text = _LINK.sub("", text.strip().lower(), count=1).partition("icc-color(")[0].strip()
+    if text in NAMES:
+        return NAMES[text]
+    if match := _HEX.fullmatch(text):
+        digits = match[1]
+        if len(digits) <= _SHORT_HEX:
+            digits = "".join(digit * 2 for digit in digits)
+        return "#" + digits[:6]
+    if match := _RGB.fullmatch(text):
+        return _joined([_channel(part) for part in match.groups()])
+    if match := _HSL.fullmatch(text):
+        hue, full, light = (float(part) for part in match.groups())
+        share = [min(max(value / 100.0, 0.0), 1.0) for value in (light, full)]
+        return _joined(list(colorsys.hls_to_rgb(hue / 360.0 % 1.0, *share)))
+    return ""
+
+
+def _channel(text: str) -> float:
+    """0 to 1 of "80%" or "204"."""
+    return float(text[:-1]) / 100.0 if text.endswith("%") else float(text) / 255.0
+
+
+def _joined(channels: list[float]) -> str:
+    return "#" + "".join(f"{int(min(max(c, 0.0), 1.0) * 255.0 + 0.5):02x}" for c in channels)

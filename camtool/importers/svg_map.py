@@ -26,9 +26,9 @@ from camtool.geometry.fit import (
     overall,
 )
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats
-from camtool.importers.assemble import MAX_COORDINATE_MM
+from camtool.importers.piece import MAX_COORDINATE_MM
 from camtool.importers.svg_affine import Affine
-from camtool.importers.svg_path import Arc, Bezier, Lines, Segment, Subpath
+from camtool.importers.svg_segments import Arc, Bezier, Lines, Segment, Subpath
 
 ROUND_EPS_MM = POSITION_EPS_MM
 """An ellipse whose half axes differ by less is a circle."""
@@ -43,13 +43,18 @@ class CurveFitter:
 
     def vertices(self, subpath: Subpath, to_mm: Affine) -> Floats:
         """(n, 3) x, y, bulge in mm, the last one the end; DrawingError when out of bounds."""
-        rows = [np.append(to_mm.points(subpath.start[None, :])[0], 0.0)[None, :]]
+        first = subpath.segments[0]
+        if len(subpath.segments) == 1 and isinstance(first, Lines):
+            return _in_reach(
+                _straight(to_mm, np.concatenate([subpath.start[None, :], first.points]))
+            )
+        rows = [_straight(to_mm, subpath.start[None, :])]
         for segment in subpath.segments:
             piece = self._segment(rows[-1][-1, :2], segment, to_mm)
             # The segment's first vertex is the last one so far, and its bulge goes there.
             rows[-1][-1, 2] = piece[0, 2]
             rows.append(piece[1:])
-        return np.concatenate(rows)
+        return _in_reach(np.concatenate(rows))
 
     def error(self) -> FitError:
         """How far all fitted arcs lie from their curves."""
@@ -58,8 +63,8 @@ class CurveFitter:
     def _segment(self, here: Floats, segment: Segment, to_mm: Affine) -> Floats:
         """(n, 3) from `here` (2,) mm to the segment's end, both exact."""
         if isinstance(segment, Lines):
-            points = np.concatenate([here[None, :], to_mm.points(segment.points)])
-            return np.column_stack([points, np.zeros(len(points))])
+            points = _straight(to_mm, segment.points)
+            return np.concatenate([[[here[0], here[1], 0.0]], points])
         if isinstance(segment, Bezier):
             control = np.concatenate([here[None, :], to_mm.points(segment.control)])
             return self._fitted(BezierCurve(control), control)
@@ -75,17 +80,31 @@ class CurveFitter:
 
     def _fitted(self, curve: Curve, bounds: Floats) -> Floats:
         """Arcs for a curve whose size and place `bounds` (n, 2) tell."""
-        furthest = float(np.abs(bounds).max())
-        if not furthest <= MAX_COORDINATE_MM:
-            raise DrawingError(
-                f"a curve lies {furthest:.6g} mm away", mend="name its unit with --units"
-            )
+        _in_reach(bounds)
         try:
             fit = fit_curve(curve, self.tolerance_mm)
         except GeometryError as error:
             raise DrawingError(f"a curve cannot be fitted: {error.message}") from error
         self._fits.append(fit)
         return fit.vertices if len(fit.vertices) > 1 else np.repeat(fit.vertices, 2, axis=0)
+
+
+def _straight(to_mm: Affine, points: Floats) -> Floats:
+    """(n, 3) of points (n, 2) mapped, without bulges."""
+    vertices = np.zeros((len(points), 3))
+    vertices[:, :2] = to_mm.points(points)
+    return vertices
+
+
+def _in_reach(vertices: Floats) -> Floats:
+    """The same numbers; DrawingError when one is no place in a drawing."""
+    furthest = float(np.abs(vertices).max())
+    if not furthest <= MAX_COORDINATE_MM:
+        raise DrawingError(
+            f"it reaches {furthest:.6g} mm away, where micrometres are lost",
+            mend="name the unit with --units",
+        )
+    return vertices
 
 
 def _circle(centre: Floats, u: Floats, v: Floats, arc: Arc) -> Floats | None:

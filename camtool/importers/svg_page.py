@@ -9,12 +9,12 @@ Source: Scalable Vector Graphics 1.1, 7.10 to 7.12; CSS 2.1, 4.3.2 for the units
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from camtool.errors import DrawingError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Units
-from camtool.importers.options import ReadOptions
+from camtool.importers.options import DPI, ReadOptions
 from camtool.importers.svg_affine import (
     Affine,
     Box,
@@ -23,7 +23,9 @@ from camtool.importers.svg_affine import (
     translation,
     view_box_map,
 )
-from camtool.importers.svg_shapes import split_length
+from camtool.importers.svg_css import declared
+from camtool.importers.svg_shapes import FONT_UNITS, split_length
+from camtool.importers.svg_style import FONT_PX
 from camtool.importers.svg_tree import Node
 
 
@@ -47,12 +49,32 @@ class _Side:
     unit: str
 
 
-def page_of(root: Node, options: ReadOptions) -> Page:
+Writer = tuple[str, float]
+"""A program that took a px for something else, and its px an inch."""
+
+
+def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> Page:
     """The page of the root element; DrawingError when its size or viewBox makes no sense."""
     width, height = (_side(root, name, options) for name in ("width", "height"))
     box = parse_view_box(root.get("viewBox"))
     if options.units is not None:
         return _asked(width, height, box, options)
+    page = _said(root, (width, height), box, options)
+    in_px = box is None or page.units.name == "px"
+    if writer is None or not in_px or options.dpi != DPI:
+        return page
+    hint = Finding(
+        Code.UNIT_GUESSED,
+        Severity.WARNING,
+        f"{writer[0]} wrote the file, which took {writer[1]:g} px an inch, and it was read with "
+        f"{DPI:g}; if it comes out too small, give --dpi {writer[1]:g}",
+    )
+    return replace(page, findings=(*page.findings, hint))
+
+
+def _said(root: Node, sides: tuple[_Side, _Side], box: Box | None, options: ReadOptions) -> Page:
+    """The page by what the file says."""
+    width, height = sides
     named = width if width.size_mm is not None else height
     if named.size_mm is None:
         return _sizeless(box, options)
@@ -102,12 +124,15 @@ def _sizeless(box: Box | None, options: ReadOptions) -> Page:
 
 
 def _side(root: Node, name: str, options: ReadOptions) -> _Side:
-    text = root.get(name)
+    """A side as the attribute says it, else as the style does (as pages for the web have it)."""
+    text = root.get(name) or declared(root.get("style"), frozenset([name])).get(name, ("",))[0]
     if text in ("", "auto"):
         return _Side(text, None, "")
     value, unit = split_length(text, name)
     if unit == "%":
         return _Side(text, None, unit)
+    if unit in FONT_UNITS:
+        value, unit = value * FONT_UNITS[unit] * FONT_PX, "px"
     if value <= 0.0:
         raise DrawingError(f"{name} is {text}: the page has no size", mend="give it a size")
     return _Side(text, value * options.mm_per(unit or "px"), unit)
@@ -129,5 +154,5 @@ def _unitless(why: str, options: ReadOptions) -> Finding:
         Code.UNITLESS,
         Severity.WARNING,
         f"{why}: read as px, {options.dpi:g} an inch; if that is wrong, name the unit of a user "
-        "unit with --units, or --dpi",
+        "unit with --units, or give --dpi",
     )

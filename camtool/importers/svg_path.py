@@ -1,256 +1,241 @@
-"""Subpaths, and the path data of SVG.
+"""The path data of SVG as subpaths.
 
-A subpath is a start and segments in user units, Y down as in the file:
+The words of path data are checked here to the letter: what stands before the first wrong sign is
+drawn, as the standard wants it, and the fault is told. Lines and arcs are done with that; the
+Bézier curves, with their smooth and relative forms, are svgpathtools' to make.
 
-    Lines        corners after the start, (n, 2)
-    Bezier       control points after the start: (2, 2) or (3, 2)
-    Arc          centre + u·cos t + v·sin t, t from `begin` over the signed `sweep`, to `end`
-
-The words of path data are checked here to the letter, since a program must not be cut from half
-a drawing; subpaths of straight lines alone are then done. The curves of the others are parsed by
-svgpathtools; of its arcs only the data are taken, as its centres are rounded (a half circle is
-recognised within 1e-8) and ours are not.
-
-Source: Scalable Vector Graphics 1.1, chapter 8 (paths) and appendix F.6 (elliptical arcs).
+Source: Scalable Vector Graphics 1.1, chapter 8 (paths; 8.3.9 for their grammar) and appendix F.2
+(drawing up to an error).
 """
 
 from __future__ import annotations
 
 import math
 import re
-import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
 
 from camtool.errors import DrawingError
 from camtool.geometry.polylines import Floats
-from camtool.importers.svg_affine import BETWEEN, MAX_NUMBER, NUMBER, parse_numbers
+from camtool.importers.svg_affine import MAX_NUMBER, NUMBER
+from camtool.importers.svg_segments import Arc, Bezier, Lines, Segment, Subpath, arc_between
 
-_COMMAND = re.compile(r"[MmZzLlHhVvCcSsQqTtAa]")
-_FLAG = re.compile(r"[01]")
-_FLAG_FIELDS = (3, 4)
+MAX_SIGNS = 50_000_000
+"""Path data of one element may be so long; their numbers would take some 3 GB."""
+
+_COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])")
+_GAP = r"[ \t\r\n\f,]*+"
+_NUM = NUMBER.pattern
+_NUMBERS = re.compile(rf"{_GAP}(?:{_NUM}{_GAP})*+", re.ASCII)
+_ARC = re.compile(
+    rf"({_NUM}){_GAP}({_NUM}){_GAP}({_NUM}){_GAP}([01]){_GAP}([01]){_GAP}({_NUM}){_GAP}({_NUM}){_GAP}",
+    re.ASCII,
+)
+_START = re.compile(_GAP)
 _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """Straight segments through `points` (n, 2)."""
+def parse_path(data: str) -> tuple[list[Subpath], str]:
+    """The subpaths of path data that draw something, up to the first fault, and that fault ("").
 
-    points: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Bezier:
-    """A quadratic (2, 2) or cubic (3, 2) Bézier: `control` without its first point."""
-
-    control: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Arc:
-    """An arc of an ellipse, its half axes `u`, `v` (2,), angles in rad, `end` (2,) exact."""
-
-    centre: Floats
-    u: Floats
-    v: Floats
-    begin: float
-    sweep: float
-    end: Floats
+    DrawingError for data that cannot be drawn at all: too many or too large, or arcs without a
+    shape.
+    """
+    if len(data) > MAX_SIGNS:
+        raise DrawingError(f"path data have more than {MAX_SIGNS} signs")
+    pen = _Pen()
+    fault = _drawn(data, pen)
+    pen.lift(closed=False)
+    return pen.subpaths(), fault
 
 
-Segment = Lines | Bezier | Arc
+def _drawn(data: str, pen: _Pen) -> str:
+    """Draws command by command; the first fault, or ""."""
+    lead, *words = _COMMAND.split(data)
+    if lead.strip() or (words and words[0] not in "Mm"):
+        begin = lead.strip() or words[0]
+        return f"path data begin with {begin[:12]!r}, wanted M or m"
+    at = len(lead)
+    for letter, text in zip(words[::2], words[1::2], strict=True):
+        kind = letter.upper()
+        name = f"path data at sign {at + 1}: {letter!r}"
+        if kind == "A":
+            fault = _arcs(pen, letter.islower(), text)
+        else:
+            match = _NUMBERS.match(text)
+            end = match.end() if match else 0
+            numbers = NUMBER.findall(text, 0, end)
+            count = _COUNTS[kind]
+            whole = len(numbers) // count * count if count else 0
+            fault = "" if end == len(text) else _odd(text[end:])
+            if not fault and (whole != len(numbers) or (count and not numbers)):
+                fault = f"has {len(numbers)} numbers, wanted {count or 'none'}"
+            pen.command(letter, numbers[:whole])
+        if fault:
+            return f"{name} {fault}"
+        at += 1 + len(text)
+    return ""
 
 
-@dataclass(frozen=True, eq=False)
-class Subpath:
-    """A start (2,) and what follows it; `closed` paths have a straight line back, if any."""
+def _arcs(pen: _Pen, relative: bool, text: str) -> str:
+    """A commands: their flags may stick to what follows ("a1 1 0 011 2"); the fault or ""."""
+    start = _START.match(text)
+    at = start.end() if start else 0
+    drawn = 0
+    while match := _ARC.match(text, at):
+        rx, ry, turn, large, positive, x, y = (float(number) for number in match.groups())
+        pen.arc(complex(rx, ry), turn, int(positive + 2.0 * large), complex(x, y), relative)
+        at = match.end()
+        drawn += 1
+    if at < len(text):
+        return _odd(text[at:])
+    return "" if drawn else "has no numbers, wanted 7"
 
-    start: Floats
-    segments: tuple[Segment, ...]
-    closed: bool
+
+def _odd(text: str) -> str:
+    return f"holds {text.strip()[:12]!r}, which does not belong there"
 
 
 @dataclass
-class _Words:
-    """One subpath on the way: its corners, and its commands for svgpathtools."""
+class _Pen:
+    """Draws: the point where it stands, the open subpath, and what is done.
 
-    points: list[complex]
-    commands: list[str] = field(default_factory=list)
-    curved: bool = False
-
-
-def arc_between(start: complex, end: complex, radii: complex, turn: float, flags: int) -> Arc:
-    """The arc of path data: `radii` = rx + i·ry, `turn` rad of the x axis; flags: 1 the sweep
-    flag, 2 the large-arc flag. Radii that are too short are grown. Start and end differ.
-
-    In the frame where the ellipse is the unit circle, with the chord's half h = (p1 − p0)/2,
-    |h| = sin(half the small sweep), the centre lies at the chord's middle ± i·h/|h|·√(1 − |h|²).
+    A subpath is listed as corners to go straight to, as arcs, and as counts of the next Béziers
+    of `_curves`, which svgpathtools makes all at once: one text in which each run of curve
+    commands has a moveto of its own, so that a smooth curve is reflected only in its own run.
     """
-    rx, ry = abs(radii.real), abs(radii.imag)
-    axis = complex(math.cos(turn), math.sin(turn))
 
-    def to_unit(z: complex) -> complex:
-        w = z * axis.conjugate()
-        return complex(w.real / rx, w.imag / ry)
+    here: complex = 0j
+    start: complex = 0j
+    corners: list[complex] = field(default_factory=list)
+    items: list[list[complex] | Arc | int] = field(default_factory=list)
+    done: list[tuple[complex, list[list[complex] | Arc | int], bool]] = field(default_factory=list)
+    text: list[str] = field(default_factory=list)
 
-    middle, half = to_unit((start + end) / 2.0), to_unit((end - start) / 2.0)
-    size = abs(half)
-    grow = max(size, 1.0)
-    rise = math.sqrt((1.0 - size) * (1.0 + size)) if size < 1.0 else 0.0
-    positive, large = bool(flags & 1), bool(flags & 2)
-    side = 1.0 if positive != large else -1.0
-    offset = side * rise * half * 1j / size
-    small = 2.0 * math.atan2(min(size, 1.0), rise)
-    sweep = (2.0 * math.pi - small) if large else small
-    from_centre = -half / grow - offset
-    centre = (middle + offset) if size < 1.0 else middle
-    at = complex(centre.real * rx, centre.imag * ry) * axis
-    u, v = rx * grow * axis, 1j * ry * grow * axis
-    return Arc(
-        centre=_pair(at),
-        u=_pair(u),
-        v=_pair(v),
-        begin=math.atan2(from_centre.imag, from_centre.real),
-        sweep=sweep if positive else -sweep,
-        end=_pair(end),
-    )
-
-
-def parse_path(data: str) -> list[Subpath]:
-    """The subpaths of path data that draw something; DrawingError naming the sign at fault."""
-    subpaths: list[Subpath] = []
-    words: _Words | None = None
-    start = here = 0j
-    for letter, numbers, at in _commands(data):
+    def command(self, letter: str, words: list[str]) -> None:
+        """Any command but A, with whole sets of numbers; "M" without numbers draws nothing."""
         kind, relative = letter.upper(), letter.islower()
         if kind == "Z":
-            if words is not None and len(words.points) > 1:
-                subpaths.append(_subpath(words, closed=True))
-            words, here = None, start
-            continue
-        count = _COUNTS[kind]
-        for row in range(0, len(numbers), count):
-            field_values = numbers[row : row + count]
-            if kind == "M" and row == 0:
-                if words is not None and len(words.points) > 1:
-                    subpaths.append(_subpath(words, closed=False))
-                start = here = complex(*field_values) + (here if relative else 0j)
-                words = _Words([here])
-                continue
-            if words is None:
-                words = _Words([here])
-            here = _step(words, "L" if kind == "M" else kind, relative, field_values)
-            if not (abs(here.real) <= MAX_NUMBER and abs(here.imag) <= MAX_NUMBER):
-                raise DrawingError(f"path data run out of all bounds at sign {at + 1}")
-    if words is not None and len(words.points) > 1:
-        subpaths.append(_subpath(words, closed=False))
-    return subpaths
+            self.lift(closed=True)
+        elif words and kind in "CSQT":
+            self._curve(letter, words)
+        elif words:
+            numbers = _floats(words)
+            if kind == "M":
+                self.lift(closed=False)
+                self.start = self.here = _bounded(
+                    complex(numbers[0], numbers[1]) + (self.here if relative else 0j)
+                )
+                numbers = numbers[2:]
+            if numbers:
+                self._straight(kind, relative, numbers)
+
+    def arc(self, radii: complex, turn: float, flags: int, to: complex, relative: bool) -> None:
+        """One arc; without a radius it is a line, and nothing when it ends where it starts."""
+        end = _bounded(to + self.here if relative else to)
+        if not max(abs(radii.real), abs(radii.imag), abs(turn)) <= MAX_NUMBER:
+            raise DrawingError("path data have an arc out of all bounds")
+        if radii.real == 0.0 or radii.imag == 0.0 or end == self.here:
+            self._to([end])
+            return
+        angle = math.radians(math.fmod(turn, 360.0))
+        self._add(arc_between(self.here, end, radii, angle, flags))
+        self.here = end
+
+    def lift(self, *, closed: bool) -> None:
+        """Ends the subpath, if one is begun; the pen stands at its start when it is closed."""
+        self._flush()
+        if self.items:
+            self.done.append((self.start, self.items, closed))
+            self.items = []
+        if closed:
+            self.here = self.start
+        else:
+            self.start = self.here
+
+    def subpaths(self) -> list[Subpath]:
+        """All that was drawn."""
+        curves = _beziers(" ".join(self.text)) if self.text else []
+        found: list[Subpath] = []
+        used = 0
+        for start, items, closed in self.done:
+            segments: list[Segment] = []
+            for item in items:
+                if isinstance(item, int):
+                    segments += curves[used : used + item]
+                    used += item
+                else:
+                    segments.append(item if isinstance(item, Arc) else Lines(_pairs(item)))
+            found.append(Subpath(_pair(start), tuple(segments), closed))
+        return found
+
+    def _straight(self, kind: str, relative: bool, n: list[float]) -> None:
+        """L, H, V, and the pairs after the first one of M."""
+        if kind == "H":
+            rest = self.here.imag if not relative else 0.0
+            ends = [complex(x, rest) for x in n]
+        elif kind == "V":
+            rest = self.here.real if not relative else 0.0
+            ends = [complex(rest, y) for y in n]
+        else:
+            ends = list(map(complex, n[::2], n[1::2]))
+        if relative:
+            ends = list(accumulate(ends, initial=self.here))[1:]
+        self._to(ends)
+
+    def _to(self, ends: list[complex]) -> None:
+        self.corners += ends
+        self.here = _bounded(ends[-1])
+
+    def _curve(self, letter: str, words: list[str]) -> None:
+        """C, S, Q, T: counted here, made by svgpathtools."""
+        count = _COUNTS[letter.upper()]
+        numbers = _floats(words)
+        xs, ys = numbers[count - 2 :: count], numbers[count - 1 :: count]
+        ends = list(map(complex, xs, ys))
+        if letter.islower():
+            ends = list(accumulate(ends, initial=self.here))[1:]
+        self._flush()
+        if self.items and isinstance(self.items[-1], int):
+            self.items[-1] += len(ends)
+        else:
+            self.items.append(len(ends))
+            self.text.append(f"M {self.here.real!r} {self.here.imag!r}")
+        self.text.append(letter)
+        self.text += words
+        self.here = _bounded(ends[-1])
+
+    def _add(self, item: Arc) -> None:
+        self._flush()
+        self.items.append(item)
+
+    def _flush(self) -> None:
+        if self.corners:
+            self.items.append(self.corners)
+            self.corners = []
 
 
-def _commands(data: str) -> Iterator[tuple[str, list[float], int]]:
-    """Letter, numbers and place of each command, all checked."""
-    places = [match.start() for match in _COMMAND.finditer(data)]
-    lead = data[: places[0]] if places else data
-    if lead.strip():
-        raise DrawingError(f"path data begin with {lead.strip()[:12]!r}, wanted M or m")
-    if places and data[places[0]] not in "Mm":
-        raise DrawingError(f"path data begin with {data[places[0]]!r}, wanted M or m")
-    for at, following in zip(places, [*places[1:], len(data)], strict=True):
-        letter, text = data[at], data[at + 1 : following]
-        name = f"path data at sign {at + 1}: {letter!r}"
-        kind = letter.upper()
-        numbers = _arc_numbers(text, name) if kind == "A" else parse_numbers(text, name)
-        count = _COUNTS[kind]
-        if (len(numbers) % count if count else len(numbers)) or (count and not numbers):
-            raise DrawingError(f"{name} has {len(numbers)} numbers, wanted {count or 'none'}")
-        yield letter, numbers, at
-
-
-def _arc_numbers(text: str, name: str) -> list[float]:
-    """Numbers of A commands, whose flags may stick to what follows ("a1 1 0 011 2")."""
-    words: list[str] = []
-    at = _after_blanks(text, 0)
-    while at < len(text):
-        pattern = _FLAG if len(words) % _COUNTS["A"] in _FLAG_FIELDS else NUMBER
-        match = pattern.match(text, at)
-        if match is None:
-            raise DrawingError(f"{name} holds {text[at : at + 12]!r}, which does not belong there")
-        words.append(match[0])
-        at = _after_blanks(text, match.end())
-    return parse_numbers(" ".join(words), name)
-
-
-def _after_blanks(text: str, at: int) -> int:
-    while at < len(text) and text[at] in BETWEEN:
-        at += 1
-    return at
-
-
-def _step(words: _Words, kind: str, relative: bool, n: list[float]) -> complex:
-    """Takes one command into the subpath; where it ends."""
-    here = words.points[-1]
-    base = here if relative else 0j
-    if kind == "H":
-        end = complex(n[0] + base.real, here.imag)
-    elif kind == "V":
-        end = complex(here.real, n[0] + base.imag)
-    else:
-        end = complex(n[-2], n[-1]) + base
-    # The standard: an arc without a radius is a line, one that ends where it starts is left out.
-    if kind in "LHV" or (kind == "A" and (n[0] == 0.0 or n[1] == 0.0 or end == here)):
-        words.commands.append(f"L {end.real!r} {end.imag!r}")
-    elif kind == "A":
-        words.commands.append(
-            f"A {n[0]!r} {n[1]!r} {n[2]!r} {n[3]:.0f} {n[4]:.0f} {end.real!r} {end.imag!r}"
-        )
-        words.curved = True
-    else:
-        letter = kind.lower() if relative else kind
-        words.commands.append(f"{letter} {' '.join(map(repr, n))}")
-        words.curved = True
-    words.points.append(end)
-    return end
-
-
-def _subpath(words: _Words, *, closed: bool) -> Subpath:
-    points = np.array(words.points).view(np.float64).reshape(-1, 2)
-    if not words.curved:
-        return Subpath(points[0], (Lines(points[1:]),), closed)
-    return Subpath(points[0], tuple(_curves(words)), closed)
-
-
-def _curves(words: _Words) -> Iterator[Segment]:
-    """The segments of a subpath with curves, as svgpathtools reads them."""
+def _beziers(text: str) -> list[Bezier]:
+    """The curves of checked data, in order."""
     import svgpathtools
 
-    begin = words.points[0]
-    text = f"M {begin.real!r} {begin.imag!r} " + " ".join(words.commands)
-    try:
-        # Its warnings are about numbers that we check, or do not use.
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            path = svgpathtools.parse_path(text)
-    except (ValueError, ArithmeticError, AssertionError, IndexError) as error:
-        raise DrawingError("path data hold a curve without a shape") from error
-    corners: list[complex] = []
-    for segment in path:
-        if isinstance(segment, svgpathtools.Line):
-            corners.append(segment.end)
-            continue
-        if corners:
-            yield Lines(_pairs(corners))
-            corners = []
-        if isinstance(segment, svgpathtools.Arc):
-            flags = int(segment.sweep) + 2 * int(segment.large_arc)
-            turn = math.radians(segment.rotation)
-            radii = complex(segment.radius)
-            yield arc_between(segment.start, segment.end, radii, turn, flags)
-        else:
-            yield Bezier(_pairs(segment.bpoints()[1:]))
-    if corners:
-        yield Lines(_pairs(corners))
+    return [Bezier(_pairs(curve.bpoints()[1:])) for curve in svgpathtools.parse_path(text)]
+
+
+def _floats(words: list[str]) -> list[float]:
+    numbers = list(map(float, words))
+    if not (max(numbers) <= MAX_NUMBER and min(numbers) >= -MAX_NUMBER):
+        raise DrawingError(f"path data have {max(numbers, key=abs):g}, out of all bounds")
+    return numbers
+
+
+def _bounded(place: complex) -> complex:
+    """The place itself; relative steps may have added up to one beyond all bounds."""
+    if not (abs(place.real) <= MAX_NUMBER and abs(place.imag) <= MAX_NUMBER):
+        raise DrawingError("path data run out of all bounds")
+    return place
 
 
 def _pair(z: complex) -> Floats:

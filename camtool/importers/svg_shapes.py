@@ -14,34 +14,46 @@ import numpy as np
 from camtool.errors import DrawingError
 from camtool.importers.options import ReadOptions
 from camtool.importers.svg_affine import NUMBER, in_bounds, parse_numbers
-from camtool.importers.svg_path import Arc, Lines, Segment, Subpath, arc_between, parse_path
+from camtool.importers.svg_path import parse_path
+from camtool.importers.svg_segments import Arc, Lines, Segment, Subpath, arc_between
+from camtool.importers.svg_style import FONT_PX
 from camtool.importers.svg_tree import Node
 from camtool.units import MM_PER_UNIT
 
 SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 
 _LENGTH = re.compile(rf"({NUMBER.pattern})\s*([A-Za-z]*|%)", re.ASCII)
+_POINTS = re.compile(rf"[ \t\r\n\f,]*+(?:{NUMBER.pattern}[ \t\r\n\f,]*+)*+", re.ASCII)
 _CSS_UNITS = ("px", "pt", "pc", "mm", "cm", "in", "q")
+FONT_UNITS = {"em": 1.0, "ex": 0.5}
+"""Units of the font size."""
 
 
 @dataclass(frozen=True)
 class Lengths:
     """Turns lengths into user units: `viewport` (width, height) is what % are of, where known;
-    a user unit is a px."""
+    a user unit is a px; em and ex are of `font_px`, ex half of it."""
 
     options: ReadOptions
     viewport: tuple[float, float] | None
+    font_px: float = FONT_PX
 
     def along(self, node: Node, name: str, axis: str, default: float = 0.0) -> float:
         """The attribute `name` in user units; `axis` x, y or d (diagonal) says what % are of."""
         text = node.get(name)
         if not text or text == "auto":
             return default
+        return self.length(text, axis, name)
+
+    def length(self, text: str, axis: str, name: str = "length") -> float:
+        """A length in user units; DrawingError naming it."""
         value, unit = split_length(text, name)
+        if not unit or unit == "px":
+            return value
         if unit == "%":
             return in_bounds(value / 100.0 * self._whole(axis, name), name)
-        if unit in ("", "px"):
-            return value
+        if unit in FONT_UNITS:
+            return in_bounds(value * FONT_UNITS[unit] * self.font_px, name)
         return in_bounds(value * MM_PER_UNIT[unit] / self.options.mm_per("px"), name)
 
     def size(self, node: Node, name: str, axis: str, default: float = 0.0) -> float:
@@ -68,46 +80,54 @@ def split_length(text: str, name: str) -> tuple[float, str]:
     if match is None:
         raise DrawingError(f"{name} {text[:24]!r} is no length")
     unit = match[2].lower()
-    if unit and unit != "%" and unit not in _CSS_UNITS:
-        raise DrawingError(
-            f"{name} {text[:24]!r} has the unit {unit!r}", mend=f"use {', '.join(_CSS_UNITS)}"
-        )
+    if unit and unit != "%" and unit not in _CSS_UNITS and unit not in FONT_UNITS:
+        known = ", ".join((*_CSS_UNITS, *FONT_UNITS))
+        raise DrawingError(f"{name} {text[:24]!r} has the unit {unit!r}", mend=f"use {known}")
     return in_bounds(float(match[1]), name), unit
 
 
-def subpaths(node: Node, lengths: Lengths) -> list[Subpath]:
-    """What the shape draws, in user units; empty when it draws nothing; DrawingError."""
+def subpaths(node: Node, lengths: Lengths) -> tuple[list[Subpath], str]:
+    """What the shape draws, in user units, none when it draws nothing; and the fault in its data
+    up to which it is drawn (""). DrawingError when it cannot be drawn at all."""
     match node.tag:
         case "path":
             data = node.get("d")
-            return [] if data in ("", "none") else parse_path(data)
-        case "rect":
-            return _rect(node, lengths)
-        case "circle":
-            radius = lengths.size(node, "r", "d")
-            return _ellipse(node, lengths, radius, radius)
-        case "ellipse":
-            rx, ry = _radii(node, lengths)
-            return _ellipse(node, lengths, rx, ry)
-        case "line":
-            start, end = (
-                np.array([lengths.along(node, f"x{i}", "x"), lengths.along(node, f"y{i}", "y")])
-                for i in (1, 2)
-            )
-            return [Subpath(start, (Lines(end[None, :]),), False)]
+            return ([], "") if data in ("", "none") else parse_path(data)
         case "polyline" | "polygon":
             return _corners(node)
+        case "rect":
+            return _rect(node, lengths), ""
+        case "circle":
+            radius = lengths.size(node, "r", "d")
+            return _ellipse(node, lengths, radius, radius), ""
+        case "ellipse":
+            rx, ry = _radii(node, lengths)
+            return _ellipse(node, lengths, rx, ry), ""
+        case "line":
+            return _line(node, lengths), ""
     raise ValueError(f"{node.tag} is no shape")
 
 
-def _corners(node: Node) -> list[Subpath]:
-    numbers = parse_numbers(node.get("points"), "points")
-    if len(numbers) % 2:
-        raise DrawingError(f"points holds {len(numbers)} numbers: one coordinate is missing")
-    if len(numbers) < 4:
-        return []
-    points = np.array(numbers).reshape(-1, 2)
-    return [Subpath(points[0], (Lines(points[1:]),), node.tag == "polygon")]
+def _line(node: Node, lengths: Lengths) -> list[Subpath]:
+    x1, y1 = lengths.along(node, "x1", "x"), lengths.along(node, "y1", "y")
+    x2, y2 = lengths.along(node, "x2", "x"), lengths.along(node, "y2", "y")
+    return [Subpath(np.array([x1, y1]), (Lines(np.array([[x2, y2]])),), False)]
+
+
+def _corners(node: Node) -> tuple[list[Subpath], str]:
+    text = node.get("points")
+    match = _POINTS.match(text)
+    end = match.end() if match else 0
+    numbers = parse_numbers(text[:end], "points")
+    fault = ""
+    if end < len(text):
+        fault = f"points hold {text[end : end + 12]!r}, which does not belong there"
+    elif len(numbers) % 2:
+        fault = f"points hold {len(numbers)} numbers: one coordinate is missing"
+    points = np.array(numbers[: len(numbers) // 2 * 2]).reshape(-1, 2)
+    if len(points) < 2:
+        return [], fault
+    return [Subpath(points[0], (Lines(points[1:]),), node.tag == "polygon")], fault
 
 
 def _radii(node: Node, lengths: Lengths) -> tuple[float, float]:

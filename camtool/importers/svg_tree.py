@@ -1,7 +1,8 @@
-"""An SVG file as a tree of nodes, each knowing its line; entities and references are refused.
+"""An SVG file as a tree of nodes, each knowing its line and its parent.
 
-The tree is read as a stream over defusedxml. A document type is let pass (old programs write
-one) but never fetched; any `<!ENTITY` is an error: its expansion can be endless or a file.
+The tree is read as a stream over defusedxml. Document types are let pass (old programs write
+one), and so are short entities that stand for plain text (Adobe Illustrator writes them for its
+namespaces); entities made of entities or of files are an error, as their expansion can be endless.
 """
 
 from __future__ import annotations
@@ -25,8 +26,16 @@ INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
 MAX_DEPTH = 150
 """Deeper nesting than any drawing has; it also bounds the recursion of the walk."""
 
+MAX_ELEMENTS = 500_000
+"""More elements than any drawing for a machine has; their tree would fill the memory."""
 
-@dataclass(eq=False)
+MAX_ENTITY_SIGNS = 256
+"""An entity in the document type may stand for so much plain text, a namespace at most."""
+
+_WRONG_PREFIX = "unbound prefix"
+
+
+@dataclass(eq=False, slots=True)
 class Node:
     """One SVG element: `tag` without namespace; foreign elements have the tag "". Attributes
     of SVG itself by name, those of XLink and Inkscape as "xlink:href", "inkscape:label"."""
@@ -34,18 +43,20 @@ class Node:
     tag: str
     attributes: dict[str, str]
     line: int
+    parent: Node | None = None
     children: list[Node] = field(default_factory=list)
     text: str = ""
 
     @property
     def label(self) -> str:
         """How messages and sources name it: "path outline" or "path at line 12"."""
-        name = self.attributes.get("id", "").strip()
+        name = self.get("id")
         return f"{self.tag} {name}" if name else f"{self.tag} at line {self.line}"
 
     def get(self, name: str, default: str = "") -> str:
         """An attribute without blanks around it."""
-        return self.attributes.get(name, default).strip()
+        value = self.attributes.get(name)
+        return default if value is None else value.strip()
 
     def walk(self) -> Iterator[Node]:
         """This node and all below it, in document order."""
@@ -57,19 +68,15 @@ class Node:
 
 
 def parse_tree(data: bytes) -> Node:
-    """The root of an SVG document; DrawingError when it is no XML, no SVG, or not safe."""
-    from defusedxml import sax
+    """The root of an SVG document made `ready`; DrawingError when it is no XML, no SVG, or not
+    safe."""
     from defusedxml.common import DefusedXmlException
 
     handler = _Builder()
-    parser = sax.make_parser()
-    parser.setContentHandler(handler)
-    parser.setFeature(feature_namespaces, True)
-    # The standard document type names its file on the web: let pass, and never fetched.
-    parser.forbid_external = False
-    parser.setFeature(feature_external_ges, False)
     source = InputSource()
     source.setByteStream(BytesIO(data))
+    parser = _parser()
+    parser.setContentHandler(handler)
     try:
         parser.parse(source)
     except DefusedXmlException as error:
@@ -79,7 +86,9 @@ def parse_tree(data: bytes) -> Node:
         ) from error
     except SAXParseException as error:
         where = f"line {error.getLineNumber()}, column {(error.getColumnNumber() or 0) + 1}"
-        raise DrawingError(f"is no XML: {error.getMessage()}", where=where) from error
+        reason = error.getMessage()
+        mend = "declare it with xmlns:...=" if reason == _WRONG_PREFIX else ""
+        raise DrawingError(f"is no XML: {reason}", where=where, mend=mend) from error
     except (SAXException, LookupError, UnicodeError) as error:
         raise DrawingError(f"is no XML: {error}") from error
     except DrawingError:
@@ -92,6 +101,23 @@ def parse_tree(data: bytes) -> Node:
     return root
 
 
+def _parser() -> Any:
+    """defusedxml's parser, which lets entities pass that are short and plain text."""
+    from defusedxml.expatreader import DefusedExpatParser
+
+    class Parser(DefusedExpatParser):  # type: ignore[misc]  # the base is untyped
+        def defused_entity_decl(self, name: str, is_parameter: bool, value: str | None,
+                                *outside: str | None) -> None:  # fmt: skip
+            plain = not is_parameter and value is not None and len(value) <= MAX_ENTITY_SIGNS
+            if not plain or any(sign in str(value) for sign in "&<%"):
+                super().defused_entity_decl(name, is_parameter, value, *outside)
+
+    parser = Parser()
+    parser.setFeature(feature_namespaces, True)
+    parser.setFeature(feature_external_ges, False)
+    return parser
+
+
 class _Builder(ContentHandler):
     """Collects nodes; `root_name` is the name of the root, whatever it is."""
 
@@ -100,6 +126,8 @@ class _Builder(ContentHandler):
         self.root: Node | None = None
         self.root_name = ""
         self._open: list[Node] = []
+        self._sheet: list[str] = []
+        self._count = 0
         self._locator: Any = None
 
     def setDocumentLocator(self, locator: Any) -> None:
@@ -107,26 +135,34 @@ class _Builder(ContentHandler):
 
     def startElementNS(self, name: tuple[str | None, str], qname: str | None, attrs: Any) -> None:
         line = int(self._locator.getLineNumber())
-        if len(self._open) >= MAX_DEPTH:
+        self._count += 1
+        if len(self._open) >= MAX_DEPTH or self._count > MAX_ELEMENTS:
+            deep = len(self._open) >= MAX_DEPTH
             raise DrawingError(
-                f"is nested deeper than {MAX_DEPTH} elements",
+                f"is nested deeper than {MAX_DEPTH} elements"
+                if deep
+                else f"has more than {MAX_ELEMENTS} elements",
                 where=f"line {line}",
-                mend="ungroup the drawing",
+                mend="ungroup the drawing" if deep else "save it in parts",
             )
         space, tag = name
-        node = Node(tag if space in (SVG, None) else "", _attributes(attrs), line)
-        if self._open:
-            self._open[-1].children.append(node)
+        above = self._open[-1] if self._open else None
+        node = Node(tag if space in (SVG, None) else "", _attributes(attrs), line, above)
+        if above is not None:
+            above.children.append(node)
         elif self.root is None:
             self.root, self.root_name = node, tag
         self._open.append(node)
 
     def endElementNS(self, name: tuple[str | None, str], qname: str | None) -> None:
-        self._open.pop()
+        node = self._open.pop()
+        if node.tag == "style":
+            node.text = "".join(self._sheet)
+            self._sheet = []
 
     def characters(self, content: str) -> None:
         if self._open[-1].tag == "style":
-            self._open[-1].text += content
+            self._sheet.append(content)
 
 
 _PREFIXES = {None: "", "": "", SVG: "", XLINK: "xlink:", INKSCAPE: "inkscape:"}
@@ -134,7 +170,7 @@ _PREFIXES = {None: "", "": "", SVG: "", XLINK: "xlink:", INKSCAPE: "inkscape:"}
 
 def _attributes(attrs: Any) -> dict[str, str]:
     return {
-        _PREFIXES[space] + name: str(value)
+        _PREFIXES[space] + name: value
         for (space, name), value in attrs.items()
         if space in _PREFIXES
     }
