@@ -137,7 +137,7 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
     head = text_head(data)
     if _DXF_START.match(head):
         return "dxf"
-    if _STEP_START.match(head) or _BREP_START.match(head):
+    if is_step(head) or is_brep(head):
         return "solid"
     start = head.lstrip()[:1]
     if start == "<":
@@ -150,6 +150,16 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
     if suffix in _EXTENSIONS:
         return _EXTENSIONS[suffix]
     return "points" if _looks_like_points(head) else None
+
+
+def is_step(head: str) -> bool:
+    """Whether a text begins as STEP does."""
+    return _STEP_START.match(head) is not None
+
+
+def is_brep(head: str) -> bool:
+    """Whether a file begins as OpenCASCADE's BREP does."""
+    return _BREP_START.match(head) is not None
 
 
 def text_head(data: bytes, size: int = HEAD_BYTES) -> str:

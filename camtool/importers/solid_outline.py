@@ -1,0 +1,206 @@
+"""Which faces of a model are drawn, and their outer and inner wires.
+
+A face is level when it is plane and its normal is vertical. Of a solid the highest level face
+that looks up is taken (and those beside it at the same height), or the faces that the plane of
+a section shares with it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from camtool.errors import DrawingError
+from camtool.geometry.drawing import Skipped
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.importers.solid_curves import LEVEL_RAD, Path, edge_path, follow, joined
+from camtool.importers.solid_shapes import Body, subshapes
+
+SECTION_MARGIN = 0.1
+"""By this share of the body's size the plane of a section reaches over it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The wires of one face; `kind` is "face", "section" or "wire"."""
+
+    kind: str
+    number: int
+    layer: str
+    colour: str
+    paths: list[Path]
+
+
+@dataclass(frozen=True, eq=False)
+class Outlines:
+    """All that is drawn; `levels` are the heights at which solids were taken, `span` is the
+    height of the whole model from its lowest to its highest point."""
+
+    outlines: list[Outline] = field(default_factory=list)
+    levels: list[float] = field(default_factory=list)
+    span: tuple[float, float] = (0.0, 0.0)
+    skipped: list[Skipped] = field(default_factory=list)
+
+
+def outlines(bodies: list[Body], height: float | None, tolerance: float, file: str) -> Outlines:
+    """The outlines of the bodies; DrawingError when a section misses them all."""
+    boxes = [_box(body.shape) for body in bodies]
+    low, high = min(box[2] for box in boxes), max(box[5] for box in boxes)
+    if height is not None and not low - POSITION_EPS_MM <= height <= high + POSITION_EPS_MM:
+        raise DrawingError(
+            f"a section at z = {height:.6g} misses the model, which spans z = {low:.6g} to "
+            f"{high:.6g}",
+            file=file,
+            mend="give a --section-z between them",
+        )
+    found = Outlines(span=(low, high))
+    missed = 0
+    for body, box in zip(bodies, boxes, strict=True):
+        kind, faces, edges, level = _taken(body, box, height, file)
+        before = len(found.outlines)
+        for face in faces:
+            number = len(found.outlines) + 1
+            paths = _wires(face, tolerance)
+            found.outlines.append(Outline(kind, number, body.layer, body.colour, paths))
+        if edges:
+            paths = [edge_path(edge, tolerance) for edge in edges]
+            number = len(found.outlines) + 1
+            found.outlines.append(Outline(kind, number, body.layer, body.colour, paths))
+        if len(found.outlines) == before:
+            missed += 1
+        elif level is not None:
+            found.levels.append(level)
+    if missed:
+        why = "has no level face that looks up" if height is None else "is not cut by the section"
+        found.skipped.append(Skipped("body", missed, why))
+    return found
+
+
+def _taken(
+    body: Body, box: tuple[float, ...], height: float | None, file: str
+) -> tuple[str, list[Any], list[Any], float | None]:
+    """Kind, faces, loose edges and height of what is drawn of one body."""
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
+
+    faces = subshapes(body.shape, TopAbs_FACE)
+    if not faces:
+        _check_flat(box, "wire", file)
+        return "wire", [], _inside(subshapes(body.shape, TopAbs_EDGE), box, height), None
+    if body.shape.ShapeType() != TopAbs_SOLID and box[5] - box[2] <= POSITION_EPS_MM:
+        return "face", _inside(faces, box, height), [], None
+    if height is not None:
+        if not box[2] - POSITION_EPS_MM <= height <= box[5] + POSITION_EPS_MM:
+            return "section", [], [], height
+        return "section", *_section(body.shape, box, height), height
+    levels = [(level, face) for face in faces if (level := _level(face)) is not None]
+    if not levels:
+        return "face", [], [], None
+    top = max(level for level, _ in levels)
+    return "face", [face for level, face in levels if top - level <= POSITION_EPS_MM], [], top
+
+
+def _inside(parts: list[Any], box: tuple[float, ...], height: float | None) -> list[Any]:
+    """Flat parts, when no section is asked for or the section is at their height."""
+    flat = height is None or abs(height - box[2]) <= POSITION_EPS_MM
+    return parts if flat else []
+
+
+def _check_flat(box: tuple[float, ...], kind: str, file: str) -> None:
+    if box[5] - box[2] > POSITION_EPS_MM:
+        raise DrawingError(
+            f"a {kind} is not level: it spans z = {box[2]:.6g} to {box[5]:.6g}",
+            file=file,
+            mend="draw it on the XY plane or one parallel to it",
+        )
+
+
+def _level(face: Any) -> float | None:
+    """The height of a level face that looks up, else None."""
+    from OCP.BRepGProp import BRepGProp_Face
+    from OCP.BRepTools import BRepTools
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    if not _is_plane(face):
+        return None
+    surface, point, normal = BRepGProp_Face(face), gp_Pnt(), gp_Vec()
+    u_low, u_high, v_low, v_high = BRepTools.UVBounds_s(face)
+    surface.Normal(0.5 * (u_low + u_high), 0.5 * (v_low + v_high), point, normal)
+    size = normal.Magnitude()
+    if size == 0.0 or normal.Z() <= 0.0:
+        return None
+    return point.Z() if math.hypot(normal.X(), normal.Y()) <= LEVEL_RAD * size else None
+
+
+def _is_plane(face: Any) -> bool:
+    """Whether the surface is a plane, also when a file writes it as a spline."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_BezierSurface, GeomAbs_BSplineSurface, GeomAbs_Plane
+    from OCP.GeomLib import GeomLib_IsPlanarSurface
+
+    kind = BRepAdaptor_Surface(face).GetType()
+    if kind in (GeomAbs_BezierSurface, GeomAbs_BSplineSurface):
+        surface = BRep_Tool.Surface_s(face)
+        return bool(GeomLib_IsPlanarSurface(surface, POSITION_EPS_MM).IsPlanar())
+    return bool(kind == GeomAbs_Plane)
+
+
+def _section(shape: Any, box: tuple[float, ...], height: float) -> tuple[list[Any], list[Any]]:
+    """The faces that a solid shares with the level plane; of what has no inside, the edges."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Section
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+    from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
+
+    middle = gp_Pnt(0.5 * (box[0] + box[3]), 0.5 * (box[1] + box[4]), height)
+    plane = gp_Pln(gp_Ax3(middle, gp_Dir(0.0, 0.0, 1.0), gp_Dir(1.0, 0.0, 0.0)))
+    reach = (0.5 + SECTION_MARGIN) * max(box[3] - box[0], box[4] - box[1], box[5] - box[2])
+    if shape.ShapeType() == TopAbs_SOLID:
+        sheet = BRepBuilderAPI_MakeFace(plane, -reach, reach, -reach, reach).Face()
+        common = BRepAlgoAPI_Common(shape, sheet)
+        if common.IsDone():
+            faces = subshapes(common.Shape(), TopAbs_FACE)
+            if faces:
+                return faces, []
+    section = BRepAlgoAPI_Section(shape, plane, True)
+    return [], subshapes(section.Shape(), TopAbs_EDGE) if section.IsDone() else []
+
+
+def _wires(face: Any, tolerance: float) -> list[Path]:
+    """Outer and inner wires as closed paths; the edges one by one of a wire that is no ring."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepTools import BRepTools_WireExplorer
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_WIRE
+
+    paths: list[Path] = []
+    for wire in subshapes(face, TopAbs_WIRE):
+        walk = BRepTools_WireExplorer(wire, face)
+        ring: list[Any] = []
+        while walk.More():
+            ring.append(walk.Current())
+            walk.Next()
+        edges = subshapes(wire, TopAbs_EDGE)
+        whole = len(ring) == len(edges)
+        parts = [
+            edge_path(edge, tolerance)
+            for edge in (ring if whole else edges)
+            if not BRep_Tool.Degenerated_s(edge)
+        ]
+        parts = [part for part in parts if len(part.vertices) > 1]
+        if parts and whole and follow(parts):
+            paths.append(joined(parts))
+        else:
+            paths.extend(parts)
+    return paths
+
+
+def _box(shape: Any) -> tuple[float, ...]:
+    """x, y and z of the lowest corner, then of the highest, to the exact geometry."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    corners = box.CornerMin(), box.CornerMax()
+    return tuple(value for corner in corners for value in (corner.X(), corner.Y(), corner.Z()))
