@@ -18,8 +18,9 @@ from camtool.geometry import strokes
 from camtool.geometry.polylines import Floats
 from camtool.importers.dxf_frames import Unusable
 
-SUBSTITUTES = ("DejaVu Sans", "Liberation Sans", "Arial", "Helvetica", "Noto Sans", "Open Sans")
-"""Families that stand in for a font that is not installed, the first that is installed."""
+SUBSTITUTES = ("Liberation Sans", "Arimo", "Arial", "Helvetica", "DejaVu Sans", "Noto Sans")
+"""Families that stand in for a font that is not installed, the first that is: most drawings name
+Arial, whose widths the first four share."""
 
 _OUTLINES = (".ttf", ".otf", ".ttc")
 _SHAPES = (".shx", ".shp", ".lff")
