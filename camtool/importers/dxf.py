@@ -16,7 +16,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped
 from camtool.geometry.fit import overall
 from camtool.importers.assemble import assemble
-from camtool.importers.dxf_load import load, quiet
+from camtool.importers.dxf_load import load, quiet, without_collector
 from camtool.importers.dxf_units import units_of
 from camtool.importers.dxf_walk import Walk
 from camtool.importers.options import ReadOptions
@@ -28,11 +28,12 @@ REPAIRS_NAMED = 3
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     """The Drawing in model space or in `options.layout`; DrawingError naming layer and entity
     when it cannot be read."""
-    loaded = load(data, file)
-    units, findings = units_of(loaded.header, options)
-    walk = Walk(loaded.document, file, options)
-    with quiet():
-        walk.space(_space(loaded.document, options.layout, file), units.mm_per_unit)
+    with without_collector():
+        loaded = load(data, file)
+        units, findings = units_of(loaded.header, options)
+        walk = Walk(loaded.document, file, options)
+        with quiet():
+            walk.space(_space(loaded.document, options.layout, file), units.mm_per_unit)
     return assemble(
         walk.pieces,
         marks=walk.marks,

@@ -60,13 +60,12 @@ def load(data: bytes, file: str) -> Loaded:
         tags = _ended(tags, frame)
         frame = frame_of(tags)
     notes = [*tags.notes, *cut, *frame.faults, *swallowed(tags, frame)]
-    with quiet() as said, _without_collector():
+    with quiet() as said, without_collector():
         document = None if frame.faults else _plain(tags, said)
         notes.extend(said)
         if document is None or (said and tags.is_text):
-            check_numbers(tags, file, all_of_them=True)
+            check_numbers(tags, file)
             document = _recovered(tags, notes, file)
-    check_numbers(tags, file, all_of_them=False)
     repairs = tuple(printable(note) for note in dict.fromkeys(notes))
     return Loaded(document, header_of(tags, frame), repairs)
 
@@ -106,8 +105,8 @@ def printable(text: str) -> str:
 
 
 @contextmanager
-def _without_collector() -> Iterator[None]:
-    """Many objects arise and none go: looking for garbage would take a third of the time."""
+def without_collector() -> Iterator[None]:
+    """Many objects arise in here and few go: looking for garbage would take half of the time."""
     running = gc.isenabled()
     gc.disable()
     try:
@@ -160,15 +159,14 @@ def _plain(tags: Tags, said: list[str]) -> Any:
     from ezdxf.document import Drawing
     from ezdxf.lldxf.types import DXFBinaryTag, DXFTag
 
-    pairs = zip(tags.codes, tags.values, strict=True)
+    def tag_of(code: int, value: Any) -> Any:
+        return (DXFBinaryTag if isinstance(value, bytes) else DXFTag)(code, value)
+
+    pairs: Iterator[Any] = map(DXFTag if tags.is_text else tag_of, tags.codes, tags.values)
     try:
-        if tags.is_text:
-            return Drawing.load(DXFTag(code, value) for code, value in pairs if code != _COMMENT)
-        return Drawing.load(
-            DXFBinaryTag(code, value) if isinstance(value, bytes) else DXFTag(code, value)
-            for code, value in pairs
-            if code != _COMMENT
-        )
+        if _COMMENT in tags.codes:
+            pairs = filter(lambda tag: tag.code != _COMMENT, pairs)
+        return Drawing.load(pairs)
     # A damaged file makes ezdxf fail in every possible way; each one is the file's fault.
     except Exception as error:
         said.append(_reason(error))
@@ -200,6 +198,7 @@ def _recovered(tags: Tags, notes: list[str], file: str) -> Any:
 
 def _reason(error: Exception) -> str:
     """What ezdxf says on purpose; what merely happened to it would help nobody."""
-    from ezdxf.lldxf.const import DXFError
+    from ezdxf.lldxf.const import DXFStructureError, DXFVersionError
 
-    return printable(str(error)) if isinstance(error, DXFError) else "its structure is damaged"
+    on_purpose = isinstance(error, (DXFStructureError, DXFVersionError))
+    return printable(str(error)) if on_purpose else "its structure is damaged"

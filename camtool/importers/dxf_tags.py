@@ -8,6 +8,7 @@ ends the reading. `frame_of` tells the sections and whether the file is whole.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -115,6 +116,11 @@ def ascii_tags(data: bytes, file: str) -> Tags:
         values = _without_escapes(values)
     tags = Tags(codes[:end], values[:end], True, notes)
     _check_codes(tags, file, codes_text)
+    # What Python takes for a number and nobody else does.
+    check_numbers(tags, file, [k for k, value in enumerate(tags.values) if "_" in value])
+    if not text.isascii():
+        odd = [k for k, value in enumerate(tags.values) if not value.isascii()]
+        check_numbers(tags, file, odd)
     return tags
 
 
@@ -227,16 +233,13 @@ def _check_codes(tags: Tags, file: str, said: list[str] | None = None) -> None:
             )
 
 
-def check_numbers(tags: Tags, file: str, *, all_of_them: bool) -> None:
-    """DrawingError for a value that must be a number and is none.
-
-    Unless it is `all_of_them`, only those that Python takes for numbers ("1_0").
-    """
-    for k, (code, value) in enumerate(zip(tags.codes, tags.values, strict=True)):
-        odd = isinstance(value, str) and ("_" in value or not value.isascii())
-        if (odd or all_of_them) and _is_number(code) and not _NUMBER.fullmatch(str(value)):
+def check_numbers(tags: Tags, file: str, rows: Iterable[int] | None = None) -> None:
+    """DrawingError for a value that must be a number and is none; of all tags, or of
+    these `rows`."""
+    for k in range(len(tags.codes)) if rows is None else rows:
+        if _is_number(tags.codes[k]) and not _NUMBER.fullmatch(str(tags.values[k])):
             raise DrawingError(
-                f"{str(value).strip()[:20]!r} is no number",
+                f"{str(tags.values[k]).strip()[:20]!r} is no number",
                 file=file,
                 where=tags.where(k),
                 mend=AGAIN,

@@ -158,7 +158,7 @@ class Walk:
                 )
             else:
                 self._skip("LINE", Unusable("is not flat"))
-        if not scope.source:
+        if is_flat.any() and not scope.source:
             self.used["LINE"] += int(is_flat.sum())
 
     def _take(self, shapes: Iterable[Shape], entity: Any, scope: Scope, look: Look) -> None:
