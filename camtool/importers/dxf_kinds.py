@@ -118,5 +118,4 @@ def text_shapes(
         for contour in text.contours
         if contour.parts
     ]
-    lacks = f"font {text.substituted} is not here: drawn with {text.font}"
-    return shapes, lacks if text.substituted else ""
+    return shapes, text.lacks

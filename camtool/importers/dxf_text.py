@@ -18,6 +18,7 @@ import numpy as np
 
 from camtool.geometry.polylines import Floats
 from camtool.importers.dxf_frames import Unusable, require
+from camtool.importers.dxf_load import printable
 from camtool.importers.text_fonts import Wanted, font_for
 from camtool.importers.text_layout import Ink, Look, Rule, finite, numbered, slant
 from camtool.importers.text_mtext import write_mtext
@@ -55,6 +56,21 @@ class TextShape:
     font: str
     substituted: str
     missing: str
+
+    @property
+    def lacks(self) -> str:
+        """What was wanted and could not be had, "" when nothing."""
+        said = []
+        if self.substituted:
+            said.append(f"font {self.substituted} is not here: drawn with {self.font}")
+        if self.missing:
+            signs = " ".join(_visible(sign) for sign in dict.fromkeys(self.missing))
+            said.append(f"{self.font} has no {signs}: left blank")
+        return "; ".join(said)
+
+
+def _visible(sign: str) -> str:
+    return sign if sign.isprintable() and not sign.isspace() else f"U+{ord(sign):04X}"
 
 
 def text_strokes(entity: Any, mode: str) -> TextShape:
@@ -239,7 +255,7 @@ def _shape(ink: Ink, place: _Place, font: str, substituted: str) -> TextShape:
     if not contours and not ink.missing:
         raise Unusable("is empty")
     missing = "".join(sorted(ink.missing.elements()))
-    return TextShape(contours, font, substituted, missing)
+    return TextShape(contours, font, printable(substituted), missing)
 
 
 def _checked(raw: str) -> str:

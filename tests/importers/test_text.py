@@ -1,6 +1,7 @@
 """TEXT, ATTRIB and ATTDEF as curves."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import ezdxf
@@ -11,10 +12,13 @@ from ezdxf.math import Matrix44
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.findings import Code
 from camtool.geometry.polylines import Floats
 from camtool.importers import text_fonts
 from camtool.importers.dxf_frames import Unusable
 from camtool.importers.dxf_text import TextShape, text_strokes
+from camtool.importers.options import ReadOptions
+from camtool.importers.read import read_drawing
 from camtool.importers.text_fonts import Wanted, font_for
 
 OUTLINE_FONT = "DejaVuSans.ttf"
@@ -263,6 +267,7 @@ def test_lines_along_a_part_of_the_text(mode: str, code: str, share: float) -> N
 def test_what_the_font_lacks_is_named_and_keeps_its_place() -> None:
     shape = text_strokes(new_text("a☃b中☃"), "stroke")
     assert shape.missing == "☃☃中"
+    assert shape.lacks == "Hershey Roman simplex has no ☃ 中: left blank"
     plain = text_strokes(new_text("a☃b"), "stroke")
     assert points(shape) == pytest.approx(points(plain))
     assert box(new_text("a☃b"))[2] > box(new_text("ab"))[2]
@@ -272,6 +277,7 @@ def test_what_the_font_lacks_is_named_and_keeps_its_place() -> None:
 def test_what_an_outline_font_lacks_is_named() -> None:
     shape = text_strokes(new_text("a\ue123b"), "outline")
     assert shape.missing == "\ue123"
+    assert "has no U+E123: left blank" in shape.lacks
     assert shape.contours
 
 
@@ -282,12 +288,13 @@ def test_a_text_of_unknown_signs_alone_is_no_error() -> None:
 
 @needs_font
 def test_a_named_font_is_used_and_an_absent_one_named() -> None:
-    assert text_strokes(new_text("A"), "outline").substituted == ""
+    assert text_strokes(new_text("A"), "outline").lacks == ""
     assert OUTLINE_FONT in text_strokes(new_text("A"), "outline").font
     text = new_text("A")
     text.doc.styles.get("plain").dxf.font = "Nowhere.ttf"
     shape = text_strokes(text, "outline")
     assert shape.substituted == "Nowhere.ttf"
+    assert shape.lacks == f"font Nowhere.ttf is not here: drawn with {shape.font}"
     assert all(contour.closed for contour in shape.contours)
 
 
@@ -402,6 +409,19 @@ def test_attributes() -> None:
     value.is_invisible = True
     with pytest.raises(Unusable, match="invisible"):
         text_strokes(value, "stroke")
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_importer_reads_text_when_asked(mode: str, tmp_path: Path) -> None:
+    text = new_text("HI\ue123")
+    text.doc.units = 4
+    file = tmp_path / "label.dxf"
+    text.doc.saveas(file)
+    drawing = read_drawing(file, options=ReadOptions(text=mode))
+    assert len(drawing.paths) == (2 if mode == "outline" else 4)
+    assert (drawing.paths.closed == (mode == "outline")).all()
+    notes = [f.message for f in drawing.findings if f.code is Code.FONT_SUBSTITUTED]
+    assert [note.endswith("has no U+E123: left blank") for note in notes] == [True]
 
 
 @given(st.text(max_size=40), st.sampled_from(["stroke", "outline"]))
