@@ -20,7 +20,7 @@ from camtool.geometry.polylines import Floats
 from camtool.importers.dxf_frames import Unusable, require
 from camtool.importers.dxf_load import printable
 from camtool.importers.text_fonts import Wanted, font_for
-from camtool.importers.text_layout import Ink, Look, Rule, finite, numbered, slant
+from camtool.importers.text_layout import NUMBERED, Ink, Look, Rule, finite, numbered, slant
 from camtool.importers.text_mtext import write_mtext
 
 MAX_CHARACTERS = 20_000
@@ -28,7 +28,7 @@ MAX_CHARACTERS = 20_000
 by hand."""
 
 _CARET = re.compile(r"\^([ @-_])")
-_CODE = re.compile(r"%%(\d{3}|[cdpkou%])", re.IGNORECASE)
+_CODE = re.compile(NUMBERED.pattern + "|%%([cdpkou%])", re.ASCII | re.IGNORECASE)
 _SIGNS = {"c": "Ø", "d": "°", "p": "±", "%": "%"}
 _RULES = {"u": Rule.UNDER, "o": Rule.OVER, "k": Rule.THROUGH}
 _ALIGNED, _MIDDLE, _FIT = 3, 4, 5
@@ -146,19 +146,12 @@ def _runs(raw: str) -> list[tuple[str, Rule]]:
         run = text[at : code.start() if code else None]
         if code:
             at = code.end()
-            run += _sign(code[1].lower())
+            run += numbered(code[1]) if code[1] else _SIGNS.get(code[2].lower(), "")
         if run:
             runs.append((run, rules))
-        if code:
-            rules ^= _RULES.get(code[1].lower(), Rule.NONE)
+        if code and code[2]:
+            rules ^= _RULES.get(code[2].lower(), Rule.NONE)
     return runs
-
-
-def _sign(code: str) -> str:
-    """The sign of a code, "" when it is none."""
-    if code.isdecimal():
-        return numbered(code)
-    return _SIGNS.get(code, "")
 
 
 def _control(match: re.Match[str]) -> str:

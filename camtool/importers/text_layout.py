@@ -20,9 +20,8 @@ RULE_SHARE = 0.07
 RULE_DROP = 0.2
 """How far an underline lies below the baseline, an overline above the capitals (same share)."""
 
-
-NUMBERED = re.compile(r"%%(\d{3})", re.ASCII)
-"""A character by its number."""
+NUMBERED = re.compile(r"%%(03[2-9]|0[4-9]\d|1\d\d|2[0-4]\d|25[0-5])", re.ASCII)
+"""A character by its number, 32 to 255."""
 
 MAX_NUMBER = 1e60
 """Sizes and places beyond it are refused: products of a few of them would not be finite."""
@@ -46,7 +45,7 @@ def slant(oblique_deg: float) -> float:
 
 def numbered(digits: str) -> str:
     """What %%nnn stands for: a character of Windows' western code page."""
-    return bytes([int(digits) & 0xFF]).decode("cp1252", errors="replace")
+    return bytes([int(digits)]).decode("cp1252", errors="replace")
 
 
 class Rule(IntFlag):

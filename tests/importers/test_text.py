@@ -235,7 +235,8 @@ def test_width_factor_and_oblique_angle(mode: str) -> None:
         ("2^3", "2^3"),
         ("a^Ib", "a b"),
         ("50%", "50%"),
-        ("%%z", "%%z"),
+        ("%%%%%%z", "%%z"),
+        ("%%%%%%300", "%%300"),
         ("e\u0301", "é"),
     ],
 )
@@ -422,6 +423,22 @@ def test_the_importer_reads_text_when_asked(mode: str, tmp_path: Path) -> None:
     assert (drawing.paths.closed == (mode == "outline")).all()
     notes = [f.message for f in drawing.findings if f.code is Code.FONT_SUBSTITUTED]
     assert [note.endswith("has no U+E123: left blank") for note in notes] == [True]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_text_in_a_mirrored_and_stretched_block(mode: str, tmp_path: Path) -> None:
+    document = ezdxf.new(units=4)
+    document.styles.add("plain", font=OUTLINE_FONT)
+    block = document.blocks.new("part")
+    text = block.add_text("LT", dxfattribs={"style": "plain", "height": 5.0, "insert": (1.0, 2.0)})
+    document.modelspace().add_blockref("part", (10.0, 0.0), {"xscale": -2.0, "yscale": 3.0})
+    file = tmp_path / "label.dxf"
+    document.saveas(file)
+    drawing = read_drawing(file, options=ReadOptions(text=mode))
+    found = points(text_strokes(text, mode))[:, :2] * (-2.0, 3.0) + (10.0, 0.0)
+    corners = drawing.paths.vertices[:, :2]
+    assert corners.min(axis=0) == pytest.approx(found.min(axis=0))
+    assert corners.max(axis=0) == pytest.approx(found.max(axis=0))
 
 
 @given(st.text(max_size=40), st.sampled_from(["stroke", "outline"]))
