@@ -147,6 +147,12 @@ def test_codes_in_the_text(coded: str, shown: str) -> None:
     assert drawn(coded) == pytest.approx(drawn(shown))
 
 
+@pytest.mark.parametrize(("code", "lift"), [("0", 0.0), ("1", 0.75), ("2", 1.5)])
+def test_smaller_letters_stand_low_in_the_middle_or_high(code: str, lift: float) -> None:
+    lines = baselines(rf"H{{\H0.5x;\A{code};H}}")
+    assert lines == pytest.approx(sorted({17.0, 17.0 + lift}, reverse=True))
+
+
 def test_height_width_slant_and_tracking_codes() -> None:
     corner = np.array([10.0, 20.0, 0.0])
     plain = drawn("HA") - corner
