@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from camtool.errors import DrawingError
-from camtool.geometry.drawing import Skipped
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.solid_curves import LEVEL_RAD, Path, edge_path, follow, joined
 from camtool.importers.solid_shapes import Body, subshapes
@@ -26,7 +25,6 @@ class Outline:
     """The wires of one face; `kind` is "face", "section" or "wire"."""
 
     kind: str
-    number: int
     layer: str
     colour: str
     paths: list[Path]
@@ -35,15 +33,16 @@ class Outline:
 @dataclass(frozen=True, eq=False)
 class Outlines:
     """All that is drawn; `levels` are the heights at which solids were taken, `span` is the
-    height of the whole model from its lowest to its highest point."""
+    height of the whole model from its lowest to its highest point; of `missed` bodies nothing is
+    drawn."""
 
     outlines: list[Outline] = field(default_factory=list)
     levels: list[float] = field(default_factory=list)
     span: tuple[float, float] = (0.0, 0.0)
-    skipped: list[Skipped] = field(default_factory=list)
+    missed: int = 0
 
 
-def outlines(bodies: list[Body], height: float | None, tolerance: float, file: str) -> Outlines:
+def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outlines:
     """The outlines of the bodies; DrawingError when a section misses them all."""
     boxes = [_box(body.shape) for body in bodies]
     low, high = min(box[2] for box in boxes), max(box[5] for box in boxes)
@@ -51,41 +50,32 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float, file: s
         raise DrawingError(
             f"a section at z = {height:.6g} misses the model, which spans z = {low:.6g} to "
             f"{high:.6g}",
-            file=file,
             mend="give a --section-z between them",
         )
-    found = Outlines(span=(low, high))
+    found: list[Outline] = []
+    levels: list[float] = []
     missed = 0
     for body, box in zip(bodies, boxes, strict=True):
-        kind, faces, edges, level = _taken(body, box, height, file)
-        before = len(found.outlines)
-        for face in faces:
-            number = len(found.outlines) + 1
-            paths = _wires(face, tolerance)
-            found.outlines.append(Outline(kind, number, body.layer, body.colour, paths))
+        kind, faces, edges, level = _taken(body, box, height)
+        wires = [_wires(face, tolerance) for face in faces]
         if edges:
-            paths = [edge_path(edge, tolerance) for edge in edges]
-            number = len(found.outlines) + 1
-            found.outlines.append(Outline(kind, number, body.layer, body.colour, paths))
-        if len(found.outlines) == before:
-            missed += 1
-        elif level is not None:
-            found.levels.append(level)
-    if missed:
-        why = "has no level face that looks up" if height is None else "is not cut by the section"
-        found.skipped.append(Skipped("body", missed, why))
-    return found
+            wires.append([edge_path(edge, tolerance) for edge in edges])
+        found.extend(Outline(kind, body.layer, body.colour, paths) for paths in wires)
+        missed += not wires
+        if wires and level is not None:
+            levels.append(level)
+    return Outlines(found, levels, (low, high), missed)
 
 
 def _taken(
-    body: Body, box: tuple[float, ...], height: float | None, file: str
+    body: Body, box: tuple[float, ...], height: float | None
 ) -> tuple[str, list[Any], list[Any], float | None]:
     """Kind, faces, loose edges and height of what is drawn of one body."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 
     faces = subshapes(body.shape, TopAbs_FACE)
     if not faces:
-        _check_flat(box, "wire", file)
+        _check_flat(box)
         return "wire", [], _inside(subshapes(body.shape, TopAbs_EDGE), box, height), None
     if body.shape.ShapeType() != TopAbs_SOLID and box[5] - box[2] <= POSITION_EPS_MM:
         return "face", _inside(faces, box, height), [], None
@@ -106,11 +96,10 @@ def _inside(parts: list[Any], box: tuple[float, ...], height: float | None) -> l
     return parts if flat else []
 
 
-def _check_flat(box: tuple[float, ...], kind: str, file: str) -> None:
+def _check_flat(box: tuple[float, ...]) -> None:
     if box[5] - box[2] > POSITION_EPS_MM:
         raise DrawingError(
-            f"a {kind} is not level: it spans z = {box[2]:.6g} to {box[5]:.6g}",
-            file=file,
+            f"a wire is not level: it spans z = {box[2]:.6g} to {box[5]:.6g}",
             mend="draw it on the XY plane or one parallel to it",
         )
 

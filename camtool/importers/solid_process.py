@@ -1,0 +1,92 @@
+"""Runs `solid_worker` in a process of its own and takes over what it found."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from camtool.errors import DrawingError
+
+FILE_SECONDS = 600.0
+"""A STEP or BREP file that takes longer than this is given up; scripts may take their time."""
+
+CHATTER_BYTES = 1 << 16
+"""So much of what OpenCASCADE prints is looked through for complaints."""
+
+# -P: nothing that lies in the working directory is taken for a module.
+_START = (
+    "import json, sys; request = json.load(open(sys.argv[1], encoding='utf-8'));"
+    "sys.path[:] = request['path'];"
+    "from camtool.importers.solid_worker import main; main(request)"
+)
+_STDERR = 2
+
+
+def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
+    """What `solid_worker.found` gives for these bytes, and a `complaint` of the reader or "".
+
+    DrawingError when the model is damaged; RuntimeError for a fault of camtool itself.
+    """
+    script = wanted["kind"] == "script"
+    with tempfile.TemporaryDirectory() as folder:
+        source, answer, chatter = (Path(folder, name) for name in ("source", "answer", "chatter"))
+        source.write_bytes(data)
+        request = wanted | {"source": str(source), "answer": str(answer), "path": sys.path}
+        asked = Path(folder, "request")
+        asked.write_text(json.dumps(request), encoding="utf-8")
+        with chatter.open("wb") as words:
+            code = _run(asked, None if script else words.fileno(), file)
+        result = _answer(answer, code, script, file)
+        with chatter.open("rb") as words:
+            said = words.read(CHATTER_BYTES).decode("utf-8", errors="replace")
+    if "error" in result:
+        error = result["error"]
+        raise DrawingError(error["message"], file=file, where=error["where"], mend=error["mend"])
+    if "fault" in result:
+        raise RuntimeError(result["fault"])
+    return result | {"complaint": _complaint(said)}
+
+
+def _run(request: Path, output: int | None, file: str) -> int:
+    """The exit code of the worker; a script's words go to standard error."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _START, str(request)],
+            stdin=subprocess.DEVNULL,
+            stdout=_STDERR if output is None else output,
+            stderr=None if output is None else output,
+            timeout=None if output is None else FILE_SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise DrawingError(
+            f"is not read after {FILE_SECONDS:g} s", file=file, mend="simplify the model"
+        ) from error
+    return done.returncode
+
+
+def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
+    """What the worker wrote; a worker that died without a word met a damaged file."""
+    if answer.exists():
+        result: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
+        return result
+    if script:
+        raise DrawingError(f"the script ended the interpreter (code {code})", file=file)
+    raise DrawingError(
+        "is damaged so badly that OpenCASCADE fails on it",
+        file=file,
+        mend="export it again as STEP (AP214 or AP242)",
+    )
+
+
+def _complaint(said: str) -> str:
+    """The first line in which OpenCASCADE speaks of an error, without its ornaments."""
+    for line in said.splitlines():
+        if "ERR" in line or "FAIL" in line.upper():
+            plain = "".join(sign for sign in line.partition("\x1b[0m")[0] if sign.isprintable())
+            return plain.replace("[31;1m", "").strip(" *")
+    return ""
