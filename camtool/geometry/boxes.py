@@ -6,10 +6,46 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats, Ints
+from camtool.geometry.polylines import Bools, Floats, Ints
 
 PAIRS_AT_A_TIME = 1 << 16
 """How many pairs of boxes are handled at a time: it bounds the memory."""
+
+MOST_LOOKS = 4_000_000_000
+"""A sweep that would have to look at more pairs of boxes than this is shortened."""
+
+
+def touching_boxes(
+    boxes: Floats, same: Ints, differ: Ints, asked: Bools, *, most: int
+) -> tuple[Ints, Ints]:
+    """Rows (J,), (J,), the lesser first, of boxes (K, 4) that touch; each pair once.
+
+    Both have the same number in `same` (K,), different ones in `differ` (K,), and one of them is
+    `asked` for (K,). No more than `most` pairs, and none of boxes that come late in a sweep that
+    would look at more than MOST_LOOKS: both bound time and memory, far beyond any real drawing.
+    """
+    from camtool.kernels.box_sweep import touching
+
+    along_x, along_y = boxes, boxes[:, [1, 0, 3, 2]]
+    work, turned, order = min(
+        ((_looks(way), number, np.argsort(way[:, 0], kind="stable"))
+         for number, way in enumerate((along_x, along_y))),
+        key=lambda item: item[:2],
+    )  # fmt: skip
+    if work > MOST_LOOKS:
+        order = order[: int(len(order) * MOST_LOOKS / work)]
+    way = (along_y if turned else along_x)[order]
+    one, other = touching(way, same[order], differ[order], asked[order], most)
+    one, other = order[one], order[other]
+    return np.minimum(one, other), np.maximum(one, other)
+
+
+def _looks(boxes: Floats) -> int:
+    """How many pairs of boxes a sweep along their first column looks at."""
+    begins = np.sort(boxes[:, 0])
+    return int(np.searchsorted(begins, boxes[:, 2], side="right").sum()) - int(
+        np.arange(len(boxes), dtype=np.int64).sum()
+    )
 
 
 def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[tuple[Ints, Ints]]:

@@ -172,6 +172,15 @@ def self_crossings(
     return found[~(same & (a_first | b_first))]
 
 
+def meetings(
+    segments: Segments, row_a: Ints, row_b: Ints, *, position_eps_mm: float = POSITION_EPS_MM
+) -> tuple[Crossings, Bools]:
+    """The common points of the rows a and b, pair by pair; and which of them cross, not touch."""
+    frames = Frames.of(segments)
+    found = _meetings(frames, frames, row_a, row_b, position_eps_mm)
+    return found, ~_touching(found, frames, frames, position_eps_mm)
+
+
 def _joined(parts: list[Crossings]) -> Crossings:
     none = np.empty(0, dtype=np.int64)
     parts = [*parts, Crossings(none, none, np.empty((0, 2)), np.empty(0), np.empty(0))]

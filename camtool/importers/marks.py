@@ -11,6 +11,7 @@ import numpy as np
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Mark, Skipped
 from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.importers.clean import DRAWN_TWICE
 from camtool.importers.options import Selection
 from camtool.importers.piece import MAX_COORDINATE_MM, Piece
 from camtool.importers.select import selected
@@ -54,4 +55,4 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
             continue
         seen.add((mark.layer, column, row))
         kept.append(mark)
-    return tuple(kept), [Skipped(kind, count, "is drawn twice") for kind, count in gone.items()]
+    return tuple(kept), [Skipped(kind, count, DRAWN_TWICE) for kind, count in gone.items()]

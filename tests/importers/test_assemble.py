@@ -11,9 +11,10 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, FitError, Skipped, Units
 from camtool.geometry.measure import signed_areas
-from camtool.importers.assemble import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM, Piece, assemble
+from camtool.importers.assemble import Piece, assemble
+from camtool.importers.clean import cleaned
 from camtool.importers.options import ReadOptions
-from camtool.importers.piece import without_repeats
+from camtool.importers.told import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM
 
 MM = Units("mm", 1.0, "in a test")
 
@@ -190,15 +191,26 @@ def test_numbers_that_are_no_place_are_errors(wrong: float, column: int) -> None
 )
 def test_repeats_go_and_the_path_stays(rows: list[tuple[int, int, float]], closed: bool) -> None:
     vertices = np.array(rows, dtype=np.float64)
-    kept, repeated = without_repeats(vertices, closed)
+    clean = cleaned([Piece(vertices, closed, "0", "", "PATH 1")], "t.dxf")
 
-    def drawn(path: np.ndarray) -> list[tuple[float, ...]]:
+    def drawn(path: np.ndarray, closed: bool) -> list[tuple[float, ...]]:
         """Segments that go somewhere: start, end, bulge."""
         ends = np.roll(path[:, :2], -1, axis=0)
         segments = [(*a[:2], *b, a[2]) for a, b in zip(path, ends, strict=True)]
         count = len(path) if closed else len(path) - 1
         return [s for s in segments[:count] if s[:2] != s[2:4]]
 
-    assert drawn(kept) == drawn(vertices)
-    assert len(drawn(kept)) == max(len(kept) - (0 if closed and len(kept) > 1 else 1), 0)
-    assert repeated <= len(vertices) - len(kept)
+    wanted = drawn(vertices, closed)
+    if not len(clean.lines):
+        assert not wanted
+        assert clean.skipped == (Skipped("PATH", 1, "has no length"),)
+        return
+    (path,) = clean.lines
+    if closed and not path.closed:
+        # There and back is one line.
+        assert len(wanted) == 2
+        assert drawn(path.vertices, False) == wanted[:1]
+    else:
+        # An open path's last vertex leaves nothing, whatever bulge it has.
+        assert drawn(path.vertices, closed) == wanted
+    assert len(drawn(path.vertices, path.closed)) == len(path)

@@ -1,0 +1,195 @@
+"""Loose lines and arcs that lie on other ones, wholly or in part, are taken off.
+
+A *loose* path is an open one of a single line, or of arcs on a single circle. What of it lies on
+another path of its group goes; the rest stays, in one piece or more. Longer paths go first, so
+that a short line on a long one goes and the long one stays.
+
+Everything else stays whole: closed paths, because two contours that share an edge are two parts
+that both need cutting, and open paths of several segments, because they were drawn as one stroke.
+What lies on itself stays too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.measure import segment_lengths
+from camtool.geometry.polylines import Ints, Polylines, Segments
+from camtool.geometry.stretches import Covers, Stretches, covers
+
+SAME_LINE_MM = 1e-4
+"""Lines and arcs nearer to each other than this lie on each other, at most the tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unlapped:
+    """The paths without overlaps, the input path that each is or is part of (M,), how many paths
+    were shortened or left out, and by what length, mm."""
+
+    lines: Polylines
+    source: Ints
+    count: int
+    length_mm: float
+
+
+_Spans = list[tuple[float, float]]
+
+
+def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapped:
+    """The paths without what lies twice, within `groups` (M,) numbers; see the top.
+
+    What is shorter than `within_mm` is left out with the overlap beside it.
+    """
+    whole = Unlapped(lines, np.arange(len(lines)), 0, 0.0)
+    of = _stretches(lines, groups, within_mm)
+    if not of.loose.any():
+        return whole
+    found = covers(of, within_mm)
+    if not len(found.a):
+        return whole
+    left = _left(of, found, within_mm)
+    if not left:
+        return whole
+    touched = np.zeros(len(lines), dtype=np.bool_)
+    touched[of.path[list(left)]] = True
+    parts, source = [lines.select(np.flatnonzero(~touched))], [np.flatnonzero(~touched)]
+    kept = 0.0
+    for row, spans in left.items():
+        path = int(of.path[row])
+        for span in spans:
+            parts.append(_part(lines, of, row, span))
+            source.append(np.array([path]))
+            kept += span[1] - span[0]
+    origin = np.concatenate(source)
+    order = np.argsort(origin, kind="stable")
+    gone = float(of.length[list(left)].sum()) - kept
+    return Unlapped(_together(parts).select(order), origin[order], len(left), gone)
+
+
+def _stretches(lines: Polylines, groups: Ints, within: float) -> Stretches:
+    """One stretch for each loose path, and one for each segment of the others."""
+    segments = Segments.of(lines)
+    counts = np.bincount(segments.path, minlength=len(lines))
+    first = np.cumsum(counts) - counts
+    loose_line = ~lines.closed & (counts == 1) & ~segments.is_arc[first]
+    head = first[segments.path]
+    radius = np.where(segments.is_arc, segments.radius, np.nan)
+    same = (
+        (np.hypot(*(segments.centre - segments.centre[head]).T) <= within)
+        & (np.abs(radius - radius[head]) <= within)
+        & (segments.bulge * segments.bulge[head] > 0.0)
+    )
+    loose_arc = ~lines.closed & (np.bincount(segments.path[~same], minlength=len(lines)) == 0)
+    loose_arc &= segments.is_arc[first]
+    sweep = np.bincount(segments.path, weights=np.abs(segments.sweep), minlength=len(lines))
+    loose_arc &= sweep <= 2.0 * math.pi
+    is_head = np.arange(len(segments)) == head
+    rows = np.flatnonzero(is_head | ~loose_arc[segments.path])
+    path = segments.path[rows]
+    chord = (segments.end - segments.start)[rows]
+    arc = segments.is_arc[rows]
+    length = segment_lengths(segments)[rows]
+    width = np.where(loose_arc[path], sweep[path], np.abs(segments.sweep[rows]))
+    length = np.where(arc, width * radius[rows], length)
+    begins = segments.start_angle[rows] - np.where(segments.bulge[rows] < 0.0, width, 0.0)
+    return Stretches(
+        path=path,
+        group=groups[path],
+        loose=(loose_line | loose_arc)[path],
+        length=length,
+        start=segments.start[rows],
+        direction=np.where(arc[:, None], np.nan, chord / np.hypot(*chord.T)[:, None]),
+        centre=segments.centre[rows],
+        radius=radius[rows],
+        low=begins,
+    )
+
+
+def _left(of: Stretches, found: Covers, within: float) -> dict[int, _Spans]:
+    """For each loose stretch that is covered by what stays, the spans of it that are left."""
+    rank = _ranks(of, np.unique(np.concatenate([found.a, found.b])))
+    # A loose stretch yields to what is not loose, and to loose ones that rank before it.
+    yields = ~of.loose[found.b] | (rank[found.b] < rank[found.a])
+    order = np.argsort(rank[found.a], kind="stable")
+    order = order[yields[order]]
+    columns = (found.a, found.b, found.begin, found.end, found.shift, found.sense)
+    left: dict[int, _Spans] = {}
+    for a, b, begin, end, shift, sense in zip(
+        *(column[order].tolist() for column in columns), strict=True
+    ):
+        spans = left.get(a, [(0.0, float(of.length[a]))])
+        if b in left:
+            held = [sorted((shift + sense * low, shift + sense * high)) for low, high in left[b]]
+            hidden = [(max(low, begin), min(high, end)) for low, high in held]
+        else:
+            hidden = [(begin, end)]
+        for low, high in hidden:
+            spans = _cut(spans, low, high, within)
+        left[a] = spans
+    whole = {a for a, spans in left.items() if spans == [(0.0, float(of.length[a]))]}
+    return {a: spans for a, spans in left.items() if a not in whole}
+
+
+def _ranks(of: Stretches, rows: Ints) -> Ints:
+    """(K,) who stays: the longest first, then by place, whatever was drawn first."""
+    of_line = of.start + 0.5 * of.length[:, None] * of.direction
+    middle = np.where(np.isnan(of.centre), of_line, of.centre)
+    low = np.where(np.isnan(of.low), 0.0, np.mod(of.low, 2.0 * math.pi))
+    keys = (low, middle[:, 1], middle[:, 0], -of.length)
+    order = np.lexsort(tuple(np.round(key[rows], 9) for key in keys))
+    rank = np.zeros(len(of.path), dtype=np.int64)
+    rank[rows[order]] = np.arange(len(rows))
+    return rank
+
+
+def _cut(spans: _Spans, low: float, high: float, within: float) -> _Spans:
+    """The spans without low … high; crumbs no longer than `within` go too."""
+    if high <= low:
+        return spans
+    cut: _Spans = []
+    for begin, end in spans:
+        if high <= begin or low >= end:
+            cut.append((begin, end))
+            continue
+        pieces = [(begin, min(end, low)), (max(begin, high), end)]
+        cut.extend(piece for piece in pieces if piece[1] - piece[0] > within)
+    return cut
+
+
+def _part(lines: Polylines, of: Stretches, row: int, span: tuple[float, float]) -> Polylines:
+    """A span of a loose stretch as a path that runs as the stretch was drawn."""
+    path = lines[int(of.path[row])].vertices
+    begin, end = span
+    if math.isnan(of.radius[row]):
+        ends = of.start[row] + np.outer([begin, end], of.direction[row])
+        vertices = np.column_stack([ends, np.zeros(2)])
+        clockwise = False
+    else:
+        clockwise = bool(path[0, 2] < 0.0)
+        radius, low = float(of.radius[row]), float(of.low[row])
+        parts = 1 if end - begin <= math.pi * radius else 2
+        angles = np.linspace(low + begin / radius, low + end / radius, parts + 1)
+        bulge = math.tan((end - begin) / radius / parts / 4.0)
+        x, y = of.centre[row][:, None] + radius * np.array([np.cos(angles), np.sin(angles)])
+        vertices = np.column_stack([x, y, np.full(parts + 1, bulge)])
+    if clockwise:
+        vertices = vertices[::-1] * np.array([1.0, 1.0, -1.0])
+    at_low, at_high = begin == 0.0, end == float(of.length[row])
+    if at_high if clockwise else at_low:
+        vertices[0, :2] = path[0, :2]
+    if at_low if clockwise else at_high:
+        vertices[-1, :2] = path[-1, :2]
+    return Polylines(vertices, np.array([0, len(vertices)]), np.zeros(1, dtype=np.bool_))
+
+
+def _together(parts: list[Polylines]) -> Polylines:
+    """All paths of all parts, in order."""
+    counts = np.concatenate([np.diff(part.offsets) for part in parts])
+    return Polylines(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([[0], np.cumsum(counts)]),
+        np.concatenate([part.closed for part in parts]),
+    )
