@@ -1,0 +1,71 @@
+"""Damaged drawings: a drawing or a clear error in bounded time, never anything else."""
+
+from functools import cache
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camtool.errors import CamtoolError
+from camtool.importers.options import FORMATS, ReadOptions
+from tests.fuzz.damage import EVERY, Damage, cut, flip, headless
+from tests.fuzz.reading import patience, read_or_refuse
+from tests.fuzz.seeds import BINARIES, TEXTS
+
+SEEDS = TEXTS | BINARIES
+CHOICES = st.integers(0, 2**20)
+EVERYTHING = {"text": "stroke", "dimensions": True, "recognise_arcs": True, "across_layers": True}
+
+
+@cache
+def seed(name: str) -> bytes:
+    return SEEDS[name]()
+
+
+@pytest.mark.parametrize("name", SEEDS)
+def test_each_seed_is_whole(name: str) -> None:
+    drawing = read_or_refuse(seed(name), name, ReadOptions())
+    assert not isinstance(drawing, CamtoolError), str(drawing)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@given(
+    hits=st.lists(st.tuples(st.sampled_from(EVERY), CHOICES, CHOICES), min_size=1, max_size=3),
+    everything=st.booleans(),
+)
+@settings(max_examples=25)
+def test_damaged_texts(name: str, hits: list[tuple[Damage, int, int]], everything: bool) -> None:
+    data = seed(name)
+    for damage, at, choice in hits:
+        data = damage(data, at, choice)
+    options = ReadOptions(**EVERYTHING) if everything else ReadOptions()
+    with patience():
+        read_or_refuse(data, name, options)
+
+
+@pytest.mark.parametrize("name", BINARIES)
+@given(damage=st.sampled_from([cut, headless, flip]), at=CHOICES, choice=CHOICES)
+@settings(max_examples=40)
+def test_damaged_binaries(name: str, damage: Damage, at: int, choice: int) -> None:
+    with patience():
+        read_or_refuse(damage(seed(name), at, choice), name, ReadOptions())
+
+
+@given(data=st.binary(max_size=200), form=st.sampled_from([None, *FORMATS]))
+def test_any_bytes_as_any_format(data: bytes, form: str | None) -> None:
+    if form == "solid":  # tried on whole seeds only: each attempt takes a second
+        form = None
+    with patience():
+        read_or_refuse(data, "noise", ReadOptions(format=form))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEEDS)
+@given(hits=st.lists(st.tuples(st.sampled_from(EVERY), CHOICES, CHOICES), min_size=1, max_size=6))
+@settings(max_examples=1500)
+def test_damaged_a_thousand_times(name: str, hits: list[tuple[Damage, int, int]]) -> None:
+    data = seed(name)
+    for damage, at, choice in hits:
+        data = damage(data, at, choice)
+    with patience():
+        read_or_refuse(data, name, ReadOptions(**EVERYTHING))
