@@ -94,7 +94,7 @@ def approach(a: Polyline, b: Polyline) -> Approach:
         apart = _box_distance(boxes[begin : begin + step], others)
         i, j = np.nonzero(apart <= best.distance)
         if len(i):
-            found = _approach(*_between(first[i + begin], second[j]))
+            found = _approach(*paired_distances(first[i + begin], second[j]))
             best = min(best, found, key=lambda each: each.distance)
     return best
 
@@ -174,7 +174,7 @@ def _distance(points: Floats, rows: _Rows) -> Floats:
     return np.where(rows.beside(points), whole, np.minimum(to_a, to_b))
 
 
-def _between(a: Segments, b: Segments) -> tuple[Floats, Floats]:
+def paired_distances(a: Segments, b: Segments) -> tuple[Floats, Floats]:
     """(N,) distances of N pairs of segments, 0 where they cross, and (N, 2) where that is."""
     rows_a, rows_b = _Rows.of(a), _Rows.of(b)
     candidates: list[tuple[Floats, Floats]] = []
