@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from camtool.importers.svg_affine import Affine
 from camtool.importers.svg_shapes import Lengths
@@ -19,8 +19,7 @@ DEFAULT_LAYER = "0"
 """The layer of what stands in no layer and in no named group."""
 
 
-@dataclass(frozen=True)
-class Scope:
+class Scope(NamedTuple):
     """What holds for an element: `to_mm` from its user units; the style of its parent; `viewport`
     what % are of; `layer`; `depth` of nesting; `uses` the ids on the way here."""
 

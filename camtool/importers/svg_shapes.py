@@ -47,6 +47,9 @@ class Lengths:
 
     def length(self, text: str, axis: str, name: str = "length") -> float:
         """A length in user units; DrawingError naming it."""
+        # Most lengths are bare numbers.
+        if NUMBER.fullmatch(text):
+            return in_bounds(float(text), name)
         value, unit = split_length(text, name)
         if not unit or unit == "px":
             return value

@@ -75,8 +75,7 @@ def parse_tree(data: bytes) -> Node:
     handler = _Builder()
     source = InputSource()
     source.setByteStream(BytesIO(data))
-    parser = _parser()
-    parser.setContentHandler(handler)
+    parser = _parser(handler)
     try:
         parser.parse(source)
     except DefusedXmlException as error:
@@ -101,11 +100,21 @@ def parse_tree(data: bytes) -> Node:
     return root
 
 
-def _parser() -> Any:
-    """defusedxml's parser, which lets entities pass that are short and plain text."""
+def _parser(builder: _Builder) -> Any:
+    """defusedxml's parser, which lets entities pass that are short and plain text.
+
+    Elements go to the builder as expat gives them: the way through SAX's own records of names and
+    attributes takes longer than all the rest.
+    """
     from defusedxml.expatreader import DefusedExpatParser
 
     class Parser(DefusedExpatParser):  # type: ignore[misc]  # the base is untyped
+        def start_element_ns(self, name: str, attributes: dict[str, str]) -> None:
+            builder.start(name, attributes, self.getLineNumber())
+
+        def end_element_ns(self, name: str) -> None:
+            builder.end()
+
         def defused_entity_decl(self, name: str, is_parameter: bool, value: str | None,
                                 *outside: str | None) -> None:  # fmt: skip
             plain = not is_parameter and value is not None and len(value) <= MAX_ENTITY_SIGNS
@@ -115,6 +124,7 @@ def _parser() -> Any:
     parser = Parser()
     parser.setFeature(feature_namespaces, True)
     parser.setFeature(feature_external_ges, False)
+    parser.setContentHandler(builder)
     return parser
 
 
@@ -128,13 +138,9 @@ class _Builder(ContentHandler):
         self._open: list[Node] = []
         self._sheet: list[str] = []
         self._count = 0
-        self._locator: Any = None
 
-    def setDocumentLocator(self, locator: Any) -> None:
-        self._locator = locator
-
-    def startElementNS(self, name: tuple[str | None, str], qname: str | None, attrs: Any) -> None:
-        line = int(self._locator.getLineNumber())
+    def start(self, name: str, attributes: dict[str, str], line: int) -> None:
+        """An element: names are "namespace name prefix", or bare without a namespace."""
         self._count += 1
         if len(self._open) >= MAX_DEPTH or self._count > MAX_ELEMENTS:
             deep = len(self._open) >= MAX_DEPTH
@@ -145,16 +151,17 @@ class _Builder(ContentHandler):
                 where=f"line {line}",
                 mend="ungroup the drawing" if deep else "save it in parts",
             )
-        space, tag = name
+        space, tag = _parted(name)
         above = self._open[-1] if self._open else None
-        node = Node(tag if space in (SVG, None) else "", _attributes(attrs), line, above)
+        node = Node(tag if space in (SVG, "") else "", _attributes(attributes), line, above)
         if above is not None:
             above.children.append(node)
         elif self.root is None:
             self.root, self.root_name = node, tag
         self._open.append(node)
 
-    def endElementNS(self, name: tuple[str | None, str], qname: str | None) -> None:
+    def end(self) -> None:
+        """The innermost element ends."""
         node = self._open.pop()
         if node.tag == "style":
             node.text = "".join(self._sheet)
@@ -165,12 +172,23 @@ class _Builder(ContentHandler):
             self._sheet.append(content)
 
 
-_PREFIXES = {None: "", "": "", SVG: "", XLINK: "xlink:", INKSCAPE: "inkscape:"}
+def _parted(name: str) -> tuple[str, str]:
+    """Namespace ("" for none) and name; the prefix, where there is one, says nothing."""
+    words = name.split(" ")
+    return ("", name) if len(words) == 1 else (words[0], words[1])
 
 
-def _attributes(attrs: Any) -> dict[str, str]:
-    return {
-        _PREFIXES[space] + name: value
-        for (space, name), value in attrs.items()
-        if space in _PREFIXES
-    }
+_PREFIXES = {SVG: "", XLINK: "xlink:", INKSCAPE: "inkscape:"}
+
+
+def _attributes(attributes: dict[str, str]) -> dict[str, str]:
+    """SVG's own by name, those of XLink and Inkscape with a prefix, no others."""
+    named: dict[str, str] = {}
+    for name, value in attributes.items():
+        if " " in name:
+            space, name = _parted(name)
+            if space not in _PREFIXES:
+                continue
+            name = _PREFIXES[space] + name
+        named[name] = value
+    return named

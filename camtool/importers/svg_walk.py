@@ -12,8 +12,6 @@ SVG 2, 5.5 (use of an svg element).
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from camtool.errors import DrawingError
 from camtool.importers.options import ReadOptions
 from camtool.importers.piece import Piece
@@ -91,7 +89,7 @@ class Walk:
 
     def _children(self, node: Node, scope: Scope) -> None:
         """All children, one level deeper."""
-        inner = replace(scope, depth=scope.depth + 1)
+        inner = scope._replace(depth=scope.depth + 1)
         for child in node.children:
             self._visit(child, inner)
 
@@ -123,7 +121,7 @@ class Walk:
         elif node.tag == "switch":
             for child in node.children:
                 if child.tag not in ("", "foreignObject") and is_for_us(child):
-                    self._visit(child, replace(scope, depth=scope.depth + 1))
+                    self._visit(child, scope._replace(depth=scope.depth + 1))
                     return
         else:
             self._children(node, scope)
@@ -151,7 +149,7 @@ class Walk:
             if style.transform_box not in ("", "view-box"):
                 self.notes.changed["transform-box", "is not applied: about the origin"] += 1
         self._limits(style, node.tag)
-        return replace(scope, to_mm=to_mm, style=style, layer=layer_in(node, scope))
+        return scope._replace(to_mm=to_mm, style=style, layer=layer_in(node, scope))
 
     def _limits(self, style: Style, name: str) -> None:
         """Counts what would hide or add something."""
@@ -221,7 +219,7 @@ class Walk:
             self._unreadable(node, error)
             return
         uses = (*scope.uses, name)
-        inner = replace(scope, to_mm=to_mm, uses=uses, depth=scope.depth + 1)
+        inner = scope._replace(to_mm=to_mm, uses=uses, depth=scope.depth + 1)
         if target.tag in ("symbol", "svg"):
             self._spend(1, node)
             entered = self._entered(target, inner)
@@ -241,7 +239,7 @@ class Walk:
             self._count(node, "its frame has no size")
             return
         first = len(self.pieces)
-        self._children(node, replace(scope, to_mm=frame.to_mm, viewport=frame.viewport))
+        self._children(node, scope._replace(to_mm=frame.to_mm, viewport=frame.viewport))
         if scope.style.overflow not in ("visible", "auto"):
             count = sum(frame.is_left_by(piece.vertices[:, :2]) for piece in self.pieces[first:])
             if count:
