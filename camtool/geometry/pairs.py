@@ -207,6 +207,8 @@ def _split(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
     ring_of = np.concatenate([ring, ring])
     at_branch = rings[ring_of] & (node[both] >= 0)
     both, ring_of = both[at_branch], ring_of[at_branch]
+    order = np.argsort(both)
+    both, ring_of = both[order], ring_of[order]
     if not len(both):
         return
     rank = _places(ends, both)
