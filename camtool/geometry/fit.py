@@ -1,8 +1,8 @@
 """Curves to tangent-continuous chains of arcs and lines, as few as the tolerance allows.
 
-From each node on the curve (`nodes`) the longest biarc that stays within the tolerance is taken:
-its error grows with the third power of its length, which tells how far to reach next, and
-bisection settles the rest. Chains break their tangent only where the curve does.
+Nodes are laid on the curve, dense where it bends (`nodes`, `kernels/bezier.py`); between them the
+longest biarcs, arcs and lines within the tolerance are chained so that their number is small
+(`kernels/spans.py`). Chains break their tangent only where the curve does.
 
 Errors are distances from dense points of the true curve to the arcs. The other direction needs no
 measuring: both have the same ends, and while the distance is below the arcs' radii the foot points
@@ -31,9 +31,11 @@ from camtool.geometry.drawing import FitError
 from camtool.geometry.nodes import curve_nodes
 from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Floats
 from camtool.kernels.fit_limits import (
+    ACCEPTED_SHARE,
     ATTEMPTS,
     MEASURE_STEPS,
     MIN_STEPS,
+    REFINING,
     SEARCH_SHARE,
     SPAN_TURN_RAD,
 )
@@ -153,9 +155,9 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
     """The same steps as the kernel `fit_pieces` takes, for a curve given by functions."""
     from camtool.kernels.fit_bezier import fit_nodes
 
-    target, steps = SEARCH_SHARE * tolerance_mm, MIN_STEPS
-    for _ in range(ATTEMPTS):
-        nodes = curve_nodes(curve, tolerance_mm, steps)
+    target, steps, fineness = SEARCH_SHARE * tolerance_mm, MIN_STEPS, tolerance_mm
+    for attempt in range(ATTEMPTS):
+        nodes = curve_nodes(curve, fineness, steps)
         if len(nodes) == 1:
             return Fit(np.append(nodes.point[0], 0.0)[None, :], 0.0, 0.0)
         share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
@@ -163,9 +165,11 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
         samples = curve.point(np.append(t, nodes.t[-1]))
         columns = (nodes.point, nodes.arrive, nodes.leave, nodes.corner)
         vertices, judged = fit_nodes(columns, samples, target, tolerance_mm)
-        if not judged[0] > tolerance_mm:
+        if not judged[0] > ACCEPTED_SHARE * tolerance_mm:
             break
-        target, steps = target * SEARCH_SHARE * tolerance_mm / judged[0], 2 * steps
+        steps, fineness = 2 * steps, REFINING * fineness
+        if attempt > 0:
+            target *= SEARCH_SHARE * tolerance_mm / judged[0]
     return _checked(vertices, judged, nodes.point[[0, -1]])
 
 

@@ -9,10 +9,12 @@ from camtool.kernels.arc_chain import chain, deviations, joined, summary
 from camtool.kernels.bezier import curve_rows, points_at
 from camtool.kernels.biarc import Bools, Floats
 from camtool.kernels.fit_limits import (
+    ACCEPTED_SHARE,
     ATTEMPTS,
     MEASURE_STEPS,
     MIN_STEPS,
     POSITION_EPS_MM,
+    REFINING,
     SEARCH_SHARE,
 )
 from camtool.kernels.spans import longest_spans
@@ -63,19 +65,22 @@ def fit_nodes(
 def fit_pieces(pieces: Floats, tolerance: float) -> tuple[Floats, Judged]:
     """The chain (n, 3) within `tolerance` of rational pieces (m, p + 1, 3), and its deviations.
 
-    A fit whose error turns out too large is done again over finer nodes.
+    A fit whose error turns out too large is done again over finer nodes, since errors peak
+    between them; if that is not enough, with less of the tolerance as well.
     """
-    target, steps = SEARCH_SHARE * tolerance, MIN_STEPS
+    target, steps, fineness = SEARCH_SHARE * tolerance, MIN_STEPS, tolerance
     vertices, judged = np.zeros((1, 3)), (0.0, 0.0, 0.0)
-    for _ in range(ATTEMPTS):
-        rows, corner = curve_rows(pieces, steps, tolerance)
+    for attempt in range(ATTEMPTS):
+        rows, corner = curve_rows(pieces, steps, fineness)
         if len(rows) == 1:
             vertices[0, 0], vertices[0, 1] = rows[0, 1], rows[0, 2]
             return vertices, (0.0, 0.0, 0.0)
         nodes = two_columns(rows, 1), two_columns(rows, 3), two_columns(rows, 5), corner
         samples = points_at(pieces, sample_parameters(rows))
         vertices, judged = fit_nodes(nodes, samples, target, tolerance)
-        if not judged[0] > tolerance:
+        if not judged[0] > ACCEPTED_SHARE * tolerance:
             break
-        target, steps = target * SEARCH_SHARE * tolerance / judged[0], 2 * steps
+        steps, fineness = 2 * steps, REFINING * fineness
+        if attempt > 0:
+            target *= SEARCH_SHARE * tolerance / judged[0]
     return vertices, judged

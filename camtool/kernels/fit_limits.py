@@ -27,14 +27,24 @@ MAX_LINES = 100_000
 SAME_ARC_MM = 1e-8
 """Neighbours that leave a common arc or line by no more become one."""
 
+CANDIDATES = 4
+"""Nodes kept for each number of arcs: the furthest, and others evenly short of it."""
+
 SEARCH_SHARE = 0.97
 """The share of the tolerance that the search may use up: errors peak between nodes."""
 
-MEASURE_STEPS = 6
+MEASURE_STEPS = 8
 """Points per step between nodes at which the final error is measured."""
+
+ACCEPTED_SHARE = 0.995
+"""A fit is accepted when its measured error is within this share of the tolerance: what lies
+between the points at which it is measured may be a little more."""
 
 ATTEMPTS = 8
 """How often a fit whose measured error is too large is done again, each time finer."""
+
+REFINING = 1.0 / 8.0
+"""The share of its error that a step between nodes may keep at each further attempt."""
 
 CORNER_ANGLE_RAD = 1e-6
 """Tangents before and after a node that differ by more make it a corner."""

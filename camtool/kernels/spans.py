@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from camtool.kernels.biarc import Bools, Floats, Ints, arc_error, biarc, half_angle, span_error
-from camtool.kernels.fit_limits import MAX_RADIUS_MM, SINGLE_TURN_RAD, SPAN_TURN_RAD
+from camtool.kernels.fit_limits import CANDIDATES, MAX_RADIUS_MM, SINGLE_TURN_RAD, SPAN_TURN_RAD
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -55,9 +55,13 @@ def single_bulge(
     sweep α + β leaves both tangents by |α − β| / 2.
     """
     ux, uy = point[high, 0] - point[low, 0], point[high, 1] - point[low, 1]
-    first = 2.0 * math.atan(half_angle(leave[low, 0], leave[low, 1], ux, uy))
-    second = 2.0 * math.atan(half_angle(ux, uy, arrive[high, 0], arrive[high, 1]))
-    if not abs(first - second) <= 2.0 * SINGLE_TURN_RAD:
+    first = half_angle(leave[low, 0], leave[low, 1], ux, uy)
+    second = half_angle(ux, uy, arrive[high, 0], arrive[high, 1])
+    # |tan a − tan b| ≤ |a − b| (1 + tan²) of the larger: most nodes are told here, without atan.
+    if not abs(first - second) <= SINGLE_TURN_RAD * (1.0 + max(first * first, second * second)):
+        return np.nan
+    first, second = 2.0 * math.atan(first), 2.0 * math.atan(second)
+    if abs(first - second) > 2.0 * SINGLE_TURN_RAD:
         return np.nan
     half = 0.5 * (first + second)
     if math.sqrt(ux * ux + uy * uy) > 2.0 * MAX_RADIUS_MM * abs(math.sin(half)):
@@ -70,76 +74,140 @@ def single_bulge(
 
 @numba.njit(cache=True, error_model="numpy")
 def longest_single(
-    point: Floats,
-    leave: Floats,
-    arrive: Floats,
+    nodes: tuple[Floats, Floats, Floats],
     low: int,
-    furthest: int,
-    biarc_end: int,
+    within: tuple[int, int],
+    guess: int,
     target: float,
 ) -> tuple[int, float]:
-    """End node and bulge of a long single arc or line from `low`; NaN when it does not reach half
-    as far as the biarc to `biarc_end`: two arcs are no dearer then."""
-    best = low + (biarc_end - low + 1) // 2
-    bulge = single_bulge(point, leave, arrive, low, best, target)
-    if math.isnan(bulge):
-        return low, np.nan
-    beyond, high = furthest + 1, biarc_end
-    while beyond - best > 1:
-        high = min(max(high, best + 1), beyond - 1)
-        found = single_bulge(point, leave, arrive, low, high, target)
-        if math.isnan(found):
-            beyond = high
-        else:
-            best, bulge = high, found
-        high = (best + beyond) // 2
+    """End node and bulge of the longest single arc or line from `low` that ends after within[0]
+    and not after within[1]; NaN when there is none.
+
+    Tangents may suit far off and not before (about an axis of symmetry), so all nodes are tried,
+    from the far end of a window of 2 · `guess` nodes that grows as long as its end is reached.
+    """
+    point, leave, arrive = nodes
+    beyond, best, bulge = within[0], within[0], np.nan
+    while best == beyond and beyond < within[1]:
+        beyond, least = min(max(low + 2 * guess, 2 * beyond - low), within[1]), beyond
+        for high in range(beyond, least, -1):
+            found = single_bulge(point, leave, arrive, low, high, target)
+            if not math.isnan(found):
+                best, bulge = high, found
+                break
+        if beyond == least:
+            break
     return best, bulge
 
 
 @numba.njit(cache=True, error_model="numpy")
-def turned_angles(leave: Floats, arrive: Floats) -> Floats:
-    """(n,) rad: how far the curve has turned at each of n nodes, to either side."""
-    out = np.zeros(len(leave))
-    for i in range(1, len(leave)):
+def furthest_nodes(leave: Floats, arrive: Floats, corner: Bools) -> Ints:
+    """(n,) the last node that a span from each node may reach: the next corner, or where the curve
+    has turned by `SPAN_TURN_RAD`, to either side."""
+    count = len(leave)
+    turned = np.zeros(count)
+    for i in range(1, count):
         cross = leave[i - 1, 0] * arrive[i, 1] - leave[i - 1, 1] * arrive[i, 0]
         dot = leave[i - 1, 0] * arrive[i, 0] + leave[i - 1, 1] * arrive[i, 1]
-        out[i] = out[i - 1] + abs(math.atan2(cross, dot))
+        turned[i] = turned[i - 1] + abs(math.atan2(cross, dot))
+    out = np.zeros(count, dtype=np.int64)
+    last = 0
+    for i in range(count - 1):
+        last = max(last, i + 1)
+        while not corner[last] and turned[last + 1] - turned[i] <= SPAN_TURN_RAD:
+            last += 1
+        out[i] = last
     return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def furthest_state(
+    nodes: tuple[Floats, Floats, Floats],
+    limit: Ints,
+    states: Ints,
+    now: int,
+    guess: int,
+    target: float,
+) -> tuple[int, int, float]:
+    """The furthest node at the price that begins at row `now` of `states` (node −1: none), the row
+    whence it is reached, and the bulge of the single arc or line that does it (NaN: a biarc)."""
+    point, leave, arrive = nodes
+    best, whence, bulge = states[now - CANDIDATES], now - CANDIDATES, np.nan
+    for row in range(max(now - 2 * CANDIDATES, 0), now):
+        low = states[row]
+        if low < 0 or limit[low] <= best:
+            continue
+        if row >= now - CANDIDATES:
+            high, found = longest_single(nodes, low, (best, limit[low]), guess, target)
+            if high > best:
+                best, whence, bulge = high, row, found
+            continue
+        first = row == now - 2 * CANDIDATES
+        if first or span_error(point, leave, arrive, low, best + 1) <= target:
+            begin = low + guess if first else best + 2
+            high = longest_span(point, leave, arrive, low, limit[low], begin, target)
+            if high > best:
+                best, whence, bulge = high, row, np.nan
+    return best, whence, bulge
 
 
 @numba.njit(cache=True, error_model="numpy")
 def longest_spans(
     point: Floats, leave: Floats, arrive: Floats, corner: Bools, target: float
 ) -> tuple[Ints, Floats]:
-    """Nodes (s + 1,) between the longest spans, and joint and bulges (s, 4) of each.
+    """Nodes (s + 1,) between the spans of a chain of few arcs; joint and bulges (s, 4) of each.
 
     `point`, `leave`, `arrive` (n, 2), `corner` (n,). A span of one arc or line has its bulge in
     the third column and NaN elsewhere. No span runs past a corner or turns by more than
     `SPAN_TURN_RAD`.
+
+    Price by price (1, 2, 3 … arcs) the furthest node is found that one arc leads to from a node of
+    the price before, or a biarc from two prices before. A few nodes short of it are kept as well:
+    a span that takes a sharp tip in its middle may have to begin there.
     """
     count = len(point)
-    turned = turned_angles(leave, arrive)
-    ends = np.zeros(count, dtype=np.int64)
-    pairs = np.empty((count, 4))
-    spans, low, reach, corner_at, furthest = 0, 0, count, 0, 0
-    while low < count - 1:
-        if corner_at <= low:
-            corner_at = low + 1
-            while not corner[corner_at]:
-                corner_at += 1
-        furthest = max(furthest, low + 1)
-        while furthest < corner_at and turned[furthest + 1] - turned[low] <= SPAN_TURN_RAD:
-            furthest += 1
-        high = longest_span(point, leave, arrive, low, furthest, low + reach, target)
-        best, bulge = longest_single(point, leave, arrive, low, furthest, high, target)
+    limit = furthest_nodes(leave, arrive, corner)
+    states = np.zeros(CANDIDATES * (2 * count + 2), dtype=np.int64)
+    whence = np.zeros(len(states), dtype=np.int64)
+    bulges = np.zeros(len(states))
+    for row in range(1, len(states)):
+        states[row] = -1
+    now, guess = 0, count
+    while states[now] < count - 1:
+        now += CANDIDATES
+        best, row, bulge = furthest_state(
+            (point, leave, arrive), limit, states, now, guess, target
+        )
+        before, low, guess = states[now - CANDIDATES], states[row], best - states[row]
+        for m in range(CANDIDATES):
+            place = best - m * (best - before) // CANDIDATES
+            if m > 0:
+                if place <= before or place == states[now + m - 1]:
+                    continue
+                if not math.isnan(bulge):
+                    bulge = single_bulge(point, leave, arrive, low, place, target)
+                    if math.isnan(bulge):
+                        break
+                elif span_error(point, leave, arrive, low, place) > target:
+                    continue
+            states[now + m], whence[now + m], bulges[now + m] = place, row, bulge
+    spans, row = 0, now
+    while row > 0:
+        spans += states[row] > states[whence[row]]
+        row = whence[row]
+    ends = np.zeros(spans + 1, dtype=np.int64)
+    pairs = np.empty((spans, 4))
+    row = now
+    while row > 0:
+        low, high, bulge = states[whence[row]], states[row], bulges[row]
+        row = whence[row]
+        if low == high:
+            continue
         pair = (np.nan, np.nan, bulge, np.nan)
         if math.isnan(bulge):
             pair = biarc(point[low], leave[low], point[high], arrive[high])
-        else:
-            high = best
+        spans -= 1
         pairs[spans, 0], pairs[spans, 1], pairs[spans, 3] = pair[0], pair[1], pair[3]
         pairs[spans, 2] = 0.0 if math.isnan(pair[2]) else pair[2]
-        spans += 1
-        ends[spans] = high
-        reach, low = high - low, high
-    return ends[: spans + 1], pairs[:spans]
+        ends[spans + 1] = high
+    return ends, pairs
