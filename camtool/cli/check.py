@@ -10,7 +10,7 @@ import click
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import talk_options
 from camtool.cli.output import check_writable, write_all
-from camtool.cli.talk import one_line, say_findings, say_first_run
+from camtool.cli.talk import say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 
 if TYPE_CHECKING:
@@ -54,17 +54,18 @@ def check(
         files[preview] = render(picture(title=source, drawing=read), preview)
     write_all(files)
     if report != "-" and not quiet:
-        click.echo(_table(facts))
+        from camtool.cli.check_table import table
+
+        click.echo(table(facts, verbose=verbose))
     say_findings(read.findings, quiet=quiet, verbose=verbose)
     return 0
 
 
 def _facts(drawing: Drawing) -> dict[str, Any]:
     """Everything worth knowing, in the order in which it is shown; lengths in mm."""
-    from camtool.geometry.facts import drawing_facts
-    from camtool.geometry.measure import extents
+    from camtool.geometry.facts import drawing_extents, drawing_facts
 
-    (left, right), (bottom, top) = extents(drawing.paths).tolist()
+    (left, right), (bottom, top) = drawing_extents(drawing).tolist()
     return {
         "file": drawing.file,
         "units": {
@@ -81,10 +82,6 @@ def _facts(drawing: Drawing) -> dict[str, Any]:
             {"kind": item.kind, "count": item.count, "reason": item.reason}
             for item in drawing.skipped
         ],
-        "gaps": [
-            {"at_mm": list(gap.at_mm), "size_mm": gap.size_mm, "layer": gap.layer}
-            for gap in drawing.gaps
-        ],
         "findings": [
             {
                 "code": finding.code.name,
@@ -95,31 +92,3 @@ def _facts(drawing: Drawing) -> dict[str, Any]:
             for finding in drawing.findings
         ],
     }
-
-
-def _table(facts: dict[str, Any]) -> str:
-    """The facts as lines for people."""
-    units, size, extents = facts["units"], facts["size_mm"], facts["extents_mm"]
-    used = ", ".join(f"{count} {kind}" for kind, count in facts["entities_used"].items())
-    lines = [
-        f"file      {facts['file']}",
-        f"units     {units['name']} ({units['why']})",
-        f"size      {size[0]:.4g} × {size[1]:.4g} mm",
-        f"extents   x {extents['x'][0]:.4f} … {extents['x'][1]:.4f}   "
-        f"y {extents['y'][0]:.4f} … {extents['y'][1]:.4f} mm",
-        f"contours  {facts['closed']} closed, {facts['open']} open, "
-        f"{facts['length_mm']:.4g} mm long, {facts['lines']} lines, {facts['arcs']} arcs",
-    ]
-    for name, layer in facts["layers"].items():
-        lines.append(f"layer     {name}: {layer['closed']} closed, {layer['open']} open")
-    lines.append(f"entities  {used or 'none'}")
-    for item in facts["entities_not_used"]:
-        lines.append(f"not used  {item['count']} {item['kind']}: {item['reason']}")
-    if facts["smallest_radius_mm"] is not None:
-        lines.append(f"smallest  radius {facts['smallest_radius_mm']:.4g} mm")
-    if facts["fit_um"]["max"] > 0.0:
-        lines.append(f"fitted    curves within {facts['fit_um']['max']:.3g} µm")
-    for gap in facts["gaps"]:
-        x, y = gap["at_mm"]
-        lines.append(f"gap       {gap['size_mm']:.4g} mm at {x:.4f}, {y:.4f} on {gap['layer']}")
-    return "\n".join(one_line(line) for line in lines)
