@@ -105,7 +105,9 @@ def solid(entity: Any, frame: Frame, _tolerance_mm: float) -> list[Shape]:
     require(entity, _CORNERS[:3])
     named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
     corners = numbers([tuple(entity.dxf.get(name)) for name in named])
-    local = corners[list(_DRAWN_ORDER)] if len(corners) == len(_CORNERS) else corners
+    # A triangle repeats its last corner, or leaves it out.
+    is_triangle = len(corners) < len(_CORNERS) or (corners[2] == corners[3]).all()
+    local = corners[:3] if is_triangle else corners[list(_DRAWN_ORDER)]
     plane = frame.plane(entity.dxf.extrusion, float(corners[0, 2]))
     return [Shape(straight(plane.points(local)), closed=True)]
 

@@ -31,7 +31,7 @@ from camtool.importers.dxf_tags import (
     check_numbers,
     frame_of,
     header_of,
-    swallowed,
+    lost,
 )
 
 MAX_BYTES = 100_000_000
@@ -59,7 +59,7 @@ def load(data: bytes, file: str) -> Loaded:
     if cut:
         tags = _ended(tags, frame)
         frame = frame_of(tags)
-    notes = [*tags.notes, *cut, *frame.faults, *swallowed(tags, frame)]
+    notes = [*tags.notes, *cut, *frame.faults, *lost(tags, frame)]
     with quiet() as said, without_collector():
         document = None if frame.faults else _plain(tags, said)
         notes.extend(said)

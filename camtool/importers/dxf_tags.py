@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from camtool.errors import DrawingError
+from camtool.geometry.polylines import Ints
 
 BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
 
@@ -28,7 +29,7 @@ SECTIONS = frozenset(
 )
 """Sections that the DXF reference names."""
 
-_LAYER, _VARIABLE = 8, 9
+_LAYER, _VARIABLE, _POINT, _COUNT = 8, 9, 10, 90
 _UTF16_MARKS, _UTF8_MARK = (b"\xff\xfe", b"\xfe\xff"), b"\xef\xbb\xbf"
 _CODE = re.compile(r"[ \t]*[0-9]{1,4}[ \t]*\r?")
 _NUMBER = re.compile(
@@ -154,10 +155,10 @@ def frame_of(tags: Tags) -> Frame:
     return Frame(tuple(sections), eof, (*faults, *_wrong_names(tags, sections)))
 
 
-def swallowed(tags: Tags, frame: Frame) -> list[str]:
-    """Entities that hold the next one, because its mark (group code 0) is damaged, in words.
+def lost(tags: Tags, frame: Frame) -> list[str]:
+    """What a damaged group code hides that is itself a group code, in words.
 
-    Every entity has one layer and at most one handle: two of them are two entities.
+    An entity that has two layers is two entities, the mark (0) of one being damaged.
     """
     codes = np.array(tags.codes, dtype=np.int64)
     entity = np.cumsum(codes == 0)
@@ -168,6 +169,22 @@ def swallowed(tags: Tags, frame: Frame) -> list[str]:
         rows = np.flatnonzero(codes[section.begin : section.end] == _LAYER) + section.begin
         twice = rows[1:][np.diff(entity[rows]) == 0]
         found.extend(f"{tags.where(int(k))}: two entities run into one" for k in twice)
+    return found + _lost_vertices(tags, codes)
+
+
+def _lost_vertices(tags: Tags, codes: Ints) -> list[str]:
+    """LWPOLYLINEs that do not have the vertices that they count, in words."""
+    found: list[str] = []
+    marks, vertices, counts = (np.flatnonzero(codes == code) for code in (0, _POINT, _COUNT))
+    ends = np.append(marks[1:], len(codes))
+    for begin, end in zip(marks.tolist(), ends.tolist(), strict=True):
+        if str(tags.values[begin]).strip() == "LWPOLYLINE":
+            held = int(np.searchsorted(vertices, end) - np.searchsorted(vertices, begin))
+            at = int(np.searchsorted(counts, begin))
+            said = str(tags.values[counts[at]]).strip() if at < len(counts) else ""
+            if at < len(counts) and counts[at] < end and said != str(held):
+                where = tags.where(begin)
+                found.append(f"{where}: LWPOLYLINE counts {said[:9]} vertices and holds {held}")
     return found
 
 
