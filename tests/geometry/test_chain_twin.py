@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.chain import Chained, Kinds, chain
+from camtool.geometry.crossings import self_crossings_of
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from camtool.geometry.transform import mirrored, moved, reverse, rotated, scaled
@@ -82,6 +83,29 @@ def test_order_and_direction_of_drawing_change_nothing(seed: int) -> None:
     one, two = chain(Polylines.of(paths), GAP), chain(Polylines.of(other), GAP)
     assert shapes(one) == shapes(two)
     assert one.branches == two.branches
+
+
+def fields(random: Random) -> list[Polyline]:
+    """The edges of fields of a chessboard, which touch each other at corners only."""
+    board = [(x, y) for x in range(4) for y in range(4) if (x + y) % 2 == 0]
+    paths = []
+    for x, y in random.sample(board, random.randint(1, len(board))):
+        corners = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]
+        for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
+            paths.append(Polyline(np.array([(*a, 0.0), (*b, 0.0)])))
+    random.shuffle(paths)
+    return [reverse(p) if random.random() < 0.5 else p for p in paths]
+
+
+@given(st.integers(0, 10**6))
+def test_fields_of_a_chessboard_are_contours_that_do_not_cross(seed: int) -> None:
+    paths = fields(Random(seed))
+    found = chain(Polylines.of(paths), GAP)
+    assert found.lines.closed.all()
+    assert self_crossings_of(found.lines, [""] * len(found.lines)) == ()
+    assert path_lengths(found.lines).sum() == pytest.approx(len(paths))
+    wanted = chained(paths, GAP, [""] * len(paths), [""] * len(paths))
+    assert found.members == tuple(of for of, _ in wanted.paths)
 
 
 CHANGES = {
@@ -180,5 +204,6 @@ def test_the_nearest_other_point_equals_the_twin(
     cells = np.floor(points / size).astype(np.int64)
     order = np.lexsort((cells[:, 1], cells[:, 0]))
     nearest, distance = nearest_others(cells[order], points[order], size, POSITION_EPS_MM, reach)
-    assert distance.tolist() == nearest_other(points[order], POSITION_EPS_MM, reach)
+    wanted = nearest_other(points[order], POSITION_EPS_MM, reach)
+    assert distance.tolist() == pytest.approx(wanted, rel=1e-12)
     assert ((nearest >= 0) == np.isfinite(distance)).all()
