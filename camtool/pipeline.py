@@ -10,7 +10,7 @@ Nothing here reads or writes a file.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from camtool.errors import ProgramError
@@ -112,7 +112,7 @@ def picture(
     from camtool.preview.scene import Scene, scene_of_drawing
 
     if drawing is not None and toolpath is None:
-        return scene_of_drawing(drawing)
+        return replace(scene_of_drawing(drawing), title=title)
     shift = (0.0, 0.0)
     if drawing is not None and job is not None:
         from camtool.planning.profile import origin_shift

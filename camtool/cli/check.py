@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -51,7 +52,7 @@ def check(
         from camtool.pipeline import picture
         from camtool.preview.render import render
 
-        files[preview] = render(picture(title=source, drawing=read), preview)
+        files[preview] = render(picture(title=Path(read.file).name, drawing=read), preview)
     write_all(files)
     if report != "-" and not quiet:
         from camtool.cli.check_table import table

@@ -79,7 +79,8 @@ def _scene(
     title = Path(source).name
     if machine.target is None:
         _refuse_program(source)
-        return picture(title=title, drawing=drawing.read(source))
+        read = drawing.read(source)
+        return picture(title=Path(read.file).name, drawing=read)
     target = machine.load()
     if Path(source).suffix.lower() == target.machine.target.extension:
         data = read_bytes(source)
