@@ -29,6 +29,8 @@ class BlockSizes:
 
     def inserted(self, insert: Any) -> int:
         """Entities that an INSERT stands for, itself included; 1 when its block is missing."""
+        if not insert.dxf.hasattr("name"):
+            return 1
         name = block_key(insert.dxf.name)
         if name not in self._sizes:
             self._sizes[name] = 0  # what a block that holds itself finds on its way round
