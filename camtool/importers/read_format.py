@@ -87,7 +87,7 @@ _ROUTER = re.compile(
     re.MULTILINE,
 )
 _COMMENT = re.compile(r"[ \t]*(?:[#%;(][^\n]*)?(?:\n|$)")
-_G_BLOCK = re.compile(r"\s*/?\s*(?:[NO]\d+\s*)?(?:[GM]\s?\d{1,3}(?!\d)|[XYZIJFST]-?\d)", re.I)
+_G_BLOCK = re.compile(r"\s*/?\s*(?:[NO]\d+|[GM]\s?\d{1,3}(?!\d)|[XYZIJFST]-?\d)", re.I)
 _G_CODE = re.compile(r"^\s*/?\s*(?:[NO]\d+\s*)?[GM]\s?\d{1,3}(?!\w*[ \t]*[,\t])", re.I | re.M)
 _TWO_FIELDS = re.compile(r"[^\S\n]*[-+.\w]+[^\S\n]*[,;\s][^\S\n]*[-+.\w]+")
 _XML_BEFORE = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE(?:[^\[>]|\[.*?\]\s*(?=>))*>", re.S)

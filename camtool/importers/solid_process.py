@@ -11,8 +11,12 @@ from typing import Any
 
 from camtool.errors import DrawingError
 
-FILE_SECONDS = 600.0
-"""A STEP or BREP file that takes longer than this is given up; scripts may take their time."""
+FILE_SECONDS = 60.0
+"""A STEP or BREP file may take so long, and SECONDS_PER_MB more for its size: damaged ones can
+keep OpenCASCADE busy for ever. Scripts may take their time."""
+
+SECONDS_PER_MB = 5.0
+"""See FILE_SECONDS; a sound file takes about one second for a megabyte."""
 
 CHATTER_BYTES = 1 << 16
 """So much of what OpenCASCADE prints is looked through for complaints."""
@@ -39,7 +43,8 @@ def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
         asked = Path(folder, "request")
         asked.write_text(json.dumps(request), encoding="utf-8")
         with chatter.open("wb") as words:
-            code = _run(asked, None if script else words.fileno(), file)
+            seconds = None if script else FILE_SECONDS + SECONDS_PER_MB * len(data) / 1e6
+            code = _run(asked, _STDERR if script else words.fileno(), seconds, file)
         result = _answer(answer, code, script, file)
         with chatter.open("rb") as words:
             said = words.read(CHATTER_BYTES).decode("utf-8", errors="replace")
@@ -51,20 +56,22 @@ def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
     return result | {"complaint": _complaint(said)}
 
 
-def _run(request: Path, output: int | None, file: str) -> int:
-    """The exit code of the worker; a script's words go to standard error."""
+def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
+    """The exit code of the worker, whose words go to this file descriptor."""
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-c", _START, str(request)],
             stdin=subprocess.DEVNULL,
-            stdout=_STDERR if output is None else output,
-            stderr=None if output is None else output,
-            timeout=None if output is None else FILE_SECONDS,
+            stdout=output,
+            stderr=output,
+            timeout=seconds,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
         raise DrawingError(
-            f"is not read after {FILE_SECONDS:g} s", file=file, mend="simplify the model"
+            f"is not read after {error.timeout:.0f} s: it is damaged, or too much for OpenCASCADE",
+            file=file,
+            mend="simplify the model, or export it again",
         ) from error
     return done.returncode
 

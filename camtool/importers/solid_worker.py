@@ -18,10 +18,13 @@ from camtool.importers.solid_shapes import Body
 _DAMAGED = "cannot be read: its structure is damaged"
 _AGAIN = "export it again as STEP (AP214 or AP242)"
 
+MAX_MEMORY_BYTES = 12 << 30
+"""The worker for a STEP or BREP file gets no more address space than this (on POSIX)."""
+
 
 def main(request: dict[str, Any]) -> None:
     """Does what is asked and writes the answer, or the error, to the file `request["answer"]`."""
-    _no_core_file()
+    _limit(None if request["kind"] == "script" else MAX_MEMORY_BYTES)
     try:
         result = found(request)
     except CamtoolError as error:
@@ -37,22 +40,26 @@ def found(request: dict[str, Any]) -> dict[str, Any]:
     `kind` ("step", "brep", "script"), `height` of a section or None, `tolerance` of fitting;
     lengths in the model's mm. `file` is the model's name for messages.
     """
-    from OCP.Standard import Standard_Failure
-
     script = request["kind"] == "script"
     try:
         bodies = _bodies(request)
         result = outlines(bodies, request["height"], request["tolerance"])
         faulty = sum(not _holds(body) for body in bodies)
-    # RuntimeError: what the binding makes of an exception that it does not know.
-    except (Standard_Failure, RuntimeError) as error:
-        mend = "mend the script" if script else _AGAIN
-        raise DrawingError(
-            "OpenCASCADE fails on the model" if script else _DAMAGED, mend=mend
-        ) from error
     except GeometryError as error:
         raise DrawingError(f"holds a curve that is none: {error.message}", mend=_AGAIN) from error
+    except Exception as error:
+        if not _is_of_kernel(error):
+            raise
+        message = "OpenCASCADE fails on the model" if script else _DAMAGED
+        raise DrawingError(message, mend="mend the script" if script else _AGAIN) from error
     return _plain(result) | {"faulty": faulty, "bodies": len(bodies)}
+
+
+def _is_of_kernel(error: Exception) -> bool:
+    """Whether OpenCASCADE raised it (its exceptions have no common class), or ran out of room."""
+    return type(error).__module__.startswith("OCP") or isinstance(
+        error, RuntimeError | MemoryError
+    )
 
 
 def _bodies(request: dict[str, Any]) -> list[Body]:
@@ -101,9 +108,11 @@ def _plain(result: Outlines) -> dict[str, Any]:
     }
 
 
-def _no_core_file() -> None:
-    """A worker that is brought down leaves nothing behind."""
+def _limit(memory: int | None) -> None:
+    """Bounds what a damaged file can do; a worker that is brought down leaves no core file."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        if memory is not None:
+            resource.setrlimit(resource.RLIMIT_AS, (memory, memory))

@@ -1,9 +1,14 @@
 """read_drawing: the format by content, files that are none, and what gets loaded."""
 
+import contextlib
+import gzip
+import io
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +16,28 @@ from hypothesis import strategies as st
 import camtool.importers
 from camtool.errors import DrawingError, OptionError
 from camtool.importers import ReadOptions, read_drawing
-from camtool.importers.read import find_format
+from camtool.importers import read as reader
+from camtool.importers.read import find_format, read_bytes
+
+
+def npy() -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, np.zeros((3, 2)))
+    return stream.getvalue()
+
+
+def npz() -> bytes:
+    stream = io.BytesIO()
+    np.savez(stream, a=np.zeros((3, 2)))
+    return stream.getvalue()
+
+
+def zipped(name: str) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr(name, "1,2")
+    return stream.getvalue()
+
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="10mm" height="10mm" viewBox="0 0 10 10">'
@@ -40,6 +66,28 @@ SVG = (
         (b"no sign of anything", ".SVG", "svg"),
         (b"no sign of anything", ".txt", "points"),
         (b"%PDF of points", ".csv", "points"),
+        (b"\xff\xfe" + "0\nSECTION\n".encode("utf-16-le"), "", "dxf"),
+        (b"\xef\xbb\xbf\n\n  999\nmade by\n  0\nSECTION\n", "", "dxf"),
+        (b"999\rcomment\r0\rSECTION\r", "", "dxf"),
+        (b"<!DOCTYPE svg [<!ENTITY a 'b>c'> ]>\n<!-- <html> --><svg:svg/>", "", "svg"),
+        ("<?xml version='1.0' encoding='utf-16'?><svg/>".encode("utf-16-le"), "", "svg"),
+        (b"<!-- " + 5000 * b"long " + b"--><svg/>", "", "svg"),
+        (b"<!-- never ends", "", "svg"),
+        (gzip.compress(b"<?xml version='1.0'?>\n<svg/>"), "", "svg"),
+        (b"ISO-10303-21;\nHEADER;", ".txt", "solid"),
+        (b"/* a */\n/* b */ ISO-10303-21;", "", "solid"),
+        (b"DBRep_DrawableShape\n\nCASCADE Topology V1", "", "solid"),
+        (b"\nCASCADE Topology V3, (c) Open Cascade", "", "solid"),
+        (b"\nOpen CASCADE Topology V4 (c)\n", "", "solid"),
+        (b"from build123d import *\n", ".py", "solid"),
+        (b"[1, 2]\n", ".py", "solid"),
+        (npy(), "", "points"),
+        (npz(), ".zip", "points"),
+        (b"% star\nxy = [1 2; 3 4]\n", "", "points"),
+        (b"lxy =\n[ 1 2 ]\n", ".txt", "points"),
+        (b"clear all\n", ".m", "points"),
+        (b"% 2 columns\n1 2\n", "", "points"),
+        (b"m1,m2\n1,2\n", ".csv", "points"),
     ],
 )
 def test_the_content_decides_and_the_name_hints(content: bytes, suffix: str, wanted: str) -> None:
@@ -56,6 +104,21 @@ def test_the_content_decides_and_the_name_hints(content: bytes, suffix: str, wan
         (b"\x89PNG\r\n", "trace it"),
         (b"\xff\xd8\xff\xe0", "trace it"),
         (b"words, and more words", "--format"),
+        (gzip.compress(b"0\nSECTION\n"), "gunzip"),
+        (zipped("a.dxf"), "unpack"),
+        (zipped("xl/workbook.xml"), "save it as CSV"),
+        (zipped("Document.xml"), "from FreeCAD"),
+        (b"<html><body/></html>", "export SVG or DXF"),
+        (b"<?xml version='1.0'?><gpx/>", "export SVG or DXF"),
+        (b"GIF89a", "trace it"),
+        (b"\xd0\xcf\x11\xe0", "export STEP or DXF"),
+        (b"solid cube\n facet normal 0 0 1\n", "export STEP"),
+        (b"IN;SP1;PU0,0;PD10,10;", "export SVG or DXF"),
+        (f"{'A file':72}S      1\n".encode(), "export STEP"),
+        (b"G21 G90\nG0 X1 Y2\n", "camtool verify"),
+        (b"%\nO1000\n(part)\nN10 G01 X1. Y2.\n", "camtool verify"),
+        (b"; by hand\nX0 Y0\nG1 X1 Y1 F100\n", "camtool verify"),
+        (b"G02X02969.00Y03400.00I03012.00J03040.00F08;\n", "camtool verify"),
         (b"\x00\x01\x02 1,2", "--format"),
     ],
 )
@@ -66,6 +129,61 @@ def test_what_is_no_drawing_is_told_what_to_do(content: bytes, mend: str, tmp_pa
         read_drawing(path)
     assert mend in caught.value.mend
     assert caught.value.file == str(path)
+
+
+class Input:
+    """Standard input that holds these bytes."""
+
+    def __init__(self, data: bytes) -> None:
+        self.buffer = io.BytesIO(data)
+
+
+def test_standard_input_is_told_by_its_content(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", Input(SVG.encode()))
+    assert read_drawing(Path("-")).file == "<stdin>"
+    monkeypatch.setattr(sys, "stdin", Input(b"1 2\n3 4\n"))
+    assert read_drawing(Path("-")).used == {"stroke": 1}
+    monkeypatch.setattr(sys, "stdin", Input(b"words and words"))
+    with pytest.raises(DrawingError, match=r"^<stdin>: is no drawing .*--format"):
+        read_drawing(Path("-"))
+    monkeypatch.setattr(sys, "stdin", Input(b""))
+    with pytest.raises(DrawingError, match="<stdin>: is empty"):
+        read_drawing(Path("-"))
+    monkeypatch.setattr(sys, "stdin", None)
+    with pytest.raises(DrawingError, match="no standard input"):
+        read_drawing(Path("-"))
+
+
+def test_a_file_that_is_too_large_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "large.csv"
+    with path.open("wb") as stream:  # a hole: it takes no room on the disk
+        stream.truncate(reader.MAX_FILE_BYTES + 1)
+    with pytest.raises(DrawingError, match="larger than 500 MB"):
+        read_drawing(path)
+    monkeypatch.setattr(reader, "MAX_FILE_BYTES", 10)
+    with pytest.raises(DrawingError, match="is larger than"):
+        read_drawing(Path("/dev/zero"))
+    monkeypatch.setattr(sys, "stdin", Input(b"1,2\n3,4\n5,6\n"))
+    with pytest.raises(DrawingError, match="is larger than"):
+        read_drawing(Path("-"))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [b"<!DOCTYPE svg [", b"<!--", b"<?", b"/*/", b"/**/", b"<!DOCTYPE a [ ] [", b" \n#\n", b"%"],
+)
+def test_the_format_of_a_long_head_is_found_in_no_time(head: bytes) -> None:
+    """Quadratic or worse would take minutes here."""
+    data = head * ((1 << 20) // len(head))
+    with contextlib.suppress(DrawingError):
+        find_format(data, "", "f")
+
+
+def test_bytes_are_read_by_the_name_they_come_with() -> None:
+    assert read_bytes(SVG.encode(), "a.svg").file == "a.svg"
+    assert read_bytes(b"1;2\n3;4", "a.tsv").used == {"stroke": 1}
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
@@ -126,8 +244,9 @@ def loaded(code: str) -> set[str]:
 
 
 def test_nothing_heavy_is_loaded_before_it_is_needed(tmp_path: Path) -> None:
-    heavy = {"ezdxf", "svgpathtools", "scipy", "build123d"}
-    assert not loaded("import camtool.importers") & (heavy | {"numpy", "defusedxml"})
+    heavy = {"ezdxf", "svgpathtools", "build123d", "OCP"}
+    rest = {"numpy", "scipy", "defusedxml"}
+    assert not loaded("import camtool.importers") & (heavy | rest)
     path = tmp_path / "part.svg"
     path.write_text(SVG)
     code = (
@@ -145,4 +264,4 @@ def test_any_bytes_have_a_format_or_a_clean_error(data: bytes, suffix: str) -> N
         name = find_format(data, suffix, "f")
     except DrawingError as error:
         name = str(error).partition(":")[0]
-    assert name in ("dxf", "svg", "points", "f")
+    assert name in ("dxf", "svg", "points", "solid", "f")
