@@ -1,0 +1,236 @@
+"""What is mended on reading, and what is told of it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camtool.errors import DrawingError
+from camtool.findings import Code, Severity
+from camtool.geometry.drawing import Drawing, FitError, Mark, Skipped, Units
+from camtool.geometry.polylines import Polyline
+from camtool.importers.assemble import assemble
+from camtool.importers.clean import cleaned
+from camtool.importers.options import ReadOptions, Selection
+from camtool.importers.piece import Piece
+from camtool.importers.told import MAX_PLACES
+
+
+def piece(
+    *points: tuple[float, ...],
+    closed: bool = False,
+    layer: str = "0",
+    colour: str = "#ff0000",
+    line_type: str = "",
+) -> Piece:
+    vertices = np.array([(*p, 0.0)[:3] for p in points], dtype=np.float64)
+    return Piece(vertices, closed, layer, colour, f"LINE {points[0]}", line_type)
+
+
+def put(*pieces: Piece, marks: tuple[Mark, ...] = (), **options: object) -> Drawing:
+    return assemble(
+        list(pieces),
+        file="t.dxf",
+        units=Units("mm", 1.0, "in a test"),
+        fit=FitError(),
+        used={},
+        skipped=[],
+        findings=[],
+        options=ReadOptions(**options),  # type: ignore[arg-type]
+        marks=marks,
+    )
+
+
+def found(drawing: Drawing, code: Code) -> list[str]:
+    return [f.message for f in drawing.findings if f.code == code]
+
+
+SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)]
+
+
+def test_what_lies_twice_is_one_finding_with_its_length() -> None:
+    square = piece(*SQUARE[:4], closed=True)
+    drawing = put(square, square, piece((2, 0), (5, 0)), piece((8, 0), (14, 0)))
+    assert [len(path) for path in drawing.paths] == [4, 1]
+    healed = drawing.healing
+    assert (healed.duplicates, healed.duplicates_mm) == (1, pytest.approx(40.0))
+    assert (healed.overlaps, healed.overlaps_mm) == (2, pytest.approx(5.0))
+    (finding,) = [f for f in drawing.findings if f.code == Code.DRAWN_TWICE]
+    assert finding.severity == Severity.INFO
+    assert finding.measured == pytest.approx(45.0)
+    assert not found(drawing, Code.ENTITY_SKIPPED)
+
+
+def test_a_contour_drawn_over_with_lines_stays_one_contour() -> None:
+    lines = [piece(a, b) for a, b in itertools.pairwise(SQUARE)]
+    drawing = put(piece(*SQUARE[:4], closed=True), *lines)
+    assert drawing.paths.closed.tolist() == [True]
+    assert drawing.healing.overlaps == 4
+
+
+def test_other_layers_and_colours_are_cut_again() -> None:
+    lines = [piece((0, 0), (9, 0)), piece((1, 0), (5, 0), layer="B"),
+             piece((1, 0), (5, 0), colour="#0000ff")]  # fmt: skip
+    assert put(*lines).healing.overlaps == 0
+    across = put(*lines, across_layers=True)
+    assert across.healing.overlaps == 1
+    assert across.layers == ("0", "0")
+
+
+def test_ends_of_other_layers_join_when_asked() -> None:
+    lines = [piece((0, 0), (9, 0), layer="A"), piece((9, 0.004), (9, 9), layer="B")]
+    assert len(put(*lines).paths) == 2
+    across = put(*lines, across_layers=True)
+    assert across.layers == ("A",)
+    assert [(gap.layer, gap.size_mm) for gap in across.closed_gaps] == [
+        ("A", pytest.approx(0.004))
+    ]
+
+
+def test_branches_are_told_with_place_and_number_of_ends() -> None:
+    tee = [piece((0, 0), (5, 0)), piece((5, 0), (9, 0)), piece((5, 0), (5, 7))]
+    drawing = put(*tee)
+    (finding,) = [f for f in drawing.findings if f.code == Code.BRANCHED]
+    assert (finding.severity, finding.measured) == (Severity.WARNING, 3.0)
+    assert finding.where == "layer 0, x 5.0000 y 0.0000 mm"
+    assert sorted(len(path) for path in drawing.paths) == [1, 2]
+
+
+def test_at_a_branch_lines_of_one_kind_are_joined() -> None:
+    ends = [((0, 0), "CONTINUOUS"), ((9, 0), "DASHED"), ((5, 7), "CONTINUOUS")]
+    drawing = put(*(piece(at, (5, 0), line_type=kind) for at, kind in ends))
+    assert sorted(drawing.line_types) == ["CONTINUOUS", "DASHED"]
+    assert dict(zip(drawing.line_types, map(len, drawing.paths), strict=True)) == {
+        "CONTINUOUS": 2,
+        "DASHED": 1,
+    }
+
+
+def test_contours_that_cross_themselves_are_told() -> None:
+    drawing = put(piece((0, 0), (5, 5), (5, 0), (0, 5), closed=True))
+    (finding,) = [f for f in drawing.findings if f.code == Code.SELF_CROSSING]
+    assert finding.severity == Severity.WARNING
+    assert finding.where == "layer 0, x 2.5000 y 2.5000 mm"
+    assert [c.at_mm for c in drawing.healing.crossings] == [pytest.approx((2.5, 2.5))]
+
+
+def test_many_places_end_in_one_count() -> None:
+    ties = [
+        piece((0, 6 * k), (5, 6 * k + 5), (5, 6 * k), (0, 6 * k + 5), closed=True)
+        for k in range(MAX_PLACES + 3)
+    ]
+    messages = found(put(*ties), Code.SELF_CROSSING)
+    assert len(messages) == MAX_PLACES + 1
+    assert messages[-1] == "3 more closed contours cross themselves"
+    tees = [
+        piece((0, 6 * k), end) for k in range(MAX_PLACES + 3) for end in
+        ((-2, 6 * k), (2, 6 * k), (0.5, 6 * k + 2))
+    ]  # fmt: skip
+    messages = found(put(*tees), Code.BRANCHED)
+    assert len(messages) == MAX_PLACES + 1
+    assert messages[-1] == "more than two ends meet at 3 more places"
+
+
+def test_specks_are_merged_within_the_tolerance() -> None:
+    drawing = put(piece((0, 0), (5, 0), (5, 0.004), (5, 5)), tolerance_mm=0.01)
+    assert [len(path) for path in drawing.paths] == [2]
+    assert drawing.healing.tiny_merged == 1
+    assert found(drawing, Code.TINY_MERGED)
+    assert not found(put(piece((0, 0), (5, 0), (5, 0.006), (5, 5)), tolerance_mm=0.01),
+                     Code.TINY_MERGED)  # fmt: skip
+
+
+def test_arcs_are_recognised_when_asked_after_loose_chords_were_joined(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[int] = []
+
+    def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
+        seen.append(len(path))
+        assert tolerance_mm == 0.002
+        return path, 2
+
+    stand_in = ModuleType("camtool.geometry.recognise")
+    stand_in.recognise_arcs = recognise_arcs  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "camtool.geometry.recognise", stand_in)
+    lines = [piece(a, b) for a, b in itertools.pairwise(SQUARE)]
+    assert put(*lines).healing.arcs_recognised == 0
+    assert seen == []
+    drawing = put(*lines, recognise_arcs=True, tolerance_mm=0.002)
+    assert (seen, drawing.healing.arcs_recognised) == ([4], 2)
+    assert found(drawing, Code.ARCS_RECOGNISED)
+
+
+HOLES = (Mark((1.0, 2.0), "holes", "", "POINT 1"), Mark((5.0, 2.0), "pins", "", "POINT 2"))
+
+
+def test_a_drawing_of_marks_alone_has_no_paths() -> None:
+    drawing = put(marks=HOLES)
+    assert (len(drawing.paths), drawing.marks) == (0, HOLES)
+
+
+def test_marks_are_chosen_as_pieces_are() -> None:
+    line = piece((0, 0), (9, 0))
+    drawing = put(line, marks=HOLES, select=Selection(layers=("pins",)))
+    assert (len(drawing.paths), drawing.marks) == (0, HOLES[1:])
+    assert set(drawing.skipped) == {
+        Skipped("LINE", 1, "is on a layer that was not asked for"),
+        Skipped("POINT", 1, "is on a layer that was not asked for"),
+    }
+    assert len(put(line, marks=HOLES, select=Selection(layers=("0",))).paths) == 1
+    with pytest.raises(DrawingError, match="holes, pins"):
+        put(marks=HOLES, select=Selection(layers=("hole",)))
+
+
+def test_a_hole_is_drilled_once() -> None:
+    drawing = put(marks=(*HOLES, Mark((1.0 + 1e-9, 2.0), "holes", "", "POINT 3")))
+    assert drawing.marks == HOLES
+    assert drawing.skipped == (Skipped("POINT", 1, "is drawn twice"),)
+    assert found(drawing, Code.ENTITY_SKIPPED) == ["1 POINT left out: is drawn twice"]
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, 2e9])
+def test_marks_that_are_no_place_are_errors(wrong: float) -> None:
+    with pytest.raises(DrawingError, match=r"^t\.dxf: layer holes, POINT 1: "):
+        put(marks=(Mark((1.0, wrong), "holes", "", "POINT 1"),))
+
+
+@given(
+    st.lists(
+        st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), min_size=2, max_size=4),
+        min_size=1, max_size=12,
+    ),
+    st.lists(st.sampled_from([0.0, 0.5, -0.5]), min_size=4, max_size=4),
+    st.booleans(),
+)  # fmt: skip
+def test_drawn_once_equals_brute_force(
+    rows: list[list[tuple[int, int]]], bulges: list[float], closed: bool
+) -> None:
+    pieces = [
+        piece(*((*p, b) for p, b in zip(points, bulges, strict=False)), closed=closed)
+        for points in rows
+    ]
+    clean = cleaned(pieces, "t.dxf")
+
+    def segments(path: Polyline) -> tuple[bool, list[tuple[object, ...]]]:
+        """The segments of a path, each the same in both directions, in any order."""
+        ends = np.roll(path.vertices, -1, axis=0)
+        both = [
+            min((*a[:2], *b[:2], a[2]), (*b[:2], *a[:2], 0.0 - a[2]))
+            for a, b in zip(path.vertices.tolist(), ends.tolist(), strict=True)
+        ]
+        return path.closed, sorted(both if path.closed else both[:-1])
+
+    alone = [cleaned([one], "t.dxf").lines for one in pieces]
+    wanted = [segments(lines[0]) for lines in alone if len(lines)]
+    kept = [segments(path) for path in clean.lines]
+    assert len(kept) + clean.duplicates == len(wanted)
+    assert all(kept.count(one) == 1 for one in kept)
+    assert all(one in kept for one in wanted)
