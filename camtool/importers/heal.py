@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from camtool.geometry.chain import Chained, Kinds, chain, numbered
 from camtool.geometry.crossings import self_crossings_of
 from camtool.geometry.drawing import Gap, Healing
@@ -50,8 +52,7 @@ def healed(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Hea
     chained = _chained(pieces, single.lines, of, options)
     lines, arcs = _recognised(chained.lines, options)
     merged = without_tiny(lines, TINY_SHARE * options.tolerance_mm)
-    rows = of.tolist()
-    members = tuple(tuple(dict.fromkeys(rows[index] for index in one)) for one in chained.members)
+    members = _members(chained.members, of)
     return Healed(
         lines=merged.lines,
         members=members,
@@ -68,6 +69,14 @@ def healed(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Hea
             crossings=self_crossings_of(merged.lines, [pieces[one[0]].layer for one in members]),
         ),
     )
+
+
+def _members(chains: tuple[tuple[int, ...], ...], of: Ints) -> tuple[tuple[int, ...], ...]:
+    """The pieces of each chain of paths, each once; `of` says which piece each path is from."""
+    if np.array_equal(of, np.arange(len(of))):
+        return chains
+    rows = of.tolist()
+    return tuple(tuple(dict.fromkeys(rows[index] for index in one)) for one in chains)
 
 
 def _chained(pieces: Sequence[Piece], lines: Polylines, of: Ints, options: ReadOptions) -> Chained:
