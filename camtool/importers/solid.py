@@ -61,7 +61,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         units=units,
         fit=overall(fits),
         used=dict(Counter(outline["kind"] for outline in found["outlines"])),
-        skipped=_missed(found["missed"], height),
+        skipped=[Skipped("body", count, why) for why, count in found["missed"].items()],
         findings=[*_faults(found), *_chosen(found, scale, height)],
         options=options,
     )
@@ -104,12 +104,6 @@ def _pieces(outlines: list[dict[str, Any]], scale: float) -> tuple[list[Piece], 
                 Fit(vertices[:0], *(scale * size for size in sizes)) for sizes in path["fits"]
             )
     return pieces, fits
-
-
-def _missed(count: int, height: float | None) -> list[Skipped]:
-    """The bodies of which nothing is drawn."""
-    why = "has no level face that looks up" if height is None else "is not cut by the section"
-    return [Skipped("body", count, why)] if count else []
 
 
 def _faults(found: dict[str, Any]) -> list[Finding]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from camtool.errors import DrawingError
-from camtool.importers.solid_shapes import Body, colour_of, has_edges, layer_of, solids_in
+from camtool.importers.solid_shapes import Body, colour_of, layer_of, parts_in
 
 _AGAIN = "export it again as STEP (AP214 or AP242)"
 
@@ -49,7 +49,7 @@ def load_brep(path: str) -> list[Body]:
     )
     if not read or shape.IsNull():
         raise DrawingError("cannot be read: its structure is damaged", mend=_AGAIN)
-    return [Body(solid, "0", "") for solid in solids_in(shape) if has_edges(solid)]
+    return [Body(part, "0", "") for part in parts_in(shape)]
 
 
 class _Tree:
@@ -95,11 +95,9 @@ class _Tree:
         shape = self.shapes.GetShape_s(original)
         if shape.IsNull():
             return []
-        solids = solids_in(shape)
         return [
-            Body(solid.Moved(place), layer, self._shape_colour(solid) or colour)
-            for solid in solids
-            if has_edges(solid)
+            Body(part.Moved(place), layer, self._shape_colour(part) or colour)
+            for part in parts_in(shape)
         ]
 
     def _colour(self, label: Any) -> str:

@@ -8,6 +8,7 @@ a section shares with it.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,7 +23,7 @@ SECTION_MARGIN = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The wires of one face; `kind` is "face", "section" or "wire"."""
+    """The wires of one face; `kind` is "face", "section", "wire" or "edge"."""
 
     kind: str
     layer: str
@@ -33,13 +34,13 @@ class Outline:
 @dataclass(frozen=True, eq=False)
 class Outlines:
     """All that is drawn; `levels` are the heights at which solids were taken, `span` is the
-    height of the whole model from its lowest to its highest point; of `missed` bodies nothing is
-    drawn."""
+    height of the whole model from its lowest to its highest point; of the `missed` bodies nothing
+    is drawn, for these reasons."""
 
     outlines: list[Outline] = field(default_factory=list)
     levels: list[float] = field(default_factory=list)
     span: tuple[float, float] = (0.0, 0.0)
-    missed: int = 0
+    missed: dict[str, int] = field(default_factory=dict)
 
 
 def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outlines:
@@ -54,17 +55,25 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
         )
     found: list[Outline] = []
     levels: list[float] = []
-    missed = 0
+    missed: Counter[str] = Counter()
     for body, box in zip(bodies, boxes, strict=True):
         kind, faces, edges, level = _taken(body, box, height)
         wires = [_wires(face, tolerance) for face in faces]
         if edges:
             wires.append([edge_path(edge, tolerance) for edge in edges])
         found.extend(Outline(kind, body.layer, body.colour, paths) for paths in wires)
-        missed += not wires
+        if not wires:
+            missed[_reason(kind, height)] += 1
         if wires and level is not None:
             levels.append(level)
-    return Outlines(found, levels, (low, high), missed)
+    return Outlines(found, levels, (low, high), dict(missed))
+
+
+def _reason(kind: str, height: float | None) -> str:
+    """Why nothing of a body is drawn."""
+    if height is not None:
+        return "is not cut by the section"
+    return "has no level face that looks up" if kind == "face" else "is not level"
 
 
 def _taken(
@@ -73,35 +82,24 @@ def _taken(
     """Kind, faces, loose edges and height of what is drawn of one body."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 
+    flat = box[5] - box[2] <= POSITION_EPS_MM
+    reached = height is None or box[2] - POSITION_EPS_MM <= height <= box[5] + POSITION_EPS_MM
     faces = subshapes(body.shape, TopAbs_FACE)
     if not faces:
-        _check_flat(box)
-        return "wire", [], _inside(subshapes(body.shape, TopAbs_EDGE), box, height), None
-    if body.shape.ShapeType() != TopAbs_SOLID and box[5] - box[2] <= POSITION_EPS_MM:
-        return "face", _inside(faces, box, height), [], None
+        kind = "edge" if body.shape.ShapeType() == TopAbs_EDGE else "wire"
+        edges = subshapes(body.shape, TopAbs_EDGE)
+        return kind, [], edges if flat and reached else [], None
+    if body.shape.ShapeType() != TopAbs_SOLID and flat:
+        return "face", faces if reached else [], [], None
     if height is not None:
-        if not box[2] - POSITION_EPS_MM <= height <= box[5] + POSITION_EPS_MM:
+        if not reached:
             return "section", [], [], height
         return "section", *_section(body.shape, box, height), height
     levels = [(level, face) for face in faces if (level := _level(face)) is not None]
-    if not levels:
+    top = max((level for level, _ in levels), default=None)
+    if top is None:
         return "face", [], [], None
-    top = max(level for level, _ in levels)
     return "face", [face for level, face in levels if top - level <= POSITION_EPS_MM], [], top
-
-
-def _inside(parts: list[Any], box: tuple[float, ...], height: float | None) -> list[Any]:
-    """Flat parts, when no section is asked for or the section is at their height."""
-    flat = height is None or abs(height - box[2]) <= POSITION_EPS_MM
-    return parts if flat else []
-
-
-def _check_flat(box: tuple[float, ...]) -> None:
-    if box[5] - box[2] > POSITION_EPS_MM:
-        raise DrawingError(
-            f"a wire is not level: it spans z = {box[2]:.6g} to {box[5]:.6g}",
-            mend="draw it on the XY plane or one parallel to it",
-        )
 
 
 def _level(face: Any) -> float | None:

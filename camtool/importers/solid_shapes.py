@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 _NO_NAME = re.compile(
@@ -18,7 +19,7 @@ _NO_NAME = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """One solid, or what stands for none (a sketch, a shell, a wire): a `TopoDS_Shape`."""
+    """One solid, or a shell, face, wire or edge that belongs to none: a `TopoDS_Shape`."""
 
     shape: Any
     layer: str
@@ -26,7 +27,7 @@ class Body:
 
 
 def shape_bodies(shape: Any) -> list[Body]:
-    """The solids of a build123d shape with the names and colours of its tree, else itself."""
+    """The parts of a build123d shape with the names and colours of its tree."""
     return _tree_bodies(shape.wrapped, shape, "0", "")
 
 
@@ -45,23 +46,28 @@ def _tree_bodies(topods: Any, shape: Any, layer: str, colour: str) -> list[Body]
                 for part, child in zip(parts, children, strict=True)
                 for body in _tree_bodies(part, child, layer, colour)
             ]
-    return [Body(solid, layer, colour) for solid in solids_in(topods) if has_edges(solid)]
+    return [Body(part, layer, colour) for part in parts_in(topods)]
 
 
-def solids_in(shape: Any) -> list[Any]:
-    """All solids of a shape; the shape itself when it has none."""
-    from OCP.TopAbs import TopAbs_SOLID
+def parts_in(shape: Any) -> list[Any]:
+    """All solids of a shape, and the shells, faces, wires and edges that belong to none."""
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
 
-    return subshapes(shape, TopAbs_SOLID) or [shape]
+    kinds = (TopAbs_SOLID, TopAbs_SHELL, TopAbs_FACE, TopAbs_WIRE, TopAbs_EDGE)
+    parts = subshapes(shape, TopAbs_SOLID)
+    for above, kind in pairwise(kinds):
+        parts.extend(subshapes(shape, kind, above))
+    return [part for part in parts if has_edges(part)]
 
 
-def subshapes(shape: Any, kind: Any) -> list[Any]:
-    """All parts of this kind (`TopAbs_FACE` …), each once."""
+def subshapes(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
+    """All parts of this kind (`TopAbs_FACE` …), each once; with `outside` none that is in such."""
+    from OCP.TopAbs import TopAbs_SHAPE
     from OCP.TopExp import TopExp_Explorer
 
     found: dict[int, list[Any]] = {}
     parts: list[Any] = []
-    explorer = TopExp_Explorer(shape, kind)
+    explorer = TopExp_Explorer(shape, kind, TopAbs_SHAPE if outside is None else outside)
     while explorer.More():
         part = explorer.Current()
         same = found.setdefault(hash(part), [])
@@ -97,13 +103,14 @@ def colour_of(colour: Any) -> str:
 
 def _typed(shape: Any) -> Any:
     """The shape as the class of its kind; the binding has other names since version 8."""
-    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID, TopAbs_WIRE
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
     from OCP.TopoDS import TopoDS
 
     names = {
         TopAbs_EDGE: "Edge",
         TopAbs_WIRE: "Wire",
         TopAbs_FACE: "Face",
+        TopAbs_SHELL: "Shell",
         TopAbs_SOLID: "Solid",
     }
     name = names[shape.ShapeType()]

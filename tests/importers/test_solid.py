@@ -196,7 +196,7 @@ def test_an_offset_curve_is_asked_for_points() -> None:
         "result = Edge(BRepBuilderAPI_MakeEdge(curve).Edge())\n",
         tolerance_mm=1e-3,
     )
-    assert drawing.used == {"wire": 1}
+    assert drawing.used == {"edge": 1}
     # A parallel curve of a convex one is longer by 2π times its distance.
     around = 48.44224110273838
     assert path_lengths(drawing.paths)[0] == pytest.approx(around + 2 * math.pi, abs=0.01)
@@ -266,7 +266,14 @@ def test_units_of_a_step_file_are_read_or_left_open() -> None:
         ("with BuildSketch(Plane.XY.offset(3)) as sketch:\n    Circle(2)", {"face": 1}),
         ("sketch = Circle(1)\npart = extrude(sketch, 3)", {"face": 1}),
         ("result = [Box(1, 2, 3), Pos(9, 0, 0) * Rectangle(3, 2)]", {"face": 2}),
-        ("with BuildLine() as result:\n    Polyline((0, 0), (3, 0), (3, 3))", {"wire": 1}),
+        ("with BuildLine() as result:\n    Polyline((0, 0), (3, 0), (3, 3))", {"edge": 2}),
+        ("result = Wire([Line((0, 0), (3, 0)), Line((3, 0), (3, 3))])", {"wire": 1}),
+        ("part = Compound([Box(1, 2, 3), Face(Wire.make_circle(9))])", {"face": 2}),
+        (
+            "a = Box(1, 2, 3)\npart = Compound([a, Edge.make_line((9, 0), (9, 1))])",
+            {"face": 1, "edge": 1},
+        ),
+        ("part = Box(1, 2, 3).shell()", {"face": 1}),
         ("import sys\npart = Box(1, 2, 3)\nsys.exit(0)", {"face": 1}),
         ("result = Cylinder(3, 2).faces().sort_by(Axis.Z)[-1]", {"face": 1}),
     ],
@@ -290,7 +297,7 @@ def test_what_a_script_may_leave(text: str, used: dict[str, int]) -> None:
         ("with BuildPart() as part:\n    pass", None, "part is empty"),
         ("part = Sphere(2)", None, "holds no lines or curves, only 1 body (has no level face"),
         ("sketch = Plane.XZ * Circle(2)", None, "has no level face"),
-        ("result = Line((0, 0, 0), (1, 1, 1))", None, "a wire is not level"),
+        ("result = Line((0, 0, 0), (1, 1, 1))", None, "only 1 body (is not level)"),
         ("fillet(Box(1, 1, 1).edges(), 3)", "line 2", "stopped with"),
     ],
 )
