@@ -1,0 +1,146 @@
+"""Polylines that were arcs become arcs again: chords whose ends lie on one circle.
+
+Drawings are often exploded into chords. A run of chords becomes an arc when
+
+- it has at least `MIN_POINTS` points, each chord turns by at most `MAX_TURN_RAD` and all turn to
+  the same side (so polygons of up to fifteen sides stay what they are);
+- the chords are alike in length, save that the first and the last may be shorter (so an arc ends
+  where a straight line begins, even when their joint is tangent);
+- the points lie on the circle within the tolerance, and what they are off looks like noise: no
+  more than the last decimal of the file, or rough along the run. Chords of a spline or an ellipse
+  are off smoothly and stay chords.
+
+The arc begins and ends exactly at points of the path. Every point that it replaces is measured
+against it afterwards: none is off by more than the tolerance, or the chords stay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from camtool.geometry.polylines import Bools, Floats, Polyline
+
+NOISE_MM = 1e-7
+"""Points of exact drawings lie on their circle within this."""
+
+DECIMALS = range(1, 7)
+"""Numbers of decimals that files round to."""
+
+GRID_SHARE = 1e-3
+"""A number is rounded when it is off its decimals by no more than this share of the last one."""
+
+ROUNDING = 0.75
+"""Rounding moves a point by no more than this share of the last decimal (½·√2, and a little)."""
+
+
+HALF_SLACK = 1e-3
+"""An arc of more than a half circle by no more than this share is tried as a half circle first."""
+
+
+def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
+    """The path with runs of chords on one circle replaced by arcs, and how many arcs were found.
+
+    Each point that an arc replaces lies within `tolerance_mm` of it; existing arcs and all other
+    lines stay. An arc of more than a half circle counts once, though it is written as two; so
+    does a whole circle.
+    """
+    from camtool.kernels.recognise import MIN_POINTS
+
+    if len(path.vertices) < MIN_POINTS:
+        return path, 0
+    noise = min(rounding_noise(path.vertices[:, :2]), tolerance_mm)
+    vertices = path.vertices
+    if path.closed:
+        vertices = np.concatenate([vertices, vertices[:1]])
+    rows, found = _replaced(vertices, noise, tolerance_mm)
+    if path.closed and found and not _whole(rows):
+        # Begin anew where an arc ends, so that no arc is cut by where the path began.
+        first = found[0][1] % len(path.vertices)
+        vertices = np.roll(path.vertices, -first, axis=0)
+        rows, found = _replaced(np.concatenate([vertices, vertices[:1]]), noise, tolerance_mm)
+    if not found:
+        return path, 0
+    return Polyline(rows[:-1] if path.closed else rows, path.closed), len(found)
+
+
+def rounding_noise(points: Floats) -> float:
+    """How far rounding to decimals has moved the points, mm: from the fewest decimals that say
+    all of them, `NOISE_MM` when none of `DECIMALS` do."""
+    for decimals in DECIMALS:
+        units = points * 10.0**decimals
+        if np.abs(units - np.round(units)).max() <= GRID_SHARE:
+            return max(NOISE_MM, ROUNDING * 10.0**-decimals)
+    return NOISE_MM
+
+
+def _replaced(
+    vertices: Floats, noise: float, tolerance_mm: float
+) -> tuple[Floats, list[tuple[int, int]]]:
+    """The open path with its arcs, and the first and last vertex of each before."""
+    from camtool.kernels.recognise import MIN_POINTS, find_runs, furthest_off
+
+    keep = np.ones(len(vertices), dtype=np.bool_)
+    found: list[tuple[int, int]] = []
+    inserted: list[tuple[int, Floats]] = []
+    rows = vertices.copy()
+    for begin, end in _line_runs(vertices):
+        if end - begin + 1 < MIN_POINTS:
+            continue
+        points = np.ascontiguousarray(vertices[begin : end + 1, :2])
+        for run in find_runs(points, noise, tolerance_mm):
+            low, high = begin + int(run[0]), begin + int(run[1])
+            inner = points[int(run[0]) : int(run[1]) + 1]
+            for arc in _arcs(vertices[low, :2], vertices[high, :2], run[2:]):
+                if furthest_off(inner, arc) <= tolerance_mm:
+                    break
+            else:
+                continue
+            keep[low + 1 : high] = False
+            rows[low] = arc[0]
+            rows[high, :2] = arc[-1, :2]
+            if len(arc) == 3:
+                inserted.append((low + 1, arc[1]))
+            found.append((low, high))
+    if not found:
+        return vertices, found
+    place = np.cumsum(keep) - 1  # where a kept row is afterwards
+    kept = rows[keep]
+    if inserted:
+        at = [int(place[row - 1]) + 1 for row, _ in inserted]
+        kept = np.insert(kept, at, np.array([row for _, row in inserted]), axis=0)
+    return kept, found
+
+
+def _line_runs(vertices: Floats) -> list[tuple[int, int]]:
+    """First and last vertex of each run of lines without an arc between."""
+    straight: Bools = np.concatenate([[False], vertices[:-1, 2] == 0.0, [False]])
+    edges = np.flatnonzero(np.diff(straight.astype(np.int8)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
+    """Vertices of the arc about `circle` (centre, radius, sweep) from start to end: two rows, or
+    three with a point in its middle when it is more than a half circle."""
+    centre, radius, sweep = circle[:2], float(circle[2]), float(circle[3])
+    turn = math.copysign(1.0, sweep)
+    if np.array_equal(start, end):
+        side = (start - centre) / np.hypot(*(start - centre))
+        around, across = centre + radius * side, centre - radius * side
+        yield np.array([[*around, turn], [*across, turn], [*around, 0.0]])
+        return
+    if abs(sweep) <= math.pi * (1.0 + HALF_SLACK):
+        bulge = math.tan(0.25 * sweep)
+        yield np.array([[*start, bulge if abs(bulge) < 1.0 else turn], [*end, 0.0]])
+    if abs(sweep) > math.pi:
+        angle = math.atan2(start[1] - centre[1], start[0] - centre[0]) + 0.5 * sweep
+        middle = centre + radius * np.array([math.cos(angle), math.sin(angle)])
+        bulge = math.tan(0.125 * sweep)
+        yield np.array([[*start, bulge], [*middle, bulge], [*end, 0.0]])
+
+
+def _whole(rows: Floats) -> bool:
+    """Whether a closed path became one circle of two halves."""
+    return len(rows) == 3 and bool((np.abs(rows[:2, 2]) == 1.0).all())
