@@ -49,7 +49,9 @@ def plain_biarc(a: Floats, out: Floats, b: Floats, into: Floats) -> Floats | Non
     halves = [_angle(out, joint - a), _angle(b - joint, into)]
     if max(abs(half) for half in halves) > 0.5 * math.pi:
         return None
-    return np.array([[*a, math.tan(0.5 * halves[0])], [*joint, math.tan(0.5 * halves[1])], [*b, 0]])
+    return np.array(
+        [[*a, math.tan(0.5 * halves[0])], [*joint, math.tan(0.5 * halves[1])], [*b, 0]]
+    )
 
 
 def plain_single(a: Floats, out: Floats, b: Floats, into: Floats, slack: float) -> Floats | None:
@@ -88,7 +90,11 @@ MISSES = 12
 
 
 def _cost(
-    points: Floats, arrive: Floats, leave: Floats, span: tuple[int, int], limits: tuple[float, float]
+    points: Floats,
+    arrive: Floats,
+    leave: Floats,
+    span: tuple[int, int],
+    limits: tuple[float, float],
 ) -> int:
     low, high = span
     between = points[low + 1 : high]
