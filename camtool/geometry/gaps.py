@@ -6,6 +6,7 @@ when it is small against the paths that it parts.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -27,6 +28,10 @@ SHARPEST_TURN_RAD = 2.6
 """Two paths that would turn by more than this where they nearly meet lie side by side, as the
 lines of a hatch do: their ends are no gap."""
 
+SPACING_SHARE = 0.1
+"""Ends of two paths are a gap when they are nearer than this share of the distance that ends
+strewn at random over the drawing would have: among very many strokes some ends are near."""
+
 FINEST_CELLS = 16.0
 """The grid in which near ends are looked for has no cell below this share of the reach."""
 
@@ -45,7 +50,10 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
             ends.points[rows], NEAR_GAPS * max(gap_mm, POSITION_EPS_MM)
         )
         one, other = rows[one], rows[other]
-        near = _is_gap(ends, lengths, one, other, size)
+        at_random = SPACING_SHARE * _spacing(ends.points[rows])
+        near = _is_gap(ends, lengths, one, other, size) & (
+            (one // 2 == other // 2) | (size <= at_random)
+        )
         for a, b, apart in zip(
             one[near].tolist(), other[near].tolist(), size[near].tolist(), strict=True
         ):
@@ -61,6 +69,16 @@ def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -
     small = size <= np.where(own, OWN_GAP_SHARE, GAP_SHARE) * shorter
     turn = np.abs(wrapped(ends.leaving[one] - ends.leaving[other] - np.pi))
     return np.asarray(small & (own | (turn <= SHARPEST_TURN_RAD)))
+
+
+def _spacing(points: Floats) -> float:
+    """The mean distance of the nearest one of points strewn over the box of these, mm.
+
+    It is half the square root of the area that each has, and half the length on a line.
+    """
+    width, height = (float(side) for side in np.ptp(points, axis=0))
+    count = len(points)
+    return max(0.5 * math.sqrt(width * height / count), 0.5 * max(width, height) / count)
 
 
 def _nearest_ends(points: Floats, reach: float) -> tuple[Ints, Ints, Floats]:

@@ -149,7 +149,7 @@ def test_layers_are_not_mixed() -> None:
     paths = Polylines.of([_path((0, 0), (1, 0)), _path((1, 0), (2, 0))])
     assert len(chain(paths, GAP, ["A", "B"]).lines) == 2
     assert len(chain(paths, GAP, ["A", "A"]).lines) == 1
-    near = Polylines.of([_path((0, 0), (1, 0)), _path((1.04, 0), (2, 0))])
+    near = Polylines.of([_path((0, 0), (1, 0)), _path((1.02, 0), (2, 0))])
     gaps = chain(near, GAP, ["A", "A"])
     assert [gap.layer for gap in gaps.open_gaps] == ["A"]
 

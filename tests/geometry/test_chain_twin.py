@@ -187,6 +187,13 @@ def test_lines_of_a_hatch_have_no_gaps_at_their_ends() -> None:
     assert chain(hatch, GAP).open_gaps == ()
 
 
+def test_of_very_many_strokes_some_are_near_by_chance() -> None:
+    rng = np.random.default_rng(1)
+    begin = 100.0 * rng.random((2000, 2))
+    rows = np.column_stack([begin, begin + rng.normal(scale=30.0, size=begin.shape)])
+    assert len(chain(_lines(*rows.tolist()), GAP).open_gaps) < 0.05 * len(rows)
+
+
 def test_short_strokes_near_each_other_are_meant_so() -> None:
     strokes = _lines((0, 0, 0.3, 0), (0.35, 0, 0.6, 0.1), (0.3, 0.05, 0.3, 0.4))
     assert chain(strokes, GAP).open_gaps == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import sys
 from types import ModuleType
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, FitError, Mark, Skipped, Units
+from camtool.geometry.facts import drawing_facts
 from camtool.geometry.polylines import Polyline
 from camtool.importers.assemble import assemble
 from camtool.importers.clean import cleaned
@@ -234,3 +236,35 @@ def test_drawn_once_equals_brute_force(
     assert len(kept) + clean.duplicates == len(wanted)
     assert all(kept.count(one) == 1 for one in kept)
     assert all(one in kept for one in wanted)
+
+
+NUMBERS = st.one_of(
+    st.sampled_from([0.0, 1.0, 1.0 + 1e-7, 1.00001, 5.0, -1e9, 1e9, 2e9, 1e300, math.nan]),
+    st.floats(-1e9, 1e9),
+)
+ANY_PIECE = st.builds(
+    lambda rows, closed, layer: piece(*rows, closed=closed, layer=layer),
+    st.lists(
+        st.tuples(NUMBERS, NUMBERS, st.sampled_from([0.0, 0.5, -1.0, 1e-300, 3.0, 1e300])),
+        min_size=1,
+        max_size=6,
+    ),
+    st.booleans(),
+    st.sampled_from("AB"),
+)
+
+
+@given(
+    st.lists(ANY_PIECE, max_size=8),
+    st.sampled_from([1e-9, 0.0005, 10.0, 1e12]),
+    st.sampled_from([0.0, 0.01, 1e6]),
+    st.booleans(),
+)
+def test_any_pieces_are_assembled_or_refused(
+    pieces: list[Piece], tolerance_mm: float, gap_mm: float, across: bool
+) -> None:
+    try:
+        drawing = put(*pieces, tolerance_mm=tolerance_mm, gap_mm=gap_mm, across_layers=across)
+    except DrawingError:
+        return
+    json.dumps(drawing_facts(drawing))
