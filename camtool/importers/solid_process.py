@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -28,6 +29,7 @@ _START = (
     "from camtool.importers.solid_worker import main; main(request)"
 )
 _STDERR = 2
+_COLOURS = re.compile(r"\x1b\[[\d;]*m")
 
 
 def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
@@ -91,9 +93,8 @@ def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
 
 
 def _complaint(said: str) -> str:
-    """The first line in which OpenCASCADE speaks of an error, without its ornaments."""
-    for line in said.splitlines():
+    """The first line in which OpenCASCADE speaks of an error, without its ornaments; else ""."""
+    for line in _COLOURS.sub("", said).splitlines():
         if "ERR" in line or "FAIL" in line.upper():
-            plain = "".join(sign for sign in line.partition("\x1b[0m")[0] if sign.isprintable())
-            return plain.replace("[31;1m", "").strip(" *")
+            return "".join(sign for sign in line if sign.isprintable()).strip(" *")
     return ""

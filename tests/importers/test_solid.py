@@ -380,6 +380,16 @@ def test_damaged_files_are_refused_or_read_without_a_word(tmp_path: Path, capfd:
     assert capfd.readouterr() == ("", "")
 
 
+def test_complaints_of_the_reader_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    says = "print('\\x1b[32;1m*** ERR StepFile : Fails Count : 1 ***\\x1b[0m');"
+    answers = "open(json.load(open(sys.argv[1]))['answer'], 'w').write('{}')"
+    wanted = {"kind": "step", "file": "f", "height": None, "tolerance": 1e-3}
+    monkeypatch.setattr(solid_process, "_START", f"import json, sys; {says} {answers}")
+    assert outlined(b"", wanted, "f") == {"complaint": "ERR StepFile : Fails Count : 1"}
+    monkeypatch.setattr(solid_process, "_START", f"import json, sys; print('fine'); {answers}")
+    assert outlined(b"", wanted, "f") == {"complaint": ""}
+
+
 def test_a_worker_that_dies_or_hangs_is_a_clean_error(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
