@@ -33,6 +33,7 @@ from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Floats
 from camtool.kernels.fit_limits import (
     ACCEPTED_SHARE,
     ATTEMPTS,
+    MAX_NODES,
     MEASURE_STEPS,
     MIN_STEPS,
     REFINING,
@@ -53,6 +54,10 @@ __all__ = [
     "overall",
     "split_bulges",
 ]
+
+
+MAX_SIZE_MM = 1e100
+"""The products of larger numbers would not be finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +149,7 @@ def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
     """Rational pieces, all in one kernel."""
     from camtool.kernels.fit_bezier import fit_pieces
 
-    if not np.isfinite(pieces.control).all():
+    if not np.abs(pieces.control).max() <= MAX_SIZE_MM:
         raise GeometryError("a point or a tangent of a curve is not finite")
     vertices, judged = fit_pieces(np.ascontiguousarray(pieces.control), tolerance_mm)
     vertices[:, :2] += pieces.origin
@@ -165,7 +170,7 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
         samples = curve.point(np.append(t, nodes.t[-1]))
         columns = (nodes.point, nodes.arrive, nodes.leave, nodes.corner)
         vertices, judged = fit_nodes(columns, samples, target, tolerance_mm)
-        if not judged[0] > ACCEPTED_SHARE * tolerance_mm:
+        if not judged[0] > ACCEPTED_SHARE * tolerance_mm or len(nodes) >= MAX_NODES:
             break
         steps, fineness = 2 * steps, REFINING * fineness
         if attempt > 0:

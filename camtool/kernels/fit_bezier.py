@@ -11,6 +11,7 @@ from camtool.kernels.biarc import Bools, Floats
 from camtool.kernels.fit_limits import (
     ACCEPTED_SHARE,
     ATTEMPTS,
+    MAX_NODES,
     MEASURE_STEPS,
     MIN_STEPS,
     POSITION_EPS_MM,
@@ -78,7 +79,7 @@ def fit_pieces(pieces: Floats, tolerance: float) -> tuple[Floats, Judged]:
         nodes = two_columns(rows, 1), two_columns(rows, 3), two_columns(rows, 5), corner
         samples = points_at(pieces, sample_parameters(rows))
         vertices, judged = fit_nodes(nodes, samples, target, tolerance)
-        if not judged[0] > ACCEPTED_SHARE * tolerance:
+        if not judged[0] > ACCEPTED_SHARE * tolerance or len(rows) >= MAX_NODES:
             break
         steps, fineness = 2 * steps, REFINING * fineness
         if attempt > 0:

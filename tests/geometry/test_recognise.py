@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -62,10 +63,7 @@ step = st.tuples(
 
 def distinct(steps):
     """Neighbouring arcs differ in radius or side: otherwise they are one arc."""
-    return all(
-        not (a[0] and b[0] and a[2] == b[2] and a[3] == b[3])
-        for a, b in zip(steps, steps[1:], strict=False)
-    )
+    return all(not (a[0] and b[0] and a[2] == b[2] and a[3] == b[3]) for a, b in pairwise(steps))
 
 
 chains = st.lists(step, min_size=1, max_size=6).filter(distinct)
@@ -123,7 +121,7 @@ def test_polygons_stay_polygons(sides):
 @pytest.mark.parametrize("sides", [16, 17, 24, 64, 999])
 @pytest.mark.parametrize("way", [1, -1])
 def test_many_sides_are_a_circle(sides, way):
-    points = regular(sides, 5.0)[::way] + [7.0, 1.0]
+    points = regular(sides, 5.0)[::way] + np.array([7.0, 1.0])
     found, count = recognise_arcs(path_of(points, True), TOLERANCE_MM)
     assert count == 1
     assert found.closed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,10 @@ SPLITS = 40
 
 
 def dense_parameters(curve: Any, count: int, longest: float) -> Floats:
-    """Equal steps between breaks, halved where neighbouring points lie apart by more than `longest`
-    or where the tangent turns by more than 0.1 rad over more than a nanometre."""
+    """Equal steps between breaks, halved where neighbours lie apart by more than `longest`, or
+    where the tangent turns by more than 0.1 rad over more than a nanometre."""
     breaks = np.asarray(curve.breaks)
-    t = np.unique(np.concatenate([np.linspace(a, b, count) for a, b in zip(breaks, breaks[1:])]))
+    t = np.unique(np.concatenate([np.linspace(a, b, count) for a, b in pairwise(breaks)]))
     for _ in range(SPLITS):
         points, slope = curve.point(t), curve.tangent(t)
         gap = np.hypot(*np.diff(points, axis=0).T)
@@ -29,6 +30,16 @@ def dense_parameters(curve: Any, count: int, longest: float) -> Floats:
             break
         t = np.sort(np.concatenate([t, 0.5 * (t[:-1] + t[1:])[split]]))
     return t
+
+
+def sharp_points(curve: Any, t: Floats, within: float) -> Floats:
+    """(k, 2) points of the curve at parameters t between which it turns by more than 0.05 rad over
+    less than `within` mm: corners, cusps and tips that no cutter could tell from them."""
+    points, slope = curve.point(t), curve.tangent(t)
+    gap = np.hypot(*np.diff(points, axis=0).T)
+    a, b = slope[:-1], slope[1:]
+    turn = np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
+    return np.asarray(points[:-1][(turn > 0.05) & (gap < within)])
 
 
 def plain_biarc(a: Floats, out: Floats, b: Floats, into: Floats) -> Floats | None:
@@ -108,8 +119,8 @@ def _cost(
 
 
 def fewest_chords(points: Floats, tolerance: float) -> int:
-    """How many chords between the points (n, 2) stay within the tolerance: greedy, the longest each
-    time, found by doubling and bisection over the points."""
+    """How many chords between the points (n, 2) stay within the tolerance: the longest each time,
+    found by doubling and bisection over the points."""
     count, low, last = 0, 0, len(points) - 1
     while low < last:
         best, step = low + 1, 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +16,7 @@ def least_squares_circle(points: Floats) -> tuple[Floats, float]:
     about = points - middle
     rows = np.column_stack([2.0 * about, np.ones(len(about))])
     a, b, c = np.linalg.lstsq(rows, (about**2).sum(axis=1), rcond=None)[0]
-    return middle + [a, b], math.sqrt(c + a * a + b * b)
+    return middle + np.array([a, b]), math.sqrt(c + a * a + b * b)
 
 
 def turns_about(points: Floats, centre: Floats) -> Floats:
@@ -29,7 +30,7 @@ def explode(vertices: Floats, most_turn: float, decimals: int | None = None) -> 
     """An open chain (n, 3) with every arc cut into equal chords that turn by at most `most_turn`,
     four at least; points (m, 2), rounded to so many decimals if told."""
     rows = [vertices[:1, :2]]
-    for (ax, ay, bulge), (bx, by, _) in zip(vertices[:-1], vertices[1:], strict=True):
+    for (ax, ay, bulge), (bx, by, _) in pairwise(vertices):
         a, b = complex(ax, ay), complex(bx, by)
         if bulge == 0.0:
             rows.append(np.array([[bx, by]]))
