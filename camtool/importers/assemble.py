@@ -82,15 +82,19 @@ def assemble(
     )
     # What is drawn twice has a finding of its own.
     once = [item for item in clean.skipped if item.reason != DRAWN_TWICE]
-    findings = [
-        *findings,
-        *skip_findings(skipped, [*unwanted, *once, *repeated]),
+    noticed = [*findings, *skip_findings(skipped, [*unwanted, *once, *repeated])]
+    return replace(drawing, findings=(*noticed, *_judged(drawing, options)))
+
+
+def _judged(drawing: Drawing, options: ReadOptions) -> list[Finding]:
+    """What the drawing itself shows: its size, its gaps, what was mended."""
+    gap_mm = gap_of(options)
+    return [
         *size_findings(drawing),
-        *gap_findings(result.closed_gaps, gap_of(options), closed=True),
-        *gap_findings(result.open_gaps, gap_of(options), closed=False),
-        *healing_findings(result.healing, options.tolerance_mm),
+        *gap_findings(drawing.closed_gaps, gap_mm, closed=True),
+        *gap_findings(drawing.gaps, gap_mm, closed=False),
+        *healing_findings(drawing.healing, options.tolerance_mm),
     ]
-    return replace(drawing, findings=tuple(findings))
 
 
 def _source(members: Sequence[Piece]) -> str:

@@ -59,8 +59,9 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     gone = _kinds(pieces, ~long_enough, "has no length")
     points = _kinds(pieces, long_enough & (repeated > 0), "is repeated", repeated, "point of ")
     rows = np.flatnonzero(long_enough)
-    lines = _lines(vertices[long_enough[owner]], left[rows], closed[rows], rows, pieces, file)
-    once = _drawn_once(lines, [(pieces[row].layer, pieces[row].colour) for row in rows.tolist()])
+    chosen = [pieces[row] for row in rows.tolist()]
+    lines = _lines(vertices[long_enough[owner]], left[rows], closed[rows], chosen, file)
+    once = _drawn_once(lines, [(piece.layer, piece.colour) for piece in chosen])
     twice = np.zeros(len(pieces), dtype=np.bool_)
     twice[rows[~once]] = True
     lengths = path_lengths(lines)
@@ -158,20 +159,14 @@ def _kinds(
 
 
 def _lines(
-    vertices: Floats,
-    counts: Ints,
-    closed: Bools,
-    rows: Ints,
-    pieces: Sequence[Piece],
-    file: str,
+    vertices: Floats, counts: Ints, closed: Bools, pieces: Sequence[Piece], file: str
 ) -> Polylines:
-    """The pieces of these rows as paths; a fault is named by its piece."""
+    """The pieces as paths; a fault is named by its piece."""
     try:
         return Polylines(vertices, np.concatenate([[0], np.cumsum(counts)]), closed)
     except GeometryError as error:
         row = int(str(error.where).removeprefix("path ").partition(",")[0])
-        where = pieces[int(rows[row])].where
-        raise DrawingError(error.message, file=file, where=where) from error
+        raise DrawingError(error.message, file=file, where=pieces[row].where) from error
 
 
 _Words = npt.NDArray[np.uint64]

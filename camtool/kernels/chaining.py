@@ -181,52 +181,62 @@ def split_loops(
     """
     where = np.full(len(mates), -1, np.int64)
     stack = np.empty(len(mates) // 2 + 1, np.int64)
-    until = np.zeros((len(stack), 2), np.int64)
+    until = np.zeros((len(stack) + 1, 2), np.int64)
     made = 0
     for start in starts:
-        rest = np.zeros(2, np.int64)
-        end = start
-        while True:
-            rest += weights[end // 2]
-            end = mates[end ^ 1]
-            if end == start:
-                break
+        rest = _ring_weight(start, mates, weights)
         last = mates[start]
-        height, end = 0, start
-        while True:
+        height, end, done = 0, start, False
+        while not done:
             label = node[end]
             if label >= 0 and where[label] >= 0:
                 k = where[label]
+                loop = until[height] - until[k]
                 begin, close = stack[k], stack[height - 1] ^ 1
                 before = last if k == 0 else stack[k - 1] ^ 1
-                loop = until[height] - until[k]
-                left = rest - loop
+                near = (
+                    _apart(points, begin, close) <= reach and _apart(points, before, end) <= reach
+                )
                 if (
-                    encloses(loop[0], loop[1])
-                    and encloses(left[0], left[1])
-                    and _apart(points, begin, close) <= reach
-                    and _apart(points, before, end) <= reach
+                    near
+                    and encloses(loop[0], loop[1])
+                    and encloses(rest[0] - loop[0], rest[1] - loop[1])
                 ):
                     mates[begin], mates[close] = close, begin
                     mates[before], mates[end] = end, before
-                    rest = left
+                    rest = rest - loop
                     made += 1
-                    for m in range(k, height):
-                        if node[stack[m]] >= 0 and where[node[stack[m]]] == m:
-                            where[node[stack[m]]] = -1
+                    _forget(stack[k:height], node, where, k)
                     height = k
             stack[height] = end
             until[height + 1] = until[height] + weights[end // 2]
             if label >= 0:
                 where[label] = height
             height += 1
-            if end ^ 1 == last:
-                break
+            done = end ^ 1 == last
             end = mates[end ^ 1]
-        for m in range(height):
-            if node[stack[m]] >= 0:
-                where[node[stack[m]]] = -1
+        _forget(stack[:height], node, where, 0)
     return made
+
+
+@njit(cache=True)
+def _ring_weight(start: int, mates: Ints, weights: Ints) -> Ints:
+    """Segments and arcs of a whole ring."""
+    total: Ints = weights[start // 2].copy()
+    end = mates[start ^ 1]
+    while end != start:
+        total += weights[end // 2]
+        end = mates[end ^ 1]
+    return total
+
+
+@njit(cache=True)
+def _forget(entries: Ints, node: Ints, where: Ints, begin: int) -> None:
+    """Takes these entries, the first of which stands at `begin`, out of `where` they stand."""
+    for m in range(len(entries)):
+        label = node[entries[m]]
+        if label >= 0 and where[label] == begin + m:
+            where[label] = -1
 
 
 @njit(cache=True)

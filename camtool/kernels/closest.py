@@ -34,40 +34,58 @@ def closest(
     tree, leaves = _tree(boxes)
     count = len(bulge)
     best, best_row, best_other = np.inf, -1, -1
-    stack = np.empty(128, np.int64)
-    first, last = 0, 0
+    first, last = 0, -1
     for row in range(count):
-        if row == 0 or path[row] != path[row - 1]:
+        if row > last:
             first, last = row, row
             while last + 1 < count and path[last + 1] == path[row]:
                 last += 1
-        x, y = start[row, 0], start[row, 1]
-        height, stack[0] = 1, 1
-        while height > 0:
-            height -= 1
-            node = stack[height]
-            low, high = _range(node, leaves, count)
-            if low >= high or (low >= first and high <= last + 1):
-                continue
-            if _box_distance(tree, node, x, y) >= best:
-                continue
-            if node >= leaves:
-                for other in range(low, high):
-                    if first <= other <= last:
-                        continue
-                    apart = distance_to_arc(
-                        x, y, start[other, 0], start[other, 1], end[other, 0], end[other, 1],
-                        bulge[other],
-                    )  # fmt: skip
-                    if apart < best:
-                        best, best_row, best_other = apart, row, other
-                continue
+        apart, other = _from_point(
+            start[row, 0], start[row, 1], (start, end, bulge), (tree, leaves), (first, last, best)
+        )
+        if other >= 0:
+            best, best_row, best_other = apart, row, other
+    return best, best_row, best_other
+
+
+@njit(cache=True)
+def _from_point(
+    x: float,
+    y: float,
+    segments: tuple[Floats, Floats, Floats],
+    nodes: tuple[Floats, int],
+    limits: tuple[int, int, float],
+) -> tuple[float, int]:
+    """The distance to the nearest segment outside first … last that is nearer than the best one
+    so far, and its row; −1 when there is none."""
+    start, end, bulge = segments
+    tree, leaves = nodes
+    first, last, best = limits
+    found = -1
+    stack = np.empty(128, np.int64)
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        low, high = _range(node, leaves, len(bulge))
+        own = low >= first and high <= last + 1
+        if low >= high or own or _box_distance(tree, node, x, y) >= best:
+            continue
+        if node < leaves:
             left, right = 2 * node, 2 * node + 1
             if _box_distance(tree, left, x, y) < _box_distance(tree, right, x, y):
                 left, right = right, left
             stack[height], stack[height + 1] = left, right
             height += 2
-    return best, best_row, best_other
+            continue
+        for row in range(low, high):
+            if first <= row <= last:
+                continue
+            ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
+            apart = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
+            if apart < best:
+                best, found = apart, row
+    return best, found
 
 
 @njit(cache=True)
