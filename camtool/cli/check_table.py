@@ -44,6 +44,9 @@ def _head(facts: dict[str, Any]) -> _Rows:
     )
     if facts["marks"]:
         yield "points", f"{facts['marks']} single"
+    for finding in facts["findings"]:
+        if finding["code"] == "SECTION_CHOSEN":
+            yield "taken", finding["message"]
     if facts["fit_um"]["max"] > 0.0:
         yield "fitted", f"curves within {facts['fit_um']['max']:.3g} µm"
     for name, found in facts["smallest"].items():
