@@ -52,6 +52,8 @@ class Plane:
     def of(cls, u: Floats, v: Floats, origin: Floats, rise: Floats | None = None) -> Plane:
         """From vectors (3,); Unusable when the plane is tilted or has no area."""
         longest = max(math.hypot(*u), math.hypot(*v))
+        if not longest <= MAX_COORDINATE_MM:  # nor is NaN
+            raise Unusable("is larger than micrometres can tell")
         if max(abs(u[2]), abs(v[2])) > FLAT_TILT * longest:
             raise Unusable("lies in a tilted plane")
         area = float(u[0] * v[1] - u[1] * v[0])

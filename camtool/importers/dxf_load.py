@@ -35,7 +35,14 @@ from camtool.importers.dxf_tags import (
 )
 
 MAX_BYTES = 100_000_000
-"""Larger files are refused: ezdxf's document takes some thirty times the file's size in memory."""
+"""Larger files are refused."""
+
+MAX_TAGS = 10_000_000
+"""Files of more tags (two lines of text each) are refused."""
+
+MAX_ENTITIES = 1_000_000
+"""Files of more entities, VERTEX and table entries included, are refused: ezdxf's document takes
+some 3 KB for each."""
 
 _COMMENT = 999
 _NO_ASCII = re.compile(r"[^\x00-\x7f]")
@@ -54,6 +61,10 @@ def load(data: bytes, file: str) -> Loaded:
     """The document in `data`; DrawingError when it is no DXF, cut off or beyond repair."""
     _check_bytes(data, file)
     tags = binary_tags(data, file) if data.startswith(BINARY_DXF) else ascii_tags(data, file)
+    if len(tags.codes) > MAX_TAGS:
+        raise _too_large("tags", MAX_TAGS, file)
+    if tags.codes.count(0) > MAX_ENTITIES:
+        raise _too_large("entities", MAX_ENTITIES, file)
     frame = frame_of(tags)
     cut = _check_whole(tags, frame, file)
     if cut:
@@ -127,9 +138,19 @@ def _check_bytes(data: bytes, file: str) -> None:
             file=file,
             mend="split the drawing, or delete what is not to be made",
         )
+    if data.count(b"\n") > 2 * MAX_TAGS and not data.startswith(BINARY_DXF):
+        raise _too_large("lines", 2 * MAX_TAGS, file)
     # UTF-16 puts a zero between any two letters.
     if b"SECTION" not in data and b"SECTION" not in data.replace(b"\x00", b""):
         raise DrawingError("is no DXF: it has no section", file=file, mend=AGAIN)
+
+
+def _too_large(what: str, most: int, file: str) -> DrawingError:
+    return DrawingError(
+        f"holds more than {most} {what}",
+        file=file,
+        mend="split the drawing, or delete what is not to be made",
+    )
 
 
 def _check_whole(tags: Tags, frame: Frame, file: str) -> list[str]:
@@ -139,8 +160,9 @@ def _check_whole(tags: Tags, frame: Frame, file: str) -> list[str]:
     if frame.eof is not None:
         return []
     if not frame.whole("ENTITIES"):
+        damaged = "" if tags.is_text else " or damaged"
         raise DrawingError(
-            "is cut off: the end mark EOF is missing",
+            f"is cut off{damaged}: the end mark EOF is missing",
             file=file,
             where=f"after {tags.where(len(tags.codes))}",
             mend=AGAIN,

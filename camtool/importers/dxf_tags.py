@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,22 +83,20 @@ class Frame:
 
 
 def binary_tags(data: bytes, file: str) -> Tags:
-    """The tags of binary DXF; DrawingError when they do not add up."""
+    """The tags of binary DXF up to its end mark, or to where they end to be tags; DrawingError
+    when a group code is none."""
     from ezdxf.lldxf.tagger import binary_tags_loader
 
     codes: list[int] = []
     values: list[Any] = []
-    # What the reader makes of bytes that are no tags depends on what they are.
-    try:
+    # What the reader makes of bytes that are no tags depends on what they are. What it has read
+    # until then has no end mark, which tells the rest.
+    with suppress(Exception):
         for tag in binary_tags_loader(data, errors="surrogateescape"):
             codes.append(tag.code)
             values.append(tag.value)
             if tag.code == 0 and tag.value == "EOF":
                 break
-    except Exception as error:
-        where = f"after {len(codes)} tags"
-        message = "is no DXF: it holds no tags" if not codes else "is cut off or damaged"
-        raise DrawingError(message, file=file, where=where, mend=AGAIN) from error
     _check_codes(Tags(codes, values, is_text=False), file)
     return Tags(codes, values, is_text=False)
 
