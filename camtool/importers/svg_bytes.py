@@ -32,8 +32,8 @@ _MARKS = {
     b"<\x00?\x00": "utf-16-le",
     b"\x00<\x00?": "utf-16-be",
 }
-_NATIVE = ("utf-8", "ascii", "iso8859-1")
-_NO_CHARSETS = ("idna", "punycode", "unicode_escape", "raw_unicode_escape", "utf-7", "undefined")
+_NATIVE = ("utf-8", "us-ascii", "iso-8859-1")
+_NO_CHARSETS = ("idna", "punycode", "unicode-escape", "raw-unicode-escape", "utf-7", "undefined")
 _DECLARED = re.compile(rb"""\s*<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 _DECLARATION = re.compile(r"(\s*<\?xml\s[^>]*?)encoding\s*=\s*[\"'][^\"']*[\"']")
 _DOCTYPE = re.compile(
@@ -89,18 +89,18 @@ def _too_large(size: int) -> DrawingError:
 
 def _decoded(data: bytes) -> bytes:
     """The same text as UTF-8, unless expat knows its encoding."""
-    name = next((name for mark, name in _MARKS.items() if data.startswith(mark)), None)
-    if name is None:
+    name = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
+    if not name:
         declared = _DECLARED.match(data[:_HEAD_BYTES])
         name = declared[1].decode("ascii") if declared else "utf-8"
+        if name.lower() in _NATIVE:
+            return data
     try:
         known = codecs.lookup(name).name
     except LookupError:
         known = ""
     if not known or known in _NO_CHARSETS:
         raise DrawingError(f"names the encoding {name!r}", mend="save it in UTF-8")
-    if known in _NATIVE:
-        return data
     try:
         text = data.decode(known)
     # A codec that makes no text (base64, zlib) may raise anything of these.

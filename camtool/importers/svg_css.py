@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from camtool.errors import DrawingError
 from camtool.importers.svg_tree import Node
 
-MAX_MATCHES = 5_000_000
+MAX_MATCHES = 1_000_000
 """So often a rule may be held against an element; a file of rules alone could ask for billions."""
 
 MAX_COMPOUNDS = 8

@@ -34,6 +34,10 @@ ROUND_EPS_MM = POSITION_EPS_MM
 """An ellipse whose half axes differ by less is a circle."""
 
 
+MAX_CURVE_MM = 1e6
+"""A curve that reaches further is left out: its fit to micrometres would take millions of arcs."""
+
+
 class CurveFitter:
     """Maps subpaths into mm; fits curves within one tolerance and remembers how well that went."""
 
@@ -80,7 +84,7 @@ class CurveFitter:
 
     def _fitted(self, curve: Curve, bounds: Floats) -> Floats:
         """Arcs for a curve whose size and place `bounds` (n, 2) tell."""
-        _in_reach(bounds)
+        _in_reach(bounds, MAX_CURVE_MM)
         try:
             fit = fit_curve(curve, self.tolerance_mm)
         except GeometryError as error:
@@ -96,10 +100,10 @@ def _straight(to_mm: Affine, points: Floats) -> Floats:
     return vertices
 
 
-def _in_reach(vertices: Floats) -> Floats:
+def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
     """The same numbers; DrawingError when one is no place in a drawing."""
     furthest = float(np.abs(vertices).max())
-    if not furthest <= MAX_COORDINATE_MM:
+    if not furthest <= limit_mm:
         raise DrawingError(
             f"it reaches {furthest:.6g} mm away, where micrometres are lost",
             mend="name the unit with --units",

@@ -32,6 +32,9 @@ MAX_ELEMENTS = 500_000
 MAX_ENTITY_SIGNS = 256
 """An entity in the document type may stand for so much plain text, a namespace at most."""
 
+MAX_REFERENCES = 10_000
+"""With entities of its own a file may have so many references to them."""
+
 _WRONG_PREFIX = "unbound prefix"
 
 
@@ -75,7 +78,7 @@ def parse_tree(data: bytes) -> Node:
     handler = _Builder()
     source = InputSource()
     source.setByteStream(BytesIO(data))
-    parser = _parser(handler)
+    parser = _parser(handler, entities=data.count(b"&") <= MAX_REFERENCES)
     try:
         parser.parse(source)
     except DefusedXmlException as error:
@@ -100,8 +103,8 @@ def parse_tree(data: bytes) -> Node:
     return root
 
 
-def _parser(builder: _Builder) -> Any:
-    """defusedxml's parser, which lets entities pass that are short and plain text.
+def _parser(builder: _Builder, *, entities: bool) -> Any:
+    """defusedxml's parser, which lets `entities` pass that are short and plain text.
 
     Elements go to the builder as expat gives them: the way through SAX's own records of names and
     attributes takes longer than all the rest.
@@ -117,8 +120,9 @@ def _parser(builder: _Builder) -> Any:
 
         def defused_entity_decl(self, name: str, is_parameter: bool, value: str | None,
                                 *outside: str | None) -> None:  # fmt: skip
-            plain = not is_parameter and value is not None and len(value) <= MAX_ENTITY_SIGNS
-            if not plain or any(sign in str(value) for sign in "&<%"):
+            text = value or ""
+            plain = len(text) <= MAX_ENTITY_SIGNS and not any(sign in text for sign in "&<%")
+            if not (entities and plain) or is_parameter or value is None:
                 super().defused_entity_decl(name, is_parameter, value, *outside)
 
     parser = Parser()
@@ -166,6 +170,11 @@ class _Builder(ContentHandler):
         if node.tag == "style":
             node.text = "".join(self._sheet)
             self._sheet = []
+
+    def skippedEntity(self, name: str) -> None:
+        """An entity of the outside: with it, attributes could have lost words without a sign."""
+        raise DrawingError(f"refers to {name[:40]!r}, which stands in no file that may be read",
+                           mend="save it as plain SVG")  # fmt: skip
 
     def characters(self, content: str) -> None:
         if self._open[-1].tag == "style":

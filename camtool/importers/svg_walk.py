@@ -26,7 +26,7 @@ from camtool.importers.svg_shapes import SHAPES, Lengths, subpaths
 from camtool.importers.svg_style import LIMITS, Sheet, Style
 from camtool.importers.svg_tree import MAX_DEPTH, Node
 
-MAX_USED = 100_000
+MAX_USED = 50_000
 """So many elements, curves and hundreds of corners may be drawn through `use`; a few nested ones
 could ask for billions."""
 
