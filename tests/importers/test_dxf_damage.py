@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
-from camtool.importers import dxf_load
+from camtool.importers import dxf_load, dxf_walk
 from camtool.importers.dxf import read
 from camtool.importers.options import ReadOptions
 
@@ -231,7 +231,8 @@ def test_files_that_are_too_large_are_refused_at_once(limit, monkeypatch):
         read(in_entities(f"{LINE} {LINE} {LINE} {LINE}"), "a", OPTIONS)
 
 
-def test_blocks_within_dimensions_cannot_explode():
+def test_blocks_within_dimensions_cannot_explode(monkeypatch):
+    monkeypatch.setattr(dxf_walk, "MAX_INSERTED", 2000)
     doc = ezdxf.new("R2000", setup=True)
     space = doc.modelspace()
     space.add_linear_dim(base=(0, 5), p1=(0, 0), p2=(6, 0)).render()
