@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import sys
+from random import Random
 from types import ModuleType
 
 import numpy as np
@@ -17,6 +18,7 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, FitError, Mark, Skipped, Units
 from camtool.geometry.facts import drawing_facts
+from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline
 from camtool.importers.assemble import assemble
 from camtool.importers.clean import cleaned
@@ -268,3 +270,33 @@ def test_any_pieces_are_assembled_or_refused(
     except DrawingError:
         return
     json.dumps(drawing_facts(drawing))
+
+
+CORNERS = st.tuples(st.integers(0, 4), st.integers(0, 4))
+
+
+@given(
+    st.lists(st.tuples(CORNERS, CORNERS, st.sampled_from([0.0, 0.0, 0.0, 1.0, -0.5])), min_size=1,
+             max_size=14),
+    st.randoms(use_true_random=False),
+)  # fmt: skip
+def test_order_and_direction_of_drawing_decide_nothing(
+    rows: list[tuple[tuple[int, int], tuple[int, int], float]], random: Random
+) -> None:
+    pieces = [piece((*a, bulge), b) for a, b, bulge in rows if a != b]
+    turned = [piece((*b, -bulge), a) for a, b, bulge in rows if a != b]
+    if not pieces:
+        return
+    other = [random.choice(both) for both in zip(pieces, turned, strict=True)]
+    random.shuffle(other)
+    one, two = put(*pieces), put(*other)
+
+    def shapes(drawing: Drawing) -> list[tuple[bool, float, float]]:
+        lengths = np.round(path_lengths(drawing.paths), 4).tolist()
+        areas = np.round(np.abs(signed_areas(drawing.paths)), 4).tolist()
+        return sorted(zip(drawing.paths.closed.tolist(), lengths, areas, strict=True))
+
+    assert np.array(shapes(one)) == pytest.approx(np.array(shapes(two)), abs=1e-3)
+    assert one.healing.branches == two.healing.branches
+    assert one.healing.duplicates == two.healing.duplicates
+    assert one.healing.overlaps_mm == pytest.approx(two.healing.overlaps_mm)
