@@ -172,7 +172,7 @@ def straight(points: Floats) -> Floats:
 def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Shape:
     """Arcs for a curve whose place and size these numbers tell."""
     furthest = float(np.abs(size).max())
-    if furthest > MAX_COORDINATE_MM:
+    if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
         raise DrawingError(
             f"is {furthest:.6g} mm large or away, where micrometres are lost",
             mend="move the drawing to its origin, or name its unit with --units",
