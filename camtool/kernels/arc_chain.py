@@ -164,17 +164,20 @@ def deviations(
 def summary(samples: Floats, off: Floats) -> tuple[float, float, float]:
     """Largest deviation and rms, weighted by length, and length of the curve, mm.
 
-    Between samples the deviation peaks where the parabola through three of them does:
-    f₀ + (f₊ − f₋)² / (8 (2f₀ − f₊ − f₋)).
+    Between samples i and i + 1 the deviation peaks at or below the meeting of the lines through
+    the two samples before and the two behind: it is concave on each side of a peak, and where the
+    nearest arc changes it has an edge there.
     """
-    largest, squares, length = off[len(off) - 1], 0.0, 0.0
+    squares, length = 0.0, 0.0
+    largest = off[len(off) - 1]
     for i in range(len(off) - 1):
         step = math.hypot(samples[i + 1, 0] - samples[i, 0], samples[i + 1, 1] - samples[i, 1])
         squares += step * 0.5 * (off[i] * off[i] + off[i + 1] * off[i + 1])
         length += step
         largest = max(largest, off[i])
-        if i > 0 and off[i] >= off[i - 1] and off[i] >= off[i + 1]:
-            bend = 2.0 * off[i] - off[i + 1] - off[i - 1]
-            if bend > 0.0:
-                largest = max(largest, off[i] + (off[i + 1] - off[i - 1]) ** 2 / (8.0 * bend))
+        if 0 < i < len(off) - 2:
+            rise, fall = off[i] - off[i - 1], off[i + 1] - off[i + 2]
+            if rise > 0.0 and fall > 0.0:
+                share = min(max((off[i + 1] + fall - off[i]) / (rise + fall), 0.0), 1.0)
+                largest = max(largest, min(off[i] + rise * share, off[i + 1] + fall))
     return largest, math.sqrt(squares / length) if length > 0.0 else 0.0, length

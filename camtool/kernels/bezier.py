@@ -138,19 +138,18 @@ def too_coarse(pieces: Floats, k: int, left: Floats, right: Floats, tolerance: f
     if not left[0] < middle < right[0]:
         return False
     pair = biarc(left[1:3], left[5:7], right[1:3], right[3:5])
-    off, reach = 0.0, 0.0
-    for i in range(1, 4):
+    bends = left[5] * right[3] + left[6] * right[4] < math.cos(STEP_TURN_RAD)
+    reach = 0.0
+    for i in (2, 1, 3):
         x, y, _, _ = evaluate(pieces, k, left[0] + 0.25 * i * (right[0] - left[0]))
-        off = max(off, distance_to_biarc(x, y, left[1:3], right[1:3], pair))
-        reach = max(reach, math.hypot(x - left[1], y - left[2]))
-        reach = max(reach, math.hypot(x - right[1], y - right[2]))
-    turn = abs(
-        math.atan2(
-            left[5] * right[4] - left[6] * right[3], left[5] * right[3] + left[6] * right[4]
-        )
-    )
-    bends = off > STEP_ERROR_SHARE * tolerance or turn > STEP_TURN_RAD
-    return bends and reach > POSITION_EPS_MM
+        reach = max(reach, abs(x - left[1]), abs(y - left[2]), abs(x - right[1]))
+        reach = max(reach, abs(y - right[2]))
+        if not bends:
+            off = distance_to_biarc(x, y, left[1:3], right[1:3], pair)
+            bends = off > STEP_ERROR_SHARE * tolerance
+        if bends and reach > POSITION_EPS_MM:
+            return True
+    return False
 
 
 @numba.njit(cache=True, error_model="numpy")

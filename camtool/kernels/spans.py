@@ -55,13 +55,14 @@ def single_bulge(
     sweep α + β leaves both tangents by |α − β| / 2.
     """
     ux, uy = point[high, 0] - point[low, 0], point[high, 1] - point[low, 1]
+    # |sin α − sin β| ≤ |α − β|: most nodes are told here, without a root.
+    askew = (leave[low, 0] + arrive[high, 0]) * uy - (leave[low, 1] + arrive[high, 1]) * ux
+    if askew * askew > 4.0 * SINGLE_TURN_RAD * SINGLE_TURN_RAD * (ux * ux + uy * uy):
+        return np.nan
     first = half_angle(leave[low, 0], leave[low, 1], ux, uy)
     second = half_angle(ux, uy, arrive[high, 0], arrive[high, 1])
-    # |tan a − tan b| ≤ |a − b| (1 + tan²) of the larger: most nodes are told here, without atan.
-    if not abs(first - second) <= SINGLE_TURN_RAD * (1.0 + max(first * first, second * second)):
-        return np.nan
     first, second = 2.0 * math.atan(first), 2.0 * math.atan(second)
-    if abs(first - second) > 2.0 * SINGLE_TURN_RAD:
+    if not abs(first - second) <= 2.0 * SINGLE_TURN_RAD:
         return np.nan
     half = 0.5 * (first + second)
     if math.sqrt(ux * ux + uy * uy) > 2.0 * MAX_RADIUS_MM * abs(math.sin(half)):
