@@ -1,0 +1,109 @@
+"""Writing RS274-like text: numbers of fixed decimals by columns, comments that say nothing else,
+lines that fit. Shared by the dialects that write words of a letter and a number.
+
+    units = units_of(values_mm, 3)             whole thousandths, half away from zero
+    say_units(units, NumberStyle(3))           ["1.500", "-0.020"], never "-0.000"
+    say_column(values, NumberStyle(3, strip=True))   both at once: ["1.5", "-0.02"]
+    comment("logo (v2).dxf", most_chars=40)    "(logo _v2_.dxf)"
+    first_too_long(lines, 80)                    index of the first line over the limit, or −1
+
+Readers never use this module, writers never `_gcode_words`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+MOST_UNITS: Final = 10**15
+"""Whole units beyond this are not said: their decimals would no longer be exact in a float."""
+
+COMMENT_CHARS: Final = 60
+"""No comment is longer, its parentheses not counted, unless asked for."""
+
+# Letters, digits and signs that mean nothing to any controller. Left out on purpose: ( ) ; % and
+# line ends, which end comments or programs; , which makes a comment active in LinuxCNC (MSG, …);
+# $ ! ? ~ which grbl obeys wherever they stand; # [ ] < > " which begin parameters and strings.
+_UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ._+:/=-]")
+
+
+@dataclass(frozen=True)
+class NumberStyle:
+    """How a number is said: digits after the point; `strip` their trailing zeros (and the point
+    if nothing follows it); `plus` also says the sign of numbers that are not negative."""
+
+    decimals: int
+    strip: bool = False
+    plus: bool = False
+
+
+def units_of(values: Floats, decimals: int) -> Ints:
+    """Values (any shape) as whole units of 10^−decimals, half away from zero.
+
+    ValueError for what is not finite or too large to be exact.
+    """
+    scaled = np.asarray(values, dtype=np.float64) * 10.0**decimals
+    if not (np.abs(scaled) <= MOST_UNITS).all():
+        raise ValueError("a value is not finite, or too large for its decimals")
+    return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
+
+
+def values_of(units: Ints, decimals: int) -> Floats:
+    """The floats nearest to the decimal numbers that units say: what a reader must find."""
+    return np.asarray(units / 10.0**decimals)
+
+
+def say_units(units: Ints, style: NumberStyle) -> list[str]:
+    """Whole units (N,) as N texts; zero has no minus."""
+    values = values_of(units, style.decimals).tolist()
+    one = f"%{'+' if style.plus else ''}.{style.decimals}f"
+    # One formatting of the whole column: several times as fast as one per number.
+    texts = "\n".join([one] * len(values)) % tuple(values)
+    column = texts.split("\n") if values else []
+    if style.strip and style.decimals > 0:
+        return [text.rstrip("0").rstrip(".") for text in column]
+    return column
+
+
+def say_column(values: Floats, style: NumberStyle) -> list[str]:
+    """Values (N,) rounded to the style's decimals, as N texts; ValueError as `units_of`."""
+    return say_units(units_of(values, style.decimals), style)
+
+
+def say_number(value: float, style: NumberStyle) -> str:
+    """A single number; ValueError as `units_of`."""
+    return say_column(np.array([value]), style)[0]
+
+
+def sanitised(text: str, most_chars: int = COMMENT_CHARS) -> str:
+    """`text` as it may stand in any program: ASCII letters, digits, spaces and ._+:/=- only.
+
+    All else becomes _ (line ends and tabs a space); runs of spaces become one; cut to
+    `most_chars`. What comes back cannot end a comment, begin one, or be obeyed by a controller
+    within one. It is not safe outside of a comment.
+    """
+    flat = " ".join(text.split())
+    return _UNSAFE.sub("_", flat)[:most_chars].strip()
+
+
+def comment(text: str, *, most_chars: int = COMMENT_CHARS, style: str = "()") -> str:
+    """`text` sanitised, as a comment: "(text)" or, with `style=";"`, "; text"."""
+    safe = sanitised(text, most_chars)
+    return f"; {safe}" if style == ";" else f"({safe})"
+
+
+def first_too_long(lines: Sequence[str], most_chars: int) -> int:
+    """Index of the first line of more than `most_chars` characters (line end not counted), or −1
+    when all of them fit."""
+    for index, line in enumerate(lines):
+        if len(line) > most_chars:
+            return index
+    return -1
