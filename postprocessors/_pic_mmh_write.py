@@ -15,7 +15,7 @@ import numpy as np
 
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, pic_mmh_controller
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from camtool.toolpath.program import Program
 
@@ -198,7 +198,7 @@ class _Writer:
         ex, ey, _ = self._numbers.end_steps[row]
         x, y = self._steps[0] - cx, self._steps[1] - cy
         error = 0
-        if self._machine.controller.initial_error == "rounded-radius":
+        if pic_mmh_controller(self._machine).initial_error == "rounded-radius":
             error = x * x + y * y - round(math.hypot(x, y)) ** 2
         return Arc(
             start=(x, y),

@@ -111,11 +111,11 @@ def _scene(
 
 def _refuse_program(source: str) -> None:
     """CamtoolError when the file's extension says that it is a program and no target is given."""
-    from camtool.machine.registry import load_target, target_names
+    from camtool.machine.registry import list_target, target_names
 
     for name in target_names():
         try:
-            extension = load_target(name).machine.target.extension
+            extension = list_target(name).target.extension
         except CamtoolError:  # a broken plug-in harms nothing else
             continue
         if Path(source).suffix.lower() == extension:

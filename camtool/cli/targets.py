@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import click
@@ -33,22 +34,25 @@ def targets(
 
 def _list(as_json: bool) -> None:
     from camtool.errors import MachineError
-    from camtool.machine.registry import load_target, target_names
+    from camtool.machine.registry import list_target, target_names
 
-    rows: list[dict[str, str]] = []
+    rows: list[dict[str, Any]] = []
     for name in target_names():
         try:
-            target = load_target(name).machine.target
+            listed = list_target(name)
         except MachineError as error:  # a broken plug-in is named and harms nothing else
             click.echo(f"camtool: warning: {error}", err=True)
             continue
-        rows.append({"name": name, "title": target.title, "extension": target.extension})
+        target = listed.target
+        row = {"name": name, "title": target.title, "extension": target.extension}
+        rows.append({**row, "needs": list(listed.needs)})
     if as_json:
         click.echo(json.dumps({"targets": rows}, indent=2, ensure_ascii=False))
         return
     width = max((len(row["name"]) for row in rows), default=0)
     for row in rows:
-        click.echo(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}")
+        needs = f" (needs --machine FILE: {', '.join(row['needs'])})" if row["needs"] else ""
+        click.echo(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}{needs}")
 
 
 def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bool) -> None:
@@ -66,12 +70,16 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     for key, value in _flat("", values):
         click.echo(f"{key} = {json.dumps(value, ensure_ascii=False)}")
     click.echo(
-        f"\nhighest feed {loaded.machine.max_feed_mm_min:.4g} mm/min, "
-        f"rapids {loaded.machine.rapid_mm_min:.4g} mm/min; "
+        f"\nhighest feed {_speed(loaded.machine.max_feed_mm_min)}, "
+        f"rapids {_speed(loaded.machine.rapid_mm_min)}; "
         "every number's source is in the target's own file:",
         err=True,
     )
     click.echo(f"{loaded.file}", err=True)
+
+
+def _speed(mm_min: float) -> str:
+    return f"{mm_min:.4g} mm/min" if math.isfinite(mm_min) else "not said"
 
 
 def _flat(prefix: str, table: dict[str, Any]) -> list[tuple[str, Any]]:

@@ -3,6 +3,10 @@
 A user's file `extends = "pic-mmh"` a target and says only what differs; a flag such as
 `--set axes.x.backlash_mm=0.2` changes single values. Both are laid over the target's own file
 before anything is checked, so that nothing can slip in unchecked.
+
+A target whose makers left a number out names it at the top of its file, for the user to give:
+
+    needs = ["axes.x.coded_step_mm", "axes.y.coded_step_mm"]
 """
 
 from __future__ import annotations
@@ -12,12 +16,15 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import msgspec
 
 from camtool.errors import MachineError
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, Target
+
+NEEDS = "needs"
+"""Key at the top of a target's file: the keys that only the user's machine file can give."""
 
 Table = dict[str, Any]
 _T = TypeVar("_T")
@@ -59,7 +66,42 @@ def build_machine(
         table, name = _laid_over(table, extra), str(user_file)
     for setting in settings:
         table, name = _laid_over(table, _setting(setting)), f"--set {setting}"
-    return convert(table, Machine, name)
+    _refuse_incomplete(table, str(user_file or base_name))
+    return convert({key: table[key] for key in table if key != NEEDS}, Machine, name)
+
+
+def target_of(base: Table, base_name: str) -> Target:
+    """The `[target]` of a target's table, which may lack what the user must give."""
+    return convert(base.get("target", {}), Target, base_name, "target")
+
+
+def missing_keys(table: Table, name: str) -> tuple[str, ...]:
+    """The keys of `needs` that nobody has given yet, such as "axes.x.coded_step_mm"."""
+    keys = convert(table.get(NEEDS, []), list[str], name, NEEDS)
+    return tuple(key for key in keys if not _has(table, key.split(".")))
+
+
+def _has(table: Any, keys: list[str]) -> bool:
+    for key in keys:
+        if not isinstance(table, dict) or key not in table:
+            return False
+        table = table[key]
+    return True
+
+
+def _refuse_incomplete(table: Table, name: str) -> None:
+    """MachineError for a target that still lacks what only the user's machine file can say."""
+    missing = missing_keys(table, name)
+    if not missing:
+        return
+    *tables, key = missing[0].split(".")
+    target = table["target"]["name"]
+    raise MachineError(
+        f"key is missing: nobody can know it but the user (needed: {', '.join(missing)})",
+        file=name,
+        where=(f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}",
+        mend=f'say it in your machine file, which extends = "{target}", and give --machine FILE',
+    )
 
 
 def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -> _T:
@@ -81,18 +123,20 @@ def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -
         *tables, key = keys or ["?"]
         where = (f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}"
         raise MachineError(
-            message, file=file, where=where, mend=_mend(kind, tables, unknown)
+            message, file=file, where=where, mend=_mend(kind, table, tables) if unknown else ""
         ) from None
 
 
-def _mend(kind: type, tables: list[str], unknown: re.Match[str] | None) -> str:
-    """For an unknown key: the keys that its table knows."""
-    if not unknown:
-        return ""
+def _mend(kind: type, values: Any, tables: list[str]) -> str:
+    """The keys that a table knows; where models have tables of their own, that of its model."""
     record: Any = kind
     for name in tables:
         fields = {f.name: f.type for f in msgspec.structs.fields(record)}
-        record = fields.get(name)
+        record, values = fields.get(name), values.get(name, {})
+        for model in get_args(record):
+            config = getattr(model, "__struct_config__", None)
+            if config is not None and values.get(config.tag_field) == config.tag:
+                record = model
     try:
         known = ", ".join(f.encode_name for f in msgspec.structs.fields(record))
     except TypeError:

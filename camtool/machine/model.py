@@ -6,11 +6,14 @@ Field names carry their units. `msgspec` checks types and ranges and refuses unk
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
+
+from camtool.errors import MachineError
 
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
@@ -26,16 +29,27 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     extension: str
 
 
+AS_CODED = 0.0
+"""What `Axis.real_step_mm` is before it becomes the coded step; no file can say it."""
+
+
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One axis. `coded_step_mm` is what the controller believes a step to be, `real_step_mm`
-    what the slide moves; `backlash_mm` is the play of the mechanics, `compensation_mm` what the
-    controller adds at each reversal; `travel_mm` None when nobody has said."""
+    what the slide moves, as coded where left out; `backlash_mm` is the play of the mechanics,
+    `compensation_mm` what the controller adds at each reversal. `travel_mm`, `max_rate_mm_min`
+    and `acceleration_mm_s2` are None when nobody has said."""
 
     coded_step_mm: Positive
-    real_step_mm: Positive
+    real_step_mm: Positive = AS_CODED
     travel_mm: Positive | None = None
     backlash_mm: NotNegative = 0.0
     compensation_mm: NotNegative = 0.0
+    max_rate_mm_min: Positive | None = None
+    acceleration_mm_s2: Positive | None = None
+
+    def __post_init__(self) -> None:
+        if self.real_step_mm == AS_CODED:
+            msgspec.structs.force_setattr(self, "real_step_mm", self.coded_step_mm)
 
 
 class Axes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -57,11 +71,16 @@ class Feed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """`max_step_rate_hz` bounds feed / coded step; `rapid_step_rate_hz` is what rapids run at;
-    `max_reversals` is the count above which parts were seen to fail."""
+    """What bounds motion; None where nobody has said.
 
-    max_step_rate_hz: Positive
-    rapid_step_rate_hz: Positive
+    `max_step_rate_hz` bounds feed / coded step, `max_feed_mm_min` the feed itself; rapids run at
+    `rapid_step_rate_hz` or `rapid_mm_min`; `max_reversals` is the count above which parts were
+    seen to fail."""
+
+    max_step_rate_hz: Positive | None = None
+    rapid_step_rate_hz: Positive | None = None
+    max_feed_mm_min: Positive | None = None
+    rapid_mm_min: Positive | None = None
     max_reversals: int | None = None
 
 
@@ -88,7 +107,23 @@ class PicMmhController(
     """Where machine zero lies in the work frame: G28 goes there."""
 
 
-Controller = PicMmhController
+class PathController(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="model", tag="path"
+):
+    """Any controller, as if it followed the programmed lines and arcs exactly.
+
+    It stands in for controllers whose own arithmetic is not modelled. `grid` "steps": ends and
+    arc centres lie on the axes' coded steps; "none": they are taken as programmed.
+    """
+
+    grid: Literal["steps", "none"] = "steps"
+    start_play: Literal["preloaded", "centred"] = "preloaded"
+    start_direction: Literal["+", "-"] = "+"
+    machine_zero_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where machine zero lies in the work frame: homing goes there."""
+
+
+Controller = PicMmhController | PathController
 """One record per controller model, told apart by `model`."""
 
 Scalar = bool | int | float | str
@@ -106,13 +141,51 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     dialect: dict[str, Scalar] = {}
 
     @property
-    def rapid_mm_min(self) -> float:
-        """Speed of a rapid along one axis, mm/min: the slowest axis of X and Y decides."""
-        step = min(self.axes.x.coded_step_mm, self.axes.y.coded_step_mm)
-        return self.limits.rapid_step_rate_hz * step * 60.0
+    def max_feed_mm_min(self) -> float:
+        """Highest feed, mm/min: the lowest of what is said; inf where nothing is.
+
+        Said are `max_feed_mm_min`, `max_step_rate_hz` on the finest axis (feed / step), and the
+        highest rates of X and Y.
+        """
+        return min(self._feed_limits(self.axes.x, self.axes.y))
 
     @property
-    def max_feed_mm_min(self) -> float:
-        """Highest feed, mm/min: feed / step ≤ max_step_rate_hz on the finest axis."""
-        step = min(axis.coded_step_mm for axis in self.axes)
-        return self.limits.max_step_rate_hz * step * 60.0
+    def max_plunge_mm_min(self) -> float:
+        """Highest feed along Z, mm/min; like `max_feed_mm_min` with the highest rate of Z."""
+        return min(self._feed_limits(self.axes.z))
+
+    @property
+    def rapid_mm_min(self) -> float:
+        """Speed of a rapid, mm/min: the first of these that is said.
+
+        `rapid_mm_min`; `rapid_step_rate_hz` on the slower axis of X and Y; the highest rate of
+        the slower one; the highest feed. Inf where nothing is: rapids then take no time.
+        """
+        x, y, limits = self.axes.x, self.axes.y, self.limits
+        if limits.rapid_mm_min is not None:
+            return limits.rapid_mm_min
+        if limits.rapid_step_rate_hz is not None:
+            return limits.rapid_step_rate_hz * min(x.coded_step_mm, y.coded_step_mm) * 60.0
+        if x.max_rate_mm_min is not None and y.max_rate_mm_min is not None:
+            return min(x.max_rate_mm_min, y.max_rate_mm_min)
+        return self.max_feed_mm_min
+
+    def _feed_limits(self, *axes: Axis) -> Iterator[float]:
+        yield math.inf
+        if self.limits.max_feed_mm_min is not None:
+            yield self.limits.max_feed_mm_min
+        if self.limits.max_step_rate_hz is not None:
+            step = min(axis.coded_step_mm for axis in self.axes)
+            yield self.limits.max_step_rate_hz * step * 60.0
+        yield from (axis.max_rate_mm_min for axis in axes if axis.max_rate_mm_min is not None)
+
+
+def pic_mmh_controller(machine: Machine) -> PicMmhController:
+    """The machine's controller, which must be the PIC18F8720; MachineError when it is not."""
+    if not isinstance(machine.controller, PicMmhController):
+        raise MachineError(
+            f"{machine.target.name} needs the controller pic-mmh",
+            where="table [controller], key model",
+            mend='write model = "pic-mmh"',
+        )
+    return machine.controller

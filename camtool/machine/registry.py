@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from camtool.errors import MachineError, UnknownTargetError
-from camtool.machine.loader import build_machine, read_table
-from camtool.machine.model import Machine
+from camtool.machine.loader import build_machine, missing_keys, read_table, target_of
+from camtool.machine.model import Machine, Target
 
 GROUP = "camtool.postprocessors"
 
@@ -29,6 +29,16 @@ class LoadedTarget:
 
     machine: Machine
     post: Any
+    file: Path
+
+
+@dataclass(frozen=True)
+class ListedTarget:
+    """What a list says of a target: `needs` are the keys that the user's machine file must give
+    before it can be loaded, such as "axes.x.coded_step_mm"; () when it is complete."""
+
+    target: Target
+    needs: tuple[str, ...]
     file: Path
 
 
@@ -44,16 +54,31 @@ def load_target(
 
     Raises UnknownTargetError (with the nearest names) and MachineError.
     """
+    post, file = _load(_found(name))
+    machine = build_machine(read_table(file), str(file), machine_file, settings)
+    post.check(machine)
+    return LoadedTarget(machine, post, file)
+
+
+def list_target(name: str) -> ListedTarget:
+    """What a list says of the target `name`, complete or not; raises as `load_target` does."""
+    post, file = _load(_found(name))
+    table = read_table(file)
+    needs = missing_keys(table, str(file))
+    if not needs:
+        post.check(build_machine(table, str(file)))
+    return ListedTarget(target_of(table, str(file)), needs, file)
+
+
+def _found(name: str) -> EntryPoint:
+    """The entry point of a target; UnknownTargetError when there is none."""
     found = {point.name: point for point in entry_points(group=GROUP)}
     if name not in found:
         near = difflib.get_close_matches(name, found, n=3, cutoff=0.4) or sorted(found)
         raise UnknownTargetError(
             f"unknown target {name!r}", mend=f"did you mean {' or '.join(near)}?"
         )
-    post, file = _load(found[name])
-    machine = build_machine(read_table(file), str(file), machine_file, settings)
-    post.check(machine)
-    return LoadedTarget(machine, post, file)
+    return found[name]
 
 
 def _load(point: EntryPoint) -> tuple[Any, Path]:

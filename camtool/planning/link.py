@@ -44,8 +44,10 @@ def feeds_of(job: Job, machine: Machine) -> Feeds:
     """The job's feeds, or the machine's; OptionError naming the highest feed when above it."""
     cut = machine.feed.default_mm_min if job.feed_mm_min is None else job.feed_mm_min
     plunge = cut if job.plunge_feed_mm_min is None else job.plunge_feed_mm_min
-    for name, flag, feed in (("feed", "--feed", cut), ("plunge feed", "--plunge-feed", plunge)):
-        highest = machine.max_feed_mm_min
+    for name, flag, feed, highest in (
+        ("feed", "--feed", cut, machine.max_feed_mm_min),
+        ("plunge feed", "--plunge-feed", plunge, machine.max_plunge_mm_min),
+    ):
         if feed > highest * (1.0 + FEED_TOLERANCE):
             unit = machine.feed.unit_mm_min
             sayable = highest // unit * unit or highest

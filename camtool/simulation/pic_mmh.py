@@ -27,7 +27,7 @@ import numpy as np
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Interpolator, Machine
+from camtool.machine.model import Interpolator, Machine, pic_mmh_controller
 from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach, line_filler
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Floats, Ints
@@ -64,7 +64,15 @@ class PicMmh:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
-        self._toolpath, self._machine, self._options = toolpath, machine, options
+        self._toolpath, self._options = toolpath, options
+        self._controller = pic_mmh_controller(machine)
+        if machine.limits.rapid_step_rate_hz is None:
+            raise MachineError(
+                "key is missing: this controller times its rapids by it",
+                where="table [limits], key rapid_step_rate_hz",
+                mend="use --set limits.rapid_step_rate_hz=HZ",
+            )
+        self._rapid_period_s = 1.0 / machine.limits.rapid_step_rate_hz
         self._coded_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         if self._coded_mm[0] != self._coded_mm[1]:
             raise MachineError(
@@ -75,7 +83,7 @@ class PicMmh:
             )
         self._ends = self._steps(toolpath.end, range(3))
         self._centres = self._arc_centres()
-        home_mm = np.array([machine.controller.machine_zero_mm], dtype=np.float64)
+        home_mm = np.array([self._controller.machine_zero_mm], dtype=np.float64)
         self._home: Ints = self._steps(home_mm, range(3), named=False)[0]
         self._position: Ints = self._steps(toolpath.start[None, :], range(3), named=False)[0]
         self._mechanics = Mechanics(machine, self._position, ideal=options.ideal)
@@ -117,7 +125,7 @@ class PicMmh:
     def _period(self, row: int, kind: Kind, axis: int) -> float:
         """Seconds between two outputs of a row on an axis."""
         if kind not in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
-            return 1.0 / self._machine.limits.rapid_step_rate_hz
+            return self._rapid_period_s
         feed = float(self._toolpath.feed[row])
         if not (math.isfinite(feed) and feed > 0.0):
             raise ProgramError(
@@ -149,9 +157,8 @@ class PicMmh:
         origin, sign = (centre_x, centre_y), (1, 1)
         if x == 0 and y == 0:
             return _Leg(line_filler(0, 0), 0, (0, 1), origin, sign, period_s, ended=False)
-        controller = self._machine.controller
-        method = self._options.interpolator or controller.arcs
-        rounded = controller.initial_error == "rounded-radius"
+        method = self._options.interpolator or self._controller.arcs
+        rounded = self._controller.initial_error == "rounded-radius"
         samples, met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
         fill = arc_filler(arc, method, rounded=rounded)
         return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=met)
@@ -176,7 +183,7 @@ class PicMmh:
 
     def _chunk(self, row: int, leg: _Leg, steps: Ints, passes: int, ended: bool) -> Chunk:
         slide, reversals, travelled = self._mechanics.follow(steps)
-        by_event = self._machine.controller.time_base == "event"
+        by_event = self._controller.time_base == "event"
         periods = len(steps) if by_event else passes
         periods += int(reversals @ self._mechanics.compensation)
         return Chunk(

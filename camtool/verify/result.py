@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from camtool import __version__
 from camtool.findings import Finding
 from camtool.geometry.polylines import Floats
+from camtool.machine.model import PicMmhController
 from camtool.verify import report as record
 from camtool.verify.case import Case
 from camtool.verify.circles import UNSEEN
@@ -60,7 +61,7 @@ class Result:
             findings=record.reported(findings),
             contours=self.cuts.contour_count,
             time_split_s=_time_split(tally),
-            interpolator=options.interpolator or case.machine.controller.arcs,
+            interpolator=_interpolator(case),
             camtool_version=__version__,
         )
 
@@ -124,6 +125,14 @@ class Result:
 
 def _max_rms(figure: Figure) -> record.MaxRms:
     return record.MaxRms(number(figure.max, UM), number(figure.rms, UM))
+
+
+def _interpolator(case: Case) -> str:
+    """What makes arcs: an interpolator of the controller, or "path" when they are followed."""
+    controller = case.machine.controller
+    if isinstance(controller, PicMmhController):
+        return case.options.interpolator or controller.arcs
+    return "path"
 
 
 def _blocks(case: Case) -> int | None:

@@ -51,7 +51,9 @@ def markdown(report: Report) -> str:
 
 def _facts(report: Report) -> Iterator[tuple[str, str]]:
     steps, extents = report.steps, report.extents_mm
-    yield "target", f"{report.target} (arcs by {report.interpolator})"
+    exact = report.interpolator == "path"
+    how = "followed exactly" if exact else f"arcs by {report.interpolator}"
+    yield "target", f"{report.target} ({how})"
     if report.dimensions:
         x, y = report.dimensions[:2]
         shown = f"error {_percent(x.error_percent)}, {_percent(y.error_percent)}"

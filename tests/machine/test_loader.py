@@ -1,5 +1,6 @@
 """Machine files: strict, and every complaint names file, table and key."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError
-from camtool.machine.loader import build_machine, read_table
-from camtool.machine.model import Machine
+from camtool.machine.loader import build_machine, missing_keys, read_table, target_of
+from camtool.machine.model import Machine, PathController, pic_mmh_controller
 
 FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
 
@@ -108,3 +109,97 @@ def test_any_setting_is_taken_or_refused_cleanly(text: str) -> None:
     except MachineError:
         return
     assert isinstance(machine, Machine)
+
+
+def needy() -> dict[str, Any]:
+    table = base()
+    table["needs"] = ["axes.x.coded_step_mm", "axes.y.coded_step_mm"]
+    del table["axes"]["x"]["coded_step_mm"]
+    return table
+
+
+def test_what_only_the_user_can_say_is_asked_for() -> None:
+    assert missing_keys(needy(), "pic_mmh.toml") == ("axes.x.coded_step_mm",)
+    with pytest.raises(MachineError) as caught:
+        build_machine(needy(), "pic_mmh.toml")
+    for word in ("pic_mmh.toml", "[axes.x]", "key coded_step_mm", "missing", "--machine FILE"):
+        assert word in str(caught.value)
+    assert 'extends = "pic-mmh"' in str(caught.value)
+    assert target_of(needy(), "pic_mmh.toml").name == "pic-mmh"
+
+
+def test_what_only_the_user_can_say_is_taken_from_his_file_or_a_flag(tmp_path: Path) -> None:
+    user = tmp_path / "mine.toml"
+    user.write_text('extends = "pic-mmh"\n[axes.x]\ncoded_step_mm = 0.0025\n')
+    assert build_machine(needy(), "a.toml", user).axes.x.coded_step_mm == 0.0025
+    said = build_machine(needy(), "a.toml", None, ["axes.x.coded_step_mm=0.005"])
+    assert said.axes.x.coded_step_mm == 0.005
+
+
+def test_a_user_file_that_forgets_what_is_needed_is_the_one_named(tmp_path: Path) -> None:
+    user = tmp_path / "mine.toml"
+    user.write_text('extends = "pic-mmh"\n[axes.x]\nbacklash_mm = 0.1\n')
+    with pytest.raises(MachineError, match=r"mine\.toml: table \[axes\.x\], key coded_step_mm"):
+        build_machine(needy(), "a.toml", user)
+
+
+@pytest.mark.parametrize("needs", ["axes", [1], {"a": 1}])
+def test_needs_is_a_list_of_keys(needs: object) -> None:
+    table = base() | {"needs": needs}
+    with pytest.raises(MachineError, match="needs"):
+        build_machine(table, "a.toml")
+
+
+def test_a_step_is_as_coded_unless_said_otherwise() -> None:
+    table = base()
+    del table["axes"]["x"]["real_step_mm"]
+    x = build_machine(table, "a.toml", None, ["axes.x.coded_step_mm=0.005"]).axes.x
+    assert (x.coded_step_mm, x.real_step_mm) == (0.005, 0.005)
+    with pytest.raises(MachineError, match="real_step_mm"):
+        built("axes.x.real_step_mm=0")
+
+
+def path_machine(**limits: float) -> dict[str, Any]:
+    table = base() | {"controller": {"model": "path"}, "limits": limits}
+    for axis in table["axes"].values():
+        axis["coded_step_mm"] = axis["real_step_mm"] = 0.01
+    return table
+
+
+@pytest.mark.parametrize(
+    ("limits", "rates", "feed", "plunge", "rapid"),
+    [
+        ({}, None, math.inf, math.inf, math.inf),
+        ({"max_feed_mm_min": 100.0}, None, 100.0, 100.0, 100.0),
+        ({"rapid_mm_min": 900.0}, None, math.inf, math.inf, 900.0),
+        ({"max_step_rate_hz": 100.0}, None, 60.0, 60.0, 60.0),
+        ({"max_step_rate_hz": 100.0, "max_feed_mm_min": 50.0}, None, 50.0, 50.0, 50.0),
+        ({"rapid_step_rate_hz": 200.0, "max_feed_mm_min": 50.0}, None, 50.0, 50.0, 120.0),
+        ({}, (500.0, 400.0, 80.0), 400.0, 80.0, 400.0),
+        ({"max_feed_mm_min": 300.0}, (500.0, 400.0, 80.0), 300.0, 80.0, 400.0),
+    ],
+)
+def test_the_lowest_limit_that_is_said_holds(
+    limits: dict[str, float],
+    rates: tuple[float, ...] | None,
+    feed: float,
+    plunge: float,
+    rapid: float,
+) -> None:
+    table = path_machine(**limits)
+    for axis, rate in zip(table["axes"].values(), rates or (), strict=False):
+        axis["max_rate_mm_min"] = rate
+    machine = build_machine(table, "a.toml")
+    assert machine.max_feed_mm_min == pytest.approx(feed)
+    assert machine.max_plunge_mm_min == pytest.approx(plunge)
+    assert machine.rapid_mm_min == pytest.approx(rapid)
+
+
+def test_a_controller_that_follows_the_path_has_a_table_of_its_own() -> None:
+    machine = build_machine(path_machine(), "a.toml")
+    assert isinstance(machine.controller, PathController)
+    assert (machine.controller.grid, machine.controller.start_play) == ("steps", "preloaded")
+    with pytest.raises(MachineError, match=r"\[controller\], key arcs: unknown.*start_play"):
+        build_machine(path_machine(), "a.toml", None, ["controller.arcs=dsm"])
+    with pytest.raises(MachineError, match="needs the controller pic-mmh"):
+        pic_mmh_controller(machine)

@@ -3,10 +3,12 @@
 from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
+from click.testing import CliRunner
 
+from camtool.cli.targets import targets
 from camtool.errors import MachineError, UnknownTargetError
 from camtool.machine import registry
-from camtool.machine.registry import load_target, target_names
+from camtool.machine.registry import list_target, load_target, target_names
 
 
 def test_pic_mmh_is_installed() -> None:
@@ -40,3 +42,25 @@ def test_a_dialect_checks_its_own_table() -> None:
         load_target("pic-mmh", settings=["dialect.form=roman"])
     with pytest.raises(MachineError, match="fourm"):
         load_target("pic-mmh", settings=["dialect.fourm=annex"])
+
+
+def test_a_target_that_needs_the_user_is_listed_and_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = registry.read_table(list_target("pic-mmh").file)
+    axes = whole["axes"] | {"x": {"travel_mm": 10.0}}
+    partial = whole | {"axes": axes, "needs": ["axes.x.coded_step_mm"]}
+    monkeypatch.setattr(registry, "read_table", lambda file: partial)
+    listed = list_target("pic-mmh")
+    assert (listed.target.extension, listed.needs) == (".pic", ("axes.x.coded_step_mm",))
+    with pytest.raises(MachineError, match="--machine FILE"):
+        load_target("pic-mmh")
+    shown = CliRunner().invoke(targets, [])
+    assert "pic-mmh" in shown.stdout
+    assert "(needs --machine FILE: axes.x.coded_step_mm)" in shown.stdout
+
+
+def test_a_listed_target_is_checked() -> None:
+    assert list_target("pic-mmh").needs == ()
+    with pytest.raises(UnknownTargetError):
+        list_target("pic")
