@@ -78,7 +78,7 @@ def parse_tree(data: bytes) -> Node:
     handler = _Builder()
     source = InputSource()
     source.setByteStream(BytesIO(data))
-    parser = _parser(handler, entities=data.count(b"&") <= MAX_REFERENCES)
+    parser = _parser(handler, data)
     try:
         parser.parse(source)
     except DefusedXmlException as error:
@@ -103,13 +103,17 @@ def parse_tree(data: bytes) -> Node:
     return root
 
 
-def _parser(builder: _Builder, *, entities: bool) -> Any:
-    """defusedxml's parser, which lets `entities` pass that are short and plain text.
+def _parser(builder: _Builder, data: bytes) -> Any:
+    """defusedxml's parser, which lets a few entities pass that are short and plain text.
+
+    It takes all data in one go: expat before 2.6 begins a long attribute anew with each portion.
 
     Elements go to the builder as expat gives them: the way through SAX's own records of names and
     attributes takes longer than all the rest.
     """
     from defusedxml.expatreader import DefusedExpatParser
+
+    entities = data.count(b"&") <= MAX_REFERENCES
 
     class Parser(DefusedExpatParser):  # type: ignore[misc]  # the base is untyped
         def start_element_ns(self, name: str, attributes: dict[str, str]) -> None:
@@ -125,7 +129,7 @@ def _parser(builder: _Builder, *, entities: bool) -> Any:
             if not (entities and plain) or is_parameter or value is None:
                 super().defused_entity_decl(name, is_parameter, value, *outside)
 
-    parser = Parser()
+    parser = Parser(bufsize=len(data) + 1)
     parser.setFeature(feature_namespaces, True)
     parser.setFeature(feature_external_ges, False)
     parser.setContentHandler(builder)
