@@ -427,8 +427,8 @@ def test_a_dimension_that_holds_itself_ends():
     dimension = doc.modelspace().query("DIMENSION").first
     name = dimension.dxf.geometry
     again = dimension.copy()
-    again.dxf.geometry = name
     doc.blocks.get(name).add_entity(again)
+    again.dxf.geometry = name
     found = drawn(doc, ReadOptions(dimensions=True))
     reasons = {(item.kind, item.reason) for item in found.skipped}
     assert ("DIMENSION", "its block holds itself, or blocks too deep") in reasons
