@@ -1,0 +1,190 @@
+"""Toolpaths in fewer words: what a dialect cannot say, said by what it can.
+
+    xy_then_z           moves of XY and Z at once become two: up before XY, down after
+    arcs_to_lines       chosen arcs become chords
+    split_full_circles  an arc that ends where it starts becomes two halves
+    arcs_within         arcs of more than a given sweep become equal parts
+
+Each function gives a new Toolpath and, for each of its rows, the row that it came from. All new
+points lie on the true arc, and the last one is the old end itself. Feed, provenance, block and
+value of a row go on in all the rows that it becomes; events stay as they are.
+
+An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the spiral
+between them: radius and Z change in proportion to the angle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import OptionError, PostError
+from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
+
+Bools = npt.NDArray[np.bool_]
+
+MAX_CHORD_SWEEP_RAD = 0.5 * math.pi
+"""No chord stands for more of an arc than this, however wide the tolerance: a circle has four."""
+
+SWEEP_EPS_RAD = 1e-9
+"""A sweep may exceed the one that is wanted by this much, by rounding alone, unsplit."""
+
+MAX_PARTS = 10_000_000
+"""A toolpath that would become more rows than this is refused: a tolerance far too fine."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lowered:
+    """A toolpath of M rows and `row` (M,), the row of the given toolpath that each came from;
+    `row` ascends, and every given row has at least one."""
+
+    toolpath: Toolpath
+    row: Ints
+
+    def after(self, earlier: Lowered) -> Lowered:
+        """The same with rows numbered as in what `earlier` was made of; this was made of it."""
+        return replace(self, row=earlier.row[self.row])
+
+
+def xy_then_z(toolpath: Toolpath) -> Lowered:
+    """Moves that change XY and Z at once become a move in XY and one in Z: up first, down last.
+
+    The Z part of an arc (a helix) is a line at the arc's feed; both parts of a rapid are rapids.
+    """
+    begin, end = toolpath.starts, toolpath.end
+    in_xy = toolpath.is_arc | (toolpath.is_motion & (end[:, :2] != begin[:, :2]).any(axis=1))
+    both = in_xy & (end[:, 2] != begin[:, 2])
+    row, part = _repeated(np.where(both, 2, 1))
+    up = end[:, 2] > begin[:, 2]
+    # First parts: Z of a climb, XY of a descent. Second parts end where the move ended.
+    is_z = both[row] & (up[row] == (part == 0))
+    points = end[row]
+    first = both[row] & (part == 0)
+    points[first & is_z, :2] = begin[row[first & is_z], :2]
+    points[first & ~is_z, 2] = begin[row[first & ~is_z], 2]
+    kind = toolpath.kind[row]
+    z_of_arc = is_z & toolpath.is_arc[row]
+    kind[z_of_arc] = Kind.LINE
+    centre = np.where(z_of_arc[:, None], np.nan, toolpath.centre[row])
+    return _built(toolpath, row, kind, points, centre)
+
+
+def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lowered:
+    """The arcs among `rows` (N,) as chords that stray from them by `tolerance_mm` at most.
+
+    Raises OptionError for a tolerance that is not above 0 and PostError for an arc without a
+    centre or beyond `MAX_PARTS`.
+
+    A chord over the sweep t of a radius r strays by the sagitta r(1 − cos t/2) = 2r sin²(t/4),
+    so t = 4 asin √(tolerance / 2r).
+    """
+    if not (math.isfinite(tolerance_mm) and tolerance_mm > 0.0):
+        raise OptionError(f"tolerance {tolerance_mm:g} mm is not above 0")
+    chosen = toolpath.is_arc & rows
+    arms = _Arms(toolpath, chosen)
+    largest = np.maximum(arms.radius, arms.end_radius)
+    with np.errstate(divide="ignore"):
+        half_sine = np.sqrt(np.minimum(tolerance_mm / (2.0 * largest), 1.0))
+    chord = np.minimum(4.0 * np.arcsin(half_sine), MAX_CHORD_SWEEP_RAD)
+    return _split(toolpath, arms, np.ceil(np.abs(arms.sweep) / chord), lines=True)
+
+
+def split_full_circles(toolpath: Toolpath) -> Lowered:
+    """Arcs that end where they start, as two halves each; PostError for one without a centre."""
+    same = (toolpath.end[:, :2] == toolpath.starts[:, :2]).all(axis=1)
+    arms = _Arms(toolpath, toolpath.is_arc & same)
+    return _split(toolpath, arms, np.full(len(arms.row), 2.0))
+
+
+def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> Lowered:
+    """Arcs of more than `max_sweep_rad` as equal parts of no more.
+
+    Raises OptionError for a sweep that is not above 0 and PostError for an arc without a centre
+    or beyond `MAX_PARTS`.
+    """
+    if not (math.isfinite(max_sweep_rad) and max_sweep_rad > 0.0):
+        raise OptionError(f"sweep {max_sweep_rad:g} rad is not above 0")
+    arms = _Arms(toolpath, toolpath.is_arc)
+    excess = np.maximum(np.abs(arms.sweep) - SWEEP_EPS_RAD, 0.0)
+    return _split(toolpath, arms, np.ceil(excess / max_sweep_rad))
+
+
+class _Arms:
+    """The chosen arcs seen from their centres: radius at start and end mm, angle at the start and
+    signed sweep rad, each (J,), for the rows `row` (J,)."""
+
+    def __init__(self, toolpath: Toolpath, chosen: Bools) -> None:
+        """PostError for an arc without a centre."""
+        self.row = np.flatnonzero(chosen)
+        self.centre = toolpath.centre[self.row]
+        bad = ~np.isfinite(self.centre).all(axis=1)
+        if bad.any():
+            raise PostError("an arc without a centre", where=f"move {self.row[bad.argmax()]}")
+        self.begin, self.end = toolpath.starts[self.row], toolpath.end[self.row]
+        out, back = self.begin[:, :2] - self.centre, self.end[:, :2] - self.centre
+        self.radius = np.hypot(out[:, 0], out[:, 1])
+        self.end_radius = np.hypot(back[:, 0], back[:, 1])
+        self.angle = np.arctan2(out[:, 1], out[:, 0])
+        self.sweep = toolpath.sweeps()[self.row]
+
+    def points(self, which: Ints, share: Floats) -> Floats:
+        """(K, 3) mm: the points of the arcs `which` (K,) at `share` (K,) of their sweep."""
+        angle = self.angle[which] + share * self.sweep[which]
+        radius = self.radius[which] + share * (self.end_radius - self.radius)[which]
+        rise = (self.end[:, 2] - self.begin[:, 2])[which]
+        return np.column_stack(
+            [
+                self.centre[which, 0] + radius * np.cos(angle),
+                self.centre[which, 1] + radius * np.sin(angle),
+                self.begin[which, 2] + share * rise,
+            ]
+        )
+
+
+def _split(toolpath: Toolpath, arms: _Arms, parts: Floats, *, lines: bool = False) -> Lowered:
+    """Each arc of `arms` in so many `parts` (J,) of equal sweep, at least one; `lines`: chords."""
+    parts = np.maximum(parts, 1.0)
+    if len(toolpath) + float(parts.sum()) > MAX_PARTS:
+        raise PostError(
+            f"arcs would become more than {MAX_PARTS} moves",
+            where=f"move {arms.row[parts.argmax()]}",
+            mend="use a wider tolerance",
+        )
+    counts = np.ones(len(toolpath), dtype=np.int64)
+    counts[arms.row] = parts.astype(np.int64)
+    row, part = _repeated(counts)
+    points = toolpath.end[row]
+    inner = np.flatnonzero(part + 1 < counts[row])
+    arm_of_row = np.zeros(len(toolpath), dtype=np.int64)
+    arm_of_row[arms.row] = np.arange(len(arms.row))
+    share = (part[inner] + 1) / counts[row[inner]]
+    points[inner] = arms.points(arm_of_row[row[inner]], share)
+    kind, centre = toolpath.kind.copy(), toolpath.centre.copy()
+    if lines:
+        kind[arms.row], centre[arms.row] = Kind.LINE, np.nan
+    return _built(toolpath, row, kind[row], points, centre[row])
+
+
+def _repeated(counts: Ints) -> tuple[Ints, Ints]:
+    """Each row so many times: the row, and which of its parts, from 0."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    before = np.cumsum(counts) - counts
+    return row, np.arange(len(row)) - before[row]
+
+
+def _built(toolpath: Toolpath, row: Ints, kind: Ints, end: Floats, centre: Floats) -> Lowered:
+    """Rows of new kinds, ends and centres with all else of the rows that they came from."""
+    new = replace(
+        toolpath,
+        kind=kind,
+        end=end,
+        centre=centre,
+        feed=toolpath.feed[row],
+        value=toolpath.value[row],
+        source=toolpath.source[row],
+        block=toolpath.block[row],
+    )
+    return Lowered(new, row)
