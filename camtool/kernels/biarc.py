@@ -129,6 +129,21 @@ def span_error(point: Floats, leave: Floats, arrive: Floats, low: int, high: int
 
 
 @numba.njit(cache=True, error_model="numpy")
+def span_holds(
+    point: Floats, leave: Floats, arrive: Floats, low: int, high: int, target: float
+) -> bool:
+    """Whether `span_error` is within the target; it stops at the first node that is not."""
+    start, end = point[low], point[high]
+    pair = biarc(start, leave[low], end, arrive[high])
+    if math.isnan(pair[0]):
+        return False
+    for i in range(high - 1, low, -1):
+        if distance_to_biarc(point[i, 0], point[i, 1], start, end, pair) > target:
+            return False
+    return True
+
+
+@numba.njit(cache=True, error_model="numpy")
 def arc_error(point: Floats, low: int, high: int, bulge: float) -> float:
     """The largest distance of the nodes between from the arc or line over nodes low..high."""
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]

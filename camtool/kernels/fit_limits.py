@@ -27,7 +27,7 @@ MAX_LINES = 100_000
 SAME_ARC_MM = 1e-8
 """Neighbours that leave a common arc or line by no more become one."""
 
-CANDIDATES = 4
+CANDIDATES = 2
 """Nodes kept for each number of arcs: the furthest, and others evenly short of it."""
 
 SEARCH_SHARE = 0.97

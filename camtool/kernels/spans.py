@@ -11,7 +11,16 @@ import math
 import numba
 import numpy as np
 
-from camtool.kernels.biarc import Bools, Floats, Ints, arc_error, biarc, half_angle, span_error
+from camtool.kernels.biarc import (
+    Bools,
+    Floats,
+    Ints,
+    arc_error,
+    biarc,
+    half_angle,
+    span_error,
+    span_holds,
+)
 from camtool.kernels.fit_limits import CANDIDATES, MAX_RADIUS_MM, SINGLE_TURN_RAD, SPAN_TURN_RAD
 
 
@@ -144,7 +153,7 @@ def furthest_state(
                 best, whence, bulge = high, row, found
             continue
         first = row == now - 2 * CANDIDATES
-        if first or span_error(point, leave, arrive, low, best + 1) <= target:
+        if first or span_holds(point, leave, arrive, low, best + 1, target):
             begin = low + guess if first else best + 2
             high = longest_span(point, leave, arrive, low, limit[low], begin, target)
             if high > best:
@@ -189,7 +198,7 @@ def longest_spans(
                     bulge = single_bulge(point, leave, arrive, low, place, target)
                     if math.isnan(bulge):
                         break
-                elif span_error(point, leave, arrive, low, place) > target:
+                elif not span_holds(point, leave, arrive, low, place, target):
                     continue
             states[now + m], whence[now + m], bulges[now + m] = place, row, bulge
     spans, row = 0, now
