@@ -22,8 +22,8 @@ BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
 
 AGAIN = "export it again from the program that made it, best as DXF R2000 or later"
 
-LARGEST_CODE = 1071
-"""The largest group code (DXF reference); the smallest that stands in files is 0."""
+LARGEST_CODE, UNUSED_CODES = 1071, range(482, 999)
+"""Group codes in files are 0 to 481 and 999 to 1071 (DXF reference)."""
 
 SECTIONS = frozenset(
     ("HEADER", "CLASSES", "TABLES", "BLOCKS", "ENTITIES", "OBJECTS", "THUMBNAILIMAGE", "ACDSDATA")
@@ -240,7 +240,8 @@ def _end(codes: list[int], values: list[str]) -> int:
 
 def _check_codes(tags: Tags, file: str, said: list[str] | None = None) -> None:
     """DrawingError for the first group code that is none."""
-    odd = {code for code in set(tags.codes) if not 0 <= code <= LARGEST_CODE}
+    known = set(tags.codes)
+    odd = {c for c in known if not 0 <= c <= LARGEST_CODE or c in UNUSED_CODES}
     for k, code in enumerate(tags.codes if odd else ()):
         if code in odd:
             what = repr(said[k].strip()[:20]) if said else str(code)

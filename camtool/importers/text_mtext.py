@@ -48,6 +48,8 @@ def write_mtext(
     """
     reader = _Reader(look, font)
     row, column = divmod(int(entity.dxf.attachment_point) - 1, 3)
+    if not 0 <= row < len(_SHARES):
+        raise Unusable(f"has an attachment point of {entity.dxf.attachment_point}")
     try:
         paragraphs = list(reader.paragraphs(content, _SHARES[column]))
     except _CODE_ERRORS as error:

@@ -157,7 +157,7 @@ def test_what_only_python_or_ezdxf_take_for_a_number_is_refused(number):
     assert caught.value.where == "line 23"
 
 
-@pytest.mark.parametrize("code", ["x8", "1_0", "-8", "8.0", "12345"])
+@pytest.mark.parametrize("code", ["x8", "1_0", "-8", "8.0", "12345", "596"])
 def test_a_group_code_that_is_none_is_refused_with_its_line(code):
     with pytest.raises(DrawingError, match="is no group code") as caught:
         read(in_entities(LINE.replace("8 0", f"{code} 0")), "part.dxf", OPTIONS)
