@@ -1,0 +1,96 @@
+"""Lines cut into pieces whose dog-legs stay near the line.
+
+A record of dx, dy steps is no straight line: both motors step together min(|dx|, |dy|) times, a
+diagonal, and then the motor with more steps goes on alone (L4683-4705, "corte recto"):
+
+            . ·B        a = max(|dx|, |dy|) steps, b = min, d = a − b; steps of sx, sy mm
+         . ·  /         L = length of AB in mm
+      . ·    /          E is the elbow, here for |dx| > |dy|: first diagonal, then along X
+    A ----- E           (drawn mirrored; the elbow lies on the diagonal's side of AB)
+
+Both legs run towards B, so the feet of all their points lie on AB, and the elbow is the point
+that is farthest from it. A point that is M diagonal and D single steps from A is at
+(M + D, M) steps, and its distance from AB is the cross product over the length:
+
+    e(M, D) = sx·sy·|(M + D)·b − M·a| / L = sx·sy·|D·b − M·d| / L
+
+so the elbow (M = b, D = 0) strays by e = sx·sy·b·(a − b) / L; with sx = sy = 1 this is
+L·t(1−t)/(1+t²), t = b/a, at most 0.2071·L (at 22.5°), and 0 along the axes and the diagonals.
+
+To stay within a tolerance, the line is walked as runs of diagonal and of single steps, each as
+long as |D·b − M·d| ≤ reach = tolerance·L/(sx·sy) allows; one record is a diagonal run and the
+single run after it. Both ends and the elbow of every record are then within the tolerance of the
+line itself, not only of their own chord, and nothing is rounded on the way. A run of at least
+one step is always possible: otherwise reach + value < d and reach − value < b, so 2·reach < a,
+but tolerance ≥ half of the coarser step gives 2·reach ≥ a.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+FREE: Final = -1
+"""A reach that binds nothing: rapids may take any dog-leg."""
+
+
+def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> Ints:
+    """(N,) the reach of lines of (N, 2) steps: the greatest |D·b − M·d| within the tolerance.
+
+    Not below a // 2, which rounding alone could take from it; see the module.
+    """
+    length = np.hypot(steps[:, 0] * step_mm[0], steps[:, 1] * step_mm[1])
+    reach = np.floor(tolerance_mm * length / (step_mm[0] * step_mm[1])).astype(np.int64)
+    return np.asarray(np.maximum(reach, np.abs(steps).max(axis=1, initial=0) // 2))
+
+
+def elbows(steps: Ints) -> Ints:
+    """(N,) b·d of lines of (N, 2) steps: what their elbow takes of the reach."""
+    size = np.abs(steps)
+    short = size.min(axis=1, initial=np.iinfo(np.int64).max)
+    return np.asarray(short * (size.max(axis=1, initial=0) - short))
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of dx, dy steps; `reach` as `reaches` gives it, or FREE."""
+
+    dx: int
+    dy: int
+    reach: int = FREE
+
+    def pieces(self, most: int) -> list[tuple[int, int]]:
+        """Steps (dx, dy) of records that follow the line, none of more than `most` steps."""
+        long, short = max(abs(self.dx), abs(self.dy)), min(abs(self.dx), abs(self.dy))
+        x_is_long = abs(self.dx) >= abs(self.dy)
+        right, up = (1 if self.dx >= 0 else -1), (1 if self.dy >= 0 else -1)
+        pieces = []
+        for diagonal, single in self._runs(short, long - short, most):
+            far = diagonal + single
+            x, y = (far, diagonal) if x_is_long else (diagonal, far)
+            pieces.append((right * x, up * y))
+        return pieces
+
+    def _runs(self, diagonals: int, singles: int, most: int) -> list[tuple[int, int]]:
+        """Records as (diagonal steps, single steps), each run as long as the reach allows."""
+        reach = diagonals * singles if self.reach == FREE else self.reach
+        value, left, rest = 0, diagonals, singles
+        runs = []
+        while left or rest:
+            run = min(left, most)
+            if singles:
+                run = min(run, (reach + value) // singles)
+            value -= run * singles
+            on = min(rest, most - run)
+            if diagonals:
+                on = min(on, (reach - value) // diagonals)
+            value += on * diagonals
+            left, rest = left - run, rest - on
+            runs.append((run, on))
+        return runs

@@ -1,0 +1,96 @@
+"""The `[dialect]` table of an i8751 machine: all that the writer and the reader share.
+
+Where the thesis contradicts itself or is silent, an option says which reading is meant;
+docs/dialects/i8751.md explains each, with the lines of the thesis.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from camtool.errors import MachineError
+from camtool.machine.loader import convert
+from camtool.machine.model import Machine, Positive
+
+RECORDS_PER_PACKET: Final = 5
+"""15 blocks of three motors (L4106-4134)."""
+
+MOST_DWELL_BYTE_S: Final = 255
+"""Seconds that one byte of a dwell pair can say (L4136-4147)."""
+
+
+class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How programs look, how near lines are followed, and one reading for each open question.
+
+    `tolerance_mm`: how far the dog-leg of a line may stray from it; `arc_tolerance_mm`: how far
+    the chords of an arc may. `plus_backward`: axes ("xz") whose motors turn backward for +.
+    """
+
+    tolerance_mm: Positive
+    arc_tolerance_mm: Positive
+    format: Literal["packets", "listing", "hex"] = "packets"
+    plus_backward: str = ""
+    key: Literal["once", "each-packet"] = "once"
+    dwell_mark: Literal["00H", "30H"] = "00H"
+    motor_reply: Literal["B", "8"] = "B"
+    dwell_reply: Literal["unstated", "M", "none"] = "unstated"
+    high_byte: Literal["256", "255"] = "256"
+    first_pulse: Literal["moves", "repeats"] = "moves"
+    z_alone: Literal["plain", "with-step"] = "plain"
+    cruise: Literal["coded", "declared"] = "coded"
+    delay: Literal["thesis", "counted"] = "thesis"
+    start_reload: Annotated[int, Meta(ge=1, le=255)] = 242
+    elbow: Literal["ramps", "flows"] = "ramps"
+
+    @property
+    def high_byte_steps(self) -> int:
+        """Steps that one unit of PH is worth."""
+        return int(self.high_byte)
+
+    @property
+    def dwell_mark_byte(self) -> int:
+        """The first byte of a dwell pair."""
+        return int(self.dwell_mark[:-1], 16)
+
+    @property
+    def lost_pulses(self) -> int:
+        """Pulses at the start of each motor's move that do not move it."""
+        return 1 if self.first_pulse == "repeats" else 0
+
+    @property
+    def most_steps(self) -> int:
+        """Steps that one record can move a motor."""
+        return 255 * self.high_byte_steps + 255 - self.lost_pulses
+
+    @property
+    def signs(self) -> tuple[int, int, int]:
+        """For X, Y, Z: 1 when + is forward, -1 when + is backward."""
+        x, y, z = (-1 if axis in self.plus_backward else 1 for axis in "xyz")
+        return x, y, z
+
+
+def dialect_of(machine: Machine) -> Dialect:
+    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
+    name = machine.target.name
+    dialect = convert(machine.dialect, Dialect, name, "dialect")
+    if not re.fullmatch("x?y?z?", dialect.plus_backward):
+        raise MachineError(
+            f"{dialect.plus_backward!r} names no axes",
+            file=name,
+            where="table [dialect], key plus_backward",
+            mend='write axes in the order x, y, z, such as "xz", or ""',
+        )
+    # Staying within half of the coarser step is possible for every line; see _i8751_dogleg.
+    least = 0.5 * max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    if dialect.tolerance_mm < least:
+        raise MachineError(
+            f"{dialect.tolerance_mm:g} mm is finer than the steps of the machine can be",
+            file=name,
+            where="table [dialect], key tolerance_mm",
+            mend=f"use {least:g} mm or more",
+        )
+    return dialect
