@@ -1,4 +1,4 @@
-"""Drawing files to Drawing, one file per format.
+"""Drawing files to Drawing, one package per format.
 
 `read_drawing` and `ReadOptions` are loaded on first use: the package itself costs nothing.
 """

@@ -47,7 +47,7 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=_EXPORT_AGAIN)
     name = options.format or find_format(data, Path(file).suffix, file)
-    module = importlib.import_module(f"camtool.importers.{name}")
+    module = importlib.import_module(f"camtool.importers.{name}.reader")
     return cast(_Reader, module).read(data, file, options)
 
 

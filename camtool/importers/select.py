@@ -110,7 +110,7 @@ def colour_named(text: str) -> str:
         # 7 is the foreground: white on a black screen, black on paper, and read as black.
         number = int(word)
         return "#000000" if number == 7 else "#{:02x}{:02x}{:02x}".format(*aci2rgb(number))
-    from camtool.importers.svg_colours import NAMES
+    from camtool.importers.svg.colours import NAMES
 
     if word in NAMES:
         return NAMES[word]

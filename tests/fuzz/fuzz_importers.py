@@ -16,7 +16,9 @@ from pathlib import Path
 import atheris
 
 with atheris.instrument_imports(include=["camtool", "ezdxf", "svgpathtools", "defusedxml"]):
-    from camtool.importers import dxf, points, svg  # noqa: F401  (to be instrumented)
+    import camtool.importers.dxf.reader
+    import camtool.importers.points.reader
+    import camtool.importers.svg.reader  # noqa: F401  (to be instrumented)
     from camtool.importers.options import ReadOptions
     from tests.fuzz.reading import read_or_refuse
     from tests.fuzz.seeds import BINARIES, TEXTS

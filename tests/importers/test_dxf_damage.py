@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
-from camtool.importers import dxf_load, dxf_walk
-from camtool.importers.dxf import read
+from camtool.importers.dxf import load as dxf_load
+from camtool.importers.dxf import walk as dxf_walk
+from camtool.importers.dxf.reader import read
 from camtool.importers.options import ReadOptions
 
 OPTIONS = ReadOptions(tolerance_mm=0.01, text="stroke", dimensions=True)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing
-from camtool.importers.dxf import read
+from camtool.importers.dxf.reader import read
 from camtool.importers.options import ReadOptions
 from tests.oracles import arcs
 
@@ -471,7 +471,7 @@ def test_a_layout_is_read_by_its_name_instead_of_model_space():
 
 
 def test_line_types_come_from_entity_layer_or_block():
-    from camtool.importers import dxf
+    from camtool.importers.dxf import reader as dxf
 
     doc = ezdxf.new("R2010", setup=True)
     doc.layers.add("CUT", linetype="DASHED")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
-from camtool.importers.points import read
+from camtool.importers.points.reader import read
 
 
 def points(text: str, **options: object) -> Drawing:

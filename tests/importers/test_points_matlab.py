@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
-from camtool.importers.points import read
+from camtool.importers.points.reader import read
 from camtool.importers.read import read_drawing
 
 # Thesis on the Matlab router, L3196-3228.

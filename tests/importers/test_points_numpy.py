@@ -14,9 +14,9 @@ from hypothesis.extra import numpy as hnp
 
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing
-from camtool.importers import points_numpy
 from camtool.importers.options import ReadOptions
-from camtool.importers.points import read
+from camtool.importers.points import numpy_file as points_numpy
+from camtool.importers.points.reader import read
 from camtool.importers.read import read_bytes
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 0.0]])

@@ -12,7 +12,7 @@ from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_lengths
 from camtool.importers.options import ReadOptions
-from camtool.importers.points import read
+from camtool.importers.points.reader import read
 
 
 def points(text: str, **options: object) -> Drawing:

@@ -16,11 +16,13 @@ from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents, path_lengths
 from camtool.geometry.polylines import Segments
-from camtool.importers import solid, solid_process, solid_worker
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes, read_drawing
-from camtool.importers.solid_process import outlined
-from camtool.importers.solid_units import step_unit
+from camtool.importers.solid import process as solid_process
+from camtool.importers.solid import reader as solid
+from camtool.importers.solid import worker as solid_worker
+from camtool.importers.solid.process import outlined
+from camtool.importers.solid.units import step_unit
 
 b = pytest.importorskip("build123d")
 
@@ -408,7 +410,7 @@ def test_a_worker_that_dies_or_hangs_is_a_clean_error(
 
 def test_nothing_of_opencascade_is_loaded_by_the_reader() -> None:
     code = (
-        "import sys, camtool.importers.solid;"
+        "import sys, camtool.importers.solid.reader;"
         "sys.exit(any(name.split('.')[0] in ('OCP', 'build123d') for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], env=dict(os.environ)).returncode == 0

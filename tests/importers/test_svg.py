@@ -14,7 +14,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents, path_lengths, signed_areas
 from camtool.geometry.polylines import Segments
 from camtool.importers.options import ReadOptions
-from camtool.importers.svg import read
+from camtool.importers.svg.reader import read
 
 SPACES = (
     'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
-from camtool.importers import svg_bytes, svg_css, svg_walk
 from camtool.importers.options import ReadOptions
-from camtool.importers.svg import read
+from camtool.importers.svg import css as svg_css
+from camtool.importers.svg import data as svg_data
+from camtool.importers.svg import walk as svg_walk
+from camtool.importers.svg.reader import read
 
 NAMES = (
     'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
@@ -72,7 +74,7 @@ def test_gzip_is_unpacked() -> None:
 
 
 def test_what_is_too_large_is_refused_packed_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(svg_bytes, "MAX_BYTES", 10_000)
+    monkeypatch.setattr(svg_data, "MAX_BYTES", 10_000)
     large = svg(LINE + " " * 10_000).encode()
     for data in (large, gzip.compress(large)):
         with pytest.raises(DrawingError, match="at most 0 MB"):

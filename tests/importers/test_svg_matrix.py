@@ -15,7 +15,7 @@ import pytest
 
 from camtool.geometry.polylines import Polyline, Segments
 from camtool.importers.options import ReadOptions
-from camtool.importers.svg import read
+from camtool.importers.svg.reader import read
 from tests.oracles.svg_ink import ink
 
 ZOOM = 10

@@ -8,8 +8,8 @@ from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
 from camtool.importers.options import ReadOptions, Selection
-from camtool.importers.svg import read
-from camtool.importers.svg_colours import parse_colour
+from camtool.importers.svg.colours import parse_colour
+from camtool.importers.svg.reader import read
 
 PAGE = 'xmlns="http://www.w3.org/2000/svg" width="100mm" height="100mm" viewBox="0 0 100 100"'
 RECT = '<rect x="10" y="20" width="4" height="6" {}/>'

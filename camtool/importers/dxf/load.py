@@ -1,0 +1,226 @@
+"""The bytes of a DXF file to ezdxf's document, and what had to be repaired on the way.
+
+    tags, each checked → sections → whole? → ezdxf's ordinary reader → the document
+                                       └── faulty order ──▶ ezdxf's recovery ──┘
+
+Nothing is audited: an audit deletes what it does not like, and here every entity is either used
+or counted with a reason. A file whose entities are not all there is refused, whatever could be
+saved; one that ends behind them is whole enough.
+"""
+
+from __future__ import annotations
+
+import gc
+import logging
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any
+
+from camtool.errors import DrawingError
+from camtool.importers.dxf.tags import (
+    AGAIN,
+    BINARY_DXF,
+    Frame,
+    Tags,
+    ascii_tags,
+    binary_tags,
+    check_numbers,
+    frame_of,
+    header_of,
+    lost,
+)
+
+MAX_BYTES = 100_000_000
+"""Larger files are refused."""
+
+MAX_TAGS = 10_000_000
+"""Files of more tags (two lines of text each) are refused."""
+
+MAX_ENTITIES = 1_000_000
+"""Files of more entities, VERTEX and table entries included, are refused: ezdxf's document takes
+some 3 KB for each."""
+
+_COMMENT = 999
+_NO_ASCII = re.compile(r"[^\x00-\x7f]")
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """An `ezdxf` document, the header as the file itself says it, and all that was mended."""
+
+    document: Any
+    header: dict[str, Any] = field(default_factory=dict)
+    repairs: tuple[str, ...] = ()
+
+
+def load(data: bytes, file: str) -> Loaded:
+    """The document in `data`; DrawingError when it is no DXF, cut off or beyond repair."""
+    _check_bytes(data, file)
+    tags = binary_tags(data, file) if data.startswith(BINARY_DXF) else ascii_tags(data, file)
+    if len(tags.codes) > MAX_TAGS:
+        raise _too_large("tags", MAX_TAGS, file)
+    if tags.codes.count(0) > MAX_ENTITIES:
+        raise _too_large("entities", MAX_ENTITIES, file)
+    frame = frame_of(tags)
+    cut = _check_whole(tags, frame, file)
+    if cut:
+        tags = _ended(tags, frame)
+        frame = frame_of(tags)
+    notes = [*tags.notes, *cut, *frame.faults, *lost(tags, frame)]
+    with quiet() as said, without_collector():
+        document = None if frame.faults else _plain(tags, said)
+        notes.extend(said)
+        if document is None or (said and tags.is_text):
+            check_numbers(tags, file)
+            document = _recovered(tags, notes, file)
+    repairs = tuple(printable(note) for note in dict.fromkeys(notes))
+    return Loaded(document, header_of(tags, frame), repairs)
+
+
+class _Kept(logging.Handler):
+    """Keeps the messages of warnings and errors."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.messages: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """One more message."""
+        self.messages.append(" ".join(record.getMessage().split()))
+
+
+@contextmanager
+def quiet() -> Iterator[list[str]]:
+    """ezdxf logs and warns of nothing in here, its warnings gather in the list; all is as before
+    behind."""
+    logger = logging.getLogger("ezdxf")
+    kept, propagate = _Kept(), logger.propagate
+    logger.addHandler(kept)
+    logger.propagate = False
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield kept.messages
+    finally:
+        logger.propagate = propagate
+        logger.removeHandler(kept)
+
+
+def printable(text: str) -> str:
+    """The text with "?" for bytes that are no text in the file's encoding."""
+    return text.encode("utf-8", errors="replace").decode("utf-8")
+
+
+@contextmanager
+def without_collector() -> Iterator[None]:
+    """Many objects arise in here and few go: looking for garbage would take half of the time."""
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()
+
+
+def _check_bytes(data: bytes, file: str) -> None:
+    """DrawingError for what needs no reading to be refused."""
+    if not data.strip():
+        raise DrawingError("is empty", file=file, mend=AGAIN)
+    if len(data) > MAX_BYTES:
+        size, most = len(data) // 1_000_000, MAX_BYTES // 1_000_000
+        raise DrawingError(
+            f"is {size} MB large, at most {most} MB are read",
+            file=file,
+            mend="split the drawing, or delete what is not to be made",
+        )
+    if data.count(b"\n") > 2 * MAX_TAGS and not data.startswith(BINARY_DXF):
+        raise _too_large("lines", 2 * MAX_TAGS, file)
+    # UTF-16 puts a zero between any two letters.
+    if b"SECTION" not in data and b"SECTION" not in data.replace(b"\x00", b""):
+        raise DrawingError("is no DXF: it has no section", file=file, mend=AGAIN)
+
+
+def _too_large(what: str, most: int, file: str) -> DrawingError:
+    return DrawingError(
+        f"holds more than {most} {what}",
+        file=file,
+        mend="split the drawing, or delete what is not to be made",
+    )
+
+
+def _check_whole(tags: Tags, frame: Frame, file: str) -> list[str]:
+    """A note when the file ends early; DrawingError unless all its entities are there."""
+    if not frame.sections:
+        raise DrawingError("is no DXF: it has no section", file=file, mend=AGAIN)
+    if frame.eof is not None:
+        return []
+    if not frame.whole("ENTITIES"):
+        damaged = "" if tags.is_text else " or damaged"
+        raise DrawingError(
+            f"is cut off{damaged}: the end mark EOF is missing",
+            file=file,
+            where=f"after {tags.where(len(tags.codes))}",
+            mend=AGAIN,
+        )
+    return ["the end mark EOF is missing: what stood behind the entities is left out"]
+
+
+def _ended(tags: Tags, frame: Frame) -> Tags:
+    """The tags up to the end of the last whole section, and an end mark."""
+    end = max(part.end for part in frame.sections if part.end is not None) + 1
+    return Tags([*tags.codes[:end], 0], [*tags.values[:end], "EOF"], tags.is_text)
+
+
+def _plain(tags: Tags, said: list[str]) -> Any:
+    """The document of ezdxf's ordinary reader; None when it fails or finds fault, as `said`."""
+    from ezdxf.document import Drawing
+    from ezdxf.lldxf.types import DXFBinaryTag, DXFTag
+
+    def tag_of(code: int, value: Any) -> Any:
+        return (DXFBinaryTag if isinstance(value, bytes) else DXFTag)(code, value)
+
+    pairs: Iterator[Any] = map(DXFTag if tags.is_text else tag_of, tags.codes, tags.values)
+    try:
+        if _COMMENT in tags.codes:
+            pairs = filter(lambda tag: tag.code != _COMMENT, pairs)
+        return Drawing.load(pairs)
+    # A damaged file makes ezdxf fail in every possible way; each one is the file's fault.
+    except Exception as error:
+        said.append(_reason(error))
+        return None
+
+
+def _recovered(tags: Tags, notes: list[str], file: str) -> Any:
+    """The document of ezdxf's recovery, its repairs added to the notes."""
+    from ezdxf.document import Drawing
+    from ezdxf.recover import Recover
+
+    if not tags.is_text:
+        raise DrawingError(f"cannot be read as DXF: {notes[-1]}", file=file, mend=AGAIN)
+    pairs = zip(tags.codes, tags.values, strict=True)
+    lines = "".join(f"{code}\n{value}\n" for code, value in pairs)
+    # Recovery reads bytes in whatever code page they name; escapes are the same in all of them.
+    plain = _NO_ASCII.sub(lambda sign: f"\\U+{ord(sign[0]):04X}", lines)
+    try:
+        recover = Recover.run(BytesIO(plain.encode("ascii")))
+        document = Drawing()
+        document._load_section_dict(recover.section_dict)
+    except Exception as error:
+        raise DrawingError(
+            f"cannot be read as DXF: {_reason(error)}", file=file, mend=AGAIN
+        ) from error
+    notes.extend(message for _, message in (*recover.fixes, *recover.errors))
+    return document
+
+
+def _reason(error: Exception) -> str:
+    """What ezdxf says on purpose; what merely happened to it would help nobody."""
+    from ezdxf.lldxf.const import DXFStructureError, DXFVersionError
+
+    on_purpose = isinstance(error, (DXFStructureError, DXFVersionError))
+    return printable(str(error)) if on_purpose else "its structure is damaged"

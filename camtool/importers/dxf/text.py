@@ -1,0 +1,275 @@
+"""TEXT, ATTRIB, ATTDEF and MTEXT of DXF drawings as curves in world coordinates.
+
+Alignment follows what CAD programs store: a line is as wide as its letters advance, BOTTOM lies
+below the baseline by the depth of "p", MIDDLE halfway between that and the top of the capitals
+(the two alignment points of drawings saved by AutoCAD agree with it to 3 digits).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+
+from camtool.geometry.polylines import Floats
+from camtool.importers.dxf.frames import Unusable, require
+from camtool.importers.dxf.load import printable
+from camtool.importers.text.fonts import Wanted, font_for
+from camtool.importers.text.layout import NUMBERED, Ink, Look, Rule, finite, numbered, slant
+from camtool.importers.text.mtext import write_mtext
+
+MAX_CHARACTERS = 20_000
+"""Of one text entity, codes included; CAD programs write 250 into TEXT and about 2000 into MTEXT
+by hand."""
+
+_CARET = re.compile(r"\^([ @-_])")
+_CODE = re.compile(NUMBERED.pattern + "|%%([cdpkou%])", re.ASCII | re.IGNORECASE)
+_SIGNS = {"c": "Ø", "d": "°", "p": "±", "%": "%"}
+_RULES = {"u": Rule.UNDER, "o": Rule.OVER, "k": Rule.THROUGH}
+_ALIGNED, _MIDDLE, _FIT = 3, 4, 5
+_BACKWARD, _UPSIDE_DOWN = 2, 4
+_STACKED_LETTERS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Contour:
+    """Parts (k, 3) of control points, k = 2 (line), 3 (quadratic) or 4 (cubic), end to end."""
+
+    parts: list[Floats]
+    closed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class TextShape:
+    """The curves of a text, in world coordinates.
+
+    `font` is what it is drawn with; `substituted` names the wanted font when that is another one
+    ("" otherwise); `missing` holds each character that the font lacks, as often as it occurs.
+    """
+
+    contours: list[Contour]
+    font: str
+    substituted: str
+    missing: str
+
+    @property
+    def lacks(self) -> str:
+        """What was wanted and could not be had, "" when nothing."""
+        said = []
+        if self.substituted:
+            said.append(f"font {self.substituted} is not here: drawn with {self.font}")
+        if self.missing:
+            signs = " ".join(_visible(sign) for sign in dict.fromkeys(self.missing))
+            said.append(f"{self.font} has no {signs}: left blank")
+        return "; ".join(said)
+
+
+def _visible(sign: str) -> str:
+    return sign if sign.isprintable() and not sign.isspace() else f"U+{ord(sign):04X}"
+
+
+def text_strokes(entity: Any, mode: str) -> TextShape:
+    """TEXT, ATTRIB, ATTDEF or MTEXT as curves; mode is "outline" or "stroke".
+
+    An ATTDEF shows its tag, or its value when that is constant. Raises Unusable when the text is
+    empty or invisible, has no finite size, or needs an outline font where none is installed.
+    """
+    if entity.dxftype() == "MTEXT":
+        return _mtext(entity, entity.doc, mode)
+    if entity.dxftype() in ("ATTRIB", "ATTDEF"):
+        if entity.is_invisible:
+            raise Unusable("is an invisible attribute")
+        if entity.has_embedded_mtext_entity:
+            return _mtext(entity.virtual_mtext_entity(), entity.doc, mode)
+    return _text(entity, mode)
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """(x, y) ↦ origin + x·u + y·v, all (3,)."""
+
+    origin: Floats
+    u: Floats
+    v: Floats
+
+    def contours(self, ink: Ink) -> list[Contour]:
+        if not ink.points:
+            return []
+        points = np.concatenate(ink.points) @ np.array([self.u, self.v]) + self.origin
+        contours, at = [], 0
+        for counts, closed in ink.contours:
+            ends = list(accumulate(counts, initial=at))
+            parts = [points[start:end] for start, end in pairwise(ends)]
+            contours.append(Contour(parts, closed))
+            at = ends[-1]
+        return contours
+
+
+def _text(entity: Any, mode: str) -> TextShape:
+    """A text on one line."""
+    require(entity, ("insert", "height"))
+    dxf = entity.dxf
+    raw = dxf.tag if entity.dxftype() == "ATTDEF" and not entity.is_const else dxf.text
+    runs = _runs(_checked(str(raw)))
+    style = _style(entity, entity.doc)
+    if style is not None and int(style.dxf.flags) & _STACKED_LETTERS:
+        raise Unusable("has its letters one below the other")
+    font, substituted = font_for(_wanted(style), mode)
+    height, factor, oblique = finite(dxf.height, dxf.width, dxf.oblique)
+    look = Look(font, height, factor, slant(oblique))
+    width = sum(look.width(run) for run, _ in runs)
+    if not (width > 0.0 and height > 0.0):
+        raise Unusable("has no size")
+    place, stretch = _place(entity, width)
+    size, share = finite(height * stretch[1], factor * stretch[0] / stretch[1])
+    look = replace(look, height=size, width_factor=share)
+    ink = Ink()
+    x, y = _start(entity, look, width * stretch[0])
+    for run, rules in runs:
+        end = ink.write(run, look, (x, y))
+        ink.rule(replace(look, rules=rules), (x, end), y)
+        x = end
+    return _shape(ink, place, font.name, substituted)
+
+
+def _runs(raw: str) -> list[tuple[str, Rule]]:
+    """The text without its codes: %%c %%d %%p %%% %%nnn are signs; %%u %%o %%k begin and end
+    lines along it."""
+    rules, runs, at = Rule.NONE, [], 0
+    text = "".join(c if c >= " " else " " for c in _CARET.sub(_control, raw))
+    for code in [*_CODE.finditer(text), None]:
+        run = text[at : code.start() if code else None]
+        if code:
+            at = code.end()
+            run += numbered(code[1]) if code[1] else _SIGNS.get(code[2].lower(), "")
+        if run:
+            runs.append((run, rules))
+        if code and code[2]:
+            rules ^= _RULES.get(code[2].lower(), Rule.NONE)
+    return runs
+
+
+def _control(match: re.Match[str]) -> str:
+    """^I is a tab and so on; "^ " is the caret itself."""
+    return "^" if match[1] == " " else chr(ord(match[1]) - ord("@"))
+
+
+def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
+    """Where the alignment point and the axes of a text lie, and how it is stretched (x, y)."""
+    dxf = entity.dxf
+    mirror = int(dxf.text_generation_flag)
+    signs = [-1.0 if mirror & _BACKWARD else 1.0, -1.0 if mirror & _UPSIDE_DOWN else 1.0]
+    insert = finite(*dxf.insert)
+    second = finite(*dxf.get("align_point", dxf.insert))
+    (turn,) = finite(math.radians(dxf.rotation))
+    stretch, at = (1.0, 1.0), second
+    halign = int(dxf.halign)
+    if halign in (_ALIGNED, _FIT):
+        length = math.dist(insert[:2], second[:2])
+        if length == 0.0:
+            raise Unusable("is fitted between two equal points")
+        # Mirrored texts of this kind still run from the first point to the second.
+        turn = math.atan2(second[1] - insert[1], second[0] - insert[0])
+        signs = [1.0, signs[0] * signs[1]]
+        stretch = (length / width, length / width if halign == _ALIGNED else 1.0)
+        at = insert
+    elif halign == 0 and int(dxf.valign) == 0:
+        at = insert
+    cosine, sine = math.cos(turn), math.sin(turn)
+    if not any(finite(*dxf.extrusion)):
+        raise Unusable("has an extrusion of 0")
+    ocs = entity.ocs()
+    u, v, origin = (
+        np.array(tuple(ocs.to_wcs(vector)), dtype=np.float64)
+        for vector in (
+            (signs[0] * cosine, signs[0] * sine, 0.0),
+            (-signs[1] * sine, signs[1] * cosine, 0.0),
+            tuple(at),
+        )
+    )
+    return _Place(origin, u, v), stretch
+
+
+def _start(entity: Any, look: Look, width: float) -> tuple[float, float]:
+    """Where the baseline begins, seen from the alignment point."""
+    halign, valign = int(entity.dxf.halign), int(entity.dxf.valign)
+    depth = look.font.descent
+    share = {1: 0.5, 2: 1.0, _MIDDLE: 0.5}.get(halign, 0.0)
+    if halign == _MIDDLE:
+        rise = 0.5 * (1.0 - depth)
+    elif halign > _MIDDLE or halign == _ALIGNED:
+        rise = 0.0
+    else:
+        rise = {1: -depth, 2: 0.5, 3: 1.0}.get(valign, 0.0)
+    return -share * width, -rise * look.height
+
+
+def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
+    """A text of any number of lines."""
+    require(entity, ("insert", "char_height"))
+    content = _checked(entity.all_columns_raw_content())
+    style = _style(entity, document)
+    height, factor, oblique, *_ = finite(
+        entity.dxf.char_height,
+        style.dxf.width if style else 1.0,
+        style.dxf.oblique if style else 0.0,
+        entity.dxf.line_spacing_factor,
+        entity.dxf.get("width", 0.0),
+    )
+    if not height > 0.0:
+        raise Unusable("has no size")
+    wanted = _wanted(style)
+    font, _ = font_for(wanted, mode)
+    look = Look(font, height, factor, slant(oblique))
+    ink, fonts = write_mtext(entity, content, look, (wanted, mode))
+    names = dict.fromkeys(name for name, _ in fonts)
+    others = dict.fromkeys(other for _, other in fonts if other)
+    return _shape(ink, _block(entity), ", ".join(names), ", ".join(others))
+
+
+def _block(entity: Any) -> _Place:
+    """The plane of an MTEXT, its insertion point at (0, 0)."""
+    insert = np.array(finite(*entity.dxf.insert))
+    normal, along = (finite(*v) for v in (entity.dxf.extrusion, entity.get_text_direction()))
+    up = np.cross(normal, along)
+    sizes = math.hypot(*along), math.hypot(*up)
+    if not min(sizes) > 0.0:
+        raise Unusable("has no direction")
+    return _Place(insert, np.array(along) / sizes[0], up / sizes[1])
+
+
+def _shape(ink: Ink, place: _Place, font: str, substituted: str) -> TextShape:
+    contours = place.contours(ink)
+    if not contours and not ink.missing:
+        raise Unusable("is empty")
+    missing = "".join(sorted(ink.missing.elements()))
+    return TextShape(contours, font, printable(substituted), missing)
+
+
+def _checked(raw: str) -> str:
+    if not raw.strip():
+        raise Unusable("is empty")
+    if len(raw) > MAX_CHARACTERS:
+        raise Unusable(f"has more than {MAX_CHARACTERS} characters")
+    return unicodedata.normalize("NFC", raw)
+
+
+def _style(entity: Any, document: Any) -> Any:
+    """The text style that the entity names, None when there is no such style."""
+    if document is None:
+        return None
+    name = entity.dxf.get("style", "Standard")
+    return document.styles.get(name) if document.styles.has_entry(name) else None
+
+
+def _wanted(style: Any) -> Wanted:
+    """The font that a text style names."""
+    if style is None:
+        return Wanted()
+    family, italic, bold = style.get_extended_font_data()
+    return Wanted(str(style.dxf.font), str(family), bool(bold), bool(italic))

@@ -1,0 +1,189 @@
+"""The arrays of the Matlab router as text: numbers are read, nothing is ever run.
+
+    xy    = [ 151 400 ; 86 265 ]      points, tenths of a millimetre: row 1 is x, row 2 is y
+    lxy   = [ 249 ; 179 ]             lengths of the lines along x and y, never negative
+    velxy = [ 480 ; 345 ]             speeds; their signs are the directions of the lines
+    size_of_array = 1;                how many lines
+    first_pointx = 151;               where they begin
+    first_pointy = 86;
+
+x_points, y_points, lx, ly, velx and vely are single rows of these. An array may stand on its
+side, (n, 2). The points come from xy, else from the first point and lxy with the signs of
+velxy; what else is there must agree with them. The speeds are the machine's: they are not used.
+
+Source: thesis on the router, its listing and example (L3196-3228, L4444-4515, L4294-4360).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePath
+from typing import NoReturn
+
+import numpy as np
+
+from camtool.errors import DrawingError
+from camtool.geometry.polylines import Floats
+from camtool.importers.points.matlab_text import Value, assigned
+from camtool.importers.points.stroke import Stroke, Table
+
+MM_PER_UNIT = 0.1
+"""The router counts in tenths of a millimetre (thesis L3202)."""
+
+AGREES_UNITS = 1e-6
+"""Two numbers of the file that should be equal may differ by this much (in its own unit)."""
+
+_PAIRS = ("xy", "lxy", "velxy")
+_VECTORS = ("x_points", "y_points", "lx", "ly", "velx", "vely")
+_SCALARS = ("size_of_array", "first_pointx", "first_pointy")
+_NAMES = (*_PAIRS, *_VECTORS, *_SCALARS)
+_PARTS = {"xy": ("x_points", "y_points"), "lxy": ("lx", "ly"), "velxy": ("velx", "vely")}
+
+_START = re.compile(rf"^[ \t]*(?:{'|'.join(_NAMES)})[ \t]*=", re.MULTILINE)
+
+
+def is_matlab(text: str, file: str) -> bool:
+    """Whether the text assigns one of the router's arrays, or the file is named .m."""
+    return _START.search(text) is not None or PurePath(file).suffix.lower() == ".m"
+
+
+def parse_matlab(text: str, file: str) -> Table:
+    """The router's one stroke; DrawingError naming the line."""
+    values = assigned(text, file, _NAMES)
+    points, line = _Job(file, values).points()
+    return Table(
+        [Stroke(points, f"at line {line}")],
+        "0.1 mm",
+        MM_PER_UNIT,
+        "the router's arrays are tenths of a millimetre",
+    )
+
+
+class _Job:
+    """What the arrays say together."""
+
+    def __init__(self, file: str, values: dict[str, Value]) -> None:
+        self.file = file
+        self.values = values
+        self.sideways = self._is_sideways()
+
+    def points(self) -> tuple[Floats, int]:
+        """The points (n, 2) in the file's unit, and the line of the array they come from."""
+        places = self._pair("xy")
+        lengths, speeds = self._pair("lxy"), self._pair("velxy")
+        if places is not None:
+            self._agree(places[0], lengths, speeds)
+            return places
+        first = [self._scalar(name) for name in ("first_pointx", "first_pointy")]
+        if lengths is None or speeds is None or None in first:
+            raise DrawingError(
+                "assigns no points",
+                file=self.file,
+                mend="give xy, or first_pointx, first_pointy, lxy and velxy",
+            )
+        steps = self._steps(lengths, speeds)
+        self._count(len(steps))
+        return np.cumsum([np.array(first, dtype=np.float64), *steps], axis=0), lengths[1]
+
+    def _is_sideways(self) -> bool:
+        """Whether pairs stand as (n, 2); a (2, 2) is as the others, else as the router has it."""
+        votes: dict[bool, Value] = {}
+        for name in _PAIRS:
+            value = self.values.get(name)
+            if value is None or value.array.shape == (2, 2):
+                continue
+            if 2 not in value.array.shape:
+                rows, columns = value.array.shape
+                self._fail(f"{name} has {rows} rows and {columns} columns, wanted 2 rows", value)
+            votes[value.array.shape[1] == 2] = value
+        if len(votes) == 2:
+            self._fail("one array has two rows, another one two columns", votes[True])
+        return True in votes
+
+    def _pair(self, name: str) -> tuple[Floats, int] | None:
+        """The array (n, 2) of this name, or of its two single rows; and its line."""
+        value = self.values.get(name)
+        rows = [self._vector(part) for part in _PARTS[name]]
+        x, y = rows
+        if (x is None) != (y is None):
+            here = self.values[_PARTS[name][x is None]]
+            self._fail(f"{_PARTS[name][x is None]} has no {_PARTS[name][x is not None]}", here)
+        parts = None
+        if x is not None and y is not None:
+            here = self.values[_PARTS[name][0]]
+            if len(x) != len(y):
+                self._fail(f"{_PARTS[name][0]} and {_PARTS[name][1]} differ in length", here)
+            parts = np.column_stack([x, y]), here.line
+        if value is None:
+            return parts
+        array = value.array if self.sideways else value.array.T
+        if parts is not None and not _same(array, parts[0]):
+            self._fail(f"{name} is not what {' and '.join(_PARTS[name])} are", value)
+        return array, value.line
+
+    def _vector(self, name: str) -> Floats | None:
+        value = self.values.get(name)
+        if value is None:
+            return None
+        if 1 not in value.array.shape:
+            self._fail(f"{name} has more than one row", value)
+        return value.array.ravel()
+
+    def _scalar(self, name: str) -> float | None:
+        value = self.values.get(name)
+        if value is None:
+            return None
+        if value.array.shape != (1, 1):
+            self._fail(f"{name} is no single number", value)
+        return float(value.array[0, 0])
+
+    def _steps(self, lengths: tuple[Floats, int], speeds: tuple[Floats, int]) -> Floats:
+        """The lines (n, 2) as displacements: lengths with the signs of the speeds."""
+        length, speed = lengths[0], speeds[0]
+        if len(length) != len(speed):
+            self._fail_at("lxy and velxy differ in length", speeds[1])
+        if (length < 0.0).any():
+            self._fail_at("a length is negative", lengths[1], "directions are signs of velxy")
+        stuck = (length > 0.0) & (speed == 0.0)
+        if stuck.any():
+            row = int(np.argmax(stuck.any(axis=1))) + 1
+            self._fail_at(f"line {row} of the job has a length, but no direction", speeds[1])
+        return np.asarray(length * np.sign(speed))
+
+    def _agree(
+        self,
+        points: Floats,
+        lengths: tuple[Floats, int] | None,
+        speeds: tuple[Floats, int] | None,
+    ) -> None:
+        """DrawingError when lines, directions, count or first point are not those of xy."""
+        steps = np.diff(points, axis=0)
+        if lengths is not None and not _same(lengths[0], np.abs(steps)):
+            self._fail_at("lxy are not the lengths of the lines of xy", lengths[1])
+        if speeds is not None and (
+            speeds[0].shape != steps.shape or (speeds[0] * steps < 0.0).any()
+        ):
+            self._fail_at("velxy has not the directions of the lines of xy", speeds[1])
+        self._count(len(steps))
+        for name, place in zip(("first_pointx", "first_pointy"), points[:1].ravel(), strict=False):
+            wanted = self._scalar(name)
+            if wanted is not None and abs(wanted - place) > AGREES_UNITS:
+                self._fail(f"{name} is {wanted:g}, xy begins at {place:g}", self.values[name])
+
+    def _count(self, lines: int) -> None:
+        count = self._scalar("size_of_array")
+        if count is not None and count != lines:
+            self._fail(
+                f"size_of_array is {count:g}, there are {lines} lines",
+                self.values["size_of_array"],
+            )
+
+    def _fail(self, message: str, value: Value) -> NoReturn:
+        self._fail_at(message, value.line)
+
+    def _fail_at(self, message: str, line: int, mend: str = "") -> NoReturn:
+        raise DrawingError(message, file=self.file, where=f"line {line}", mend=mend)
+
+
+def _same(one: Floats, other: Floats) -> bool:
+    return one.shape == other.shape and bool((np.abs(one - other) <= AGREES_UNITS).all())

@@ -1,0 +1,118 @@
+"""The process in which solid models are read: bytes in one file, JSON in another one.
+
+It ends without an answer when OpenCASCADE brings it down.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import traceback
+from pathlib import Path
+from typing import Any
+
+from camtool.errors import CamtoolError, DrawingError, GeometryError
+from camtool.importers.solid.outline import Outlines, outlines
+from camtool.importers.solid.shapes import Body
+
+_DAMAGED = "cannot be read: its structure is damaged"
+_AGAIN = "export it again as STEP (AP214 or AP242)"
+
+MAX_MEMORY_BYTES = 12 << 30
+"""The worker for a STEP or BREP file gets no more address space than this (on POSIX)."""
+
+
+def main(request: dict[str, Any]) -> None:
+    """Does what is asked and writes the answer, or the error, to the file `request["answer"]`."""
+    _limit(None if request["kind"] == "script" else MAX_MEMORY_BYTES)
+    try:
+        result = found(request)
+    except CamtoolError as error:
+        result = {"error": {"message": error.message, "where": error.where, "mend": error.mend}}
+    except Exception:
+        result = {"fault": traceback.format_exc()}
+    Path(request["answer"]).write_text(json.dumps(result), encoding="utf-8")
+
+
+def found(request: dict[str, Any]) -> dict[str, Any]:
+    """The outlines of the model in the file `request["source"]`, as plain lists and numbers.
+
+    `kind` ("step", "brep", "script"), `height` of a section or None, `tolerance` of fitting;
+    lengths in the model's mm. `file` is the model's name for messages.
+    """
+    script = request["kind"] == "script"
+    try:
+        bodies = _bodies(request)
+        result = outlines(bodies, request["height"], request["tolerance"])
+        faulty = sum(not _holds(body) for body in bodies)
+    except GeometryError as error:
+        raise DrawingError(f"holds a curve that is none: {error.message}", mend=_AGAIN) from error
+    except Exception as error:
+        if not _is_of_kernel(error):
+            raise
+        message = "OpenCASCADE fails on the model" if script else _DAMAGED
+        raise DrawingError(message, mend="mend the script" if script else _AGAIN) from error
+    return _plain(result) | {"faulty": faulty, "bodies": len(bodies)}
+
+
+def _is_of_kernel(error: Exception) -> bool:
+    """Whether OpenCASCADE raised it (its exceptions have no common class), or ran out of room."""
+    return type(error).__module__.startswith("OCP") or isinstance(
+        error, RuntimeError | MemoryError
+    )
+
+
+def _bodies(request: dict[str, Any]) -> list[Body]:
+    if request["kind"] == "script":
+        from camtool.importers.solid.script import run_script
+
+        return run_script(Path(request["source"]).read_bytes(), request["file"])
+    from camtool.importers.solid.load import load_brep, load_step
+
+    load = load_step if request["kind"] == "step" else load_brep
+    bodies = load(request["source"])
+    if not bodies:
+        raise DrawingError("holds no shapes, or is damaged", mend=_AGAIN)
+    return bodies
+
+
+def _holds(body: Body) -> bool:
+    """Whether all faces and edges of the body fit together."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    return bool(BRepCheck_Analyzer(body.shape).IsValid())
+
+
+def _plain(result: Outlines) -> dict[str, Any]:
+    """The outlines without arrays and records."""
+    return {
+        "levels": result.levels,
+        "span": result.span,
+        "missed": result.missed,
+        "outlines": [
+            {
+                "kind": outline.kind,
+                "layer": outline.layer,
+                "colour": outline.colour,
+                "paths": [
+                    {
+                        "closed": path.closed,
+                        "vertices": path.vertices.tolist(),
+                        "fits": [[fit.max_mm, fit.rms_mm, fit.length_mm] for fit in path.fits],
+                    }
+                    for path in outline.paths
+                ],
+            }
+            for outline in result.outlines
+        ],
+    }
+
+
+def _limit(memory: int | None) -> None:
+    """Bounds what a damaged file can do; a worker that is brought down leaves no core file."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        if memory is not None:
+            resource.setrlimit(resource.RLIMIT_AS, (memory, memory))

@@ -1,0 +1,1 @@
+"""SVG drawings: `reader` is the door, `data` and `tree` give elements, `walk` draws them."""

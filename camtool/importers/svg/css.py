@@ -1,0 +1,265 @@
+"""The rules of `<style>` elements: which declarations hold for an element, in their order.
+
+Selectors are made of types, classes, ids and attributes, and of ancestors and parents:
+`path`, `.cut`, `#outline`, `path.cut[id]`, `g.layer > path`. Rules with others (`p + q`, `:hover`)
+and blocks for other media are left out and counted.
+
+Source: Cascading Style Sheets 2.1, chapters 4.1 (syntax), 5 (selectors) and 6.4 (cascade).
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from camtool.errors import DrawingError
+from camtool.importers.svg.tree import Node
+
+MAX_MATCHES = 1_000_000
+"""So often a rule may be held against an element; a file of rules alone could ask for billions."""
+
+MAX_COMPOUNDS = 8
+"""A selector of more steps than this is no selector of a drawing."""
+
+Declarations = dict[str, tuple[str, bool]]
+"""Property to its value and whether it is !important."""
+
+_CHAIN_COST = 100
+_ATTRIBUTE = r"""\[\s*([\w-]+)\s*(?:([~|^$*]?=)\s*("[^"]*"|'[^']*'|[\w-]+)\s*)?\]"""
+_SIMPLE = re.compile(rf"([#.]?)([\w-]+)|(\*)|{_ATTRIBUTE}")
+_IMPORTANT = re.compile(r"!\s*important$", re.IGNORECASE)
+_BRACE = re.compile(r"[{}]")
+_Test = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class _Compound:
+    """What one element must be: tag ("" any), ids, classes and tests of attributes."""
+
+    tag: str = ""
+    ids: tuple[str, ...] = ()
+    classes: tuple[str, ...] = ()
+    tests: tuple[_Test, ...] = ()
+
+    def matches(self, node: Node) -> bool:
+        return (
+            self.tag in ("", node.tag)
+            and all(name == node.get("id") for name in self.ids)
+            and (not self.classes or set(self.classes) <= set(node.get("class").split()))
+            and all(_holds(node, test) for test in self.tests)
+        )
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """Steps from the element outwards; `child[i]`: step i + 1 is the parent of step i."""
+
+    steps: tuple[_Compound, ...]
+    child: tuple[bool, ...]
+    declarations: Declarations
+    order: int
+
+    @property
+    def weight(self) -> tuple[int, int, int, int]:
+        """Ids, classes, types, and then the later rule."""
+        return (
+            sum(len(step.ids) for step in self.steps),
+            sum(len(step.classes) + len(step.tests) for step in self.steps),
+            sum(bool(step.tag) for step in self.steps),
+            self.order,
+        )
+
+    @property
+    def cost(self) -> int:
+        """How much work a match is, about."""
+        return 1 if len(self.steps) == 1 else _CHAIN_COST
+
+    def matches(self, node: Node) -> bool:
+        """Whether the rule holds for the element: all places of each step, inmost first."""
+        places = [node] if self.steps[0].matches(node) else []
+        for child, step in zip(self.child, self.steps[1:], strict=True):
+            if not places:
+                return False
+            if child:
+                near = [place.parent for place in places if place.parent is not None]
+            else:
+                # What lies around the inmost place lies around all others, or is one.
+                near = _around(places[0])
+            places = [place for place in near if step.matches(place)]
+        return bool(places)
+
+
+@dataclass
+class Rules:
+    """All rules of a document, found by what their element must be; `left_out` counts others."""
+
+    left_out: int = 0
+    _by_id: dict[str, list[_Rule]] = field(default_factory=lambda: defaultdict(list))
+    _by_class: dict[str, list[_Rule]] = field(default_factory=lambda: defaultdict(list))
+    _by_tag: dict[str, list[_Rule]] = field(default_factory=lambda: defaultdict(list))
+    _count: int = 0
+    _matches: int = 0
+
+    def read(self, text: str, properties: Iterable[str]) -> None:
+        """Adds the rules of one sheet that say one of these properties."""
+        wanted = frozenset(properties)
+        for selectors, body in self._blocks(_without_comments(text)):
+            declarations = declared(body, wanted)
+            if not declarations:
+                continue
+            for selector in selectors.split(","):
+                self._add(selector.strip(), declarations)
+
+    def holding(self, node: Node) -> list[Declarations]:
+        """The declarations that hold for an element, the strongest last; DrawingError when the
+        sheets are a bomb."""
+        if not self._count:
+            return []
+        near = [self._by_tag[""], self._by_tag.get(node.tag, []), self._by_id.get(node.get("id"))]
+        near += [self._by_class.get(name) for name in dict.fromkeys(node.get("class").split())]
+        found: list[_Rule] = []
+        for rules in near:
+            if rules:
+                self._matches += sum(rule.cost for rule in rules)
+                if self._matches > MAX_MATCHES:
+                    raise DrawingError("its style sheets have too many rules", mend="simplify it")
+                found += [rule for rule in rules if rule.matches(node)]
+        found.sort(key=lambda rule: rule.weight)
+        return [rule.declarations for rule in found]
+
+    def _blocks(self, text: str) -> Iterable[tuple[str, str]]:
+        """Selectors and body of each rule; @-blocks are passed over, @media counted."""
+        at = 0
+        while (begin := text.find("{", at)) >= 0:
+            selectors = text[at:begin].rpartition(";")[2].strip()
+            end = text.find("}", begin)
+            if selectors.startswith("@"):
+                at = _block_end(text, begin)
+                self.left_out += selectors.startswith("@media")
+            elif end < 0:
+                return
+            else:
+                yield selectors, text[begin + 1 : end]
+                at = end + 1
+
+    def _add(self, selector: str, declarations: Declarations) -> None:
+        parsed = _parsed(selector)
+        if parsed is None:
+            self.left_out += 1
+            return
+        rule = _Rule(*parsed, declarations, self._count)
+        self._count += 1
+        last = rule.steps[0]
+        if last.ids:
+            self._by_id[last.ids[0]].append(rule)
+        elif last.classes:
+            self._by_class[last.classes[0]].append(rule)
+        else:
+            self._by_tag[last.tag].append(rule)
+
+
+def declared(text: str, wanted: frozenset[str]) -> Declarations:
+    """The wanted properties of "name: value; ..."; of two the later wins, or the important one."""
+    found: Declarations = {}
+    for item in text.split(";"):
+        name, colon, value = item.partition(":")
+        name = name.strip().lower()
+        if not colon or name not in wanted:
+            continue
+        plain, important = _IMPORTANT.subn("", value.strip())
+        if plain.strip() and (important or not found.get(name, ("", False))[1]):
+            found[name] = plain.strip(), bool(important)
+    return found
+
+
+def _parsed(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, ...]] | None:
+    """Steps and links of a selector from the element outwards, None when it has other signs."""
+    words = selector.replace(">", " > ").split()
+    steps: list[_Compound] = []
+    child: list[bool] = []
+    linked = True
+    for word in words:
+        if word == ">":
+            if linked:
+                return None
+            child[-1] = linked = True
+            continue
+        step = _compound(word)
+        if step is None or len(steps) == MAX_COMPOUNDS:
+            return None
+        steps.append(step)
+        child.append(False)
+        linked = False
+    if linked:
+        return None
+    return tuple(reversed(steps)), tuple(reversed(child[:-1]))
+
+
+def _compound(word: str) -> _Compound | None:
+    tag = ""
+    found: dict[str, list[str]] = {"#": [], ".": []}
+    tests: list[_Test] = []
+    at = 0
+    while at < len(word):
+        match = _SIMPLE.match(word, at)
+        if match is None or (at > 0 and not match[1] and not match[4]):
+            return None
+        if match[4]:
+            tests.append((match[4], match[5] or "", (match[6] or "").strip("\"'")))
+        elif match[1]:
+            found[match[1]].append(match[2])
+        else:
+            tag = match[2] or ""
+        at = match.end()
+    return _Compound(tag, tuple(found["#"]), tuple(found["."]), tuple(tests))
+
+
+def _holds(node: Node, test: _Test) -> bool:
+    """One test of an attribute, as in [name], [name=value], [name~=value], ..."""
+    name, sign, value = test
+    own = node.attributes.get(name)
+    if own is None or not sign:
+        return own is not None
+    if sign == "=":
+        return own == value
+    if sign == "~=":
+        return value in own.split()
+    if sign == "|=":
+        return own == value or own.startswith(value + "-")
+    if not value:
+        return False
+    if sign == "^=":
+        return own.startswith(value)
+    return own.endswith(value) if sign == "$=" else value in own
+
+
+def _around(node: Node) -> list[Node]:
+    """Parent, its parent and so on."""
+    found: list[Node] = []
+    while node.parent is not None:
+        node = node.parent
+        found.append(node)
+    return found
+
+
+def _block_end(text: str, begin: int) -> int:
+    """Behind the brace that closes the one at `begin`."""
+    depth = 0
+    for match in _BRACE.finditer(text, begin):
+        depth += 1 if match[0] == "{" else -1
+        if depth == 0:
+            return match.end()
+    return len(text)
+
+
+def _without_comments(text: str) -> str:
+    """The text without `/* ... */` and the marks of old `<!-- ... -->`."""
+    parts: list[str] = []
+    at = 0
+    while (begin := text.find("/*", at)) >= 0:
+        parts.append(text[at:begin])
+        end = text.find("*/", begin + 2)
+        at = len(text) if end < 0 else end + 2
+    return " ".join([*parts, text[at:]]).replace("<!--", " ").replace("-->", " ")

@@ -1,0 +1,158 @@
+"""The page of an SVG: its unit, its size and the map from user units to mm, Y up.
+
+The page's lower left corner is (0, 0). What decides, in this order: the caller's unit; width and
+height with the viewBox; 96 px an inch. Y' = page height − Y, so a page whose height nobody knows
+is turned about its own zero line.
+
+Source: Scalable Vector Graphics 1.1, 7.10 to 7.12; CSS 2.1, 4.3.2 for the units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from camtool.errors import DrawingError
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.drawing import Units
+from camtool.importers.options import DPI, ReadOptions
+from camtool.importers.svg.affine import (
+    Affine,
+    Box,
+    parse_view_box,
+    scaling,
+    translation,
+    view_box_map,
+)
+from camtool.importers.svg.css import declared
+from camtool.importers.svg.shapes import FONT_UNITS, split_length
+from camtool.importers.svg.style import FONT_PX
+from camtool.importers.svg.tree import Node
+
+
+@dataclass(frozen=True)
+class Page:
+    """`to_mm`: user units of the root to mm; `viewport` (width, height) in user units where
+    known; the unit and what is to be said about it."""
+
+    to_mm: Affine
+    viewport: tuple[float, float] | None
+    units: Units
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Width or height as written: in mm where it says a size, and its unit ("" bare)."""
+
+    text: str
+    size_mm: float | None
+    unit: str
+
+
+Writer = tuple[str, float]
+"""A program that took a px for something else, and its px an inch."""
+
+
+def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> Page:
+    """The page of the root element; DrawingError when its size or viewBox makes no sense."""
+    width, height = (_side(root, name, options) for name in ("width", "height"))
+    box = parse_view_box(root.get("viewBox"))
+    if options.units is not None:
+        return _asked(width, height, box, options)
+    page = _said(root, (width, height), box, options)
+    in_px = box is None or page.units.name == "px"
+    if writer is None or not in_px or options.dpi != DPI:
+        return page
+    hint = Finding(
+        Code.UNIT_GUESSED,
+        Severity.WARNING,
+        f"{writer[0]} wrote the file, which took {writer[1]:g} px an inch, and it was read with "
+        f"{DPI:g}; if it comes out too small, give --dpi {writer[1]:g}",
+    )
+    return replace(page, findings=(*page.findings, hint))
+
+
+def _said(root: Node, sides: tuple[_Side, _Side], box: Box | None, options: ReadOptions) -> Page:
+    """The page by what the file says."""
+    width, height = sides
+    named = width if width.size_mm is not None else height
+    if named.size_mm is None:
+        return _sizeless(box, options)
+    why = f'width="{width.text}" height="{height.text}"'
+    findings = () if named.unit else (_unitless(f"{why} name no unit", options),)
+    units = Units(named.unit or "px", options.mm_per(named.unit or "px"), why)
+    if box is None:
+        px = options.mm_per("px")
+        return Page(_flip(height.size_mm or 0.0) @ scaling(px, px), _size(width, height, px),
+                    units, findings)  # fmt: skip
+    # A side that is not said follows from the other one.
+    if width.size_mm is None:
+        width = _Side("", named.size_mm * box.width / box.height, named.unit)
+    elif height.size_mm is None:
+        height = _Side("", named.size_mm * box.height / box.width, named.unit)
+    onto = Box(0.0, 0.0, width.size_mm or 0.0, height.size_mm or 0.0)
+    inner = view_box_map(box, onto, root.get("preserveAspectRatio"))
+    why += f", {inner.a:.6g} mm a user unit"
+    units = Units(units.name, units.mm_per_unit, why)
+    return Page(_flip(onto.height) @ inner, (box.width, box.height), units, findings)
+
+
+def _asked(width: _Side, height: _Side, box: Box | None, options: ReadOptions) -> Page:
+    """One user unit is the caller's unit; the size that the file says is left aside."""
+    unit = str(options.units).lower()
+    scale = options.mm_per(unit)
+    viewport = _size(width, height, options.mm_per("px"))
+    if box is not None:
+        viewport = (box.width, box.height)
+    elif viewport is None and height.size_mm is not None:
+        viewport = (0.0, height.size_mm / options.mm_per("px"))
+    tall = viewport[1] if viewport is not None else 0.0
+    shift = translation(-box.x, -box.y) if box is not None else Affine()
+    units = Units(unit, scale, f"as asked: one user unit is 1 {unit}")
+    return Page(_flip(tall * scale) @ scaling(scale, scale) @ shift, viewport, units)
+
+
+def _sizeless(box: Box | None, options: ReadOptions) -> Page:
+    """Nothing says how large the page is: user units are taken as px."""
+    px = options.mm_per("px")
+    units = Units("px", px, f"no size in the file, taken as {options.dpi:g} px an inch")
+    finding = _unitless("the svg has no width and height", options)
+    if box is None:
+        return Page(_flip(0.0) @ scaling(px, px), None, units, (finding,))
+    to_mm = _flip(box.height * px) @ scaling(px, px) @ translation(-box.x, -box.y)
+    return Page(to_mm, (box.width, box.height), units, (finding,))
+
+
+def _side(root: Node, name: str, options: ReadOptions) -> _Side:
+    """A side as the attribute says it, else as the style does (as pages for the web have it)."""
+    text = root.get(name) or declared(root.get("style"), frozenset([name])).get(name, ("",))[0]
+    if text in ("", "auto"):
+        return _Side(text, None, "")
+    value, unit = split_length(text, name)
+    if unit == "%":
+        return _Side(text, None, unit)
+    if unit in FONT_UNITS:
+        value, unit = value * FONT_UNITS[unit] * FONT_PX, "px"
+    if value <= 0.0:
+        raise DrawingError(f"{name} is {text}: the page has no size", mend="give it a size")
+    return _Side(text, value * options.mm_per(unit or "px"), unit)
+
+
+def _size(width: _Side, height: _Side, px: float) -> tuple[float, float] | None:
+    """Both sides in px, where both are known."""
+    if width.size_mm is None or height.size_mm is None:
+        return None
+    return width.size_mm / px, height.size_mm / px
+
+
+def _flip(height_mm: float) -> Affine:
+    return Affine(d=-1.0, f=height_mm)
+
+
+def _unitless(why: str, options: ReadOptions) -> Finding:
+    return Finding(
+        Code.UNITLESS,
+        Severity.WARNING,
+        f"{why}: read as px, {options.dpi:g} an inch; if that is wrong, name the unit of a user "
+        "unit with --units, or give --dpi",
+    )

@@ -1,0 +1,165 @@
+"""What an SVG element looks like, as far as it decides whether and as what it is drawn.
+
+Each over the one before: what is inherited, attributes, rules of `<style>` sheets by their weight,
+the style attribute; what is `!important` over all. Source: Cascading Style Sheets 2.1, chapter 6.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+from camtool.importers.svg.affine import NUMBER
+from camtool.importers.svg.colours import parse_colour
+from camtool.importers.svg.css import Rules, declared
+from camtool.importers.svg.tree import Node
+from camtool.units import MM_PER_UNIT
+
+FONT_PX = 16.0
+"""The font size, which em and ex are of, where nothing sets another."""
+
+LIMITS = {
+    "clip-path": "is not applied: it is drawn whole",
+    "mask": "is not applied: it is drawn whole",
+    "filter": "is not applied: it is an effect on pixels",
+    "marker-start": "is not drawn",
+    "marker-mid": "is not drawn",
+    "marker-end": "is not drawn",
+    "marker": "is not drawn",
+}
+"""Properties that would hide or add something, and what is said of them."""
+
+_NOT_INHERITED = ("display", "transform", "transform-origin", "transform-box", "overflow",
+                  "limits")  # fmt: skip
+_SHEET_ONLY = ("transform", "transform-origin", "transform-box")
+_FONT_SIZE = re.compile(rf"({NUMBER.pattern})(px|pt|pc|mm|cm|in|q|em|rem|ex|%)?", re.ASCII)
+_FONT_WORDS = {
+    "xx-small": 9.0, "x-small": 10.0, "small": 13.0, "medium": FONT_PX, "large": 18.0,
+    "x-large": 24.0, "xx-large": 32.0,
+}  # fmt: skip
+_FURTHEST_FONT_PX = 1e6
+_UNSEEN = ("none", "transparent")
+
+
+@dataclass(frozen=True)
+class Style:
+    """The properties of one element, after inheritance; `transform` and its like only where a
+    style says them, for attributes of that name are read by the walk. `limits`: the properties of
+    LIMITS that the element itself has."""
+
+    stroke: str = "none"
+    fill: str = "black"
+    color: str = "black"
+    visibility: str = "visible"
+    dash: str = "none"
+    font_px: float = FONT_PX
+    display: str = "inline"
+    transform: str = ""
+    transform_origin: str = ""
+    transform_box: str = ""
+    overflow: str = ""
+    limits: tuple[str, ...] = ()
+
+    @property
+    def is_painted(self) -> bool:
+        """Whether there is a stroke or a fill to be seen."""
+        return self.stroke not in _UNSEEN or self.fill not in _UNSEEN
+
+    @cached_property
+    def colour(self) -> str:
+        """ "#rrggbb" of the stroke, else of the fill; "" when it is none of its own."""
+        paint = self.stroke if self.stroke not in _UNSEEN else self.fill
+        return parse_colour(self.color if paint == "currentcolor" else paint)
+
+    @property
+    def line_type(self) -> str:
+        """ "DASHED" for a dashed stroke, else ""."""
+        dashed = self.dash != "none" and any(sign in "123456789" for sign in self.dash)
+        return "DASHED" if dashed and self.stroke not in _UNSEEN else ""
+
+
+_FIELDS = {
+    "font-size": "font_px",
+    "stroke-dasharray": "dash",
+    "transform-origin": "transform_origin",
+    "transform-box": "transform_box",
+}
+_NAMES = ("stroke", "fill", "color", "visibility", "stroke-dasharray", "font-size",
+          "display", "transform", "transform-origin", "transform-box", "overflow",
+          *LIMITS)  # fmt: skip
+_PROPERTIES = frozenset(_NAMES)
+_ATTRIBUTES = tuple(name for name in _NAMES if name not in _SHEET_ONLY)
+_INITIAL = {field.name: field.default for field in fields(Style)}
+_BLANK = {_FIELDS.get(name, name): _INITIAL[_FIELDS.get(name, name)] for name in _NOT_INHERITED}
+
+
+class Sheet:
+    """The styles of a document's elements; `left_out` counts rules that are not applied."""
+
+    def __init__(self, root: Node) -> None:
+        self._rules = Rules()
+        self._known: dict[tuple[Style, tuple[tuple[str, str], ...]], Style] = {}
+        for node in root.walk():
+            if node.tag == "style" and node.get("type", "text/css") in ("text/css", ""):
+                self._rules.read(node.text, _PROPERTIES)
+
+    @property
+    def left_out(self) -> int:
+        """Rules and blocks whose selectors are not understood."""
+        return self._rules.left_out
+
+    def style(self, node: Node, above: Style) -> Style:
+        """The element's style under its parent's; DrawingError when the sheets are a bomb."""
+        attributes = node.attributes
+        values = {name: attributes[name] for name in _ATTRIBUTES if name in attributes}
+        strong: dict[str, str] = {}
+        sheets = self._rules.holding(node)
+        own = attributes.get("style")
+        if own:
+            sheets.append(declared(own, _PROPERTIES))
+        for declarations in sheets:
+            for name, (value, important) in declarations.items():
+                (strong if important else values)[name] = value
+        values.update(strong)
+        key = above, tuple(values.items())
+        style = self._known.get(key)
+        if style is None:
+            style = self._known[key] = _under(above, values)
+        return style
+
+
+def _under(above: Style, values: dict[str, str]) -> Style:
+    """The style of these values; what they do not say, or say "inherit", comes from above."""
+    own: dict[str, Any] = dict(_BLANK)
+    for name, written in values.items():
+        value = written.strip().lower()
+        if name in LIMITS:
+            if value not in ("none", "inherit", "initial", "unset", ""):
+                own["limits"] = (*own["limits"], name)
+            continue
+        target = _FIELDS.get(name, name)
+        if value == "inherit" or (value == "unset" and name not in _NOT_INHERITED):
+            own[target] = getattr(above, target)
+        elif value in ("initial", "unset"):
+            own[target] = _INITIAL[target]
+        elif name == "font-size":
+            own[target] = _font_px(value, above.font_px)
+        elif value:
+            own[target] = value
+    merged = {field.name: getattr(above, field.name) for field in fields(Style)} | own
+    return Style(**merged)
+
+
+def _font_px(text: str, above: float) -> float:
+    """A font size in px; what is none leaves the one above."""
+    if text in _FONT_WORDS:
+        return _FONT_WORDS[text]
+    match = _FONT_SIZE.fullmatch(text)
+    if match is None:
+        return above
+    value, unit = float(match[1]), match[2] or "px"
+    relative = {"em": above, "ex": above / 2.0, "%": above / 100.0, "rem": FONT_PX}
+    size = value * relative.get(unit, MM_PER_UNIT.get(unit, 0.0) / MM_PER_UNIT["px"])
+    return size if 0.0 <= size <= _FURTHEST_FONT_PX else above

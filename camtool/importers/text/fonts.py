@@ -1,0 +1,254 @@
+"""Letters as curves: outlines of an installed font, or the single strokes of Hershey's Roman.
+
+Letters are measured in heights of a capital: the baseline is y = 0, a capital reaches y = 1. Fonts
+are found by ezdxf, which lists the installed ones once for all its uses; nothing is downloaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+
+from camtool.geometry import strokes
+from camtool.geometry.polylines import Floats
+from camtool.importers.dxf.frames import Unusable
+
+SUBSTITUTES = ("Liberation Sans", "Arimo", "Arial", "Helvetica", "DejaVu Sans", "Noto Sans")
+"""Families that stand in for a font that is not installed, the first that is: most drawings name
+Arial, whose widths the first four share."""
+
+_OUTLINES = (".ttf", ".otf", ".ttc")
+_SHAPES = (".shx", ".shp", ".lff")
+_SHAPE_FONTS = frozenset(
+    [
+        "txt",
+        "monotxt",
+        "simplex",
+        "complex",
+        "italic",
+        "romans",
+        "romanc",
+        "romand",
+        "romant",
+        "scripts",
+        "scriptc",
+        "greeks",
+        "greekc",
+        "gothice",
+        "gothicg",
+        "gothici",
+        "isocp",
+        "isocp2",
+        "isocp3",
+        "isoct",
+        "isoct2",
+        "isoct3",
+        "iso",
+        "symath",
+        "symap",
+    ]
+)
+_BOLD, _REGULAR, _NORMAL_WIDTH = 700, 400, 5
+_FONTS_KEPT = 8  # fonts whose letters stay in memory
+_LETTERS_KEPT = 4096  # of each
+_CHOICES_KEPT = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Letter:
+    """`points` (n, 2) of all parts; each contour is the count of points (2 to 4) of its parts."""
+
+    points: Floats
+    contours: tuple[tuple[int, ...], ...]
+    advance: float
+
+    @classmethod
+    def of(cls, contours: list[list[Floats]], advance: float) -> Letter:
+        """From contours of parts (k, 2)."""
+        parts = [part for contour in contours for part in contour]
+        points = np.concatenate(parts) if parts else np.empty((0, 2))
+        counts = tuple(tuple(len(part) for part in contour) for contour in contours)
+        return cls(points, counts, advance)
+
+
+@dataclass(frozen=True, eq=False)
+class Font:
+    """`letter` gives None for what the font lacks: a blank as wide as `blank` stands there."""
+
+    name: str
+    outlines: bool
+    letter: Callable[[str], Letter | None]
+    descent: float
+    blank: float
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A font as a drawing names it: a file, or a family in bold or italic letters."""
+
+    file: str = ""
+    family: str = ""
+    bold: bool = False
+    italic: bool = False
+
+    @property
+    def is_stroked(self) -> bool:
+        """Whether it is one of CAD's own stroke fonts: txt, romans.shx, symbols.shp, iso.lff."""
+        if self.family:
+            family = self.family.lower()
+            return family.endswith(_SHAPES) or family in _SHAPE_FONTS
+        return not self.file.lower().endswith(_OUTLINES)
+
+    def __str__(self) -> str:
+        looks = " bold" * self.bold + " italic" * self.italic
+        return (self.family or self.file or "txt") + looks
+
+
+@lru_cache(maxsize=_CHOICES_KEPT)
+def font_for(wanted: Wanted, mode: str) -> tuple[Font, str]:
+    """The font to draw with, and the wanted one's name when that is not it ("" otherwise).
+
+    mode "stroke" draws all with single strokes, "outline" only what a stroke font is wanted for.
+    Raises Unusable when outlines are wanted and no outline font is installed.
+    """
+    if mode == "stroke":
+        return stroke_font(), ""
+    if wanted.is_stroked:
+        return stroke_font(), str(wanted)
+    found = _named(wanted)
+    font = _outline_font(found.path) if found else None
+    if font is not None:
+        return font, ""
+    for face in _substitutes(wanted):
+        font = _outline_font(face.path)
+        if font is not None:
+            return font, str(wanted)
+    raise Unusable(f"is in the font {wanted}, but no outline font is installed; use --text stroke")
+
+
+@lru_cache(maxsize=1)
+def stroke_font() -> Font:
+    """Hershey's Roman simplex; it needs no font file."""
+    depth = max(y for stroke in _strokes("p") for _, y in stroke) - strokes.BASELINE
+    blank = strokes.BOX.advance / strokes.CAP_UNITS
+    return Font(strokes.NAME, False, _stroke_letter, depth / strokes.CAP_UNITS, blank)
+
+
+def _strokes(character: str) -> strokes.Strokes:
+    glyph = strokes.glyph(character)
+    return glyph.strokes if glyph else ()
+
+
+@lru_cache(maxsize=_LETTERS_KEPT)
+def _stroke_letter(character: str) -> Letter | None:
+    glyph = strokes.glyph(character)
+    if glyph is None:
+        return None
+    contours = []
+    for stroke in glyph.strokes:
+        points = np.array(stroke, dtype=np.float64)
+        points[:, 1] = strokes.BASELINE - points[:, 1]
+        points /= strokes.CAP_UNITS
+        contours.append([points[k : k + 2] for k in range(len(points) - 1)])
+    return Letter.of(contours, glyph.advance / strokes.CAP_UNITS)
+
+
+@dataclass(frozen=True, order=True)
+class _Face:
+    """One installed font file."""
+
+    path: str
+    family: str
+    style: str
+    weight: int
+    width: int
+
+    @property
+    def italic(self) -> bool:
+        return any(word in self.style.lower() for word in ("italic", "oblique"))
+
+    def distance(self, wanted: Wanted) -> tuple[bool, int, int, str]:
+        """Smaller is more alike."""
+        weight = _BOLD if wanted.bold else _REGULAR
+        unlike = self.italic is not wanted.italic
+        return unlike, abs(self.weight - weight), abs(self.width - _NORMAL_WIDTH), self.path
+
+
+@lru_cache(maxsize=1)
+def _installed() -> tuple[_Face, ...]:
+    """All outline fonts, in an order that does not depend on the file system."""
+    import json
+
+    from ezdxf.fonts import fonts
+
+    listed = json.loads(fonts.font_manager.dumps())["font-faces"]
+    faces = {_Face(*face) for face in listed}
+    return tuple(sorted(f for f in faces if PurePath(f.path).suffix.lower() in _OUTLINES))
+
+
+def _named(wanted: Wanted) -> _Face | None:
+    """The installed font of this family or file name."""
+    if wanted.family and (found := _of_family(wanted.family, wanted)) is not None:
+        return found
+    name = PurePath(wanted.file.replace("\\", "/")).name.lower()
+    return next((f for f in _installed() if PurePath(f.path).name.lower() == name), None)
+
+
+def _of_family(family: str, wanted: Wanted) -> _Face | None:
+    faces = [f for f in _installed() if f.family.lower() == family.lower()]
+    return min(faces, key=lambda face: face.distance(wanted), default=None)
+
+
+def _substitutes(wanted: Wanted) -> list[_Face]:
+    """Fonts to try in place of the wanted one, the best first."""
+    best = [face for name in SUBSTITUTES if (face := _of_family(name, wanted)) is not None]
+    others = sorted(_installed(), key=lambda face: face.distance(wanted))
+    return best + others[:_FONTS_KEPT]
+
+
+@lru_cache(maxsize=_FONTS_KEPT)
+def _outline_font(path: str) -> Font | None:
+    """The font of a file, None when it is broken or holds no letters."""
+    from io import BytesIO
+
+    from ezdxf.fonts.font_manager import UnsupportedFont
+    from ezdxf.fonts.ttfonts import TTFontRenderer
+    from fontTools.ttLib import TTFont, TTLibError
+
+    try:
+        glyphs = TTFontRenderer(TTFont(BytesIO(Path(path).read_bytes()), fontNumber=0))
+        size = glyphs.font_measurements
+        blank = float(glyphs.undefined_generic_glyph.width)
+    except (OSError, TTLibError, UnsupportedFont, LookupError, ValueError, AttributeError):
+        return None
+    capital = float(size.cap_height)
+    if not capital > 0.0:
+        return None
+    letter = lru_cache(maxsize=_LETTERS_KEPT)(partial(_outline, glyphs, capital))
+    name = f"{glyphs.font_name} ({PurePath(path).name})"
+    return Font(name, True, letter, float(size.descender_height) / capital, blank / capital)
+
+
+def _outline(glyphs: Any, capital: float, character: str) -> Letter | None:
+    """One letter of a font whose capitals are this high in its own units."""
+    if ord(character) not in glyphs.cmap:
+        return None
+    base = np.array([0.0, float(glyphs.font_measurements.baseline)])
+    contours = []
+    for path in glyphs.get_glyph_path(character).to_path().sub_paths():
+        at, parts = path.start, []
+        for command in path.commands():
+            controls = [getattr(command, name, None) for name in ("ctrl", "ctrl1", "ctrl2")]
+            points = [at, *(point for point in controls if point is not None), command.end]
+            part = np.array([(p.x, p.y) for p in points], dtype=np.float64)
+            if np.ptp(part, axis=0).any():
+                parts.append((part - base) / capital)
+            at = command.end
+        if parts:
+            contours.append(parts)
+    return Letter.of(contours, float(glyphs.get_glyph_width(character)) / capital)
