@@ -1,0 +1,160 @@
+"""The `[dialect]` table of a matlab-router machine: all that the writer and the reader share.
+
+The thesis's text, its listing and what is safe to send differ; `profile` chooses between them as
+a whole, and each option of its own overrides its profile. `Lnnnn` are lines of the thesis.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from camtool.errors import MachineError
+from camtool.machine.loader import convert
+from camtool.machine.model import Machine
+
+UNIT_MM: Final = 0.1
+"""Positions and distances are whole tenths of a millimetre (L3202-3204, L4444-4445)."""
+
+UNITS_PER_MM: Final = 10
+"""The same, the other way round."""
+
+GRID_TOLERANCE: Final = 1e-9
+"""`grid_mm` is a whole multiple of the unit within this part of a unit."""
+
+CHUNK_UNITS: Final = 2
+"""The slaves run chunks of 0.2 mm: `factor = deci_mm / 2`, a whole division (L5589-5600)."""
+
+FIXED_Y_UNITS: Final = 200
+"""What the listed master sends the Y slave in place of the first point (state 1, L4822)."""
+
+MOST_NUMBER: Final = 32767
+"""Every number is a signed int16 in the master (L4625-4635)."""
+
+Positive = Annotated[float, Meta(gt=0.0)]
+Lines = Annotated[int, Meta(ge=1, le=255)]
+
+
+class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The table as written; None leaves the choice to the profile."""
+
+    profile: Literal["safe", "listing", "text"] = "safe"
+    format: Literal["m", "stream"] = "m"
+    speed: Literal["axis", "path"] = "axis"
+    arc_tolerance_mm: Positive = 0.05
+    bend_tolerance_mm: Positive = 0.1
+    plunge_mm: Positive = 10.0
+    plunge_mm_min: Positive = 201.545
+    spindle_rpm: Positive | None = None
+    grid_mm: Positive | None = None
+    max_lines: Lines | None = None
+    odd: Literal["truncated", "kept"] | None = None
+    first_y: Literal["number", "character"] | None = None
+    master_y: Literal["sent", "fixed"] | None = None
+    end: Literal["off", "raise"] | None = None
+    baud: Annotated[int, Meta(ge=1)] | None = None
+    data_bits: Literal[7, 8] | None = None
+
+
+PROFILES: Final[dict[str, dict[str, Any]]] = {
+    # What the machine of the listing executes, with the faults of the way there mended.
+    "safe": {
+        "grid_mm": 0.2,
+        "max_lines": 128,
+        "odd": "truncated",
+        "first_y": "number",
+        "master_y": "sent",
+        "end": "off",
+        "baud": 9600,
+        "data_bits": 8,
+    },
+    # Appendix A as it stands (Matlab L4271-4515, master L4563-4985, slave X L5104-5729).
+    "listing": {
+        "grid_mm": 0.1,
+        "max_lines": 128,
+        "odd": "truncated",
+        "first_y": "character",
+        "master_y": "fixed",
+        "end": "off",
+        "baud": 9600,
+        "data_bits": 7,
+    },
+    # What the chapters say (L3144-3181, L3202-3204, L3319-3321).
+    "text": {
+        "grid_mm": 0.1,
+        "max_lines": 255,
+        "odd": "kept",
+        "first_y": "number",
+        "master_y": "sent",
+        "end": "raise",
+        "baud": 921600,
+        "data_bits": 8,
+    },
+}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """Every choice made.
+
+    `format` "m": the arrays as a Matlab file; "stream": the bytes of the serial line.
+    `speed`: what a feed is: that of the faster axis, as the GUI computes ("axis"), or that of the
+    tool along its line ("path").
+    `grid_units`: positions are whole multiples of so many tenths of a millimetre.
+    `odd`: distances lose their odd tenth in the slaves, or do not.
+    `first_y`: y of the first point is sent as digits, or as one character (L4306).
+    `master_y`: the master passes it on, or always takes `FIXED_Y_UNITS`.
+    `end`: after its last line the tool is switched off where it stands, or also raised and sent
+    home (L3319-3321).
+    `max_lines` of one job; `arc_tolerance_mm` chords of arcs; `bend_tolerance_mm` how far whole
+    speeds may bend a line. `plunge_mm` down from home, at `plunge_mm_min`. `spindle_rpm` is what
+    the reader says of the tool, which can only be switched.
+    """
+
+    profile: str
+    format: str
+    speed: str
+    grid_units: int
+    max_lines: int
+    odd: str
+    first_y: str
+    master_y: str
+    end: str
+    baud: int
+    data_bits: int
+    arc_tolerance_mm: float
+    bend_tolerance_mm: float
+    plunge_mm: float
+    plunge_mm_min: float
+    spindle_rpm: float | None
+
+
+def dialect_of(machine: Machine) -> Dialect:
+    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
+    file = machine.target.name
+    table = convert(machine.dialect, _Table, file, "dialect")
+    chosen = {
+        name: value
+        for name, value in msgspec.structs.asdict(table).items()
+        if name not in PROFILES["safe"] or value is not None
+    }
+    chosen = {**PROFILES[table.profile], **chosen}
+    grid_mm = chosen.pop("grid_mm")
+    units = round(grid_mm * UNITS_PER_MM)
+    if not math.isclose(units, grid_mm * UNITS_PER_MM, rel_tol=0.0, abs_tol=GRID_TOLERANCE):
+        raise MachineError(
+            f"{grid_mm:g} mm is no multiple of {UNIT_MM} mm, the unit of this machine",
+            file=file,
+            where="table [dialect], key grid_mm",
+            mend="use 0.2, the chunk that the slaves execute, or 0.1",
+        )
+    return Dialect(grid_units=units, **chosen)
+
+
+def cut_z_mm(machine: Machine, dialect: Dialect) -> float:
+    """Z of every cut, mm in the work frame: the plunge always starts from home."""
+    return machine.controller.machine_zero_mm[2] - dialect.plunge_mm
