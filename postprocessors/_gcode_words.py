@@ -38,6 +38,17 @@ _COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
 _ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
 _LINE_END: Final = re.compile(r"\r\n|\n|\r")
 
+# What a sign means that begins no word: (message, mend).
+_SIGNS: Final = {
+    ",": ("a decimal comma", "write a decimal point"),
+    "#": ("a parameter", "only plain numbers can be read"),
+    "[": ("an expression", "only plain numbers can be read"),
+    "$": ("a command of the controller itself", "programs hold words only"),
+    "/": ("a block that a switch may leave out", "write it without / or remove it"),
+    "%": ("a % that is not alone on its line", "remove it"),
+    "=": ("an assignment", "only plain numbers can be read"),
+}
+
 Blanks = Literal["anywhere", "between", "none"]
 
 
@@ -211,8 +222,8 @@ def _explained(rest: str, before: str, lexing: Lexing) -> tuple[str, str, int]:
         past = 1 + (wrong.end() if wrong else 0)
         past = past if past < len(rest) else 0
         return f"no number after {sign}", "digits, with a point if need be, follow a letter", past
-    if sign == ",":
-        return "a decimal comma", "write a decimal point", 0
+    if sign in _SIGNS:
+        return _SIGNS[sign][0], _SIGNS[sign][1], 0
     if sign in " \t":
         return f"a blank within the block, before {behind[:SHOWN_CHARS]!r}", "remove it", 0
     if sign.islower() and sign.upper() in lexing.letters:

@@ -1,0 +1,73 @@
+"""Geometry of arcs as their readers need it: centre from radius, turn, chords of a helix."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+HELIX_SAGITTA_MM: Final = 0.0005
+"""Chords in place of a helical arc stray from it by no more."""
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Circle:
+    """An arc from `start` to `end` about `centre`, mm."""
+
+    start: Point
+    end: Point
+    centre: Point
+    ccw: bool
+
+
+def centre_of_radius(
+    start: Point, end: Point, radius: float, ccw: bool, slack_mm: float
+) -> Point | str:
+    """The centre of an arc given by its radius, or why there is none.
+
+    With m the middle of the chord of length d, the centre lies √(R² − d²/4) beside it: on the left
+    of the way for a CCW arc of at most half a turn; a negative R asks for more than half a turn,
+    whose centre is on the other side. Half the chord may exceed |R| by the slack.
+    """
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    chord = math.hypot(dx, dy)
+    if chord == 0.0:
+        return "an arc by its radius that ends where it starts has no centre"
+    if chord / 2.0 - abs(radius) > slack_mm:
+        return f"half the chord is {chord / 2.0:.4f} mm, more than the radius"
+    aside = math.sqrt(max(0.0, radius * radius - chord * chord / 4.0))
+    left = aside if ccw == (radius > 0.0) else -aside
+    return (
+        (start[0] + end[0]) / 2.0 - left * dy / chord,
+        (start[1] + end[1]) / 2.0 + left * dx / chord,
+    )
+
+
+def turn_of(circle: Circle) -> float:
+    """How far the arc turns, rad, in (−π, π]: near 0 for the shortest and for the longest."""
+    ox, oy = circle.start[0] - circle.centre[0], circle.start[1] - circle.centre[1]
+    ex, ey = circle.end[0] - circle.centre[0], circle.end[1] - circle.centre[1]
+    return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)
+
+
+def chords(circle: Circle, z: float, to_z: float, full: bool) -> list[tuple[float, float, float]]:
+    """Ends (x, y, z) of equal chords along a helical arc; the last is the very end.
+
+    A chord over the angle a strays by 2 R sin²(a/4); radius and height run evenly.
+    """
+    cx, cy = circle.centre
+    r1, r2 = math.dist(circle.start, circle.centre), math.dist(circle.end, circle.centre)
+    sign = 1.0 if circle.ccw else -1.0
+    turn = math.tau if full else (sign * turn_of(circle)) % math.tau
+    ratio = min(0.5, HELIX_SAGITTA_MM / (2.0 * max(r1, r2)))
+    count = max(1, math.ceil(turn / (4.0 * math.asin(math.sqrt(ratio)))))
+    first = math.atan2(circle.start[1] - cy, circle.start[0] - cx)
+    ends = []
+    for index in range(1, count):
+        part = index / count
+        radius, angle = r1 + (r2 - r1) * part, first + sign * turn * part
+        x, y = cx + radius * math.cos(angle), cy + radius * math.sin(angle)
+        ends.append((x, y, z + (to_z - z) * part))
+    return [*ends, (*circle.end, to_z)]

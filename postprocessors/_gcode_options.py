@@ -1,0 +1,72 @@
+"""Options that the dialects grbl and linuxcnc have in common: all that writer and reader share.
+
+The `arc_*` numbers are the controller's own rule for arcs (radii in mm, r1 at the start and r2 at
+the end, as the numbers of the block give them). An arc is refused when
+
+    |r1 − r2| > most_difference,
+    or |r1 − r2| > difference and |r1 − r2| > part · r,
+    or r < least_radius.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from camtool.errors import MachineError
+from camtool.machine.model import Machine
+
+POWER_OF_TEN_TOLERANCE: Final = 1e-9
+"""`feed.unit_mm_min` must be a power of ten to this part of its logarithm."""
+
+MOST_FEED_DECIMALS: Final = 6
+
+NotNegative = Annotated[float, Meta(ge=0.0)]
+Positive = Annotated[float, Meta(gt=0.0)]
+
+
+class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What both dialects let a user choose, and their controller's rule for arcs.
+
+    `decimals` of coordinates; `strip_zeros` says 1.5 for 1.500; `line_chars` that the controller
+    takes in a line; `block_numbers` N1 N2 …; `comments`: a "header", also the name of each contour
+    ("contours"), or "none"; `full_circles` "whole" (end = start) or as two "halves";
+    `program_end`; `retract` to the highest Z in front of the end if the tool is left in the
+    material. `arc_most_radius_mm`: larger arcs are written as lines; `arc_full_turn_rad`: the
+    controller takes an arc that turns by less for a full circle; `arc_chord_slack_mm`: by how much
+    half the chord may exceed R.
+    """
+
+    decimals: Annotated[int, Meta(ge=3, le=6)] = 3
+    strip_zeros: bool = False
+    line_chars: Annotated[int, Meta(ge=64)]
+    block_numbers: bool = False
+    comments: Literal["contours", "header", "none"] = "contours"
+    full_circles: Literal["whole", "halves"] = "whole"
+    program_end: Literal["M2", "M30"] = "M2"
+    retract: bool = True
+    arc_difference_mm: Positive
+    arc_difference_part: Positive
+    arc_most_difference_mm: Positive
+    arc_least_radius_mm: NotNegative
+    arc_most_radius_mm: Positive
+    arc_full_turn_rad: NotNegative
+    arc_chord_slack_mm: NotNegative = 0.0
+
+
+def feed_decimals(machine: Machine) -> int:
+    """Digits behind the point of an F word, from `feed.unit_mm_min`; MachineError when that is
+    no power of ten between 1 and 10^−6."""
+    digits = -math.log10(machine.feed.unit_mm_min)
+    whole = round(digits)
+    if abs(digits - whole) > POWER_OF_TEN_TOLERANCE or not 0 <= whole <= MOST_FEED_DECIMALS:
+        raise MachineError(
+            f"{machine.feed.unit_mm_min:g} is no unit of an F word",
+            file=machine.target.name,
+            where="table [feed], key unit_mm_min",
+            mend="use 1, 0.1, 0.01 or 0.001",
+        )
+    return whole

@@ -1,0 +1,88 @@
+"""Reading grbl 1.1 as it takes programs: its words, its groups, its rule for arcs (gcode.c).
+
+Commands of grbl itself (`$H`, `$J=…`) and its realtime characters are the sender's, no program's.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from camtool.errors import ProgramError
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Toolpath
+
+from ._gcode_modal import ModalReader, Rules
+from ._gcode_words import Lexing, blocks_of
+from ._grbl_options import Dialect, dialect_of
+
+GROUPS: Final = {
+    **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
+    **dict.fromkeys((40, 530), "one block"),
+    170: "plane",
+    **dict.fromkeys((200, 210), "units"),
+    **dict.fromkeys((900, 910), "distance"),
+    911: "arc distance",
+    940: "feed mode",
+    400: "cutter radius",
+    490: "tool length",
+    540: "work frame",
+    610: "path",
+}
+
+_FRAME: Final = "moves part zero by what only the controller knows"
+_PLANE: Final = "is another plane; arcs lie in XY here"
+REFUSED: Final = {
+    **dict.fromkeys(("G10", "G92", "G92.1", "G55", "G56", "G57", "G58", "G59"), _FRAME),
+    **dict.fromkeys(("G28", "G30"), "goes to a place that only the controller remembers"),
+    **dict.fromkeys(("G28.1", "G30.1"), "remembers a place, which is not simulated"),
+    **dict.fromkeys(("G18", "G19"), _PLANE),
+    **dict.fromkeys(("G38.2", "G38.3", "G38.4", "G38.5"), "probes, which cannot be simulated"),
+    "G43.1": "shifts Z by a tool length",
+    "G93": "says feeds as inverse time, which is not read",
+    "M6": "is unknown to grbl, its error 20",
+}
+
+
+def read_grbl(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError with block, line and column."""
+    dialect = dialect_of(machine)
+    lexing = Lexing(
+        letters="GMXYZIJKFSTPRL",
+        lower_case=True,
+        blanks="anywhere",
+        parentheses=True,
+        semicolon=True,
+        block_numbers=True,
+        line_chars=dialect.line_chars,
+        counts_blanks=False,
+    )
+    reader = ModalReader(machine, rules_of(dialect))
+    empty = True
+    for block in blocks_of(data, lexing):
+        reader.block(block)
+        empty = False
+    if empty:
+        raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
+    return reader.finish()
+
+
+def rules_of(dialect: Dialect) -> Rules:
+    """What grbl takes."""
+
+    def arc_fault(r1: float, r2: float) -> str:
+        """grbl's error 33; r1 is the radius that counts."""
+        gap = abs(r1 - r2)
+        wide = gap > dialect.arc_difference_mm and gap > dialect.arc_difference_part * r1
+        if r1 <= dialect.arc_least_radius_mm or gap > dialect.arc_most_difference_mm or wide:
+            return f"grbl's error 33: radius {r1:.4f} mm at the start, {r2:.4f} mm at the end"
+        return ""
+
+    return Rules(
+        groups=GROUPS,
+        refused=REFUSED,
+        first_motion=0,
+        arc_fault=arc_fault,
+        full_turn_rad=dialect.arc_full_turn_rad,
+        chord_slack_mm=dialect.arc_chord_slack_mm,
+        tools="pause" if dialect.tool_change == "pause" else "none",
+    )

@@ -1,0 +1,34 @@
+"""The dialect of grbl 1.1; docs/dialects/grbl.md explains the format, its options and limits."""
+
+from __future__ import annotations
+
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.program import Program
+
+
+class GrblPost:
+    """Writes and reads grbl programs; the two share no code but the options of `[dialect]`."""
+
+    name = "grbl"
+
+    def check(self, machine: Machine) -> None:
+        """Raise MachineError when the machine's `[dialect]` table does not fit."""
+        from ._grbl_options import dialect_of
+
+        dialect_of(machine)
+
+    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+        """The program; PostError naming the move that cannot be said or done."""
+        from ._grbl_write import write_grbl
+
+        return write_grbl(toolpath, machine)
+
+    def read(self, data: bytes, machine: Machine) -> Toolpath:
+        """The moves as the controller decodes them; ProgramError with block, line and column."""
+        from ._grbl_read import read_grbl
+
+        return read_grbl(data, machine)
+
+
+POST = GrblPost()

@@ -1,0 +1,34 @@
+"""The dialect of LinuxCNC; docs/dialects/linuxcnc.md explains format, options and limits."""
+
+from __future__ import annotations
+
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.program import Program
+
+
+class LinuxCncPost:
+    """Writes and reads linuxcnc programs; the two share no code but the options of `[dialect]`."""
+
+    name = "linuxcnc"
+
+    def check(self, machine: Machine) -> None:
+        """Raise MachineError when the machine's `[dialect]` table does not fit."""
+        from ._linuxcnc_options import dialect_of
+
+        dialect_of(machine)
+
+    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+        """The program; PostError naming the move that cannot be said or done."""
+        from ._linuxcnc_write import write_linuxcnc
+
+        return write_linuxcnc(toolpath, machine)
+
+    def read(self, data: bytes, machine: Machine) -> Toolpath:
+        """The moves as the controller decodes them; ProgramError with block, line and column."""
+        from ._linuxcnc_read import read_linuxcnc
+
+        return read_linuxcnc(data, machine)
+
+
+POST = LinuxCncPost()
