@@ -36,11 +36,13 @@ AS_CODED = 0.0
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One axis. `coded_step_mm` is what the controller believes a step to be, `real_step_mm`
     what the slide moves, as coded where left out; `backlash_mm` is the play of the mechanics,
-    `compensation_mm` what the controller adds at each reversal. `travel_mm`, `max_rate_mm_min`
-    and `acceleration_mm_s2` are None when nobody has said."""
+    `compensation_mm` what the controller adds at each reversal. `resolution_mm` is the finest
+    difference of places that a program can say, where that is coarser than the step. `travel_mm`,
+    `max_rate_mm_min` and `acceleration_mm_s2` are None when nobody has said."""
 
     coded_step_mm: Positive
     real_step_mm: Positive = AS_CODED
+    resolution_mm: Positive | None = None
     travel_mm: Positive | None = None
     backlash_mm: NotNegative = 0.0
     compensation_mm: NotNegative = 0.0
