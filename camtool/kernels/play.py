@@ -70,3 +70,35 @@ def play_fill(steps: Ints, axis: Floats, state: Floats, out: Floats) -> None:
             slide = min(max(slide, motor + low), motor + high)
         out[k] = slide
     state[0], state[1], state[2], state[3] = position, direction, offset, slide
+
+
+@njit(cache=True)
+def play_path_fill(
+    positions: Floats, offsets: Ints, axis: Floats, state: Floats, out: Floats, turns: Ints
+) -> None:
+    """Positions of the slide in mm, `out` (n,), for a motor that follows `positions` (n,) mm.
+
+    `axis` (5,): real over coded step, low and high in mm, compensation in mm, and how far back
+    a position must go to be a reversal, mm (rounding must not make one). `state` (5,): furthest
+    position in the present direction, direction, compensation so far, slide, reversals so far;
+    changed in place, so that the next call goes on. Run r is offsets[r]:offsets[r+1];
+    `turns` (R,) are its reversals.
+    """
+    scale, low, high, compensation, least = axis[0], axis[1], axis[2], axis[3], axis[4]
+    furthest, direction, offset, slide = state[0], state[1], state[2], state[3]
+    for run in range(len(turns)):
+        turns[run] = 0
+        for k in range(offsets[run], offsets[run + 1]):
+            ahead = (positions[k] - furthest) * direction
+            if ahead >= 0.0:
+                furthest = positions[k]
+            elif -ahead >= least:
+                direction = -direction
+                offset += direction * compensation
+                turns[run] += 1
+                furthest = positions[k]
+            motor = (positions[k] + offset) * scale
+            slide = min(max(slide, motor + low), motor + high)
+            out[k] = slide
+        state[4] += turns[run]
+    state[0], state[1], state[2], state[3] = furthest, direction, offset, slide

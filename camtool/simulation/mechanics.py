@@ -1,11 +1,14 @@
-"""Three axes between the controller's steps and the slides: compensation, play, real step."""
+"""Three axes between the controller and the slides: compensation, play, real step.
+
+`Mechanics` follows a controller that gives steps, `PathMechanics` one that gives positions.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from camtool.kernels.lattice import to_steps
-from camtool.kernels.play import play_fill, play_limits, play_start
+from camtool.kernels.play import play_fill, play_limits, play_path_fill, play_start
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Floats, Ints
 
@@ -45,3 +48,44 @@ class Mechanics:
         """The controller stands at `position` (3,) steps without having reversed: what follows
         an arc that was left at its nearest approach."""
         self._states[:, 0] = position
+
+
+REVERSAL_STEPS = 0.5
+"""An axis has reversed when it came back by this much of a coded step."""
+
+
+class PathMechanics:
+    """The slides behind a motor that follows positions in mm, engaged as the controller record
+    says, at rest at `start` (3,) mm. Scale errors act about part zero; compensation is whole
+    steps. `ideal`: no play, no compensation, real = coded step."""
+
+    def __init__(self, machine: Machine, start: Floats, *, ideal: bool) -> None:
+        direction = 1 if machine.controller.start_direction == "+" else -1
+        self._axes = np.zeros((3, 5))
+        self._states = np.zeros((3, 5))
+        for index, axis in enumerate(machine.axes):
+            scale, low, high, compensation_mm = 1.0, 0.0, 0.0, 0.0
+            if not ideal:
+                scale = axis.real_step_mm / axis.coded_step_mm
+                low, high = play_limits(axis.backlash_mm, machine.controller.start_play, direction)
+                steps = to_steps(axis.compensation_mm, axis.coded_step_mm)
+                compensation_mm = float(steps) * axis.coded_step_mm
+            least = REVERSAL_STEPS * axis.coded_step_mm
+            self._axes[index] = scale, low, high, compensation_mm, least
+            self._states[index] = start[index], direction, 0.0, start[index] * scale, 0.0
+
+    def follow(self, positions: Floats, offsets: Ints) -> tuple[Floats, Ints]:
+        """Slides (K, 3) mm for positions (K, 3) mm, which follow those given before, and the
+        reversals (R, 3) in each run offsets[r]:offsets[r+1] of them."""
+        slide = np.empty(positions.shape)
+        reversals = np.zeros((len(offsets) - 1, 3), dtype=np.int64)
+        for index in range(3):
+            play_path_fill(
+                positions[:, index],
+                offsets,
+                self._axes[index],
+                self._states[index],
+                slide[:, index],
+                reversals[:, index],
+            )
+        return slide, reversals

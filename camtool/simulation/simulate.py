@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from camtool.errors import MachineError, OptionError
+from camtool.errors import OptionError
 from camtool.machine.model import Interpolator, Machine, PicMmhController
 from camtool.simulation.motion import Chunk
 from camtool.toolpath.moves import Toolpath
@@ -33,4 +33,12 @@ def simulate(
         from camtool.simulation.pic_mmh import Options, PicMmh  # loads numba
 
         return PicMmh(toolpath, machine, Options(interpolator, ideal, chunk_steps)).run()
-    raise MachineError(f"no simulation of the controller {type(machine.controller).__name__}")
+    if interpolator is not None:
+        raise OptionError(
+            f"the controller of {machine.target.name} has no interpolators to choose from",
+            where="--interpolator",
+            mend="leave it out",
+        )
+    from camtool.simulation.path import PathRun  # loads numba
+
+    return PathRun(toolpath, machine, ideal=ideal, chunk_steps=chunk_steps).run()

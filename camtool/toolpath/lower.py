@@ -7,10 +7,8 @@
 
 Each function gives a new Toolpath and, for each of its rows, the row that it came from. All new
 points lie on the true arc, and the last one is the old end itself. Feed, provenance, block and
-value of a row go on in all the rows that it becomes; events stay as they are.
-
-An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the spiral
-between them: radius and Z change in proportion to the angle.
+value of a row go on in all the rows that it becomes; events stay as they are. Arcs whose ends lie
+at two radii are spirals, as in `camtool.toolpath.arms`.
 """
 
 from __future__ import annotations
@@ -22,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.errors import OptionError, PostError
+from camtool.toolpath.arms import Arms
 from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
 
 Bools = npt.NDArray[np.bool_]
@@ -84,7 +83,7 @@ def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lower
     if not (math.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise OptionError(f"tolerance {tolerance_mm:g} mm is not above 0")
     chosen = toolpath.is_arc & rows
-    arms = _Arms(toolpath, chosen)
+    arms = Arms(toolpath, chosen)
     largest = np.maximum(arms.radius, arms.end_radius)
     with np.errstate(divide="ignore"):
         half_sine = np.sqrt(np.minimum(tolerance_mm / (2.0 * largest), 1.0))
@@ -95,7 +94,7 @@ def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lower
 def split_full_circles(toolpath: Toolpath) -> Lowered:
     """Arcs that end where they start, as two halves each; PostError for one without a centre."""
     same = (toolpath.end[:, :2] == toolpath.starts[:, :2]).all(axis=1)
-    arms = _Arms(toolpath, toolpath.is_arc & same)
+    arms = Arms(toolpath, toolpath.is_arc & same)
     return _split(toolpath, arms, np.full(len(arms.row), 2.0))
 
 
@@ -107,44 +106,12 @@ def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> Lowered:
     """
     if not (math.isfinite(max_sweep_rad) and max_sweep_rad > 0.0):
         raise OptionError(f"sweep {max_sweep_rad:g} rad is not above 0")
-    arms = _Arms(toolpath, toolpath.is_arc)
+    arms = Arms(toolpath, toolpath.is_arc)
     excess = np.maximum(np.abs(arms.sweep) - SWEEP_EPS_RAD, 0.0)
     return _split(toolpath, arms, np.ceil(excess / max_sweep_rad))
 
 
-class _Arms:
-    """The chosen arcs seen from their centres: radius at start and end mm, angle at the start and
-    signed sweep rad, each (J,), for the rows `row` (J,)."""
-
-    def __init__(self, toolpath: Toolpath, chosen: Bools) -> None:
-        """PostError for an arc without a centre."""
-        self.row = np.flatnonzero(chosen)
-        self.centre = toolpath.centre[self.row]
-        bad = ~np.isfinite(self.centre).all(axis=1)
-        if bad.any():
-            raise PostError("an arc without a centre", where=f"move {self.row[bad.argmax()]}")
-        self.begin, self.end = toolpath.starts[self.row], toolpath.end[self.row]
-        out, back = self.begin[:, :2] - self.centre, self.end[:, :2] - self.centre
-        self.radius = np.hypot(out[:, 0], out[:, 1])
-        self.end_radius = np.hypot(back[:, 0], back[:, 1])
-        self.angle = np.arctan2(out[:, 1], out[:, 0])
-        self.sweep = toolpath.sweeps()[self.row]
-
-    def points(self, which: Ints, share: Floats) -> Floats:
-        """(K, 3) mm: the points of the arcs `which` (K,) at `share` (K,) of their sweep."""
-        angle = self.angle[which] + share * self.sweep[which]
-        radius = self.radius[which] + share * (self.end_radius - self.radius)[which]
-        rise = (self.end[:, 2] - self.begin[:, 2])[which]
-        return np.column_stack(
-            [
-                self.centre[which, 0] + radius * np.cos(angle),
-                self.centre[which, 1] + radius * np.sin(angle),
-                self.begin[which, 2] + share * rise,
-            ]
-        )
-
-
-def _split(toolpath: Toolpath, arms: _Arms, parts: Floats, *, lines: bool = False) -> Lowered:
+def _split(toolpath: Toolpath, arms: Arms, parts: Floats, *, lines: bool = False) -> Lowered:
     """Each arc of `arms` in so many `parts` (J,) of equal sweep, at least one; `lines`: chords."""
     parts = np.maximum(parts, 1.0)
     if len(toolpath) + float(parts.sum()) > MAX_PARTS:

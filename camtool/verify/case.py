@@ -5,14 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from camtool.geometry.drawing import Drawing
-from camtool.machine.model import Interpolator, Machine
+from camtool.machine.model import Interpolator, Machine, PicMmhController
 from camtool.toolpath.moves import Toolpath
 
 COVERAGE_MM = 0.005
 """A move is missing, or extra, when farther than this from all moves of the other side ..."""
 
 COVERAGE_STEPS = 4.0
-"""... or than so many steps of the coarser axis, where that is more."""
+"""... or than so many steps of the coarser axis, where that is more ..."""
+
+COVERAGE_RESOLUTIONS = 1.5
+"""... or than so many resolutions of a dialect that is coarser than the steps: vertices are off
+by up to 0.71 of them, and starts that a machine cannot reach by up to 1.41."""
 
 SAMPLE_MM = 0.01
 """Spacing of the points on decoded and wanted moves that are compared with each other."""
@@ -25,8 +29,9 @@ TRACE_POINTS = 20_000
 class VerifyOptions:
     """How to judge, and what the report says of the program.
 
-    `interpolator` None: as the machine does. `coverage_mm` None: `COVERAGE_MM` or
-    `COVERAGE_STEPS`. `blocks` None: counted from the decoded toolpath where it was read.
+    `interpolator` None: as the machine does. `coverage_mm` None: `COVERAGE_MM`,
+    `COVERAGE_STEPS` or `COVERAGE_RESOLUTIONS`. `blocks` None: counted from the decoded toolpath
+    where it was read.
     """
 
     interpolator: Interpolator | None = None
@@ -54,10 +59,20 @@ class Case:
         return min(self.machine.axes.x.coded_step_mm, self.machine.axes.y.coded_step_mm)
 
     @property
+    def spacing_mm(self) -> float:
+        """How far apart the samples of the motion are, about."""
+        if isinstance(self.machine.controller, PicMmhController):
+            return self.step_mm
+        from camtool.simulation.path_samples import spacing_mm
+
+        return spacing_mm(self.decoded, self.machine)
+
+    @property
     def coverage_mm(self) -> float:
         """How far moves of one side may be from those of the other."""
         if self.options.coverage_mm is not None:
             return self.options.coverage_mm
-        axes = self.machine.axes
-        coarse = max(axes.x.coded_step_mm, axes.y.coded_step_mm)
-        return max(COVERAGE_MM, COVERAGE_STEPS * coarse)
+        axes = (self.machine.axes.x, self.machine.axes.y)
+        coarse = max(axis.coded_step_mm for axis in axes)
+        said = max(axis.resolution_mm or 0.0 for axis in axes)
+        return max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * said)

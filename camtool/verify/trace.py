@@ -26,14 +26,14 @@ class Trace:
 class TraceBuffer:
     """Collects a Trace of at most `most` points.
 
-    Of every `stride` steps of a row the one with the largest error is kept, and each row's last.
+    Of every `stride` samples of a row the one with the largest error is kept, and each row's last.
     The stride is chosen from the way of the whole toolpath, so that about half of `most` come of
     it. What is too many in the end (more rows than points) is thinned likewise.
     """
 
-    def __init__(self, decoded: Toolpath, step_mm: float, most: int) -> None:
+    def __init__(self, decoded: Toolpath, spacing_mm: float, most: int) -> None:
         rise = np.abs(decoded.end[:, 2] - decoded.starts[:, 2]) if len(decoded) else np.zeros(0)
-        expected = float((moved_lengths(decoded) + rise).sum()) / step_mm
+        expected = float((moved_lengths(decoded) + rise).sum()) / spacing_mm
         self._most = most
         self._stride = max(1, int(np.ceil(2.0 * expected / most)))
         start = decoded.start[None, :2]

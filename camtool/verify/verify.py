@@ -79,7 +79,7 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
         wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
     circles = full_circles(wanted.cuts, case.coverage_mm)
     coverage = _coverage(case, decoded, Goal(wanted, circles, case.coverage_mm))
-    trace = TraceBuffer(case.decoded, case.step_mm, case.options.trace_points)
+    trace = TraceBuffer(case.decoded, case.spacing_mm, case.options.trace_points)
     slides = SlidePass(decoded, wanted, coverage.match, circles, trace)
     tally = Tally()
     for batch in batches(chunks, case.decoded, decoded.cuts.is_cut, tally):

@@ -1,0 +1,229 @@
+"""Any controller, as if it followed the programmed lines and arcs exactly.
+
+It stands in where a controller's own arithmetic is not modelled: it has no interpolator, no
+acceleration, no look-ahead. What it does with a row of the toolpath:
+
+1. Ends go to the nearest coded step of each axis (`controller.grid` "steps") or stay as they are
+   ("none"). Arcs keep their programmed centre; when their ends then lie at two radii, radius and
+   Z change in proportion to the angle.
+2. The commanded position runs along the line or arc; see `camtool.simulation.path_samples` for
+   where it is sampled. Between samples nothing is rounded: steps are counted, not taken.
+3. A move takes way / feed, a rapid way / `Machine.rapid_mm_min`, and no straight move is faster
+   than the highest rate of each axis. Compensation takes no time.
+4. Play, compensation and scale act on the commanded position as on that of any other controller.
+   An axis has reversed when it came back by half a coded step: less is not seen by a motor.
+
+Positions at and between samples: an error that changes with the way changes by no more than the
+way, so the largest error between two samples exceeds that at the nearer one by half the spacing
+at most; extents, reversals and the steps of each axis do not depend on the spacing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import ProgramError
+from camtool.kernels.lattice import to_steps
+from camtool.machine.model import Machine, PathController
+from camtool.simulation.mechanics import PathMechanics
+from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.simulation.path_samples import PathSamples, move_lengths, spacing_mm
+from camtool.toolpath.moves import Kind, Toolpath
+
+Bools = npt.NDArray[np.bool_]
+
+MAX_PATH_STEPS = 1 << 40
+"""Positions beyond this many steps (a million kilometres at 1 µm) are refused: counts must stay
+exact in a float."""
+
+
+def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The moves that the controller follows: ends on its grid, homing at machine zero.
+
+    Raises ProgramError for arcs without a centre and for positions beyond all steps. An arc
+    shorter than a step, whose rounded ends would turn it into a full circle, becomes a line; one
+    that lacks less than a step of its full circle becomes that.
+    """
+    _check_positions(toolpath, machine)
+    home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
+    exact = _placed(toolpath, home)
+    if isinstance(machine.controller, PathController) and machine.controller.grid == "none":
+        return exact
+    home = _on_grid(home, machine)
+    start, end = _on_grid(exact.start, machine), _on_grid(exact.end, machine)
+    made, sweeps = replace(exact, start=start, end=end), exact.sweeps()
+    while True:
+        inside_out = made.is_arc & (np.abs(made.sweeps() - sweeps) > np.pi)
+        if not inside_out.any():
+            return made
+        made = _placed(_turned_back(made, inside_out, np.abs(sweeps) < np.pi), home)
+
+
+def _placed(toolpath: Toolpath, home: Floats) -> Toolpath:
+    """The same with events where the moves before them ended, and homing at `home` (3,) mm."""
+    kind, count = toolpath.kind, len(toolpath)
+    end = toolpath.end.copy()
+    for axis, homing in ((0, Kind.HOME_XY), (1, Kind.HOME_XY), (2, Kind.HOME_Z)):
+        end[kind == homing, axis] = home[axis]
+        known = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
+        latest = np.maximum.accumulate(known)
+        end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
+    return replace(toolpath, end=end)
+
+
+def _turned_back(made: Toolpath, inside_out: Bools, short: Bools) -> Toolpath:
+    """Arcs that rounding has turned inside out: the short ones as lines, the long ones closed."""
+    lines, full = inside_out & short, inside_out & ~short
+    end = made.end.copy()
+    end[full, :2] = made.starts[full, :2]
+    kind = np.where(lines, np.int64(Kind.LINE), made.kind)
+    centre = np.where(lines[:, None], np.nan, made.centre)
+    return replace(made, kind=kind, centre=centre, end=end)
+
+
+def _on_grid(points: Floats, machine: Machine) -> Floats:
+    """Points (..., 3) mm, each coordinate at its nearest coded step."""
+    columns = [
+        to_steps(points[..., index], axis.coded_step_mm) * axis.coded_step_mm
+        for index, axis in enumerate(machine.axes)
+    ]
+    return np.stack(columns, axis=-1)
+
+
+class PathRun:
+    """One run of a toolpath; ProgramError for rows that no controller can follow."""
+
+    def __init__(
+        self, toolpath: Toolpath, machine: Machine, *, ideal: bool, chunk_steps: int
+    ) -> None:
+        self._path = followed(toolpath, machine)
+        ends = np.flatnonzero(self._path.kind == Kind.END)
+        self._rows = int(ends[0]) + 1 if len(ends) else len(self._path)
+        _check_rows(self._path, self._rows)
+        self._seconds: list[float] = _durations(self._path, machine).tolist()
+        self._samples = PathSamples(self._path, spacing_mm(self._path, machine))
+        self._mechanics = PathMechanics(machine, self._path.start, ideal=ideal)
+        self._coded_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._steps = self._in_steps(self._path.start[None, :])
+        self._chunk_steps = chunk_steps
+
+    def run(self) -> Iterator[Chunk]:
+        """The chunks of all rows up to the end of the program."""
+        row = 0  # the first whose chunk has not been given
+        for chunk in self._moving():
+            yield from (self._still(number) for number in range(row, chunk.row))
+            yield chunk
+            row = chunk.row + 1
+        yield from (self._still(number) for number in range(row, self._rows))
+
+    def _moving(self) -> Iterator[Chunk]:
+        """The chunks of rows that move, window by window."""
+        first = self._samples.first
+        total = int(first[self._rows])
+        for low in range(0, total, self._chunk_steps):
+            high = min(low + self._chunk_steps, total)
+            row, commanded = self._samples.window(low, high)
+            offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [len(row)]])
+            slide, reversals = self._mechanics.follow(commanded, offsets)
+            steps = self._counted(commanded, offsets)
+            for run, number in enumerate(row[offsets[:-1]].tolist()):
+                here = slice(offsets[run], offsets[run + 1])
+                share = (here.stop - here.start) / (first[number + 1] - first[number])
+                yield Chunk(
+                    row=number,
+                    commanded=commanded[here],
+                    slide=slide[here],
+                    duration_s=self._seconds[number] * float(share),
+                    iterations=0,
+                    steps=steps[run],
+                    reversals=reversals[run],
+                    last=bool(low + here.stop == first[number + 1]),
+                    ended=True,
+                )
+
+    def _counted(self, commanded: Floats, offsets: Ints) -> Ints:
+        """(R, 3) steps of each run, from where the last window ended."""
+        steps = np.concatenate([self._steps, self._in_steps(commanded)])
+        self._steps = steps[-1:]
+        return np.asarray(np.add.reduceat(np.abs(np.diff(steps, axis=0)), offsets[:-1], axis=0))
+
+    def _in_steps(self, points: Floats) -> Ints:
+        columns = [to_steps(points[:, axis], step) for axis, step in enumerate(self._coded_mm)]
+        return np.column_stack(columns)
+
+    def _still(self, row: int) -> Chunk:
+        """A chunk of a row without motion."""
+        return Chunk(
+            row=row,
+            commanded=np.empty((0, 3)),
+            slide=np.empty((0, 3)),
+            duration_s=self._seconds[row],
+            iterations=0,
+            steps=np.zeros(3, dtype=np.int64),
+            reversals=np.zeros(3, dtype=np.int64),
+            last=True,
+            ended=True,
+        )
+
+
+def _durations(path: Toolpath, machine: Machine) -> Floats:
+    """(N,) s of each row; NaN feeds, which `_check_rows` refuses, only behind the end."""
+    homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
+    speed = np.where(path.is_feed, path.feed, machine.rapid_mm_min)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seconds = np.where(path.is_motion | homing, 60.0 * move_lengths(path) / speed, 0.0)
+    way = np.abs(path.end - path.starts) if len(path) else np.zeros((0, 3))
+    for index, axis in enumerate(machine.axes):
+        if axis.max_rate_mm_min is not None:
+            least = 60.0 * way[:, index] / axis.max_rate_mm_min
+            seconds = np.where(path.is_arc, seconds, np.maximum(seconds, least))
+    return np.where(path.kind == Kind.DWELL, path.value, seconds)
+
+
+def _check_positions(toolpath: Toolpath, machine: Machine) -> None:
+    """ProgramError for an arc without a centre or a position that cannot be counted."""
+    bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
+    if bad.any():
+        raise ProgramError("an arc without a centre", where=_place(toolpath, bad))
+    most = MAX_PATH_STEPS * np.array([axis.coded_step_mm for axis in machine.axes])
+    centre = np.where(toolpath.is_arc[:, None], np.abs(toolpath.centre), 0.0)
+    far = np.any(np.column_stack([np.abs(toolpath.end) > most, centre > most[:2]]), axis=1)
+    if far.any():
+        raise ProgramError(
+            "a position is beyond all that the controller can count",
+            where=_place(toolpath, far),
+        )
+
+
+def _check_rows(path: Toolpath, rows: int) -> None:
+    """ProgramError for moves without a feed and events that cannot be followed."""
+    running = np.arange(len(path)) < rows
+    with np.errstate(invalid="ignore"):
+        no_feed = running & path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
+        no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
+    if no_feed.any():
+        raise ProgramError(
+            "a move at a feed without a feed above 0",
+            where=_place(path, no_feed),
+            mend="give it one (F)",
+        )
+    if (running & no_time).any():
+        raise ProgramError("a dwell without its seconds", where=_place(path, running & no_time))
+    away = running & (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
+    if away.any():
+        raise ProgramError(
+            "part zero is set away from part zero",
+            where=_place(path, away),
+            mend="set it once, before any move",
+        )
+
+
+def _place(toolpath: Toolpath, bad: npt.ArrayLike) -> str:
+    """The block (from 1) that the first bad row was read from, or the row when planned."""
+    row = int(np.argmax(bad))
+    block = int(toolpath.block[row])
+    return f"block {block + 1}" if block >= 0 else f"move {row}"

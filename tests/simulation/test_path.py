@@ -1,0 +1,331 @@
+"""A controller that follows the path: samples, steps, time, reversals, play."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camtool.errors import OptionError, ProgramError
+from camtool.simulation import path_samples
+from camtool.simulation.motion import Chunk
+from camtool.simulation.path import followed
+from camtool.simulation.path_samples import PathSamples, move_lengths, spacing_mm
+from camtool.simulation.simulate import simulate
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.extents import toolpath_extents
+from camtool.toolpath.moves import Kind, Toolpath
+from tests.oracles.path_machine import (
+    STEP,
+    Slide,
+    both,
+    dense_path,
+    length_of,
+    path_machine,
+)
+
+FREE = "controller.grid=none"
+
+
+@st.composite
+def jobs(draw: st.DrawFn) -> Toolpath:
+    """Moves whose ends lie on the grid: lines, rapids, arcs about centres on it, events."""
+    b = ToolpathBuilder()
+    cell = st.integers(-40, 40).map(lambda number: number * 0.05)
+    for number in range(draw(st.integers(1, 6))):
+        b.block = number
+        kind = draw(st.sampled_from(["rapid", "line", "arc", "dwell"]))
+        if kind == "dwell":
+            b.event(Kind.DWELL, 0.25)
+        elif kind == "arc":
+            x, y, _ = b.position
+            a, c = draw(st.sampled_from([(3, 4), (4, 3), (5, 0), (0, 5), (-3, 4), (-5, 0)]))
+            p, q = draw(st.sampled_from([(5, 0), (0, -5), (-4, -3), (3, -4), (a, c)]))
+            scale = draw(st.integers(1, 20)) * 0.02
+            centre = (x - a * scale, y - c * scale)
+            end = (centre[0] + p * scale, centre[1] + q * scale) if (p, q) != (a, c) else (x, y)
+            b.arc(*end, centre=centre, ccw=draw(st.booleans()), feed=60.0)
+        elif kind == "rapid":
+            b.rapid(draw(cell), draw(cell), draw(cell))
+        else:
+            b.line(draw(cell), draw(cell), draw(cell), feed=30.0)
+    return b.finish()
+
+
+def gathered(chunks: list[Chunk]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row, commanded and slide of all samples."""
+    return (
+        np.concatenate([np.full(len(c.commanded), c.row) for c in chunks]),
+        np.concatenate([c.commanded for c in chunks]),
+        np.concatenate([c.slide for c in chunks]),
+    )
+
+
+def square(side: float = 1.0) -> Toolpath:
+    b = ToolpathBuilder()
+    for x, y in ((side, 0), (side, side), (0, side), (0, 0)):
+        b.line(x, y, feed=60.0)
+    return b.finish()
+
+
+@given(jobs(), st.sampled_from([1, 7, 65536]))
+def test_every_row_gives_its_chunks_in_order(toolpath: Toolpath, chunk_steps: int) -> None:
+    chunks = list(simulate(toolpath, path_machine(), chunk_steps=chunk_steps))
+    assert [c.row for c in chunks if c.last] == list(range(len(toolpath)))
+    assert [c.row for c in chunks] == sorted(c.row for c in chunks)
+    assert all(len(c.commanded) <= chunk_steps and c.ended for c in chunks)
+
+
+@given(jobs())
+def test_ends_are_met_and_samples_are_no_wider_than_a_step(toolpath: Toolpath) -> None:
+    machine = path_machine(FREE)
+    row, commanded, _ = gathered(list(simulate(toolpath, machine)))
+    for index, move in enumerate(toolpath):
+        mine = commanded[row == index]
+        if move.centre is None and move.start == move.end:
+            assert len(mine) == 0
+            continue
+        assert mine[-1].tolist() == list(move.end)
+        apart = np.linalg.norm(np.diff([move.start, *mine.tolist()], axis=0), axis=1)
+        assert apart.max() <= spacing_mm(toolpath, machine) * (1.0 + 1e-9)
+        assert len(mine) <= length_of(toolpath, index) / STEP + 5
+
+
+@given(jobs())
+def test_samples_lie_on_the_moves(toolpath: Toolpath) -> None:
+    row, commanded, _ = gathered(list(simulate(toolpath, path_machine(FREE))))
+    moves = list(toolpath)
+    for index, point in zip(row.tolist(), commanded.tolist(), strict=True):
+        move = moves[index]
+        if move.centre is not None:
+            radius = math.dist(move.start[:2], move.centre)
+            assert math.dist(point[:2], move.centre) == pytest.approx(radius, abs=1e-9)
+        else:
+            around = math.dist(move.start, point) + math.dist(point, move.end)
+            assert around == pytest.approx(math.dist(move.start, move.end), abs=1e-9)
+
+
+@given(jobs())
+def test_extents_are_exact(toolpath: Toolpath) -> None:
+    _, commanded, _ = gathered(list(simulate(toolpath, path_machine(FREE))))
+    points = np.concatenate([toolpath.start[None, :], commanded])
+    reach = np.column_stack([points.min(axis=0), points.max(axis=0)])
+    assert reach == pytest.approx(toolpath_extents(toolpath), abs=1e-12)
+
+
+@given(jobs(), st.sampled_from([1, 10, 65536]))
+def test_chunks_do_not_matter(toolpath: Toolpath, chunk_steps: int) -> None:
+    machine = path_machine(*both("backlash_mm", 0.03), *both("compensation_mm", 0.02))
+    whole = list(simulate(toolpath, machine))
+    parts = list(simulate(toolpath, machine, chunk_steps=chunk_steps))
+    for one, other in zip(gathered(whole), gathered(parts), strict=True):
+        assert np.array_equal(one, other)
+    for name in ("steps", "reversals"):
+        assert np.array_equal(
+            sum(getattr(c, name) for c in whole), sum(getattr(c, name) for c in parts)
+        )
+    seconds = sum(c.duration_s for c in parts)
+    assert seconds == pytest.approx(sum(c.duration_s for c in whole))
+
+
+@given(
+    jobs(),
+    st.sampled_from([0.0, 0.01, 0.3]),
+    st.sampled_from([0.0, 0.01, 0.2]),
+    st.sampled_from(["preloaded", "centred"]),
+)
+def test_slides_and_reversals_are_those_of_one_axis_at_a_time(
+    toolpath: Toolpath, play: float, compensation: float, convention: str
+) -> None:
+    machine = path_machine(
+        f"controller.start_play={convention}",
+        *both("backlash_mm", play),
+        *both("compensation_mm", compensation),
+    )
+    chunks = list(simulate(toolpath, machine))
+    _, commanded, slide = gathered(chunks)
+    counted = sum(c.reversals for c in chunks)
+    for axis in (0, 1):
+        twin = Slide(0.0, play, compensation, centred=convention == "centred")
+        wanted = [twin.go(to) for to in commanded[:, axis].tolist()]
+        assert slide[:, axis] == pytest.approx(np.array(wanted), abs=1e-12)
+        assert counted[axis] == twin.reversals
+
+
+@given(jobs())
+def test_reversals_and_steps_are_those_of_a_dense_path(toolpath: Toolpath) -> None:
+    chunks = list(simulate(toolpath, path_machine()))
+    points = np.array([point for _, point in dense_path(toolpath)])
+    for axis in range(3) if len(points) else ():
+        twin = Slide(0.0, 0.0, 0.0, centred=False)
+        for to in points[:, axis].tolist():
+            twin.go(to)
+        assert sum(c.reversals for c in chunks)[axis] == twin.reversals
+        counted = int(sum(c.steps for c in chunks)[axis])
+        way = np.abs(np.diff(points[:, axis], prepend=0.0)).sum() / STEP
+        assert counted == pytest.approx(way, abs=1.0 + 2.0 * len(toolpath))
+
+
+def test_the_steps_of_a_square_are_exact() -> None:
+    chunks = list(simulate(square(), path_machine()))
+    assert sum(c.steps for c in chunks).tolist() == [400, 400, 0]
+    assert sum(c.reversals for c in chunks).tolist() == [1, 1, 0]
+    assert [c.reversals.tolist() for c in chunks] == [[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert [c.iterations for c in chunks] == [0, 0, 0, 0]
+
+
+def test_a_circle_from_its_right_end_reverses_where_it_turns() -> None:
+    b = ToolpathBuilder((2.0, 0.0, 0.0)).arc(2, 0, centre=(0, 0), ccw=True, feed=60)
+    (chunk,) = simulate(b.finish(), path_machine())
+    # X: engaged to +, turns at once, then at the left; Y: at the top and at the bottom.
+    assert chunk.reversals.tolist() == [2, 2, 0]
+    assert chunk.steps.tolist() == [1600, 1600, 0]
+
+
+def test_the_wrong_way_round_a_spiral_of_rounded_coordinates_reverses_no_axis() -> None:
+    """Its radius grows by half a step, so that X first grows by a hair."""
+    b = ToolpathBuilder((2.0, 0.0, 0.0)).arc(0, 2.0025, centre=(0, 0), ccw=True, feed=60)
+    (chunk,) = simulate(b.finish(), path_machine(FREE, "controller.start_direction=-"))
+    assert chunk.reversals.tolist() == [0, 1, 0]
+
+
+def test_ideal_slides_are_the_commanded_positions_to_the_bit() -> None:
+    machine = path_machine(*both("backlash_mm", 0.1), "axes.x.real_step_mm=0.006")
+    for chunk in simulate(square(0.7313), machine, ideal=True):
+        assert np.array_equal(chunk.slide, chunk.commanded)
+    assert any((c.slide != c.commanded).any() for c in simulate(square(), machine))
+
+
+def test_a_real_step_scales_the_slides() -> None:
+    machine = path_machine("axes.x.real_step_mm=0.0051")
+    for chunk in simulate(square(), machine):
+        assert chunk.slide[:, 0] == pytest.approx(chunk.commanded[:, 0] * 1.02, abs=1e-12)
+        assert np.array_equal(chunk.slide[:, 1], chunk.commanded[:, 1])
+
+
+def seconds(toolpath: Toolpath, *settings: str) -> list[float]:
+    return [c.duration_s for c in simulate(toolpath, path_machine(*settings))]
+
+
+def test_time_is_way_over_feed() -> None:
+    b = ToolpathBuilder().line(3, 4, feed=60).rapid(3, 4, 2)
+    b.arc(3, 4, centre=(3, 5), ccw=True, feed=30).event(Kind.DWELL, 1.5)
+    toolpath = b.finish()
+    arc = 2 * math.pi / 0.5
+    assert seconds(toolpath) == pytest.approx([5.0, 0.0, arc, 1.5], abs=1e-9)
+    found = seconds(toolpath, "limits.rapid_mm_min=600")
+    assert found == pytest.approx([5.0, 0.2, arc, 1.5])
+    found = seconds(toolpath, "limits.rapid_mm_min=600", "axes.z.max_rate_mm_min=60")
+    assert found == pytest.approx([5.0, 2.0, arc, 1.5])
+    found = seconds(toolpath, "axes.x.max_rate_mm_min=20", "limits.rapid_mm_min=600")
+    assert found == pytest.approx([9.0, 0.2, arc, 1.5])
+
+
+def test_homing_goes_to_machine_zero_and_on_from_there() -> None:
+    b = ToolpathBuilder().line(1, 1, 1, feed=60)
+    b.event(Kind.HOME_Z).event(Kind.HOME_XY).line(2, 3, 4, feed=60)
+    chunks = list(simulate(b.finish(), path_machine("controller.machine_zero_mm=[-1.0, -2.0, 5]")))
+    assert [c.commanded[-1].tolist() for c in chunks] == [
+        [1, 1, 1],
+        [1, 1, 5],
+        [-1, -2, 5],
+        [2, 3, 4],
+    ]
+
+
+def test_nothing_runs_behind_the_end() -> None:
+    b = ToolpathBuilder().line(1, feed=60).event(Kind.END).line(2, feed=math.nan)
+    assert [c.row for c in simulate(b.finish(), path_machine())] == [0, 1]
+    assert list(simulate(ToolpathBuilder().finish(), path_machine())) == []
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda b: b.line(1, feed=math.nan), "without a feed"),
+        (lambda b: b.line(1, feed=0.0), "without a feed"),
+        (lambda b: b.line(1, feed=-2.0), "without a feed"),
+        (lambda b: b.arc(1, 0, centre=(math.nan, 0), ccw=True, feed=1.0), "without a centre"),
+        (lambda b: b.event(Kind.DWELL, -1.0), "without its seconds"),
+        (lambda b: b.event(Kind.DWELL), "without its seconds"),
+        (lambda b: b.rapid(1e12), "beyond all"),
+        (lambda b: b.rapid(1).event(Kind.SET_ZERO), "part zero"),
+    ],
+)
+def test_what_cannot_be_followed_is_named(build, words: str) -> None:
+    b = ToolpathBuilder()
+    b.block = 6
+    with pytest.raises(ProgramError, match=words) as caught:
+        list(simulate(build(b).finish(), path_machine()))
+    assert "block 7" in str(caught.value)
+
+
+def test_it_has_no_interpolators() -> None:
+    with pytest.raises(OptionError, match="no interpolators"):
+        simulate(square(), path_machine(), interpolator="dda")
+
+
+@given(jobs())
+def test_followed_ends_lie_on_the_grid_and_near(toolpath: Toolpath) -> None:
+    shifted = ToolpathBuilder((0.0013, 0.0, 0.0))
+    for move in toolpath:
+        if move.centre is None and move.kind == Kind.LINE:
+            shifted.line(*(value + 0.0013 for value in move.end), feed=10.0)
+    given_ = shifted.finish()
+    made = followed(given_, path_machine())
+    steps = made.end / STEP
+    assert steps == pytest.approx(np.round(steps), abs=1e-9)
+    if len(given_):
+        assert np.abs(made.end - given_.end).max() <= 0.5 * STEP + 1e-12
+    free = followed(given_, path_machine(FREE))
+    assert np.array_equal(free.end, given_.end)
+
+
+@pytest.mark.parametrize("ccw", [True, False])
+@pytest.mark.parametrize("missing", [1e-4, 1e-3, 0.002])
+def test_rounding_turns_no_arc_inside_out(missing: float, ccw: bool) -> None:
+    """Arcs shorter than a step, and circles that lack less than a step."""
+    for turn in np.linspace(0.0, 6.2, 23):
+        for sweep in (missing, 2 * math.pi - missing):
+            end = turn + (sweep if ccw else -sweep)
+            b = ToolpathBuilder((math.cos(turn), math.sin(turn), 0.0))
+            b.arc(math.cos(end), math.sin(end), centre=(0, 0), ccw=ccw, feed=10)
+            b.event(Kind.DWELL, 0.0)
+            made = followed(b.finish(), path_machine())
+            assert move_lengths(made)[0] == pytest.approx(sweep, abs=2 * math.pi * STEP)
+            assert np.array_equal(made.end[0], made.end[1])
+
+
+def test_long_programs_are_sampled_more_coarsely(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(path_samples, "MAX_SAMPLES", 100)
+    b = ToolpathBuilder((3.0, 0.0, 0.0)).arc(3, 0, centre=(0, 0.0), ccw=True, feed=60)
+    toolpath = b.line(-3, 1, feed=60).finish()
+    machine = path_machine(*both("backlash_mm", 0.1))
+    wide = spacing_mm(toolpath, machine)
+    assert wide == pytest.approx(move_lengths(toolpath).sum() / 100)
+    coarse = list(simulate(toolpath, machine))
+    monkeypatch.undo()
+    fine = list(simulate(toolpath, machine))
+    assert 100 <= sum(len(c.commanded) for c in coarse) <= 110
+    assert sum(len(c.commanded) for c in fine) > 3000
+    for name in ("steps", "reversals"):
+        for one, other in zip(coarse, fine, strict=True):
+            assert getattr(one, name).tolist() == getattr(other, name).tolist()
+    for one, other in zip(coarse, fine, strict=True):
+        assert one.slide[-1] == pytest.approx(other.slide[-1], abs=1e-12)
+    for reach in (np.min, np.max):
+        assert reach(coarse[0].slide, axis=0) == pytest.approx(reach(fine[0].slide, axis=0))
+
+
+@given(jobs(), st.integers(1, 40))
+def test_any_window_holds_the_same_samples(toolpath: Toolpath, size: int) -> None:
+    samples = PathSamples(toolpath, 0.05)
+    total = int(samples.first[-1])
+    rows, points = samples.window(0, total)
+    for low in range(0, total, size):
+        row, point = samples.window(low, min(low + size, total))
+        assert np.array_equal(row, rows[low : low + size])
+        assert np.array_equal(point, points[low : low + size])
+    owner = np.repeat(np.arange(len(toolpath)), np.diff(samples.first))
+    assert np.array_equal(rows, owner)
