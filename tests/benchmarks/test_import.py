@@ -146,3 +146,35 @@ def test_dxf(benchmark: Any, reader: str, tmp_path: Path) -> None:
     else:
         document = benchmark.pedantic(lambda: ezdxf.readfile(file), rounds=5, warmup_rounds=1)
         assert len(document.modelspace()) == 10_000
+
+
+def svg(count: int) -> bytes:
+    """Random quadratic Béziers of 5 to 50 mm, one path."""
+    rng = np.random.default_rng(1)
+    sizes = rng.uniform(5.0, 50.0, count)
+    place = 60.0 * np.column_stack([np.arange(count) % 30, np.arange(count) // 30])
+    curves = rng.uniform(0.0, 1.0, (count, 3, 2)) * sizes[:, None, None] + place[:, None, :]
+    data = " ".join(
+        "M{:.4f} {:.4f}Q{:.4f} {:.4f} {:.4f} {:.4f}".format(*row)
+        for row in curves.reshape(count, 6)
+    )
+    page = 'xmlns="http://www.w3.org/2000/svg" width="1800mm" viewBox="0 0 1800 1800"'
+    return f'<svg {page}><path d="{data}"/></svg>'.encode()
+
+
+@pytest.mark.benchmark(group="an SVG of 900 quadratic Béziers: below 0.5 s")
+@pytest.mark.parametrize("reader", ["svgpathtools", "read_drawing"])
+def test_svg(benchmark: Any, reader: str, tmp_path: Path) -> None:
+    import svgpathtools
+
+    file = tmp_path / "curves.svg"
+    file.write_bytes(svg(900))
+    if reader == "svgpathtools":
+        paths, _ = benchmark.pedantic(
+            lambda: svgpathtools.svg2paths(str(file)), rounds=5, warmup_rounds=1
+        )
+        assert sum(map(len, paths)) == 900
+        return
+    drawing = benchmark.pedantic(lambda: read_drawing(file), rounds=5, warmup_rounds=1)
+    assert len(drawing.paths) == 900
+    benchmark.extra_info["moves"] = len(drawing.paths.vertices) - 900
