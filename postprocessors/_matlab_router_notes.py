@@ -58,7 +58,7 @@ class Notes:
             )
             found.append(
                 Finding(
-                    Code.VALUE_ROUNDED,
+                    Code.PLACES_SNAPPED,
                     Severity.WARNING,
                     f"vertices were moved to the grid of {grid_mm:g} mm, by"
                     f" {self.snap_mm * 1000.0:.0f} µm at most{starts}",
@@ -71,7 +71,7 @@ class Notes:
         if self.ones:
             found.append(
                 Finding(
-                    Code.VALUE_ROUNDED,
+                    Code.PLACES_SNAPPED,
                     Severity.WARNING,
                     f"{self.ones} vertices were moved by 0.1 mm, because a distance of 0.1 mm"
                     " would never end",

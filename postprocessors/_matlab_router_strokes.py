@@ -196,7 +196,7 @@ def _unsaid(toolpath: Toolpath, rows: Bools, what: str, severity: Severity) -> l
         return []
     return [
         Finding(
-            Code.VALUE_ROUNDED,
+            Code.EVENT_LEFT_OUT,
             severity,
             f"{count} {what} are not sent: the arrays have no place for them",
             where=place(toolpath, int(np.argmax(rows))),

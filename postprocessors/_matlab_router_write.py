@@ -14,13 +14,12 @@ from typing import Final
 import numpy as np
 
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Ints, Toolpath
 from camtool.toolpath.program import Program
 
 from ._matlab_router_lines import Job, JobMaker
-from ._matlab_router_options import FIXED_Y_UNITS, UNIT_MM, Dialect, dialect_of
+from ._matlab_router_options import UNIT_MM, Dialect, dialect_of
 from ._matlab_router_strokes import strokes_of
 
 STREAM_EXTENSION: Final = ".stream"
@@ -45,8 +44,6 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
             mend="scale the drawing up" if strokes else "cut below the top of the stock, Z < 0",
         )
     findings += maker.notes.findings(dialect)
-    findings += _master_y(jobs, dialect)
-    findings += _odd(jobs, dialect)
     stream = dialect.format == "stream"
     return Program(
         data=_stream(jobs, dialect) if stream else _matlab(jobs, dialect),
@@ -118,39 +115,3 @@ def _first_y(y: int, number: int, dialect: Dialect) -> bytes:
             mend="use --set dialect.first_y=number",
         )
     return bytes([y, CARRIAGE_RETURN])
-
-
-def _master_y(jobs: list[Job], dialect: Dialect) -> list[Finding]:
-    """The listed master sends a constant in place of the first point's y."""
-    off = [number for number, job in enumerate(jobs, 1) if int(job.xy[0, 1]) != FIXED_Y_UNITS]
-    if dialect.master_y == "sent" or not off:
-        return []
-    y = int(jobs[off[0] - 1].xy[0, 1])
-    return [
-        Finding(
-            Code.VALUE_ROUNDED,
-            Severity.WARNING,
-            f"{_count(len(off), 'job')} will lie elsewhere: the listed master begins each job at Y"
-            f" {FIXED_Y_UNITS * UNIT_MM:g} mm, whatever it is sent",
-            where=f"job {off[0]}",
-            measured=y * UNIT_MM,
-            limit=FIXED_Y_UNITS * UNIT_MM,
-            unit="mm",
-        )
-    ]
-
-
-def _odd(jobs: list[Job], dialect: Dialect) -> list[Finding]:
-    """Odd distances that lose a tenth of a millimetre each."""
-    count = sum(int((np.diff(job.xy, axis=0) % 2).sum()) for job in jobs)
-    if dialect.odd == "kept" or not count:
-        return []
-    return [
-        Finding(
-            Code.VALUE_ROUNDED,
-            Severity.WARNING,
-            f"{count} distances are odd and lose 0.1 mm each, because the slaves run chunks of"
-            " 0.2 mm; use --set dialect.grid_mm=0.2",
-            measured=float(count),
-        )
-    ]
