@@ -81,7 +81,7 @@ def test_columns_count_the_block_number() -> None:
         (b"G1 X[1+2]", FREE, "block 1, line 1, column 5", "no number after X"),
         (b"/G1", FREE, "block 1, line 1, column 1", "a block that a switch may leave out"),
         (b"$H", FREE, "block 1, line 1, column 1", "a command of the controller itself"),
-        (b"G1 X1e3", FREE, "block 1, line 1, column 6", "the letter e is no word"),
+        (b"G1 X1e3", FREE, "block 1, line 1, column 6", "the letter E is no word"),
         (b"G1 (a (b) c)", FREE, "block 1, line 1, column 4", "a comment that is nested"),
         (b"G1 (a", FREE, "block 1, line 1, column 4", "not closed"),
         (b"G1 a)", FREE, "block 1, line 1, column 5", "not closed"),
