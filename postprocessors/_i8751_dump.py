@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from dataclasses import dataclass
-from typing import Final
+from itertools import islice
+from typing import Final, NamedTuple
 
 from camtool.errors import ProgramError
 
@@ -24,8 +24,7 @@ _LINE: Final = re.compile(
 _REPLIES: Final = re.compile(r"<-([^<]*)$")
 
 
-@dataclass(frozen=True)
-class _Run:
+class _Run(NamedTuple):
     """A line with bytes: its number from 1, the offset of its first byte, how many, the column
     of its first byte from 1, and its comment."""
 
@@ -88,7 +87,7 @@ def _no_line(number: int, line: str) -> ProgramError:
         column = offset.end() + (good.end() if good else 0) + 1
     return ProgramError(
         f"{shown(line)} is no line of a hex dump: wanted an offset of four digits or more, bytes "
-        "of two digits, and nothing else but a comment after ;",
+        "of two digits, and perhaps a comment behind a semicolon",
         where=f"line {number}, column {column}",
         mend="for a listing, use --set dialect.format=listing",
     )
@@ -101,7 +100,7 @@ def _placed(fault: ByteFault, runs: list[_Run], lines: list[str]) -> ProgramErro
     column = run.column
     if inside < run.size:
         digits = re.finditer(r"[0-9A-Fa-f]{2}", lines[run.line - 1][run.column - 1 :])
-        column += [match.start() for match in digits][inside]
+        column += next(islice(digits, inside, None)).start()
     return ProgramError(
         fault.message,
         where=f"record {fault.record + 1}, offset {fault.offset:04X}, line {run.line}, "

@@ -76,18 +76,16 @@ class ListingReader:
         match = _RECORD.fullmatch(text)
         if match is None:
             raise self._no_record(text, indent)
-        self._steps.append(
-            [
-                self._whole(match[group], axis, indent + match.start(group))
-                for axis, group in enumerate((1, 2, 4))
-            ]
+        waits = (
+            self._wait(match[3], indent + match.start(3)),
+            self._wait(match[5], indent + match.start(5)),
         )
-        self._waits.append(
-            (
-                self._wait(match[3], indent + match.start(3)),
-                self._wait(match[5], indent + match.start(5)),
-            )
-        )
+        steps = [
+            self._whole(match[group], axis, indent + match.start(group))
+            for axis, group in enumerate((1, 2, 4))
+        ]
+        self._steps.append(steps)
+        self._waits.append(waits)
 
     def _whole(self, text: str, axis: int, column: int) -> int:
         """A distance in steps, half a step away from zero."""

@@ -77,11 +77,6 @@ def records_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Record
     each = np.where(deltas.any(axis=1), 1, 0)
     for index, parts in pieces.items():
         each[index] = len(parts)
-    if each.sum() > MOST_RECORDS:
-        raise PostError(
-            f"the program would have {each.sum()} records, more than {MOST_RECORDS}",
-            mend="use a larger dialect.tolerance_mm, or check the unit of the drawing",
-        )
     owner = np.repeat(np.arange(len(lowered)), each)
     first = np.cumsum(each) - each
     steps = deltas[owner]
@@ -144,8 +139,9 @@ def _cut_rows(
     far = np.abs(deltas).max(axis=1, initial=0) > most
     counts.long_moves = int(far.sum())
     counts.cut_lines = int(strays.sum())
+    of_elbows = np.where(strays, elbows(xy) / (2.0 * np.maximum(reach, 1)), 0.0)
+    _refuse_too_many(np.abs(deltas).max(axis=1, initial=0) / most + of_elbows)
     pieces = {}
-    total = 0
     for row in np.flatnonzero(strays | far).tolist():
         dx, dy, dz = deltas[row].tolist()
         if dz:
@@ -155,10 +151,17 @@ def _cut_rows(
             parts = [(*part, 0) for part in line.pieces(most)]
         pieces[row] = np.array(parts, dtype=np.int64)
         counts.cut_pieces += len(parts) if strays[row] else 0
-        total += len(parts)
-        if total > MOST_RECORDS:
-            break
     return pieces
+
+
+def _refuse_too_many(each: npt.NDArray[np.float64]) -> None:
+    """PostError for rows (N,) that need about so many records, or more."""
+    total = float(np.maximum(each, 1.0).sum())
+    if total > MOST_RECORDS:
+        raise PostError(
+            f"the program would have about {total:.3g} records, more than {MOST_RECORDS}",
+            mend="use a larger dialect.tolerance_mm, or check the unit of the drawing",
+        )
 
 
 def _chopped(steps: int, most: int) -> list[int]:
