@@ -1,0 +1,45 @@
+"""The `[dialect]` table of a flashcut machine, and the words: all that writer and reader share."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from camtool.machine.loader import convert
+from camtool.machine.model import Machine
+
+from ._gcode_options import feed_decimals
+
+MOST_MM: Final = 9999.999
+"""Coordinates beyond this have more than the 4.3 digits of a block (L436, L440-451)."""
+
+STOP_TEXT: Final = "programmed stop"
+"""The message that stands for M00 in a toolpath: the machine waits for the operator."""
+
+
+class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Points on which the thesis leaves a choice; docs/dialects/flashcut.md says why.
+
+    `decimals` of a coordinate; `trailing_zeros` says 1.000 for 1.0; `feed_words`: F only where
+    the thesis's syntax has it ("syntax": G01 in XY) or on every feed move ("everywhere");
+    `full_circles` as two "halves" or as one block ("whole"); `program_end`; `z_up`: the sign of Z
+    away from the work; `spindle_stops`: M05 stops it; `arc_spread_mm`: the radii at an arc's start
+    and end may differ by this much.
+    """
+
+    decimals: Annotated[int, Meta(ge=1, le=4)] = 3
+    trailing_zeros: bool = False
+    feed_words: Literal["syntax", "everywhere"] = "syntax"
+    full_circles: Literal["halves", "whole"] = "halves"
+    program_end: Literal["M30", "M02"] = "M30"
+    z_up: Literal["+", "-"] = "+"
+    spindle_stops: bool = True
+    arc_spread_mm: Annotated[float, Meta(gt=0.0)] = 0.005
+
+
+def dialect_of(machine: Machine) -> Dialect:
+    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
+    feed_decimals(machine)
+    return convert(machine.dialect, Dialect, machine.target.name, "dialect")

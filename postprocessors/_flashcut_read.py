@@ -1,0 +1,205 @@
+"""Reading flashcut, one block a line, by the four templates of the thesis (L980-1016).
+
+The real program hands each line to the routine of its code; what it does with a line that fits no
+template is not said, so here such a line is an error with block, line and column.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+
+from ._flashcut_options import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from ._gcode_words import Block, Lexing, blocks_of
+
+LEXING: Final = Lexing(letters="GMXYZIJF")
+
+FEED_GUARD: Final = 1e-9
+"""Part of a feed: a feed above its limit by less is at the limit."""
+
+TEMPLATES: Final = {
+    "G00": ("XY", "Z"),
+    "G01": ("XY", "XYF", "Z"),
+    "G02": ("XYIJ",),
+    "G03": ("XYIJ",),
+    "M00": ("",),
+    "M02": ("",),
+    "M03": ("",),
+    "M04": ("",),
+    "M05": ("",),
+    "M30": ("",),
+}
+MORE_FEEDS: Final = {"G01": ("ZF",), "G02": ("XYIJF",), "G03": ("XYIJF",)}
+"""Further templates where feeds may stand everywhere."""
+
+SPINDLE: Final = {
+    "M03": Kind.SPINDLE_CW,
+    "M04": Kind.SPINDLE_CCW,
+    "M05": Kind.SPINDLE_OFF,
+}
+NOT_INCHES: Final = frozenset({"G20", "G21", "G30", "G31"})
+"""Arcs in the list that the thesis cites (L393-432), which it does not implement."""
+
+
+def read_program(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError naming block, line and column when it is none."""
+    reader = _Reader(machine)
+    for block in blocks_of(data, LEXING):
+        reader.block(block)
+    if not reader.blocks:
+        raise ProgramError("the program is empty", mend="a program has blocks such as M30")
+    return reader.path.finish(reader.findings())
+
+
+@dataclass
+class _Excess:
+    """How many blocks have a feed above the limit, the highest, and the first of them."""
+
+    count: int = 0
+    most: float = 0.0
+    where: str = ""
+
+
+class _Reader:
+    """Blocks in, rows out; knows the feed that holds and whether the program has ended."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.path = ToolpathBuilder()
+        self.blocks = 0
+        self._dialect: Dialect = dialect_of(machine)
+        self._max_feed = machine.max_feed_mm_min
+        self._sign = 1.0 if self._dialect.z_up == "+" else -1.0
+        self._templates = {code: set(forms) for code, forms in TEMPLATES.items()}
+        if self._dialect.feed_words == "everywhere":
+            for code, forms in MORE_FEEDS.items():
+                self._templates[code] |= set(forms)
+        self._feed = math.nan
+        self._ended = ""
+        self._fast = _Excess()
+
+    def block(self, block: Block) -> None:
+        """One block."""
+        self.blocks += 1
+        if self._ended:
+            block.fail(f"a block after {self._ended}, the end of the program", mend="remove it")
+        words = block.words
+        code = words[0][0] + words[0][1]
+        form = "".join(letter for letter, _ in words[1:])
+        if form not in self._templates.get(code, ()):
+            self._refuse(block, code, form)
+        text = block.text.strip(" ")
+        if text.count(" ") != len(words) - 1 or "\t" in text or "  " in text:
+            _refuse_spacing(block)
+        self.path.block = block.index
+        if code[0] == "G":
+            self._motion(block, code, form, [float(number) for _, number in words[1:]])
+        elif code in SPINDLE:
+            self.path.event(SPINDLE[code])
+        elif code == "M00":
+            self.path.message(STOP_TEXT)
+        else:
+            self.path.event(Kind.END)
+            self._ended = code
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What goes beyond the machine's limits."""
+        if not self._fast.count:
+            return ()
+        return (
+            Finding(
+                Code.FEED_ABOVE_LIMIT,
+                Severity.ERROR,
+                f"{self._fast.count} blocks have a feed above what the machine's shortest half "
+                f"period gives, up to {self._fast.most:g} mm/min where {self._max_feed:.4g} is "
+                "the limit",
+                where=self._fast.where,
+                measured=self._fast.most,
+                limit=self._max_feed,
+                unit="mm_min",
+            ),
+        )
+
+    def _motion(self, block: Block, code: str, form: str, numbers: list[float]) -> None:
+        """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""
+        for at, number in enumerate(numbers, 1):
+            if not abs(number) <= MOST_MM:
+                block.fail(f"a number beyond ±{MOST_MM:g}", word=at, mend="check the units")
+        if form[-1] == "F":
+            self._set_feed(block, numbers.pop(), len(form))
+        if code != "G00" and math.isnan(self._feed):
+            block.fail(f"{code} before any F", mend="say F in a G01 of X and Y first")
+        if form[0] == "Z":
+            end: tuple[float | None, float | None, float | None]
+            end = None, None, self._sign * numbers[0] + 0.0
+        else:
+            end = numbers[0], numbers[1], None
+        if code == "G00":
+            self.path.rapid(*end)
+        elif code == "G01":
+            here = (numbers[0], numbers[1]) == self.path.position[:2] if form == "XYF" else False
+            if not here:  # a G01 to where the tool is sets the feed, no more
+                self.path.line(*end, feed=self._feed)
+        else:
+            self._arc(block, code, numbers)
+
+    def _set_feed(self, block: Block, feed: float, word: int) -> None:
+        if feed <= 0.0:
+            block.fail("a feed must be above 0", word=word, mend="write F3.0")
+        if feed > self._max_feed * (1.0 + FEED_GUARD):
+            self._fast.where = self._fast.where or f"block {block.index + 1}"
+            self._fast.count += 1
+            self._fast.most = max(self._fast.most, feed)
+        self._feed = feed
+
+    def _arc(self, block: Block, code: str, numbers: list[float]) -> None:
+        x, y, i, j = numbers
+        at_x, at_y, _ = self.path.position
+        centre = at_x + i, at_y + j
+        radius, other = math.hypot(i, j), math.hypot(x - centre[0], y - centre[1])
+        if radius == 0.0:
+            block.fail("an arc about its own start", word=3, mend="give I and J from the start")
+        spread, most = abs(radius - other), self._dialect.arc_spread_mm
+        if spread > most:
+            block.fail(
+                f"the arc's start is {radius:.6g} mm from its centre, its end {other:.6g} mm",
+                word=3,
+                mend=f"they may differ by {most:g} mm",
+            )
+        if (x, y) == (at_x, at_y) and self._dialect.full_circles == "halves":
+            block.fail(
+                "an arc that ends where it starts: whether it is a circle or nothing is not known",
+                word=1,
+                mend="write two halves, or say --set dialect.full_circles=whole",
+            )
+        self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=self._feed)
+
+    def _refuse(self, block: Block, code: str, form: str) -> None:
+        """Why a block fits no template."""
+        forms = self._templates.get(code)
+        if code in NOT_INCHES:
+            block.fail(
+                f"{code} is an arc in this controller's list, neither inches nor a return, and is "
+                "not done",
+                mend="remove it; lengths are mm",
+            )
+        if forms is None:
+            known = " ".join(TEMPLATES)
+            block.fail(f"{code} is not known", mend=f"known, with two digits: {known}")
+        wanted = " or ".join(" ".join([code, *one]) for one in sorted(forms))
+        for at, letter in enumerate(form):
+            if not any(one.startswith(form[: at + 1]) for one in forms):
+                block.fail(
+                    f"{letter} has no place here", word=at + 1, mend=f"write {wanted}, no more"
+                )
+        block.fail(f"{code} lacks a word", word=len(form), mend=f"write {wanted}")
+
+
+def _refuse_spacing(block: Block) -> None:
+    block.fail("one space, no more and no tab, goes between words", mend="as in G00 X1.0 Y1.0")

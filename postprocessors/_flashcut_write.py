@@ -1,0 +1,187 @@
+"""Writing flashcut: a Toolpath to blocks that each say everything anew, but for the feed.
+
+    rows ──checked──▶ XY and Z apart ──units, arcs mended──▶ blocks, F where it changes
+
+The syntax has F in G01 of XY alone (L989-992). So a feed that changes before a Z move or an arc
+is said by a G01 to where the tool is: X and Y "aún así es necesario", L985.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.program import Program
+
+from ._flashcut_options import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from ._gcode_checks import feed_units, place
+from ._gcode_format import Ints, NumberStyle, say_units
+from ._gcode_options import feed_decimals
+from ._gcode_plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
+from ._gcode_plain_checks import check_plain, left_out, split_z
+
+WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
+EVENT: Final = {
+    Kind.SPINDLE_CW: "M03",
+    Kind.SPINDLE_CCW: "M04",
+    Kind.SPINDLE_OFF: "M05",
+    Kind.TOOL_CHANGE: "M00",
+}
+
+
+def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    dialect = dialect_of(machine)
+    check_plain(toolpath, machine)
+    feeds, feed_note = feed_units(toolpath, machine)
+    lowered, split_note = split_z(toolpath)
+    rules = ArcRules(dialect.decimals, dialect.full_circles, MOST_MM)
+    rows = plain_rows(lowered.toolpath, rules)
+    of_row = lowered.row[rows.row]
+    _check_reach(toolpath, rows, of_row, dialect)
+    writer = _Writer(rows, dialect, machine)
+    writer.run(_event_words(toolpath), of_row, feeds[of_row])
+    ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
+    first = place(toolpath, int(lowered.row[rows.first])) if rows.first >= 0 else ""
+    notes = [
+        *([feed_note] if feed_note else []),
+        *([split_note] if split_note else []),
+        *arc_findings(rows, first),
+        *_event_notes(toolpath, dialect),
+    ]
+    blocks = [*writer.blocks, dialect.program_end]
+    return Program(
+        data="".join(f"{block}\n" for block in blocks).encode("ascii"),
+        extension=machine.target.extension,
+        target=machine.target.name,
+        row_of_block=np.array([*writer.rows, len(toolpath) - 1 if ended else -1], dtype=np.int64),
+        findings=tuple(notes),
+    )
+
+
+def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: Dialect) -> None:
+    far = (np.abs(rows.end) > MOST_MM * 10**dialect.decimals).any(axis=1)
+    if far.any():
+        raise PostError(
+            f"a coordinate has more than four digits before the point (±{MOST_MM:g} mm)",
+            where=place(toolpath, int(of_row[far.argmax()])),
+            mend="check the units",
+        )
+
+
+def _texts(units: Ints, dialect: Dialect) -> list[str]:
+    """Column of units (M,) as texts: "1.0", "-0.25"; zero has no minus."""
+    texts = say_units(units, NumberStyle(dialect.decimals))
+    if dialect.trailing_zeros:
+        return texts
+    return [f"{text}0" if text[-1] == "." else text for text in (t.rstrip("0") for t in texts)]
+
+
+def _event_words(toolpath: Toolpath) -> dict[int, str]:
+    """The block of each event that has one, by row."""
+    words = {}
+    for row in np.flatnonzero(~toolpath.is_motion).tolist():
+        kind = Kind(int(toolpath.kind[row]))
+        if kind in EVENT:
+            words[row] = EVENT[kind]
+        elif kind == Kind.MESSAGE and toolpath.texts[int(toolpath.value[row])] == STOP_TEXT:
+            words[row] = "M00"
+    return words
+
+
+def _event_notes(toolpath: Toolpath, dialect: Dialect) -> list[Finding]:
+    """What the events lose."""
+    found = left_out(toolpath, [Kind.DWELL], "this controller has no dwell")
+    kinds = toolpath.kind
+    spindles = np.isin(kinds, [int(Kind.SPINDLE_CW), int(Kind.SPINDLE_CCW)])
+    speeds = int((spindles & ~np.isnan(toolpath.value)).sum())
+    tools = int((kinds == Kind.TOOL_CHANGE).sum())
+    if speeds or tools:
+        found.append(
+            Finding(
+                Code.VALUE_ROUNDED,
+                Severity.INFO,
+                f"{speeds} spindle speeds and {tools} tool numbers have no word: the spindle "
+                "turns with the feed, and M00 waits for the tool",
+            )
+        )
+    if not dialect.spindle_stops:
+        why = "M05 is written, but this machine's spindle turns with every move"
+        found += left_out(toolpath, [Kind.SPINDLE_OFF], why)
+    return found
+
+
+class _Writer:
+    """Blocks one by one; knows which feed the controller holds."""
+
+    def __init__(self, rows: PlainRows, dialect: Dialect, machine: Machine) -> None:
+        self.blocks: list[str] = []
+        self.rows: list[int] = []
+        self._table = rows
+        self._dialect = dialect
+        self._feed_decimals = max(1, feed_decimals(machine))
+        self._feed_scale = 10 ** feed_decimals(machine)
+        self._said_feeds: dict[int, str] = {}
+        self._feed = 0
+
+    def run(self, events: dict[int, str], of_row: Ints, feeds: Ints) -> None:
+        """All blocks; `of_row` (M,) names the toolpath's rows, `feeds` (M,) in units of F."""
+        table, dialect = self._table, self._dialect
+        sign = 1 if dialect.z_up == "+" else -1
+        xy = self._xy_texts(table.end)
+        z = _texts(table.end[:, 2] * sign, dialect)
+        i, j = (_texts(table.offset[:, axis], dialect) for axis in (0, 1))
+        begin = table.starts
+        flat = (table.end[:, :2] != begin[:, :2]).any(axis=1)
+        columns = zip(
+            table.kind.tolist(),
+            table.moves.tolist(),
+            flat.tolist(),
+            of_row.tolist(),
+            feeds.tolist(),
+            strict=True,
+        )
+        at = self._xy_texts(table.start[None, :])[0]
+        for index, (kind, moves, in_xy, row, feed) in enumerate(columns):
+            if kind > Kind.ARC_CCW:
+                if row in events:
+                    self._send(events[row], row)
+            elif moves:
+                arc = kind >= Kind.ARC_CW
+                target = xy[index] if in_xy or arc else f"Z{z[index]}"
+                if arc:
+                    target += f" I{i[index]} J{j[index]}"
+                self._move(WORD[Kind(kind)], target, row, feed, at)
+            at = xy[index]
+
+    def _xy_texts(self, units: Ints) -> list[str]:
+        x, y = (_texts(units[:, axis], self._dialect) for axis in (0, 1))
+        return [f"X{one} Y{two}" for one, two in zip(x, y, strict=True)]
+
+    def _move(self, word: str, target: str, row: int, feed: int, at: str) -> None:
+        """One move, and a block in front that says the feed where its own cannot."""
+        tail = ""
+        if word != "G00" and feed != self._feed:
+            tail = f" {self._feed_word(feed)}"
+            self._feed = feed
+            here = word == "G01" and target[0] == "X"
+            if not here and self._dialect.feed_words == "syntax":
+                self._send(f"G01 {at}{tail}", row)
+                tail = ""
+        self._send(f"{word} {target}{tail}", row)
+
+    def _feed_word(self, units: int) -> str:
+        word = self._said_feeds.get(units)
+        if word is None:
+            word = f"F{units / self._feed_scale:.{self._feed_decimals}f}"
+            self._said_feeds[units] = word
+        return word
+
+    def _send(self, block: str, row: int) -> None:
+        self.blocks.append(block)
+        self.rows.append(row)

@@ -1,0 +1,254 @@
+"""Reading valcnc as its firmware takes a block: blanks dropped, then the first X, Y, Z, I and J of
+the block, wherever they stand (L1179, L1222-1226).
+
+What the firmware would meet and the thesis does not tell (a missing word, Z along with X, a full
+circle, an arc whose chord exceeds its diameter) is an error with block, line and column, unless an
+option of `[dialect]` says what happens.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Toolpath
+
+from ._gcode_words import Block, Lexing, blocks_of
+from ._valcnc_options import dialect_of, scales_of
+
+CODES: Final = ("G00", "G01", "G02", "G03")
+MOST_UNITS: Final = 99_999.0
+"""Numbers beyond this are taken for a mistake."""
+
+CHORD_GUARD: Final = 1e-9
+"""Part of an arc's diameter: a chord longer by less is a diameter."""
+
+SCALE_GUARD: Final = 1e-12
+"""Part of a scale: X and Y whose scales differ by less are alike."""
+
+Point = tuple[float, float, float]
+
+
+def read_program(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError naming block, line and column when it is none."""
+    reader = _Reader(machine)
+    for block in blocks_of(data, reader.lexing):
+        reader.block(block)
+    if not reader.blocks:
+        raise ProgramError(
+            "the program is empty", mend="a program has blocks such as G00 X1 Y1 Z0"
+        )
+    return reader.path.finish(reader.findings())
+
+
+@dataclass
+class _Missed:
+    """How many arcs the controller's own angle takes past or short of their end, and the worst."""
+
+    count: int = 0
+    most_mm: float = 0.0
+    where: str = ""
+
+
+class _Reader:
+    """Blocks in, rows out, in mm."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._dialect = dialect_of(machine)
+        scale_x, scale_y, scale_z = scales_of(machine, self._dialect).tolist()
+        self._scales = (scale_x, scale_y, scale_z)
+        self._alike = abs(scale_x - scale_y) <= SCALE_GUARD * scale_x
+        self._feed = machine.max_feed_mm_min
+        self._step_mm = machine.axes.x.coded_step_mm
+        self._at: Point = (0.0, 0.0, 0.0)
+        self._missed = _Missed()
+        self.lexing = Lexing(
+            letters="GXYZIJ", blanks="anywhere", line_chars=self._dialect.block_chars
+        )
+        self.path = ToolpathBuilder()
+        self.blocks = 0
+
+    def block(self, block: Block) -> None:
+        """One block."""
+        self.blocks += 1
+        words = block.words
+        code = words[0][0] + words[0][1]
+        if code not in CODES:
+            block.fail(
+                f"{code} is no code of this controller", mend=f"known: {' '.join(CODES)}, in front"
+            )
+        if "\t" in block.text:
+            block.fail("a tab: only spaces are dropped", mend="use spaces")
+        values: dict[str, float] = {}
+        for at, (letter, text) in enumerate(words[1:], 1):
+            if letter in values or letter == "G":
+                block.fail(
+                    f"a second {letter}: only the first counts", word=at, mend="one block a line"
+                )
+            values[letter] = float(text)
+            if not abs(values[letter]) <= MOST_UNITS:
+                block.fail(f"a number beyond ±{MOST_UNITS:g}", word=at, mend="check the units")
+        self.path.block = block.index
+        end = self._end(block, values)
+        if code in ("G02", "G03"):
+            self._arc(block, code, values, end)
+        else:
+            for letter in ("I", "J"):
+                if letter in values:
+                    at = 1 + list(values).index(letter)
+                    block.fail(f"{letter} in a {code}", word=at, mend="only arcs have a centre")
+            self._line(block, code, end)
+        self._at = end
+
+    def findings(self) -> tuple[Finding, ...]:
+        """The scale that was taken, and arcs that the controller's angle does not bring home."""
+        found = []
+        if not self._dialect.coord_scale_checked:
+            found.append(
+                Finding(
+                    Code.COORDINATES_SCALED,
+                    Severity.WARNING,
+                    f"lengths are the program's numbers divided by {self._dialect.coord_scale:g} "
+                    "(dialect.coord_scale)",
+                    measured=self._dialect.coord_scale,
+                )
+            )
+        if self._missed.count:
+            found.append(
+                Finding(
+                    Code.ARC_MISSES_END,
+                    Severity.WARNING,
+                    f"{self._missed.count} arcs of about 180°: the controller takes their angle "
+                    f"from an arcsine and ends up to {self._missed.most_mm:.3g} mm off",
+                    where=self._missed.where,
+                    measured=self._missed.most_mm,
+                    limit=self._step_mm,
+                    unit="mm",
+                )
+            )
+        return tuple(found)
+
+    def _end(self, block: Block, values: dict[str, float]) -> Point:
+        """Where the block goes, in the program's units; absolute (L1135)."""
+        missing = [letter for letter in "XYZ" if letter not in values]
+        if missing and self._dialect.missing_words == "refused":
+            block.fail(
+                f"no {missing[0]}: whether it then stays or becomes 0 is not known",
+                mend="write X, Y and Z, or say --set dialect.missing_words=keep",
+            )
+        zero = self._dialect.missing_words == "zero"
+        x, y, z = (
+            values.get(letter, 0.0 if zero else old)
+            for letter, old in zip("XYZ", self._at, strict=True)
+        )
+        return x, y, z
+
+    def _mm(self, x: float, y: float, z: float) -> Point:
+        a, b, c = self._scales
+        return x / a + 0.0, y / b + 0.0, z / c + 0.0
+
+    def _line(self, block: Block, code: str, end: Point) -> None:
+        """A line; in two where the option puts Z before or after X and Y."""
+        first = self._in_order(block, end)
+        for point in (first, end) if first else (end,):
+            x, y, z = self._mm(*point)
+            if code == "G00":
+                self.path.rapid(x, y, z)
+            else:
+                self.path.line(x, y, z, feed=self._feed)
+
+    def _in_order(self, block: Block, end: Point) -> Point | None:
+        """The point on the way where Z and XY change turns, if they do."""
+        old, order = self._at, self._dialect.z_order
+        if end[:2] == old[:2] or end[2] == old[2] or order == "together":
+            return None
+        if order == "refused":
+            letters = [letter for letter, _ in block.words]
+            block.fail(
+                "Z moves along with X or Y: which goes first is not known",
+                word=letters.index("Z") if "Z" in letters else None,
+                mend="move them in two blocks, or say --set dialect.z_order=before",
+            )
+        return (*old[:2], end[2]) if order == "before" else (*end[:2], old[2])
+
+    def _arc(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
+        """An arc; Z in a block of its own before or after it where the option says so."""
+        for letter in ("I", "J"):
+            if letter not in values:
+                block.fail(f"an arc without {letter}", mend="give I and J from the start")
+        if not self._alike:
+            block.fail(
+                "on axes of unequal steps this arc is an ellipse",
+                mend="set axes.x.coded_step_mm and axes.y.coded_step_mm to one value",
+            )
+        i, j = values["I"], values["J"]
+        self._check_arc(block, (i, j), end)
+        x, y, z = self._mm(*end)
+        old_x, old_y, _ = self._mm(*self._at)
+        centre = old_x + i / self._scales[0], old_y + j / self._scales[1]
+        order = self._dialect.z_order
+        if end[2] != self._at[2]:
+            if order in ("refused", "together"):
+                block.fail("Z moves along with an arc", mend="move Z in a block of its own")
+            if order == "before":
+                self.path.line(old_x, old_y, z, feed=self._feed)
+        self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=self._feed)
+        if end[2] != self._at[2] and order == "after":
+            self.path.line(x, y, z, feed=self._feed)
+
+    def _check_arc(self, block: Block, offset: tuple[float, float], end: Point) -> None:
+        """That the firmware's formulas (L1284-1326) have a value, and nearly the right one."""
+        i, j = offset
+        at_i = next(index for index, word in enumerate(block.words) if word[0] == "I")
+        radius = math.hypot(i, j)
+        chord = end[0] - self._at[0], end[1] - self._at[1]
+        other = math.hypot(chord[0] - i, chord[1] - j)
+        if radius == 0.0:
+            block.fail("an arc about its own start", word=at_i, mend="give I and J from the start")
+        spread, most = abs(radius - other) / self._scales[0], self._dialect.arc_spread_mm
+        if spread > most:
+            block.fail(
+                f"the radii at the arc's start and end differ by {spread:.4g} mm",
+                word=at_i,
+                mend=f"they may differ by {most:g} mm",
+            )
+        length = math.hypot(*chord)
+        if length == 0.0:
+            if self._dialect.full_circles == "refused":
+                block.fail(
+                    "an arc that ends where it starts: its angle is 0 by one formula, 360° by the "
+                    "other",
+                    mend="write it in parts, or say --set dialect.full_circles=whole",
+                )
+            return
+        ratio = length / (2.0 * radius)
+        if ratio > 1.0 + CHORD_GUARD:
+            block.fail(
+                "the arc's chord is longer than its diameter: the controller's arcsine has no "
+                "value",
+                word=at_i,
+                mend="write it in parts of 90°",
+            )
+        self._note_miss(block, offset, chord)
+
+    def _note_miss(
+        self, block: Block, offset: tuple[float, float], chord: tuple[float, float]
+    ) -> None:
+        """Compare 2·arcsin(C/2R), or 2π less it, with the angle between the two arms."""
+        out = -offset[0], -offset[1]
+        back = chord[0] - offset[0], chord[1] - offset[1]
+        cross, dot = out[0] * back[1] - out[1] * back[0], out[0] * back[0] + out[1] * back[1]
+        angle = abs(math.atan2(cross, dot))
+        radius = math.hypot(*offset)
+        taken = 2.0 * math.asin(min(1.0, math.hypot(*chord) / (2.0 * radius)))
+        miss_mm = abs(taken - angle) * radius / self._scales[0]
+        if miss_mm > self._step_mm:
+            self._missed.count += 1
+            if miss_mm > self._missed.most_mm:
+                self._missed.most_mm = miss_mm
+                self._missed.where = f"block {block.index + 1}"
