@@ -1,0 +1,89 @@
+"""LinuxCNC's own interpreter as a referee: what `rs274 -g` makes of a program, as rows.
+
+pytestmark = needs_rs274             marks and skips
+compare(toolpath, data, tmp_path)    the motions of the toolpath are LinuxCNC's own
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camtool.errors import ProgramError
+from camtool.toolpath.moves import Kind, Toolpath
+
+RS274 = shutil.which("rs274")
+PRINTED_MM = 1.1e-4
+"""rs274 prints four decimals."""
+
+needs_rs274 = [
+    pytest.mark.referee,
+    pytest.mark.skipif(
+        RS274 is None, reason="rs274 is missing: apt-get install linuxcnc-uspace brings it"
+    ),
+]
+
+Call = tuple[str, str, list[float]]
+"""Name, arguments as text, the numbers among them."""
+
+_CALL = re.compile(r"N(?:\.+|\d+) *([A-Z_0-9]+)\((.*)\)$")
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+_MOVES = {"STRAIGHT_TRAVERSE": Kind.RAPID, "STRAIGHT_FEED": Kind.LINE}
+_MM = {"CANON_UNITS_MM": 1.0, "CANON_UNITS_INCHES": 25.4}
+
+
+def interpreted(data: bytes, folder: Path) -> list[Call]:
+    """The canonical calls of a program; ProgramError with LinuxCNC's words when it refuses."""
+    file = folder / "program.ngc"
+    file.write_bytes(data)
+    run = subprocess.run(
+        [str(RS274), "-g", str(file)], cwd=folder, capture_output=True, text=True, check=False
+    )
+    found = [_CALL.search(line) for line in run.stdout.splitlines()]
+    calls = [
+        (call[1], call[2], [float(number) for number in _NUMBER.findall(call[2])])
+        for call in found
+        if call
+    ]
+    if not any(name == "PROGRAM_END" for name, _, _ in calls):
+        raise ProgramError(run.stderr.strip() or "the program does not end")
+    return calls
+
+
+def motions(calls: list[Call]) -> np.ndarray:
+    """(N, 7) kind, x, y, z, centre x, centre y, feed of each motion, mm; NaN where none."""
+    rows, feed, mm, none = [], float("nan"), 1.0, float("nan")
+    for name, text, values in calls:
+        if name == "USE_LENGTH_UNITS":
+            feed, mm = feed * mm / _MM[text], _MM[text]
+        elif name == "SET_FEED_RATE":
+            feed = values[0]
+        elif name in _MOVES:
+            x, y, z = values[:3]
+            rate = none if name == "STRAIGHT_TRAVERSE" else feed * mm
+            rows.append((_MOVES[name], x * mm, y * mm, z * mm, none, none, rate))
+        elif name == "ARC_FEED":
+            x, y, cx, cy, turn, z = values[:6]
+            kind = Kind.ARC_CCW if turn > 0 else Kind.ARC_CW
+            rows.append((kind, x * mm, y * mm, z * mm, cx * mm, cy * mm, feed * mm))
+    return np.array(rows, dtype=np.float64).reshape(-1, 7)
+
+
+def motions_of(path: Toolpath) -> np.ndarray:
+    """The same of a toolpath; homing is a rapid in LinuxCNC."""
+    homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
+    kind = np.where(homing, int(Kind.RAPID), path.kind)
+    table = np.column_stack([kind, path.end, path.centre, path.feed])
+    return np.asarray(table[path.is_motion | homing])
+
+
+def compare(path: Toolpath, data: bytes, folder: Path) -> None:
+    """The moves of the toolpath are those that LinuxCNC finds in the program."""
+    ours, theirs = motions_of(path), motions(interpreted(data, folder))
+    assert ours[:, 0].tolist() == theirs[:, 0].tolist()
+    np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=PRINTED_MM)
