@@ -36,6 +36,7 @@ TEMPLATES: Final = {
     "M05": ("",),
     "M30": ("",),
 }
+MOTIONS: Final = frozenset({"G00", "G01", "G02", "G03"})
 MORE_FEEDS: Final = {"G01": ("ZF",), "G02": ("XYIJF",), "G03": ("XYIJF",)}
 """Further templates where feeds may stand everywhere."""
 
@@ -91,14 +92,14 @@ class _Reader:
             block.fail(f"a block after {self._ended}, the end of the program", mend="remove it")
         words = block.words
         code = words[0][0] + words[0][1]
-        form = "".join(letter for letter, _ in words[1:])
+        form = "".join([letter for letter, _ in words[1:]])
         if form not in self._templates.get(code, ()):
             self._refuse(block, code, form)
         text = block.text.strip(" ")
-        if text.count(" ") != len(words) - 1 or "\t" in text or "  " in text:
+        if text.count(" ") != len(words) - 1 or "  " in text or "\t" in text:
             _refuse_spacing(block)
         self.path.block = block.index
-        if code[0] == "G":
+        if code in MOTIONS:
             self._motion(block, code, form, [float(number) for _, number in words[1:]])
         elif code in SPINDLE:
             self.path.event(SPINDLE[code])
@@ -128,26 +129,26 @@ class _Reader:
 
     def _motion(self, block: Block, code: str, form: str, numbers: list[float]) -> None:
         """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""
-        for at, number in enumerate(numbers, 1):
-            if not abs(number) <= MOST_MM:
-                block.fail(f"a number beyond ±{MOST_MM:g}", word=at, mend="check the units")
+        if not max(map(abs, numbers)) <= MOST_MM:
+            at = next(at for at, number in enumerate(numbers, 1) if not abs(number) <= MOST_MM)
+            block.fail(f"a number beyond ±{MOST_MM:g}", word=at, mend="check the units")
         if form[-1] == "F":
             self._set_feed(block, numbers.pop(), len(form))
         if code != "G00" and math.isnan(self._feed):
             block.fail(f"{code} before any F", mend="say F in a G01 of X and Y first")
-        if form[0] == "Z":
-            end: tuple[float | None, float | None, float | None]
-            end = None, None, self._sign * numbers[0] + 0.0
-        else:
-            end = numbers[0], numbers[1], None
-        if code == "G00":
-            self.path.rapid(*end)
-        elif code == "G01":
-            here = (numbers[0], numbers[1]) == self.path.position[:2] if form == "XYF" else False
-            if not here:  # a G01 to where the tool is sets the feed, no more
-                self.path.line(*end, feed=self._feed)
-        else:
+        if code in ("G02", "G03"):
             self._arc(block, code, numbers)
+            return
+        x, y, z = (
+            (None, None, self._sign * numbers[0] + 0.0)
+            if form[0] == "Z"
+            else (numbers[0], numbers[1], None)
+        )
+        if code == "G00":
+            self.path.rapid(x, y, z)
+        elif form != "XYF" or (x, y) != self.path.position[:2]:
+            # A G01 with F to where the tool is sets the feed, no more.
+            self.path.line(x, y, z, feed=self._feed)
 
     def _set_feed(self, block: Block, feed: float, word: int) -> None:
         if feed <= 0.0:

@@ -25,7 +25,12 @@ from ._gcode_options import feed_decimals
 from ._gcode_plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
 from ._gcode_plain_checks import check_plain, left_out, split_z
 
-WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
+WORD: Final[dict[int, str]] = {
+    Kind.RAPID: "G00",
+    Kind.LINE: "G01",
+    Kind.ARC_CW: "G02",
+    Kind.ARC_CCW: "G03",
+}
 EVENT: Final = {
     Kind.SPINDLE_CW: "M03",
     Kind.SPINDLE_CCW: "M04",
@@ -79,7 +84,13 @@ def _texts(units: Ints, dialect: Dialect) -> list[str]:
     texts = say_units(units, NumberStyle(dialect.decimals))
     if dialect.trailing_zeros:
         return texts
-    return [f"{text}0" if text[-1] == "." else text for text in (t.rstrip("0") for t in texts)]
+    return [text if text[-1] != "0" else _short(text) for text in texts]
+
+
+def _short(text: str) -> str:
+    """Without its last zeros, but for the first decimal."""
+    short = text.rstrip("0")
+    return f"{short}0" if short[-1] == "." else short
 
 
 def _event_words(toolpath: Toolpath) -> dict[int, str]:
@@ -135,7 +146,8 @@ class _Writer:
         sign = 1 if dialect.z_up == "+" else -1
         xy = self._xy_texts(table.end)
         z = _texts(table.end[:, 2] * sign, dialect)
-        i, j = (_texts(table.offset[:, axis], dialect) for axis in (0, 1))
+        arc = table.is_arc
+        i, j = (iter(_texts(table.offset[arc, axis], dialect)) for axis in (0, 1))
         begin = table.starts
         flat = (table.end[:, :2] != begin[:, :2]).any(axis=1)
         columns = zip(
@@ -152,11 +164,10 @@ class _Writer:
                 if row in events:
                     self._send(events[row], row)
             elif moves:
-                arc = kind >= Kind.ARC_CW
-                target = xy[index] if in_xy or arc else f"Z{z[index]}"
-                if arc:
-                    target += f" I{i[index]} J{j[index]}"
-                self._move(WORD[Kind(kind)], target, row, feed, at)
+                target = xy[index] if in_xy or kind >= Kind.ARC_CW else f"Z{z[index]}"
+                if kind >= Kind.ARC_CW:
+                    target += f" I{next(i)} J{next(j)}"
+                self._move(WORD[kind], target, row, feed, at)
             at = xy[index]
 
     def _xy_texts(self, units: Ints) -> list[str]:

@@ -78,11 +78,15 @@ class PlainRows:
         return np.concatenate([self.start[None, :], self.end])[:-1]
 
     @property
+    def is_arc(self) -> Bools:
+        """(M,) true for ARC_CW and ARC_CCW."""
+        return np.asarray((self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW))
+
+    @property
     def moves(self) -> Bools:
         """(M,) true for motions that leave their start, and for all arcs."""
         motion = self.kind <= Kind.ARC_CCW
-        arc = motion & (self.kind >= Kind.ARC_CW)
-        return np.asarray(arc | (motion & (self.end != self.starts).any(axis=1)))
+        return np.asarray(self.is_arc | (motion & (self.end != self.starts).any(axis=1)))
 
 
 def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:

@@ -21,12 +21,18 @@ from camtool.toolpath.moves import Toolpath
 from ._gcode_words import Block, Lexing, blocks_of
 from ._valcnc_options import dialect_of, scales_of
 
-CODES: Final = ("G00", "G01", "G02", "G03")
+CODES: Final = ("00", "01", "02", "03")
+PLAIN: Final = frozenset({"GXYZ", "GXYZIJ"})
+"""Letters of a block as they mostly come; other orders are as good."""
+
 MOST_UNITS: Final = 99_999.0
 """Numbers beyond this are taken for a mistake."""
 
 CHORD_GUARD: Final = 1e-9
 """Part of an arc's diameter: a chord longer by less is a diameter."""
+
+NEARLY_DIAMETER: Final = 0.9
+"""Part of an arc's diameter: for shorter chords the arcsine errs as little as the numbers do."""
 
 SCALE_GUARD: Final = 1e-12
 """Part of a scale: X and Y whose scales differ by less are alike."""
@@ -77,33 +83,37 @@ class _Reader:
         """One block."""
         self.blocks += 1
         words = block.words
-        code = words[0][0] + words[0][1]
-        if code not in CODES:
-            block.fail(
-                f"{code} is no code of this controller", mend=f"known: {' '.join(CODES)}, in front"
-            )
+        code, letters = words[0][1], "".join([letter for letter, _ in words])
+        if letters not in PLAIN or code not in CODES or "\t" in block.text:
+            self._check_words(block, letters)
+        values = {letter: float(text) for letter, text in words[1:]}
+        if not max(map(abs, values.values()), default=0.0) <= MOST_UNITS:
+            at = next(at for at, value in enumerate(values.values(), 1) if abs(value) > MOST_UNITS)
+            block.fail(f"a number beyond ±{MOST_UNITS:g}", word=at, mend="check the units")
+        self.path.block = block.index
+        if letters.startswith("GXYZ"):
+            end = values["X"], values["Y"], values["Z"]
+        else:
+            end = self._end(block, values)
+        if code in ("02", "03"):
+            self._arc(block, code, values, end)
+        else:
+            self._line(block, code, values, end)
+        self._at = end
+
+    def _check_words(self, block: Block, letters: str) -> None:
+        """ProgramError for an unknown code, for a word that stands twice, and for tabs."""
+        first = "".join(block.words[0])
+        if letters[0] != "G" or block.words[0][1] not in CODES:
+            known = " ".join(f"G{code}" for code in CODES)
+            block.fail(f"{first} is no code of this controller", mend=f"known: {known}, in front")
         if "\t" in block.text:
             block.fail("a tab: only spaces are dropped", mend="use spaces")
-        values: dict[str, float] = {}
-        for at, (letter, text) in enumerate(words[1:], 1):
-            if letter in values or letter == "G":
+        for at, letter in enumerate(letters):
+            if letter in letters[:at]:
                 block.fail(
                     f"a second {letter}: only the first counts", word=at, mend="one block a line"
                 )
-            values[letter] = float(text)
-            if not abs(values[letter]) <= MOST_UNITS:
-                block.fail(f"a number beyond ±{MOST_UNITS:g}", word=at, mend="check the units")
-        self.path.block = block.index
-        end = self._end(block, values)
-        if code in ("G02", "G03"):
-            self._arc(block, code, values, end)
-        else:
-            for letter in ("I", "J"):
-                if letter in values:
-                    at = 1 + list(values).index(letter)
-                    block.fail(f"{letter} in a {code}", word=at, mend="only arcs have a centre")
-            self._line(block, code, end)
-        self._at = end
 
     def findings(self) -> tuple[Finding, ...]:
         """The scale that was taken, and arcs that the controller's angle does not bring home."""
@@ -152,12 +162,15 @@ class _Reader:
         a, b, c = self._scales
         return x / a + 0.0, y / b + 0.0, z / c + 0.0
 
-    def _line(self, block: Block, code: str, end: Point) -> None:
+    def _line(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
         """A line; in two where the option puts Z before or after X and Y."""
+        for at, letter in enumerate(values, 1):
+            if letter in "IJ":
+                block.fail(f"{letter} in a G{code}", word=at, mend="only arcs have a centre")
         first = self._in_order(block, end)
         for point in (first, end) if first else (end,):
             x, y, z = self._mm(*point)
-            if code == "G00":
+            if code == "00":
                 self.path.rapid(x, y, z)
             else:
                 self.path.line(x, y, z, feed=self._feed)
@@ -197,7 +210,7 @@ class _Reader:
                 block.fail("Z moves along with an arc", mend="move Z in a block of its own")
             if order == "before":
                 self.path.line(old_x, old_y, z, feed=self._feed)
-        self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=self._feed)
+        self.path.arc(x, y, centre=centre, ccw=code == "03", feed=self._feed)
         if end[2] != self._at[2] and order == "after":
             self.path.line(x, y, z, feed=self._feed)
 
@@ -234,7 +247,8 @@ class _Reader:
                 word=at_i,
                 mend="write it in parts of 90°",
             )
-        self._note_miss(block, offset, chord)
+        if ratio > NEARLY_DIAMETER:
+            self._note_miss(block, offset, chord)
 
     def _note_miss(
         self, block: Block, offset: tuple[float, float], chord: tuple[float, float]

@@ -28,7 +28,12 @@ from ._gcode_plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
 from ._gcode_plain_checks import check_plain, left_out, split_z
 from ._valcnc_options import Dialect, dialect_of, scales_of
 
-WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
+WORD: Final[dict[int, str]] = {
+    Kind.RAPID: "G00",
+    Kind.LINE: "G01",
+    Kind.ARC_CW: "G02",
+    Kind.ARC_CCW: "G03",
+}
 UNSAID: Final = (
     Kind.DWELL,
     Kind.SPINDLE_CW,
@@ -110,15 +115,15 @@ def _scaled(toolpath: Toolpath, scales: Floats) -> Toolpath:
 
 
 def _blocks(rows: PlainRows, dialect: Dialect) -> list[str]:
-    """The block of each row, "" for events."""
+    """The block of each row, without a code for events."""
     style = NumberStyle(dialect.decimals)
     x, y, z = (say_units(rows.end[:, axis], style) for axis in range(3))
-    i, j = (say_units(rows.offset[:, axis], style) for axis in range(2))
-    words = [WORD.get(Kind(kind), "") for kind in rows.kind.tolist()]
+    words = [WORD.get(kind, "") for kind in rows.kind.tolist()]
     blocks = [f"{w} X{a} Y{b} Z{c}" for w, a, b, c in zip(words, x, y, z, strict=True)]
-    arcs = (rows.kind <= Kind.ARC_CCW) & (rows.kind >= Kind.ARC_CW)
-    for row in np.flatnonzero(arcs).tolist():
-        blocks[row] += f" I{i[row]} J{j[row]}"
+    arcs = np.flatnonzero(rows.is_arc)
+    i, j = (say_units(rows.offset[arcs, axis], style) for axis in range(2))
+    for row, a, b in zip(arcs.tolist(), i, j, strict=True):
+        blocks[row] += f" I{a} J{b}"
     return blocks
 
 
