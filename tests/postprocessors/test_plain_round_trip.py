@@ -1,0 +1,182 @@
+"""flashcut and valcnc: what is written is what is read back, and every arc stays an arc."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from camtool.findings import Code
+from camtool.machine.registry import load_target
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+from tests.postprocessors.plain_parts import KINDS, anywhere, judge, on_grid, part
+
+TARGETS = sorted(KINDS)
+LOADED = {name: load_target(name) for name in TARGETS}
+THOROUGH = settings(max_examples=10_000, deadline=None, suppress_health_check=list(HealthCheck))
+USUAL = settings(max_examples=200)
+
+
+def check_same(name: str, wanted: Toolpath) -> None:
+    target = LOADED[name]
+    program = target.post.write(wanted, target.machine)
+    assert {finding.code for finding in program.findings} <= {Code.COORDINATES_SCALED}
+    read = target.post.read(program.data, target.machine)
+    assert read.kind.tolist() == wanted.kind.tolist()
+    np.testing.assert_allclose(read.end, wanted.end, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(read.centre, wanted.centre, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(read.feed, wanted.feed, rtol=1e-12)
+    rows = program.row_of_block[read.block]
+    assert rows.tolist() == list(range(len(wanted)))
+    again = target.post.write(read, target.machine)
+    assert again.data == program.data
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@USUAL
+@given(data=st.data())
+def test_what_can_be_said_comes_back(name: str, data: st.DataObject) -> None:
+    check_same(name, data.draw(on_grid(KINDS[name])))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TARGETS)
+@THOROUGH
+@given(data=st.data())
+def test_what_can_be_said_comes_back_thoroughly(name: str, data: st.DataObject) -> None:
+    check_same(name, data.draw(on_grid(KINDS[name])))
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@USUAL
+@given(data=st.data())
+def test_anything_comes_back_within_a_unit(name: str, data: st.DataObject) -> None:
+    judge(LOADED[name], data.draw(anywhere(KINDS[name])), KINDS[name].unit_mm)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TARGETS)
+@THOROUGH
+@given(data=st.data())
+def test_anything_comes_back_within_a_unit_thoroughly(name: str, data: st.DataObject) -> None:
+    judge(LOADED[name], data.draw(anywhere(KINDS[name])), KINDS[name].unit_mm)
+
+
+@pytest.mark.parametrize(
+    ("name", "setting"),
+    [
+        ("flashcut", "dialect.decimals=1"),
+        ("flashcut", "dialect.decimals=4"),
+        ("flashcut", "dialect.trailing_zeros=true"),
+        ("flashcut", "dialect.feed_words=everywhere"),
+        ("flashcut", "dialect.full_circles=whole"),
+        ("flashcut", "dialect.z_up=-"),
+        ("valcnc", "dialect.coord_scale=1"),
+        ("valcnc", "dialect.decimals=2"),
+        ("valcnc", "dialect.max_sweep_deg=180"),
+        ("valcnc", "dialect.max_sweep_deg=30"),
+    ],
+)
+def test_every_option_is_understood_by_both(name: str, setting: str) -> None:
+    settings = [setting]
+    if setting == "dialect.decimals=1":
+        settings.append("dialect.arc_spread_mm=0.1")
+    if setting == "dialect.decimals=2":
+        settings.append("dialect.arc_spread_mm=0.1")
+    target = load_target(name, settings=settings)
+    dialect = target.machine.dialect
+    unit = 10.0 ** -float(dialect["decimals"]) / float(dialect.get("coord_scale", 1.0))
+    program = judge(target, part(3.0, 8.0), unit)
+    default = LOADED[name].post.write(part(3.0, 8.0), LOADED[name].machine)
+    assert program.data != default.data
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_random_arcs_stay_arcs(name: str) -> None:
+    """Of large arcs none may become lines, whatever their numbers."""
+    rng = np.random.default_rng(20070301)
+    path = ToolpathBuilder()
+    for _ in range(3000):
+        x, y, _ = path.position
+        radius, angle = rng.uniform(0.5, 8.0), math.atan2(y, x) + rng.normal()
+        sweep, ccw = rng.uniform(0.2, 6.2), bool(rng.integers(2))
+        cx, cy = x - radius * math.cos(angle), y - radius * math.sin(angle)
+        to = angle + (sweep if ccw else -sweep)
+        path.arc(
+            cx + radius * math.cos(to),
+            cy + radius * math.sin(to),
+            centre=(cx, cy),
+            ccw=ccw,
+            feed=3.0,
+        )
+    target = LOADED[name]
+    wanted = path.finish()
+    program = target.post.write(wanted, target.machine)
+    read = target.post.read(program.data, target.machine)
+    assert (read.is_arc == read.is_feed).all()
+    (mended,) = (f for f in program.findings if f.code == Code.ARC_MENDED)
+    assert mended.measured is not None
+    assert mended.measured > 100
+    assert "0 too small or too large" in mended.message
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_full_circles_are_written_in_parts(name: str) -> None:
+    target = LOADED[name]
+    circle = ToolpathBuilder().rapid(2.0, 0.0).arc(2.0, 0.0, centre=(0, 0), ccw=True, feed=3.0)
+    program = target.post.write(circle.finish(), target.machine)
+    read = target.post.read(program.data, target.machine)
+    arcs = read.sweeps()[read.is_arc]
+    assert len(arcs) == (2 if name == "flashcut" else 4)
+    assert arcs.sum() == pytest.approx(2.0 * math.pi)
+
+
+def test_findings_count_what_was_lost() -> None:
+    target = LOADED["flashcut"]
+    wanted = part(3.0, 8.0)
+    found = {f.code: f for f in target.post.write(wanted, target.machine).findings}
+    assert set(found) == {
+        Code.MOVE_SPLIT,
+        Code.EVENT_LEFT_OUT,
+        Code.VALUE_ROUNDED,
+    }
+    assert "1 feed moves" in found[Code.MOVE_SPLIT].message
+    assert "DWELL" in found[Code.EVENT_LEFT_OUT].message
+    valcnc = LOADED["valcnc"]
+    found = {f.code: f for f in valcnc.post.write(wanted, valcnc.machine).findings}
+    assert set(found) >= {
+        Code.COORDINATES_SCALED,
+        Code.MOVE_SPLIT,
+        Code.EVENT_LEFT_OUT,
+        Code.FEED_ROUNDED,
+    }
+    assert "6 events" in found[Code.EVENT_LEFT_OUT].message
+
+
+def test_specks_are_counted() -> None:
+    target = LOADED["flashcut"]
+    path = ToolpathBuilder().line(1.0, 0.0, feed=3.0).line(1.0002, 0.0, feed=3.0)
+    path.arc(1.0002, 0.004, centre=(1.0002, 0.002), ccw=True, feed=3.0)
+    path.arc(1.5, 0.004, centre=(1.25, 200.0), ccw=True, feed=3.0)
+    found = {f.code: f for f in target.post.write(path.finish(), target.machine).findings}
+    assert found[Code.MOVE_COLLAPSED].measured == 2.0
+    assert found[Code.ARC_MENDED].message.startswith("0 arcs got another centre")
+    assert found[Code.ARC_MENDED].where == "move 2"
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_an_empty_toolpath(name: str) -> None:
+    target = LOADED[name]
+    program = target.post.write(ToolpathBuilder().finish(), target.machine)
+    assert program.data == (b"M30\n" if name == "flashcut" else b"")
+    assert len(program.row_of_block) == program.data.count(b"\n")
+
+
+def test_kinds_are_those_of_the_targets() -> None:
+    for name, kinds in KINDS.items():
+        dialect = LOADED[name].machine.dialect
+        scale = float(dialect.get("coord_scale", 1.0))
+        assert kinds.unit_mm == pytest.approx(10.0 ** -float(dialect["decimals"]) / scale)
+    assert Kind.END not in LOADED["valcnc"].post.read(b"G00X0Y0Z1", LOADED["valcnc"].machine).kind
