@@ -20,6 +20,9 @@ from camtool.toolpath.moves import Toolpath
 MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or wider when a program would have more of them than this."""
 
+SPACING_EPS = 1e-6
+"""Samples may be wider apart by this part of their spacing: by rounding alone."""
+
 TURN_EPS_RAD = 1e-9
 """A turning point nearer than this to an end of its arc is that end."""
 
@@ -69,7 +72,7 @@ class PathSamples:
         self._pieces = _pieces(length, self._arms)
         pieces = self._pieces
         way = length[pieces.row] * (pieces.end - pieces.begin)
-        self._parts = np.maximum(np.ceil(way / spacing_mm), 1.0).astype(np.int64)
+        self._parts = np.maximum(np.ceil(way / spacing_mm - SPACING_EPS), 1.0).astype(np.int64)
         self._offsets = np.concatenate([[0], np.cumsum(self._parts)])
         self.first = self._offsets[np.searchsorted(pieces.row, np.arange(len(toolpath) + 1))]
         """(N+1,) row r owns samples first[r]:first[r+1]; its start is no sample of it."""

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verify.cuts import CutMoves
 from camtool.verify.runs import run_offsets, run_peaks
 
@@ -99,7 +99,7 @@ def _circle(toolpath: Toolpath, run: Ints, radius: float) -> Circle:
     return Circle(
         centre_mm=(float(toolpath.centre[row, 0]), float(toolpath.centre[row, 1])),
         radius_mm=radius,
-        ccw=bool(toolpath.sweeps()[row] > 0.0),
+        ccw=bool(toolpath.kind[row] == Kind.ARC_CCW),
         z_mm=float(toolpath.end[row, 2]),
         first_row=row,
         last_row=int(run[-1]),

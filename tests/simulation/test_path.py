@@ -88,7 +88,7 @@ def test_ends_are_met_and_samples_are_no_wider_than_a_step(toolpath: Toolpath) -
             continue
         assert mine[-1].tolist() == list(move.end)
         apart = np.linalg.norm(np.diff([move.start, *mine.tolist()], axis=0), axis=1)
-        assert apart.max() <= spacing_mm(toolpath, machine) * (1.0 + 1e-9)
+        assert apart.max() <= spacing_mm(toolpath, machine) * (1.0 + path_samples.SPACING_EPS)
         assert len(mine) <= length_of(toolpath, index) / STEP + 5
 
 
