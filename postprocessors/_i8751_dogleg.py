@@ -3,10 +3,10 @@
 A record of dx, dy steps is no straight line: both motors step together min(|dx|, |dy|) times, a
 diagonal, and then the motor with more steps goes on alone (L4683-4705, "corte recto"):
 
-            . ·B        a = max(|dx|, |dy|) steps, b = min, d = a − b; steps of sx, sy mm
-         . ·  /         L = length of AB in mm
-      . ·    /          E is the elbow, here for |dx| > |dy|: first diagonal, then along X
-    A ----- E           (drawn mirrored; the elbow lies on the diagonal's side of AB)
+        E ———————— B        a = max(|dx|, |dy|) steps, b = min, d = a − b; steps of sx, sy mm
+       /      . ·           L = length of AB in mm
+      /  . ·                E is the elbow, here for |dx| > |dy|: the diagonal, then along X
+    A ·
 
 Both legs run towards B, so the feet of all their points lie on AB, and the elbow is the point
 that is farthest from it. A point that is M diagonal and D single steps from A is at

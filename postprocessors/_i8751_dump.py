@@ -17,9 +17,7 @@ from ._i8751_faults import ByteFault, Decoded, shown, text_lines
 from ._i8751_options import Dialect
 from ._i8751_packets import PacketReader, replies
 
-_LINE: Final = re.compile(
-    r"([0-9A-Fa-f]{4,8})[ \t]+((?:[0-9A-Fa-f]{2}[ \t]+)*[0-9A-Fa-f]{2})[ \t]*(?:;(.*))?"
-)
+_LINE: Final = re.compile(r"([0-9A-Fa-f]{4,8})[ \t]+([0-9A-Fa-f][0-9A-Fa-f \t]*)(?:;(.*))?")
 
 _REPLIES: Final = re.compile(r"<-([^<]*)$")
 
@@ -63,7 +61,8 @@ def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
         if not line.strip() or line.lstrip().startswith(";"):
             continue
         match = _LINE.fullmatch(line)
-        if match is None:
+        found = _bytes(match[2]) if match else b""
+        if match is None or not found:
             raise _no_line(number, line)
         if int(match[1], 16) != len(stream):
             raise ProgramError(
@@ -71,11 +70,18 @@ def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
                 where=f"line {number}, column 1",
                 mend="look for a line that is missing or doubled",
             )
-        found = bytes.fromhex(match[2])
         column = match.start(2) + 1
         runs.append(_Run(number, len(stream), len(found), column, match[3] or ""))
         stream += found
     return runs, bytes(stream)
+
+
+def _bytes(text: str) -> bytes:
+    """Pairs of hex digits with blanks between them; b"" when it is no such text."""
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        return b""
 
 
 def _no_line(number: int, line: str) -> ProgramError:

@@ -11,8 +11,6 @@ and dog-leg included (`_i8751_times`).
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import numpy.typing as npt
 
@@ -29,9 +27,6 @@ from ._i8751_packets import PacketReader
 from ._i8751_times import StepTimes
 
 Ints = npt.NDArray[np.int64]
-
-SLOTS: Final = 4
-"""Rows that a record can become: X and Y, T1, Z, T2."""
 
 
 def read_program(data: bytes, machine: Machine) -> Toolpath:
@@ -69,6 +64,7 @@ def _toolpath(decoded: Decoded, machine: Machine, dialect: Dialect) -> Toolpath:
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
     moves_xy, moves_z = steps[:, :2].any(axis=1), steps[:, 2] != 0
     present = np.column_stack([moves_xy, waits[:, 0] > 0, moves_z, waits[:, 1] > 0])
+    # Slots 0 to 3 of a record: X and Y, T1, Z, T2.
     record, slot = np.nonzero(present)
     at = np.cumsum(steps, axis=0)
     ends = at[record]

@@ -73,7 +73,7 @@ def records_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Record
     _check_events_stand(lowered, deltas)
     pieces = _cut_rows(lowered, deltas, machine, dialect, counts)
     counts.dropped = int((lowered.is_motion & ~deltas.any(axis=1)).sum())
-    counts.feeds = int(lowered.is_feed.sum())
+    counts.feeds = int(toolpath.is_feed.sum())
     each = np.where(deltas.any(axis=1), 1, 0)
     for index, parts in pieces.items():
         each[index] = len(parts)

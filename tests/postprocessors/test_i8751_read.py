@@ -370,3 +370,8 @@ def test_noise_under_every_option(option: str) -> None:
 
 def test_the_reader_starts_at_part_zero() -> None:
     assert read(ONE).start.tolist() == ToolpathBuilder().finish().start.tolist()
+
+
+def test_records_that_move_nothing() -> None:
+    path = read(b"\x13" + STILL * 2 + b"\x45\x54")
+    assert rows(path) == [("END", 0, 0, 0, None, 2)]
