@@ -5,8 +5,7 @@ is the end and the offset centre − start. For each arc, by its rounded numbers
 
     sagitta below half a unit           one line says it as well
     the controller's rule holds         as it is
-    otherwise                           1. re-centred: the point nearest to the centre from which
-                                           both ends are equally far, rounded
+    otherwise                           1. re-centred: a centre close by for which it holds
                                         2. split into two arcs at its middle (each re-centred)
                                         3. lines within a unit of the arc
 
@@ -35,6 +34,11 @@ FLAT_UNITS: Final = 0.5
 
 LINE_SAGITTA_UNITS: Final = 1.0
 """Lines in place of an arc stray from it by no more (in units), their rounding not counted."""
+
+RECENTRE_UNITS: Final = 1.5
+"""A centre may move by this many units, or by the controller's tolerance if that is more."""
+
+_AROUND: Final = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)])
 
 RULE_MARGIN: Final = 0.9
 """Arcs are kept within this part of the controller's tolerance: it may compute in 32 bits."""
@@ -196,10 +200,11 @@ class _Wanted:
 def _one(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> Piece | None:
-    """The arc with the centre from which both rounded ends are equally far; None when the
-    controller would refuse that too, or the centre would move by more than its tolerance.
+    """The arc about the nearest centre that the controller takes; None when there is none close.
 
-    That centre is c + ((m − c)·t) t with m the middle of the chord and t its direction.
+    The centre from which both rounded ends are equally far and which is nearest to c is
+    c + ((m − c)·t) t, with m the middle of the chord and t its direction. It is hardly ever a
+    whole number of units, so those around it are tried, the nearest to c first.
     """
     begin, stop = ends
     chord = (stop - begin).astype(np.float64)
@@ -208,16 +213,19 @@ def _one(
         return None
     unit = 10.0**-dialect.decimals
     centre, along = wanted.centre / unit, chord / length
-    middle = (begin + stop) / 2.0
-    moved = float((middle - centre) @ along)
-    if abs(moved) * unit > dialect.arc_difference_mm:
+    moved = float(((begin + stop) / 2.0 - centre) @ along)
+    tried = np.rint(centre + moved * along).astype(np.int64) + _AROUND
+    away = np.hypot(*(tried - centre).T)
+    tried = tried[np.argsort(away, kind="stable")]
+    most = max(dialect.arc_difference_mm / unit, RECENTRE_UNITS)
+    tried = tried[np.sort(away, kind="stable") <= most]
+    same = np.ones((len(tried), 1), dtype=np.int64)
+    points = (begin * same, stop * same, tried)
+    sweeps = np.full(len(tried), abs(wanted.sweep))
+    holds = arcs_hold(sweeps, points, np.full(len(tried), int(kind)), dialect)
+    if not holds.any():
         return None
-    new = np.rint(centre + moved * along).astype(np.int64)
-    points = (begin[None, :], stop[None, :], new[None, :])
-    sweep = np.array([abs(wanted.sweep)])
-    if not arcs_hold(sweep, points, np.array([kind]), dialect)[0]:
-        return None
-    return Piece(kind, _pair(stop), _pair(new - begin))
+    return Piece(kind, _pair(stop), _pair(tried[int(np.argmax(holds))] - begin))
 
 
 def _two(

@@ -60,7 +60,8 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     # A rapid to where X and Y should be already is not left out before they were ever said.
     still = (kind == Kind.RAPID) & ~says.any(axis=1)
     still &= _unsaid(flat, home_xy) & ~_unsaid(says[:, 2], home_z)
-    both = is_arc | still | (flat & _unsaid(flat, home_xy))
+    still &= _unsaid(flat | still, home_xy)
+    both = is_arc | still | (flat & _unsaid(flat | still, home_xy))
     says[both, :2] = True
     wanted = (toolpath.end != toolpath.starts).any(axis=1)[of]
     kept = ~motion | says.any(axis=1)

@@ -129,8 +129,10 @@ def _with_comments(
     """The blocks with messages, and the name of each contour, on lines of their own before."""
     wanted: dict[int, list[str]] = {}
     if style.dialect.comments == "contours":
-        named = np.where(toolpath.is_motion, toolpath.source, -1)
-        for row in np.flatnonzero((np.diff(named, prepend=-1) != 0) & (named >= 0)).tolist():
+        motions = np.flatnonzero(toolpath.is_motion)
+        named = toolpath.source[motions]
+        begins = (np.diff(named, prepend=-1) != 0) & (named >= 0)
+        for row in motions[begins].tolist():
             wanted.setdefault(row, []).append(comment(toolpath.text(row)))
     for row in np.flatnonzero(toolpath.kind == Kind.MESSAGE).tolist():
         wanted.setdefault(row, []).append(_message(toolpath, row, style))

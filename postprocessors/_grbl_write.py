@@ -36,9 +36,10 @@ def _words(event: Event, dialect: Dialect) -> str:
         if tool_number(event) > MOST_TOOL:
             raise event.refuse(f"grbl's tools end at {MOST_TOOL}")
         return f"T{tool_number(event)} M0"
+    block = common_words(event)
     if event.kind == Kind.DWELL and event.value > dialect.most_dwell_s:
         raise event.refuse(
             f"a dwell of {event.value:g} s; grbl counts at most {dialect.most_dwell_s:g} s",
             "use several dwells",
         )
-    return common_words(event)
+    return block
