@@ -1,0 +1,342 @@
+"""What the readers of grbl and linuxcnc make of programs, good and bad."""
+
+import functools
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Severity
+from camtool.machine.registry import load_target
+from camtool.toolpath.moves import Kind, Toolpath
+from tests.postprocessors.gcode_parts import part
+
+TARGETS = ("grbl", "linuxcnc")
+
+
+loaded = functools.cache(lambda name, settings: load_target(name, settings=settings))
+
+
+def read(data: bytes | str, name: str = "grbl", *settings: str) -> Toolpath:
+    target = loaded(name, settings)
+    text = data.encode() if isinstance(data, str) else data
+    path: Toolpath = target.post.read(text, target.machine)
+    return path
+
+
+def ends(path: Toolpath) -> list[tuple[float, ...]]:
+    return [tuple(row) for row in path.end[path.is_motion].tolist()]
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_modes_and_modal_words(name: str) -> None:
+    path = read(
+        "n10 g17 g21 g90 g94 g54 g40 g49\nN20 G0X1 Y2 (go)\nz3 ; up\nG91 X1 Y-1\nG90\n"
+        "G20\nG1 X1 F10\nG21 Y.5\nF100.5 Y1\nM30\n",
+        name,
+    )
+    assert ends(path) == [
+        (1, 2, 0),
+        (1, 2, 3),
+        (2, 1, 3),
+        (25.4, 1, 3),
+        (25.4, 0.5, 3),
+        (25.4, 1, 3),
+    ]
+    assert path.feed[path.is_feed].tolist() == [254.0, 254.0, 100.5]
+    assert path.block.tolist() == [1, 2, 3, 6, 7, 8, 9]
+    assert path.kind[-1] == Kind.END
+
+
+def test_grbl_begins_with_rapids_and_linuxcnc_with_nothing() -> None:
+    assert read("X1\n").kind.tolist() == [Kind.RAPID]
+    with pytest.raises(ProgramError, match="no motion word in force"):
+        read("X1\n", "linuxcnc")
+    with pytest.raises(ProgramError, match="no motion word in force"):
+        read("G80\nX1\n", "grbl")
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_arcs_by_centre_and_by_radius(name: str) -> None:
+    path = read(
+        "F60 G0 X10\nG2 X0 Y-10 I-10 J0\nG3 X10 Y0 R10\nG2 X0 Y-10 R-10\nG3 I0 J10 X0 Y-10\n"
+        "X0 Y-10 I1\n",
+        name,
+    )
+    centres = [(0, 0), (0, 0), (10, -10), (0, 0), (1, -10)]
+    np.testing.assert_allclose(path.centre[path.is_arc], centres, atol=1e-12)
+    turns = np.array([-90.0, 90.0, -270.0, 360.0, 360.0])
+    np.testing.assert_allclose(path.sweeps()[path.is_arc], np.radians(turns), atol=1e-9)
+
+
+def test_absolute_centres_are_linuxcnc_s() -> None:
+    path = read("G90.1 F60 G0 X10 Y1\nG3 X0 Y11 I0 J1\n", "linuxcnc")
+    assert path.centre[-1].tolist() == [0.0, 1.0]
+    with pytest.raises(ProgramError, match=r"does not know G90\.1"):
+        read("G90.1", "grbl")
+    assert len(read("G91.1\nG0 X1", "grbl")) == 1
+
+
+def test_events() -> None:
+    path = read("M3 S100\nS200\nM4\nM5\nS5\nG4 P.5\nM8\nM9\nM0\nM2", "grbl")
+    rows = [(move.kind, move.value) for move in path]
+    assert rows == [
+        (Kind.SPINDLE_CW, 100.0),
+        (Kind.SPINDLE_CW, 200.0),
+        (Kind.SPINDLE_CCW, 200.0),
+        (Kind.SPINDLE_OFF, None),
+        (Kind.DWELL, 0.5),
+        (Kind.END, None),
+    ]
+    assert [(note.code, note.where) for note in path.findings] == [
+        (Code.NOT_APPLIED, "block 7"),
+        (Code.NOT_APPLIED, "block 9"),
+    ]
+
+
+def test_tools_and_messages() -> None:
+    path = read("T2 M6\n(MSG, swap the vice)\nG0 X1 (msg,also here)\nM2", "linuxcnc")
+    assert [(move.kind, move.value) for move in path] == [
+        (Kind.TOOL_CHANGE, 2.0),
+        (Kind.MESSAGE, 0.0),
+        (Kind.MESSAGE, 1.0),
+        (Kind.RAPID, None),
+        (Kind.END, None),
+    ]
+    assert path.texts == ("swap the vice", "also here")
+    pause = read("T2 M0\nM0\nM2", "grbl", "dialect.tool_change=pause")
+    assert pause.kind.tolist() == [Kind.TOOL_CHANGE, Kind.END]
+    assert pause.findings[0].where == "block 2"
+    with pytest.raises(ProgramError, match="M6 is unknown to grbl"):
+        read("T2 M6", "grbl", "dialect.tool_change=pause")
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_homing_goes_to_machine_zero(name: str) -> None:
+    path = read(
+        "G0 X1 Y1 Z1\nG53 G0 Z0\nG53 X0 Y0\n", name, "controller.machine_zero_mm=[-5, -6, 7]"
+    )
+    assert path.kind.tolist() == [Kind.RAPID, Kind.HOME_Z, Kind.HOME_XY]
+    assert path.end.tolist() == [[1, 1, 1], [1, 1, 7], [-5, -6, 7]]
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_helices_become_lines_on_the_helix(name: str) -> None:
+    path = read("F60 G0 X10 Z2\nG3 X10 Y0 Z-2 I-10\n", name)
+    lines = path.end[path.kind == Kind.LINE]
+    np.testing.assert_allclose(np.hypot(lines[:, 0], lines[:, 1]), 10.0, atol=1e-9)
+    turn = np.arctan2(lines[:-1, 1], lines[:-1, 0]) % (2 * math.pi)
+    np.testing.assert_allclose(lines[:-1, 2], 2.0 - 4.0 * turn / (2 * math.pi), atol=1e-9)
+    chord = np.hypot(*(np.diff(lines[:, :2], axis=0)).T).max()
+    assert 10.0 - math.sqrt(100.0 - chord * chord / 4.0) <= 0.0005 + 1e-9
+    assert lines[-1].tolist() == [10.0, 0.0, -2.0]
+
+
+def test_a_turn_of_next_to_nothing_is_a_full_circle_to_grbl() -> None:
+    path = read("F60 G0 X1000\nG3 X1000 Y0.0004 I-1000\n")
+    assert path.kind.tolist() == [Kind.RAPID, Kind.ARC_CCW, Kind.LINE]
+    assert path.sweeps()[1] == pytest.approx(2.0 * math.pi)
+    assert path.end[2].tolist() == [1000.0, 0.0004, 0.0]
+    assert read("F60 G0 X1000\nG3 X1000 Y0.001 I-1000\n").sweeps()[1] == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize(
+    ("radius", "difference", "fine"),
+    [
+        (1.0, 0.0049, True),
+        (1.0, 0.0051, False),
+        (100.0, 0.099, True),
+        (100.0, 0.101, False),
+        (1500.0, 0.49, True),
+        (1500.0, 0.51, False),
+    ],
+)
+def test_the_rule_for_arcs_is_grbl_s(radius: float, difference: float, fine: bool) -> None:
+    text = f"F60\nG2 X{2.0 * radius + difference:.6f} Y0 I{radius:.6f} J0\n"
+    if fine:
+        assert read(text).is_arc[-1]
+        return
+    with pytest.raises(ProgramError, match="error 33") as caught:
+        read(text)
+    assert str(caught.value.where).startswith("block 2, line 2, column ")
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_feeds_above_the_limit_are_a_finding(name: str) -> None:
+    path = read("G1 F9999 X1\nF100 X2\nF8888 X3\n", name)
+    (finding,) = path.findings
+    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.ERROR)
+    assert (finding.where, finding.measured) == ("block 1", 9999.0)
+
+
+BAD = [
+    ("G0 X1\nG0 X1,5\n", 2, 6, "decimal comma"),
+    ("G0 X\n", 1, 4, "no number after X"),
+    ("G0 X1 X2\n", 1, 7, "two X words"),
+    ("G0 G1 X1 F1\n", 1, 4, "two G words of one group"),
+    ("G1 X1\n", 1, 1, "no feed yet"),
+    ("G1 X1 F0\n", 1, 7, "a feed that is not above 0"),
+    ("G1 X1 F-5\n", 1, 7, "a feed that is not above 0"),
+    ("F9 G2 X1 Y1\n", 1, 1, "without I, J or R"),
+    ("F9 G2 I1\n", 1, 1, "without X or Y"),
+    ("F9 G2 X0 Y0 R1\n", 1, 13, "has no centre"),
+    ("F9 G2 X5 Y0 R1\n", 1, 13, "more than the radius"),
+    ("F9 G2 X5 Y0 R5 I2\n", 1, 13, "by its radius and by its centre"),
+    ("F9 G2 X5 I1 J0\n", 1, 10, "radius"),
+    ("F9 G2 X5 I2.5 K1\n", 1, 15, "nothing in the block uses the K word"),
+    ("G0 X1 I1\n", 1, 7, "nothing in the block uses the I word"),
+    ("P1\n", 1, 1, "nothing in the block uses the P word"),
+    ("G4\n", 1, 1, "a dwell without P"),
+    ("G4 P-1\n", 1, 4, "a dwell below 0"),
+    ("G4 P1 X1\n", 1, 7, "uses the X word"),
+    ("M3\n", 1, 1, "before an S word"),
+    ("S-5\n", 1, 1, "a speed below 0"),
+    ("M3 M4 S1\n", 1, 4, "two M words of one group"),
+    ("M2\nG0 X1\n", 2, 1, "after the end"),
+    ("G55\n", 1, 1, "moves part zero"),
+    ("G92 X0\n", 1, 1, "moves part zero"),
+    ("G28\n", 1, 1, "only the controller remembers"),
+    ("G18\n", 1, 1, "another plane"),
+    ("G38.2 Z-5\n", 1, 1, "probes"),
+    ("G93\n", 1, 1, "inverse time"),
+    ("G43.1 Z1\n", 1, 1, "tool"),
+    ("G77 X1\n", 1, 1, "does not know G77"),
+    ("G1.5 X1\n", 1, 1, "does not know G1.5"),
+    ("M77\n", 1, 1, "does not know M77"),
+    ("M3.5 S1\n", 1, 1, "does not know M3.5"),
+    ("G99999999999999999999\n", 1, 1, "does not know G9999"),
+    ("T1.5\n", 1, 1, "a whole number"),
+    ("G20 F1\n", 1, 5, "a feed beside a change of units"),
+    ("G53 G0 X1 Y0\n", 1, 1, "only homing"),
+    ("F1 G53 G1 X0 Y0\n", 1, 1, "only homing"),
+    ("G53 G0 X0\n", 1, 1, "only homing"),
+    ("$H\n", 1, 1, "a command of the controller"),
+    ("/G0 X1\n", 1, 1, "switch"),
+    ("#1=5\n", 1, 1, "a parameter"),
+    ("G0 (a (b)) X1\n", 1, 4, "nested"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "column", "message"), BAD)
+@pytest.mark.parametrize("name", TARGETS)
+def test_refused(name: str, text: str, line: int, column: int, message: str) -> None:
+    with pytest.raises(ProgramError, match=message) as caught:
+        read(text, name)
+    assert caught.value.where == f"block {line}, line {line}, column {column}"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("G41 D1", "compensates for a tool"),
+        ("G43 H1", "compensates for a tool"),
+        ("G81 X1 Z-1 R1", "is a cycle"),
+        ("G33 Z-1 K1", "follows the spindle"),
+        ("G5 X1", "a spline"),
+        ("O100 CALL", "the letter O is no word"),
+        ("G0 X[1+1]", "no number after X"),
+        ("M6", "before a T word"),
+        ("G90.1 F9\nG2 X1 Y1 I1", "needs both I and J"),
+        ("F9 G2 X.001 I.0005", "an arc of radius 0.00050 mm is none"),
+        ("G0 X1 (" + "a" * 250 + ")", "more than 252 characters"),
+    ],
+)
+def test_linuxcnc_refuses(text: str, message: str) -> None:
+    with pytest.raises(ProgramError, match=message):
+        read(text, "linuxcnc")
+
+
+def test_grbl_refuses() -> None:
+    with pytest.raises(ProgramError, match="M6 is unknown to grbl, its error 20"):
+        read("T1 M6")
+    with pytest.raises(ProgramError, match="a % that is not alone"):
+        read("%\nG0 X1\n%\n")
+    with pytest.raises(ProgramError, match="more than 79 characters"):
+        read("G0 X1." + "0" * 80)
+    assert len(read("G0 X1 (" + "a" * 200 + ")" + " " * 100)) == 1  # dropped as it comes in
+
+
+@pytest.mark.parametrize("data", [b"", b"\n\n", b"(nothing)\n; at all"])
+@pytest.mark.parametrize("name", TARGETS)
+def test_an_empty_program_is_an_error(name: str, data: bytes) -> None:
+    with pytest.raises(ProgramError, match="the program is empty"):
+        read(data, name)
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\r", "\n\n", "\r\n\r"])
+@pytest.mark.parametrize("name", TARGETS)
+def test_line_ends_of_any_system(name: str, end: str) -> None:
+    assert ends(read(f"G0 X1{end}Y2{end}Z3", name)) == [(1, 0, 0), (1, 2, 0), (1, 2, 3)]
+
+
+def program(name: str) -> bytes:
+    target = load_target(name)
+    data: bytes = target.post.write(part(tools=name == "linuxcnc"), target.machine).data
+    return data
+
+
+def outcome(data: bytes, name: str) -> str:
+    """ "read", or where the reader stopped; anything but a ProgramError escapes."""
+    try:
+        read(data, name)
+    except ProgramError as error:
+        return str(error.where or error)
+    return "read"
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_a_program_cut_anywhere_is_read_or_refused_at_its_last_line(name: str) -> None:
+    whole = program(name)
+    outcomes = [outcome(whole[:at], name) for at in range(len(whole))]
+    lines = [len(whole[:at].splitlines()) for at in range(len(whole))]
+    stopped = [
+        (re.findall(r"line (\d+)", where), line)
+        for where, line in zip(outcomes, lines, strict=True)
+        if "line" in where
+    ]
+    assert "read" in outcomes
+    assert len(stopped) > 50
+    assert all(found == [str(line)] for found, line in stopped)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@given(data=st.data())
+def test_a_damaged_program_is_read_or_refused(name: str, data: st.DataObject) -> None:
+    whole = bytearray(program(name))
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(whole) - 1))
+        damage = data.draw(st.sampled_from(["change", "remove", "insert", "swap"]))
+        if damage == "change":
+            whole[at] = data.draw(st.integers(0, 255))
+        elif damage == "remove":
+            del whole[at]
+        elif damage == "insert":
+            whole[at:at] = data.draw(st.sampled_from([b"G", b"X", b"\n", b",", b"-", b"9", b"("]))
+        else:
+            whole[at:] = whole[at:][::-1]
+    assert outcome(bytes(whole), name)
+
+
+WORDS = ["G0", "G1", "G2", "G3", "G4", "G20", "G21", "G53", "G90", "G91", "M3", "M5", "M2", "X1"]
+MORE = ["Y-2.5", "Z.5", "I1", "J-1", "R2", "F100", "S9", "T1", "P1", "K1", "X0", "Y0", "(a)", ";"]
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@given(words=st.lists(st.sampled_from([*WORDS, *MORE, "\n", "\n", "\n"]), max_size=40))
+def test_words_in_any_order_are_read_or_refused(name: str, words: list[str]) -> None:
+    assert outcome(" ".join(words).encode(), name)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@given(data=st.binary(max_size=100))
+def test_noise_is_read_or_refused(name: str, data: bytes) -> None:
+    assert outcome(data, name)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_ten_megabytes_on_one_line_are_refused(name: str) -> None:
+    assert outcome(b"G0 X1 Y1 " * 1_200_000, name).startswith("block 1, line 1, column")
