@@ -63,11 +63,11 @@ def fail(where: str, message: str, mend: str = "") -> NoReturn:
     raise ProgramError(message, where=where, mend=mend)
 
 
-def check_count(count: int, where: str, dialect: Dialect) -> None:
+def check_count(count: int, where: Where, dialect: Dialect) -> None:
     """The master's arrays hold so many lines, and it does not look (L4625-4635)."""
     if not 1 <= count <= dialect.max_lines:
         fail(
-            where,
+            where("size_of_array", 0, 0),
             f"{count} lines: a job has 1 to {dialect.max_lines}",
             "post the drawing again: it is split into jobs then",
         )

@@ -63,10 +63,10 @@ class Seen:
         place = f"job {job.number}"
         odd = int((job.length % 2).sum() + (job.first % 2).sum())
         if self.dialect.odd == "truncated" and odd:
-            drift = np.abs(done.points - done.asked)
+            drift = done.points - done.asked
             if self.dialect.master_y == "fixed":
-                drift[:, 1] = 0
-            self.odd.add(odd, float(drift.max()) * UNIT_MM, place)
+                drift[:, 1] -= drift[0, 1]
+            self.odd.add(odd, float(np.abs(drift).max()) * UNIT_MM, place)
         if self.dialect.master_y == "fixed" and int(job.first[1]) != FIXED_Y_UNITS:
             off = abs(int(job.first[1]) - FIXED_Y_UNITS) * UNIT_MM
             self.fixed_y.add(1, off, place)

@@ -6,8 +6,8 @@ L4668-4708). Jobs follow one another; a master takes one and must be reset for t
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Callable, Iterator
+from typing import Final, NoReturn
 
 import numpy as np
 
@@ -62,50 +62,51 @@ def _job(words: list[bytes], first: int, number: int, dialect: Dialect) -> ReadJ
     head = words[first : first + len(HEADER)]
     if len(head) < len(HEADER):
         fail(place(len(head)), "the stream ends inside the header of a job")
-    count = _int(head[0], where("size_of_array", 0, 0))
-    check_count(count, where("size_of_array", 0, 0), dialect)
-    x = _int(head[1], where("first_pointx", 0, 0))
-    y = _first_y(head[2], where("first_pointy", 0, 0), dialect)
+    for index in (0, 1):
+        if _NUMBER.fullmatch(head[index]) is None:
+            _fail_number(head[index], place(index))
+    count, x = int(head[0]), int(head[1])
+    check_count(count, where, dialect)
+    y = _first_y(head[2], place, dialect)
     begin = first + len(HEADER)
     body = words[begin : begin + 4 * count]
-    numbers = [
-        _int(word, "") if _NUMBER.fullmatch(word) else _int(word, place(len(HEADER) + index))
-        for index, word in enumerate(body)
-    ]
+    for index, word in enumerate(body):
+        if _NUMBER.fullmatch(word) is None:
+            _fail_number(word, place(len(HEADER) + index))
     if len(body) < 4 * count:
         fail(
             place(len(HEADER) + len(body)),
             f"the stream ends after {len(body)} of {4 * count} numbers",
             f"a job of {count} lines has four for each",
         )
-    table = np.array(numbers, dtype=np.int64).reshape(4, count)
+    table = np.array(list(map(int, body)), dtype=np.int64).reshape(4, count)
     return ReadJob(number, np.array([x, y]), table[:2], table[2:], where)
 
 
-def _int(word: bytes, where: str) -> int:
-    if _NUMBER.fullmatch(word) is None:
-        fail(
-            where,
-            f"{word[:SHOWN_BYTES]!r} is no whole number of at most {MOST_DIGITS} digits",
-            "each number is digits and a CR, nothing else",
-        )
-    return int(word)
+def _fail_number(word: bytes, where: str) -> NoReturn:
+    fail(
+        where,
+        f"{word[:SHOWN_BYTES]!r} is no whole number of at most {MOST_DIGITS} digits",
+        "each number is digits and a CR, nothing else",
+    )
 
 
-def _first_y(word: bytes, where: str, dialect: Dialect) -> int:
+def _first_y(word: bytes, place: Callable[[int], str], dialect: Dialect) -> int:
     """y of the first point; sent as a character, the master's atol makes its digit or 0 of it."""
     if dialect.first_y == "character":
         if len(word) != 1:
             fail(
-                where,
+                place(2),
                 f"{word[:SHOWN_BYTES]!r} is not one character",
                 "use --set dialect.first_y=number",
             )
         return int(word) if word.isdigit() else 0
-    if _NUMBER.fullmatch(word) is None and len(word) == 1:
-        fail(
-            where,
-            f"y of the first point is the character {word!r}, as the listing sends it",
-            "use --set dialect.profile=listing",
-        )
-    return _int(word, where)
+    if _NUMBER.fullmatch(word) is None:
+        if len(word) == 1:
+            fail(
+                place(2),
+                f"y of the first point is the character {word!r}, as the listing sends it",
+                "use --set dialect.profile=listing",
+            )
+        _fail_number(word, place(2))
+    return int(word)

@@ -30,13 +30,16 @@ DEPTH_TOLERANCE_MM: Final = 0.005
 
 
 @dataclass(frozen=True, eq=False)
-class Stroke:
-    """One stroke of m lines: `points` (m+1, 2) mm in the work frame; for each line the row of the
-    toolpath that it came from (m,) and its feed (m,) mm/min."""
+class Cuts:
+    """The lines to be cut, in their order, L rows: `start`, `end` (L, 2) mm in the work frame;
+    `feed` (L,) mm/min; `row` (L,) the row of the toolpath that each came from; `stroke` (L,)
+    ascends from 0. Within a stroke each line starts where the one before it ended."""
 
-    points: Floats
-    row: Ints
+    start: Floats
+    end: Floats
     feed: Floats
+    row: Ints
+    stroke: Ints
 
 
 def place(toolpath: Toolpath, row: int) -> str:
@@ -45,10 +48,8 @@ def place(toolpath: Toolpath, row: int) -> str:
     return f"move {row} ({source})" if source else f"move {row}"
 
 
-def strokes_of(
-    toolpath: Toolpath, machine: Machine, dialect: Dialect
-) -> tuple[list[Stroke], list[Finding]]:
-    """The strokes of a toolpath in their order, and what had to be changed to have them."""
+def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> tuple[Cuts, list[Finding]]:
+    """The strokes of a toolpath, and what had to be changed to have them."""
     findings = _events(toolpath)
     apart = xy_then_z(toolpath)
     lowered = arcs_to_lines(apart.toolpath, apart.toolpath.is_arc, dialect.arc_tolerance_mm).after(
@@ -77,19 +78,9 @@ def strokes_of(
     # Each time the tool is above the stock, another stroke begins.
     number: Ints = np.cumsum(~below, dtype=np.int64)
     _refuse_holes(toolpath, number, below & path.is_motion, cut, rows)
-    return _grouped(path, np.flatnonzero(cut), number, rows), findings
-
-
-def _grouped(path: Toolpath, cut: Ints, number: Ints, rows: Ints) -> list[Stroke]:
-    """The cutting rows by stroke; in each, every row starts where the one before it ended."""
-    if len(cut) == 0:
-        return []
-    starts = path.starts[:, :2]
-    parts = np.split(cut, np.flatnonzero(np.diff(number[cut])) + 1)
-    return [
-        Stroke(np.vstack([starts[part[:1]], path.end[part, :2]]), rows[part], path.feed[part])
-        for part in parts
-    ]
+    stroke = np.unique(number[cut], return_inverse=True)[1].reshape(-1)
+    lines = Cuts(path.starts[cut, :2], path.end[cut, :2], path.feed[cut], rows[cut], stroke)
+    return lines, findings
 
 
 def _refuse(bad: Bools, rows: Ints, toolpath: Toolpath, message: str, mend: str = "") -> None:

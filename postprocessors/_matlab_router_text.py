@@ -35,7 +35,8 @@ SHOWN_CHARS: Final = 24
 
 _BLANK: Final = re.compile(r"(?:[ \t\r\n]+|%[^\n]*)*")
 _NAME: Final = re.compile(r"([A-Za-z]\w*)(?:\{(\d{1,6})\})?[ \t]*=[ \t]*", re.ASCII)
-_NUMBER: Final = re.compile(r"[+-]?\d{1,6}")
+_NUMBER: Final = re.compile(r"[+-]?\d{1,5}")
+_WHOLE: Final = re.compile(r"(?:[ \t\r\n,;]*[+-]?\d{1,5}(?![0-9+-]))*[ \t\r\n,;]*")
 _ROWS: Final = re.compile(r"\[([0-9 \t\r\n,;+-]*)\]")
 _TOKEN: Final = re.compile(r"[^ \t\r\n,;]+")
 _ROW_END: Final = re.compile(r"[;\n]")
@@ -89,7 +90,7 @@ def _job(text: _Text, number: int, values: dict[str, _Value], dialect: Dialect) 
         return text.where_in(values[name], row, column)
 
     count = scalar["size_of_array"]
-    check_count(count, where("size_of_array", 0, 0), dialect)
+    check_count(count, where, dialect)
     for name in TABLES:
         wanted = (2, count + 1 if name == "xy" else count)
         if values[name].table.shape != wanted:
@@ -195,12 +196,15 @@ class _Text:
             self._fail_rows()
             raise AssertionError
         begin = match.start(1)
-        rows = []
+        rows: list[list[int]] = []
         offset = begin
+        whole = _WHOLE.fullmatch(match[1]) is not None
         for part in _ROW_END.split(match[1]):
             words = part.replace(",", " ").split()
             if words:
-                rows.append([self._int(word, offset) for word in words])
+                rows.append(
+                    list(map(int, words)) if whole else [self._int(w, offset) for w in words]
+                )
                 if len(rows[-1]) != len(rows[0]):
                     self.fail(
                         offset + len(part) - len(part.lstrip()),
