@@ -41,22 +41,35 @@ def heights_of(job: Job, machine: Machine) -> Heights:
 
 
 def feeds_of(job: Job, machine: Machine) -> Feeds:
-    """The job's feeds, or the machine's; OptionError naming the highest feed when above it."""
+    """The job's feeds, or the machine's; OptionError naming the highest feed when above it.
+
+    Plunges that the job is silent about run at the feed of the cut, or at the highest that Z can.
+    """
     cut = machine.feed.default_mm_min if job.feed_mm_min is None else job.feed_mm_min
     plunge = cut if job.plunge_feed_mm_min is None else job.plunge_feed_mm_min
+    if job.plunge_feed_mm_min is None and _above(cut, machine.max_plunge_mm_min):
+        plunge = _sayable(machine.max_plunge_mm_min, machine)
     for name, flag, feed, highest in (
         ("feed", "--feed", cut, machine.max_feed_mm_min),
         ("plunge feed", "--plunge-feed", plunge, machine.max_plunge_mm_min),
     ):
-        if feed > highest * (1.0 + FEED_TOLERANCE):
-            unit = machine.feed.unit_mm_min
-            sayable = highest // unit * unit or highest
+        if _above(feed, highest):
             raise OptionError(
                 f"{name} {feed:g} mm/min is above {highest:.4g} mm/min, the highest of"
                 f" {machine.target.name}",
-                mend=f"use {flag} {sayable:g} or less",
+                mend=f"use {flag} {_sayable(highest, machine):g} or less",
             )
     return Feeds(cut, plunge)
+
+
+def _above(feed: float, highest: float) -> bool:
+    return feed > highest * (1.0 + FEED_TOLERANCE)
+
+
+def _sayable(highest_mm_min: float, machine: Machine) -> float:
+    """The highest feed not above the highest that the dialect can say."""
+    unit = machine.feed.unit_mm_min
+    return highest_mm_min // unit * unit or highest_mm_min
 
 
 def link(
