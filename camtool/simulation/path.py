@@ -4,8 +4,9 @@ It stands in where a controller's own arithmetic is not modelled: it has no inte
 acceleration, no look-ahead. What it does with a row of the toolpath:
 
 1. Ends go to the nearest coded step of each axis (`controller.grid` "steps") or stay as they are
-   ("none"). Arcs keep their programmed centre; when their ends then lie at two radii, radius and
-   Z change in proportion to the angle.
+   ("none"). Where that leaves the ends of an arc at two radii, its centre goes to the nearest
+   point as far from both. Ends that the program itself has put at two radii (by more than
+   `SPREAD_STEPS`) stay: radius and Z then change in proportion to the angle.
 2. The commanded position runs along the line or arc; see `camtool.simulation.path_samples` for
    where it is sampled. Between samples nothing is rounded: steps are counted, not taken.
 3. A move takes way / feed, a rapid way / `Machine.rapid_mm_min`, and no straight move is faster
@@ -41,6 +42,13 @@ MAX_PATH_STEPS = 1 << 40
 exact in a float."""
 
 
+SPREAD_STEPS = 2.0
+"""Ends of an arc at two radii that differ by so many steps or fewer were made so by rounding."""
+
+LEAST_CHORD_STEPS = 2.0
+"""An arc with its ends nearer than this keeps its centre: no direction can be told from them."""
+
+
 def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
     """The moves that the controller follows: ends on its grid, homing at machine zero.
 
@@ -55,7 +63,8 @@ def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
         return exact
     home = _on_grid(home, machine)
     start, end = _on_grid(exact.start, machine), _on_grid(exact.end, machine)
-    made, sweeps = replace(exact, start=start, end=end), exact.sweeps()
+    sweeps = exact.sweeps()
+    made = _centred(replace(exact, start=start, end=end), np.abs(sweeps), machine)
     while True:
         inside_out = made.is_arc & (np.abs(made.sweeps() - sweeps) > np.pi)
         if not inside_out.any():
@@ -73,6 +82,28 @@ def _placed(toolpath: Toolpath, home: Floats) -> Toolpath:
         latest = np.maximum.accumulate(known)
         end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
     return replace(toolpath, end=end)
+
+
+def _centred(made: Toolpath, sweep: Floats, machine: Machine) -> Toolpath:
+    """Arcs whose centres are as far from their rounded ends as from their rounded starts.
+
+    With the chord's direction u and its middle m, the nearest such point to the centre c is
+    c − ((c − m)·u) u. It is as far from c as the ends' radii differ, times radius / chord: an arc
+    of little sweep still runs between its ends, but one that lacks little of a full circle would
+    be thrown to a side. So for more than half a turn the chord must not be below the radius.
+    """
+    step = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    begin, end, centre = made.starts[:, :2], made.end[:, :2], made.centre
+    chord, out, back = end - begin, begin - centre, end - centre
+    length, radius = np.hypot(chord[:, 0], chord[:, 1]), np.hypot(out[:, 0], out[:, 1])
+    spread = np.abs(radius - np.hypot(back[:, 0], back[:, 1]))
+    apt = made.is_arc & (length >= LEAST_CHORD_STEPS * step) & (spread <= SPREAD_STEPS * step)
+    apt &= (sweep <= np.pi) | (length >= radius)
+    u = chord[apt] / length[apt, None]
+    off = ((centre[apt] - 0.5 * (begin + end)[apt]) * u).sum(axis=1)
+    new = centre.copy()
+    new[apt] -= off[:, None] * u
+    return replace(made, centre=new)
 
 
 def _turned_back(made: Toolpath, inside_out: Bools, short: Bools) -> Toolpath:

@@ -329,3 +329,36 @@ def test_any_window_holds_the_same_samples(toolpath: Toolpath, size: int) -> Non
         assert np.array_equal(point, points[low : low + size])
     owner = np.repeat(np.arange(len(toolpath)), np.diff(samples.first))
     assert np.array_equal(rows, owner)
+
+
+@given(
+    st.floats(0.2, 20.0),
+    st.floats(0.0, 6.28),
+    st.floats(0.01, 6.28),
+    st.booleans(),
+    st.sampled_from([STEP, 0.0125]),
+)
+def test_arcs_on_the_grid_stay_within_a_step_of_what_was_programmed(
+    radius: float, turn: float, sweep: float, ccw: bool, y_step: float
+) -> None:
+    end = turn + (sweep if ccw else -sweep)
+    b = ToolpathBuilder((radius * math.cos(turn), radius * math.sin(turn), 0.0))
+    b.arc(radius * math.cos(end), radius * math.sin(end), centre=(0, 0), ccw=ccw, feed=10)
+    machine = path_machine(f"axes.y.coded_step_mm={y_step}", f"axes.x.coded_step_mm={STEP}")
+    _, commanded, _ = gathered(list(simulate(b.finish(), machine)))
+    apart = np.abs(np.hypot(commanded[:, 0], commanded[:, 1]) - radius)
+    assert max(apart, default=0.0) <= 1.5 * math.hypot(STEP, y_step)
+    made = followed(b.finish(), machine)
+    start = math.dist(made.start[:2], made.centre[0])
+    chord = math.dist(made.start[:2], made.end[0, :2])
+    if made.is_arc[0] and chord >= max(radius * 1.01, 3 * y_step):
+        assert math.dist(made.end[0, :2], made.centre[0]) == pytest.approx(start, abs=1e-9)
+
+
+def test_ends_that_the_program_put_at_two_radii_stay() -> None:
+    b = ToolpathBuilder((1.0, 0.0, 0.0)).arc(0, 1.1, centre=(0, 0), ccw=True, feed=10)
+    assert followed(b.finish(), path_machine()).centre[0].tolist() == [0.0, 0.0]
+    (chunk,) = simulate(b.finish(), path_machine())
+    angle = np.arctan2(chunk.commanded[:, 1], chunk.commanded[:, 0])
+    radius = np.hypot(chunk.commanded[:, 0], chunk.commanded[:, 1])
+    assert radius == pytest.approx(1.0 + 0.1 * angle / (0.5 * math.pi))
