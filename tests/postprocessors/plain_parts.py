@@ -155,6 +155,8 @@ def judge(target: LoadedTarget, wanted: Toolpath, unit_mm: float) -> Program:
             swept[now] += decoded.sweeps()[row]
         elif decoded.is_motion[row] and wanted.is_arc[now]:
             _near_circle(wanted, now, decoded.end[row], 2.5 * unit_mm)
+            middle = (decoded.end[row] + starts[row]) / 2.0
+            _near_circle(wanted, now, middle, 2.5 * unit_mm)
         last = row + 1 == len(decoded) or row_of[row + 1] != now
         if last and decoded.is_motion[row]:
             reach = np.abs(decoded.end[row] - wanted.end[now]).max()
