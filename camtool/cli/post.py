@@ -64,8 +64,8 @@ def post(
             "--json is the report of the verification that --no-verify leaves out"
         )
     target = machine.load()
-    output = output or _name_for(source, target.machine.target.extension)
-    check_writable([output, preview, report], [source])
+    expected = output or _name_for(source, target.machine.target.extension)
+    check_writable([expected, preview, report], [source])
 
     from camtool.pipeline import post_drawing
 
@@ -77,6 +77,9 @@ def post(
     if posted.failed or posted.program is None:
         say(f"camtool: error: {source}: nothing was written; mend the errors above", quiet=False)
         return 1
+    # A dialect of several forms (binary, listing) says only now which extension it takes.
+    output = output or _name_for(source, posted.program.extension)
+    check_writable([output, preview, report], [source])
     files = {output: posted.program.data}
     if preview is not None:
         files[preview] = _picture(preview, read, wanted, posted, target)
