@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from camtool.toolpath.builder import ToolpathBuilder
+
 HELIX_SAGITTA_MM: Final = 0.0005
 """Chords in place of a helical arc stray from it by no more."""
 
@@ -71,3 +73,26 @@ def chords(circle: Circle, z: float, to_z: float, full: bool) -> list[tuple[floa
         x, y = cx + radius * math.cos(angle), cy + radius * math.sin(angle)
         ends.append((x, y, z + (to_z - z) * part))
     return [*ends, (*circle.end, to_z)]
+
+
+def follow(
+    path: ToolpathBuilder, circle: Circle, to_z: float, feed_and_turn: tuple[float, float]
+) -> None:
+    """The rows of an arc read at the path's position; chords where it is helical.
+
+    `feed_and_turn`: mm/min, and the turn (rad) below which the controller takes an arc for a full
+    circle: it is that then, and a line to its end.
+    """
+    feed, full_turn_rad = feed_and_turn
+    z = path.position[2]
+    same = circle.start == circle.end
+    full = same or abs(turn_of(circle)) <= full_turn_rad
+    if to_z != z:
+        for x, y, height in chords(circle, z, to_z, full):
+            path.line(x, y, height, feed=feed)
+        return
+    path.arc(
+        *(circle.start if full else circle.end), centre=circle.centre, ccw=circle.ccw, feed=feed
+    )
+    if full and not same:
+        path.line(*circle.end, feed=feed)

@@ -9,46 +9,38 @@ nothing uses is an error, and so are two words of one group: controllers refuse 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Final, NoReturn
 
-from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ._gcode_circles import Circle, centre_of_radius, chords, turn_of
+from ._gcode_circles import Circle, centre_of_radius, follow
+from ._gcode_notes import ReadNotes
+from ._gcode_rules import (
+    ABSOLUTE,
+    ABSOLUTE_CENTRES,
+    ARC_CCW,
+    BLEND,
+    DWELL,
+    INCHES,
+    LINE,
+    M_CODES,
+    MACHINE_FRAME,
+    NO_MOTION,
+    RAPID,
+    Rules,
+)
 from ._gcode_words import Block
 
 MM_PER_INCH: Final = 25.4
+"""What one unit of a coordinate is under G20."""
 
 FEED_GUARD: Final = 1e-9
 """Part of a feed: a feed above its limit by less is at the limit."""
 
 SPINDLE: Final = {30: Kind.SPINDLE_CW, 40: Kind.SPINDLE_CCW, 50: Kind.SPINDLE_OFF}
 MOTION_GROUP: Final = "motion"
-NO_MOTION: Final = 800
-
-
-@dataclass(frozen=True)
-class Rules:
-    """One dialect. Codes are tenfold: G91.1 is 911.
-
-    `groups`: the G codes it takes and the group of each; two of a group in a block are an error.
-    `refused`: codes ("G55", "M6") that the controller knows but that have no place in a program
-    here, and why. `first_motion`: the motion mode before any word says one (None: none).
-    `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
-    `tools`: "change" (M6), "pause" (M0 beside a T word), or "none".
-    """
-
-    groups: Mapping[int, str]
-    refused: Mapping[str, str]
-    first_motion: int | None
-    arc_fault: Callable[[float, float], str]
-    full_turn_rad: float
-    chord_slack_mm: float
-    tools: str = "none"
 
 
 class ModalReader:
@@ -67,61 +59,60 @@ class ModalReader:
         self._tool: int | None = None
         self._ended = False
         self._codes: dict[tuple[str, str], int] = {}
-        self._max_feed = machine.max_feed_mm_min
+        self._notes = ReadNotes(machine.max_feed_mm_min)
         self._zero = machine.controller.machine_zero_mm
-        self._fast: list[tuple[int, float]] = []
-        self._ignored: list[int] = []
-        self._pauses: list[int] = []
         self._changed = False
 
     def block(self, block: Block) -> None:
         """Decode one block; ProgramError where the controller would refuse it."""
         if self._ended:
             block.fail("a block after the end of the program", mend="remove it")
+        self.path.block = block.index
         numbers: dict[str, float] = {}
-        taken: dict[str, int] = {}
-        motion = self._motion
-        once = 0
-        path = self.path
-        path.block = block.index
+        modes: dict[str, int] = {}
         m_codes: list[int] = []
         for letter, text in block.words:
             if letter == "G":
                 code = self._code("G", text, block)
                 group = self._rules.groups[code]
-                if group in taken:
+                if group in modes:
                     self._fail(block, "G", text, f"two G words of one group ({group})")
-                taken[group] = code
+                modes[group] = code
             elif letter == "M":
                 m_codes.append(self._code("M", text, block))
             elif letter in numbers:
                 self._fail(block, letter, text, f"two {letter} words in one block")
             else:
                 numbers[letter] = float(text)
-        if taken:
-            once = self._modes(block, taken, numbers)
-            motion = taken.get(MOTION_GROUP, motion)
-            self._motion = motion
-        if "F" in numbers:
-            self._set_feed(block, numbers.pop("F") * self._mm)
-        if m_codes or "S" in numbers or "T" in numbers:
-            self._changed = False
-            self._machine_words(block, m_codes, numbers)
-        if once == 40:
-            self._dwell(block, numbers)
-        elif once == 530:
-            self._home(block, motion, numbers)
-        elif numbers or MOTION_GROUP in taken:
-            self._move(block, motion, numbers, MOTION_GROUP in taken)
+        self._carry_out(block, modes, m_codes, numbers)
         if numbers:
             letter = next(iter(numbers))
             self._fail(block, letter, None, f"nothing in the block uses the {letter} word")
         if m_codes:
             self._stop(m_codes)
 
-    def finish(self, findings: tuple[Finding, ...] = ()) -> Toolpath:
+    def _carry_out(
+        self, block: Block, modes: dict[str, int], m_codes: list[int], numbers: dict[str, float]
+    ) -> None:
+        """All but the end of the program, in RS274's order; takes out the numbers it uses."""
+        if modes:
+            self._set_modes(block, modes, numbers)
+        if "F" in numbers:
+            self._set_feed(block, numbers.pop("F") * self._mm)
+        if m_codes or "S" in numbers or "T" in numbers:
+            self._changed = False
+            self._machine_words(block, m_codes, numbers)
+        once = modes.get("one block")
+        if once == DWELL:
+            self._dwell(block, numbers)
+        elif once == MACHINE_FRAME:
+            self._home(block, numbers)
+        elif numbers or MOTION_GROUP in modes:
+            self._move(block, numbers, said=MOTION_GROUP in modes)
+
+    def finish(self) -> Toolpath:
         """The rows, with what was noticed."""
-        return self.path.finish((*findings, *self._findings()))
+        return self.path.finish(self._notes.findings())
 
     def message(self, text: str) -> None:
         """A comment that the operator is shown."""
@@ -146,31 +137,28 @@ class ModalReader:
         self._codes[letter, text] = code
         return code
 
-    def _modes(self, block: Block, taken: dict[str, int], numbers: dict[str, float]) -> int:
-        """Set units, distance and arc modes; gives the code that holds for this block alone."""
-        units = taken.get("units")
-        if units is not None:
-            mm = MM_PER_INCH if units == 200 else 1.0
+    def _set_modes(self, block: Block, modes: dict[str, int], numbers: dict[str, float]) -> None:
+        """Motion, units, distance and arc modes."""
+        self._motion = modes.get(MOTION_GROUP, self._motion)
+        if "units" in modes:
+            mm = MM_PER_INCH if modes["units"] == INCHES else 1.0
             if mm != self._mm and "F" in numbers:
                 message = "a feed beside a change of units"
                 self._fail(block, "F", None, message, "say F in the next block")
             self._mm = mm
-        distance = taken.get("distance")
-        if distance is not None:
-            self._absolute = distance == 900
-        centres = taken.get("arc distance")
-        if centres is not None:
-            self._absolute_centres = centres == 901
-        if taken.get("path") == 640:  # G64: P is the tolerance, Q that of merging lines
+        if "distance" in modes:
+            self._absolute = modes["distance"] == ABSOLUTE
+        if "arc distance" in modes:
+            self._absolute_centres = modes["arc distance"] == ABSOLUTE_CENTRES
+        if modes.get("path") == BLEND:  # P is its tolerance, Q that of merging lines
             numbers.pop("P", None)
             numbers.pop("Q", None)
-        return taken.get("one block", 0)
 
     def _set_feed(self, block: Block, feed: float) -> None:
         if feed <= 0.0:
             self._fail(block, "F", None, "a feed that is not above 0")
-        if feed > self._max_feed * (1.0 + FEED_GUARD):
-            self._fast.append((block.index, feed))
+        if feed > self._notes.max_feed_mm_min * (1.0 + FEED_GUARD):
+            self._notes.fast.append((block.index, feed))
         self._feed = feed
 
     def _machine_words(self, block: Block, codes: list[int], numbers: dict[str, float]) -> None:
@@ -195,7 +183,7 @@ class ModalReader:
         elif speed is not None and self._spindle is not None:
             self.path.event(self._spindle, speed)
         if any(M_CODES[code] == "coolant" for code in codes):
-            self._ignored.append(block.index)
+            self._notes.coolant.append(block.index)
 
     def _change_tool(self, block: Block) -> None:
         if self._rules.tools == "none":
@@ -217,7 +205,7 @@ class ModalReader:
                 self.path.event(Kind.END)
                 self._ended = True
             elif code in (0, 10) and not self._changed:
-                self._pauses.append(self.path.block)
+                self._notes.pauses.append(self.path.block)
 
     def _dwell(self, block: Block, numbers: dict[str, float]) -> None:
         """G4 P: seconds."""
@@ -228,12 +216,12 @@ class ModalReader:
             self._fail(block, "P", None, "a dwell below 0 s")
         self.path.event(Kind.DWELL, seconds)
 
-    def _home(self, block: Block, motion: int | None, numbers: dict[str, float]) -> None:
+    def _home(self, block: Block, numbers: dict[str, float]) -> None:
         """G53 G0 X0 Y0 and G53 G0 Z0: to machine zero."""
         said = {axis: numbers.pop(axis) for axis in "XYZ" if axis in numbers}
         kinds = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}
         kind = kinds.get(tuple(said))
-        if motion != 0 or kind is None or any(said.values()):
+        if self._motion != RAPID or kind is None or any(said.values()):
             block.fail(
                 "of machine coordinates only homing can be simulated",
                 mend="write G53 G0 X0 Y0 or G53 G0 Z0",
@@ -245,41 +233,35 @@ class ModalReader:
 
     # Motion
 
-    def _move(
-        self, block: Block, motion: int | None, numbers: dict[str, float], said: bool
-    ) -> None:
-        """Rapid, line or arc to the block's coordinates."""
-        here = self.path.position
-        mm = self._mm
+    def _move(self, block: Block, numbers: dict[str, float], *, said: bool) -> None:
+        """Rapid, line or arc to the block's coordinates; `said`: by a motion word of its own."""
+        x, y, z = self.path.position
+        to = [x, y, z]
         axes = False
-        to = [here[0], here[1], here[2]]
         for at, axis in enumerate("XYZ"):
             if axis in numbers:
                 axes = True
-                value = numbers.pop(axis) * mm
-                to[at] = value if self._absolute else here[at] + value
+                value = numbers.pop(axis) * self._mm
+                to[at] = value if self._absolute else to[at] + value
+        motion = self._motion
         if motion is None or motion == NO_MOTION:
             if axes:
                 block.fail("coordinates, and no motion word in force", mend="write G0 or G1")
-            return
-        if motion == 0:
-            if axes:
-                self.path.rapid(*to)
-            return
-        if not axes:
-            if motion > 10 and said:
+        elif not axes:
+            if motion > LINE and said:
                 block.fail("an arc without X or Y", mend="say where it ends")
-            return
-        if self._feed == 0.0:
+        elif motion == RAPID:
+            self.path.rapid(*to)
+        elif self._feed == 0.0:
             block.fail("a feed move, and no feed yet", mend="say F first")
-        if motion == 10:
+        elif motion == LINE:
             self.path.line(*to, feed=self._feed)
         else:
-            self._arc(block, motion == 30, to, numbers)
+            self._arc(block, motion == ARC_CCW, to, numbers)
 
     def _arc(self, block: Block, ccw: bool, to: list[float], numbers: dict[str, float]) -> None:
         """G2 and G3, by centre or by radius, flat or helical."""
-        x, y, z = self.path.position
+        x, y, _ = self.path.position
         if "R" in numbers and ("I" in numbers or "J" in numbers):
             self._fail(block, "R", None, "an arc by its radius and by its centre at once")
         if "R" in numbers:
@@ -297,23 +279,7 @@ class ModalReader:
                 letter = "I" if any(word == "I" for word, _ in block.words) else "J"
                 self._fail(block, letter, None, fault)
         circle = Circle((x, y), (to[0], to[1]), centre, ccw)
-        self._follow(circle, z, to)
-
-    def _follow(self, circle: Circle, z: float, to: list[float]) -> None:
-        """The row of an arc; chords where it is helical. One that turns by so little that the
-        controller takes it for a full circle is that, and a line to its end."""
-        path, feed = self.path, self._feed
-        end = circle.end
-        full = circle.start == end or abs(turn_of(circle)) <= self._rules.full_turn_rad
-        if to[2] != z:
-            for x, y, height in chords(circle, z, to[2], full):
-                path.line(x, y, height, feed=feed)
-        elif full:
-            path.arc(*circle.start, centre=circle.centre, ccw=circle.ccw, feed=feed)
-        else:
-            path.arc(*end, centre=circle.centre, ccw=circle.ccw, feed=feed)
-        if full and circle.start != end:
-            path.line(*end, feed=feed)
+        follow(self.path, circle, to[2], (self._feed, self._rules.full_turn_rad))
 
     def _centre(
         self, block: Block, start: tuple[float, float], numbers: dict[str, float]
@@ -328,7 +294,7 @@ class ModalReader:
             block.fail("with G90.1 an arc needs both I and J")
         return numbers.pop("I") * self._mm, numbers.pop("J") * self._mm
 
-    # Errors and findings
+    # Errors
 
     def _whole(self, block: Block, letter: str, value: float) -> int:
         if value < 0.0 or value != math.floor(value):
@@ -345,51 +311,3 @@ class ModalReader:
             if word == letter and text in (None, number)
         ]
         block.fail(message, word=at[-1] if at else None, mend=mend)
-
-    def _findings(self) -> tuple[Finding, ...]:
-        found = []
-        if self._fast:
-            first, _ = self._fast[0]
-            most = max(feed for _, feed in self._fast)
-            found.append(
-                Finding(
-                    Code.FEED_ABOVE_LIMIT,
-                    Severity.ERROR,
-                    f"{len(self._fast)} F words are above the machine's highest feed, up to "
-                    f"{most:g} mm/min where {self._max_feed:g} is the limit",
-                    where=f"block {first + 1}",
-                    measured=most,
-                    limit=self._max_feed,
-                    unit="mm_min",
-                )
-            )
-        for blocks, what in (
-            (self._ignored, "switch coolant"),
-            (self._pauses, "wait for the operator (M0, M1)"),
-        ):
-            if blocks:
-                found.append(
-                    Finding(
-                        Code.NOT_APPLIED,
-                        Severity.INFO,
-                        f"{len(blocks)} blocks {what}, which is not simulated",
-                        where=f"block {blocks[0] + 1}",
-                    )
-                )
-        return tuple(found)
-
-
-M_CODES: Final = {
-    0: "stop",
-    10: "stop",
-    20: "stop",
-    300: "stop",
-    30: "spindle",
-    40: "spindle",
-    50: "spindle",
-    60: "tool",
-    70: "coolant",
-    80: "coolant",
-    90: "coolant",
-}
-"""M words, tenfold, and their groups."""

@@ -23,6 +23,7 @@ POWER_OF_TEN_TOLERANCE: Final = 1e-9
 """`feed.unit_mm_min` must be a power of ten to this part of its logarithm."""
 
 MOST_FEED_DECIMALS: Final = 6
+"""`feed.unit_mm_min` is no smaller than 10 to the minus this."""
 
 NotNegative = Annotated[float, Meta(ge=0.0)]
 Positive = Annotated[float, Meta(gt=0.0)]

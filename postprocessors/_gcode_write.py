@@ -10,10 +10,10 @@ anywhere. Comment lines and `%` are lines, but no blocks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.metadata import version
 
 import numpy as np
 
-import camtool
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
@@ -116,7 +116,7 @@ def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
     ]
     lines = [
-        f"camtool {camtool.__version__} for {machine.target.name}: {machine.target.title}",
+        f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
         "mm and mm/min - part zero at X0 Y0 Z0",
         *bounds,
     ]

@@ -12,7 +12,8 @@ from camtool.errors import ProgramError
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
-from ._gcode_modal import ModalReader, Rules
+from ._gcode_modal import ModalReader
+from ._gcode_rules import Rules
 from ._gcode_words import Lexing, blocks_of
 from ._linuxcnc_options import Dialect, dialect_of
 

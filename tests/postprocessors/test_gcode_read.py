@@ -93,8 +93,8 @@ def test_events() -> None:
         (Kind.END, None),
     ]
     assert [(note.code, note.where) for note in path.findings] == [
-        (Code.NOT_APPLIED, "block 7"),
-        (Code.NOT_APPLIED, "block 9"),
+        (Code.WORDS_PASSED_OVER, "block 7"),
+        (Code.WORDS_PASSED_OVER, "block 9"),
     ]
 
 
