@@ -32,7 +32,7 @@ class Run:
             last = took.max(axis=1)
             both = moving.all(axis=1)
             share = np.where(both, took.min(axis=1) / last, 1.0)
-            along = np.hypot(*way.T) / last
+            along = np.hypot(*way.T) / last  # NaN for lines of no length, which give no row
         lag = np.where(both, _lag(distance, took, share), 0.0)
         bent = lag > tolerance_mm * UNITS_PER_MM
         self.bent = int(bent.sum())
@@ -71,4 +71,5 @@ def _lag(distance: Floats, took: Floats, share: Floats) -> Floats:
     later = took.argmax(axis=1)
     left = distance[np.arange(len(distance)), later] * (1.0 - share)
     other = distance[np.arange(len(distance)), 1 - later]
-    return np.asarray(left * other / np.hypot(*distance.T))
+    length = np.hypot(*distance.T)
+    return np.asarray(left * other / np.where(length > 0.0, length, 1.0))

@@ -32,6 +32,9 @@ def read_stream(data: bytes, dialect: Dialect) -> Iterator[ReadJob]:
     """The jobs of a stream, checked; ProgramError naming job, number and byte."""
     if not data:
         raise ProgramError("the stream is empty", mend="a stream begins with the count of lines")
+    feed = data.find(b"\r\n") if dialect.first_y == "number" else -1
+    if feed >= 0:
+        fail(f"byte {feed + 2}", "a line feed: the master takes it for part of the next number")
     words = data.split(b"\r")
     if words[-1]:
         at = len(data) - len(words[-1]) + 1

@@ -196,32 +196,37 @@ class _Text:
             self._fail_rows()
             raise AssertionError
         begin = match.start(1)
+        if _WHOLE.fullmatch(match[1]) is None:
+            self._refuse_words(begin, match.end(1))
         rows: list[list[int]] = []
         offset = begin
-        whole = _WHOLE.fullmatch(match[1]) is not None
         for part in _ROW_END.split(match[1]):
-            words = part.replace(",", " ").split()
-            if words:
-                rows.append(
-                    list(map(int, words)) if whole else [self._int(w, offset) for w in words]
-                )
-                if len(rows[-1]) != len(rows[0]):
+            if words := part.replace(",", " ").split():
+                rows.append(list(map(int, words)))
+                if len(words) != len(rows[0]):
                     self.fail(
                         offset + len(part) - len(part.lstrip()),
-                        f"a row has {len(rows[-1])} numbers, the first one {len(rows[0])}",
+                        f"a row has {len(words)} numbers, the first one {len(rows[0])}",
                         "numbers are whole tenths of a millimetre, without decimals",
                     )
             offset += len(part) + 1
         if not rows:
             self.fail(begin, "an array is empty")
+        table = np.array(rows, dtype=np.int64)
+        if np.abs(table).max() > MOST_NUMBER:
+            self._refuse_words(begin, match.end(1))
         self._finish(match.end())
-        return _Value(np.array(rows, dtype=np.int64), begin)
+        return _Value(table, begin)
+
+    def _refuse_words(self, begin: int, end: int) -> None:
+        """ProgramError at the first word between two places that is no number of an int16."""
+        for match in _TOKEN.finditer(self.text, begin, end):
+            self._int(match[0], match.start())
 
     def _int(self, word: str, offset: int) -> int:
-        """A word as a whole number; `offset` is where its row begins."""
+        """A word at an offset as a whole number."""
         if _NUMBER.fullmatch(word) is None or abs(int(word)) > MOST_NUMBER:
-            place = self.text.index(word, offset)
-            self.fail(place, f"{word[:SHOWN_CHARS]!r} is no whole number of an int16")
+            self.fail(offset, f"{word[:SHOWN_CHARS]!r} is no whole number of an int16")
         return int(word)
 
     def _fail_rows(self) -> None:
