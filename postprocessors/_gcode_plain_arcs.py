@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.findings import Code, Finding, Severity
-from camtool.toolpath.lower import Lowered, arcs_to_lines, split_full_circles
+from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ._gcode_format import Floats, Ints, units_of
@@ -91,7 +91,7 @@ class PlainRows:
 
 def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
     """The rows of a toolpath (in the program's own lengths) in units, arcs made consistent."""
-    lowered = _whole_turns(toolpath, rules)
+    lowered = _halved(toolpath, rules)
     path = lowered.toolpath
     rows = np.flatnonzero(path.is_arc)
     begin, stop = units_of(path.starts, rules.decimals), units_of(path.end, rules.decimals)
@@ -154,23 +154,19 @@ def arc_findings(rows: PlainRows, place: str) -> list[Finding]:
     return found
 
 
-def _whole_turns(toolpath: Toolpath, rules: ArcRules) -> Lowered:
-    """Nearly full circles, whose rounded ends coincide, made full; full ones cut in halves where
-    the dialect wants that."""
+def _halved(toolpath: Toolpath, rules: ArcRules) -> Lowered:
+    """Full and nearly full circles, whose rounded ends coincide, in halves; all else as it is."""
     begin = units_of(toolpath.starts, rules.decimals)
     stop = units_of(toolpath.end, rules.decimals)
-    same = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)
-    same &= np.abs(toolpath.sweeps()) > math.pi
-    path = toolpath
-    if same.any():
-        end = toolpath.end.copy()
-        # One after the other: a start is the end of the row before, which may have moved too.
-        for row in np.flatnonzero(same).tolist():
-            end[row, :2] = end[row - 1, :2] if row else toolpath.start[:2]
-        path = replace(toolpath, end=end)
-    if rules.full_circles == "halves":
-        return split_full_circles(path)
-    return Lowered(path, np.arange(len(path)))
+    full = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)
+    full &= np.abs(toolpath.sweeps()) > math.pi
+    if rules.full_circles == "whole" or not full.any():
+        return Lowered(toolpath, np.arange(len(toolpath)))
+    # Other arcs pass for lines meanwhile, so that these alone are cut.
+    alone = np.where(toolpath.is_arc & ~full, int(Kind.LINE), toolpath.kind)
+    halves = arcs_within(replace(toolpath, kind=alone), math.pi)
+    kind = toolpath.kind[halves.row]
+    return Lowered(replace(halves.toolpath, kind=kind), halves.row)
 
 
 class _Wanted:

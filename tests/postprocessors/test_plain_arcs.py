@@ -85,6 +85,17 @@ def test_a_nearly_full_circle_becomes_full() -> None:
     assert found.moves.tolist() == [True]
 
 
+def test_or_two_halves() -> None:
+    for end_y in (0.0, 0.0003):
+        path = ToolpathBuilder().line(3.0, 0.0, feed=1.0)
+        path.arc(3.0, end_y, centre=(2.0, 0.0), ccw=False, feed=1.0).line(4.0, 0.0, feed=1.0)
+        found = plain_rows(path.finish(), ArcRules(3, "halves", 9999.999))
+        assert found.row.tolist() == [0, 1, 1, 2]
+        assert found.kind.tolist() == [Kind.LINE, Kind.ARC_CW, Kind.ARC_CW, Kind.LINE]
+        assert found.end[1:3, :2].tolist() == [[1000, 0], [3000, 0]]
+        assert found.offset.tolist() == [[0, 0], [-1000, 0], [1000, 0], [0, 0]]
+
+
 def test_a_speck_of_an_arc_moves_nothing() -> None:
     found = rows(arc((0.0, -0.0003), (1.0, 0.0)))
     assert found.moves.tolist() == [False]

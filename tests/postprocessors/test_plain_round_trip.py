@@ -133,6 +133,15 @@ def test_full_circles_are_written_in_parts(name: str) -> None:
     assert arcs.sum() == pytest.approx(2.0 * math.pi)
 
 
+@pytest.mark.parametrize("name", TARGETS)
+def test_a_speck_of_an_arc_behind_a_nearly_full_circle(name: str) -> None:
+    """The circle lacks 0.01 µm: to close it would turn the speck into a circle."""
+    path = ToolpathBuilder().rapid(0.0, 0.0)
+    path.arc(-5.0e-12, 1.0e-5, centre=(-10.0, 0.0), ccw=False, feed=3.0)
+    path.arc(-6.0e-9, 3.8e-6, centre=(-0.00316, 1.0e-5), ccw=False, feed=3.0)
+    judge(LOADED[name], path.event(Kind.END).finish(), KINDS[name].unit_mm)
+
+
 def test_findings_count_what_was_lost() -> None:
     target = LOADED["flashcut"]
     wanted = part(3.0, 8.0)
