@@ -205,7 +205,7 @@ def _durations(path: Toolpath, machine: Machine) -> Floats:
     """(N,) s of each row; NaN feeds, which `_check_rows` refuses, only behind the end."""
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
     speed = np.where(path.is_feed, path.feed, machine.rapid_mm_min)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         seconds = np.where(path.is_motion | homing, 60.0 * move_lengths(path) / speed, 0.0)
     way = np.abs(path.end - path.starts) if len(path) else np.zeros((0, 3))
     for index, axis in enumerate(machine.axes):

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError, ProgramError
+from camtool.machine.model import Machine
 from camtool.simulation import path_samples
 from camtool.simulation.motion import Chunk
 from camtool.simulation.path import followed
@@ -51,6 +52,24 @@ def jobs(draw: st.DrawFn) -> Toolpath:
         else:
             b.line(draw(cell), draw(cell), draw(cell), feed=30.0)
     return b.finish()
+
+
+@st.composite
+def machines(draw: st.DrawFn) -> Machine:
+    """Made-up machines: steps, play, scale and rates of each axis, limits said or not."""
+    settings = [f"controller.grid={draw(st.sampled_from(['steps', 'none']))}"]
+    settings.append(f"controller.start_play={draw(st.sampled_from(['preloaded', 'centred']))}")
+    settings.append(f"controller.start_direction={draw(st.sampled_from('+-'))}")
+    for axis in "xyz":
+        step = draw(st.sampled_from([0.001, 0.0125, 0.04, 0.00333]))
+        settings.append(f"axes.{axis}.coded_step_mm={step}")
+        settings.append(f"axes.{axis}.real_step_mm={step * draw(st.floats(0.9, 1.1))}")
+        settings.append(f"axes.{axis}.backlash_mm={draw(st.sampled_from([0.0, 0.03, 0.5]))}")
+        if draw(st.booleans()):
+            settings.append(f"axes.{axis}.max_rate_mm_min={draw(st.floats(1.0, 1000.0))}")
+    if draw(st.booleans()):
+        settings.append(f"limits.rapid_mm_min={draw(st.floats(1.0, 5000.0))}")
+    return path_machine(*settings)
 
 
 def gathered(chunks: list[Chunk]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -362,3 +381,25 @@ def test_ends_that_the_program_put_at_two_radii_stay() -> None:
     angle = np.arctan2(chunk.commanded[:, 1], chunk.commanded[:, 0])
     radius = np.hypot(chunk.commanded[:, 0], chunk.commanded[:, 1])
     assert radius == pytest.approx(1.0 + 0.1 * angle / (0.5 * math.pi))
+
+
+@given(jobs(), machines())
+def test_any_machine_keeps_its_slides_within_its_play(
+    toolpath: Toolpath, machine: Machine
+) -> None:
+    chunks = list(simulate(toolpath, machine, chunk_steps=500))
+    made = followed(toolpath, machine)
+    seconds = np.zeros(len(toolpath))
+    for chunk in chunks:
+        seconds[chunk.row] += chunk.duration_s
+        for index, axis in enumerate(machine.axes):
+            motor = chunk.commanded[:, index] * (axis.real_step_mm / axis.coded_step_mm)
+            lag = chunk.slide[:, index] - motor
+            assert np.abs(lag).max(initial=0.0) <= axis.backlash_mm + 1e-12
+    feeds, straight = made.is_feed, made.is_motion & ~made.is_arc
+    least = 60.0 * move_lengths(made)[feeds] / made.feed[feeds]
+    assert (seconds[feeds] >= least - 1e-9).all()
+    for index, axis in enumerate(machine.axes):
+        if axis.max_rate_mm_min is not None and len(made):
+            way = np.abs(made.end - made.starts)[straight, index]
+            assert (seconds[straight] >= 60.0 * way / axis.max_rate_mm_min - 1e-9).all()
