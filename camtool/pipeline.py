@@ -1,7 +1,8 @@
-"""The whole way in three calls: what the commands and batches run.
+"""The whole way in four calls: what the commands and batches run.
 
     post_drawing     Drawing + Job + target → program, read back, simulated and judged
     verify_program   bytes of a program (anybody's) → judged, against a drawing if there is one
+    convert_program  bytes of one target's program → the program of another, judged as above
     picture          any of the values on the way → the scene that `camtool.preview` draws
 
 Nothing here reads or writes a file.
@@ -80,11 +81,7 @@ def verify_program(
 ) -> tuple[Toolpath, Verification]:
     """(decoded toolpath, verification) of any program of the target; against `drawing` planned
     with `job` when there is one. ProgramError names file, block and column."""
-    try:
-        decoded = target.post.read(data, target.machine)
-    except ProgramError as error:
-        error.file = error.file or source
-        raise
+    decoded = _read(data, target, source)
     wanted = None
     if drawing is not None:
         from camtool.planning.job import Job
@@ -94,6 +91,41 @@ def verify_program(
     return decoded, _judged(
         data, decoded, target.machine, wanted, drawing, source=source, interpolator=interpolator
     )
+
+
+def convert_program(
+    data: bytes, source: LoadedTarget, target: LoadedTarget, *, file: str, check: bool = True
+) -> Posted:
+    """A program of one target as the program of another, read back and judged against the first.
+
+    What the first controller decodes is what the second one shall do; where its part zero was set
+    is left out, since a program begins there. ProgramError names file, block and column.
+    """
+    from camtool.toolpath.carried import carried_over
+
+    decoded = _read(data, source, file)
+    same = source.machine.target.dialect == target.machine.target.dialect
+    wanted = decoded if same else carried_over(decoded)
+    if worst(wanted.findings) >= Severity.ERROR:
+        return Posted(wanted, None, None, None, wanted.findings)
+    program = target.post.write(wanted, target.machine)
+    again = target.post.read(program.data, target.machine)
+    findings = _merged(wanted.findings, program.findings, again.findings)
+    if not check:
+        return Posted(wanted, program, again, None, findings)
+    judged = _judged(program.data, again, target.machine, wanted, None, source=file)
+    findings = _merged(findings, judged.findings)
+    return Posted(wanted, program, again, judged.with_findings(findings), findings)
+
+
+def _read(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
+    """The decoded program; ProgramError names the file too."""
+    try:
+        toolpath: Toolpath = target.post.read(data, target.machine)
+    except ProgramError as error:
+        error.file = error.file or file
+        raise
+    return toolpath
 
 
 def picture(

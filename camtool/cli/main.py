@@ -15,6 +15,7 @@ import click
 
 from camtool import __version__
 from camtool.cli.check import check
+from camtool.cli.convert import convert
 from camtool.cli.post import post
 from camtool.cli.preview import preview
 from camtool.cli.targets import targets
@@ -35,6 +36,7 @@ def cli() -> None:
     camtool check   logo.dxf                    what is in the drawing
     camtool post    logo.dxf --target pic-mmh   drawing to verified program
     camtool verify  logo.pic --target pic-mmh   judge any program of a machine
+    camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool targets                             the machines it knows
 
@@ -42,7 +44,7 @@ def cli() -> None:
     """
 
 
-for _command in (post, verify, preview, check, targets):
+for _command in (post, verify, convert, preview, check, targets):
     cli.add_command(_command)
 
 

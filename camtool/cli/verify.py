@@ -75,7 +75,7 @@ def verify(
     decoded, verification = verify_program(
         data,
         target,
-        source=program,
+        source=shown(program),
         drawing=read,
         job=wanted,
         interpolator=cast("Interpolator | None", interpolator),
@@ -85,7 +85,7 @@ def verify(
         from camtool.preview.render import render
 
         scene = picture(
-            title=Path(program).name,
+            title=Path(shown(program)).name,
             drawing=read,
             job=wanted,
             toolpath=decoded,
@@ -103,6 +103,11 @@ def verify(
     if failed:
         say(f"camtool: error: {program}: the errors above would spoil the part", quiet=False)
     return 1 if failed else 0
+
+
+def shown(name: str) -> str:
+    """The name of a file in messages."""
+    return "<stdin>" if name == STDOUT else name
 
 
 def read_bytes(name: str) -> bytes:

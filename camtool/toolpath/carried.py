@@ -1,0 +1,29 @@
+"""A toolpath decoded from one machine's program, as what another machine shall do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from camtool.toolpath.moves import Kind, Toolpath
+
+
+def carried_over(decoded: Toolpath) -> Toolpath:
+    """The moves and events of a program, free of what belongs to its own machine alone.
+
+    Part zero set at the very beginning is left out: there every program begins. Homing becomes a
+    rapid to where machine zero lay. Rows lose their block: the new program has blocks of its own.
+    """
+    first = 1 if len(decoded) and decoded.kind[0] == Kind.SET_ZERO else 0
+    kind = decoded.kind[first:].copy()
+    kind[(kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)] = Kind.RAPID
+    return replace(
+        decoded,
+        kind=kind,
+        block=np.full(len(kind), -1, dtype=np.int64),
+        **{
+            name: getattr(decoded, name)[first:]
+            for name in ("end", "centre", "feed", "value", "source")
+        },
+    )
