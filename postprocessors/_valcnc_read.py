@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NoReturn
 
 from camtool.errors import ProgramError
 from camtool.findings import Code, Finding, Severity
@@ -164,9 +164,9 @@ class _Reader:
 
     def _line(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
         """A line; in two where the option puts Z before or after X and Y."""
-        for at, letter in enumerate(values, 1):
-            if letter in "IJ":
-                block.fail(f"{letter} in a G{code}", word=at, mend="only arcs have a centre")
+        if "I" in values or "J" in values:
+            at, letter = next((at, one) for at, one in enumerate(values, 1) if one in "IJ")
+            block.fail(f"{letter} in a G{code}", word=at, mend="only arcs have a centre")
         first = self._in_order(block, end)
         for point in (first, end) if first else (end,):
             x, y, z = self._mm(*point)
@@ -191,9 +191,9 @@ class _Reader:
 
     def _arc(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
         """An arc; Z in a block of its own before or after it where the option says so."""
-        for letter in ("I", "J"):
-            if letter not in values:
-                block.fail(f"an arc without {letter}", mend="give I and J from the start")
+        if "I" not in values or "J" not in values:
+            missing = "J" if "I" in values else "I"
+            block.fail(f"an arc without {missing}", mend="give I and J from the start")
         if not self._alike:
             block.fail(
                 "on axes of unequal steps this arc is an ellipse",
@@ -202,7 +202,7 @@ class _Reader:
         i, j = values["I"], values["J"]
         self._check_arc(block, (i, j), end)
         x, y, z = self._mm(*end)
-        old_x, old_y, _ = self._mm(*self._at)
+        old_x, old_y, _ = self.path.position
         centre = old_x + i / self._scales[0], old_y + j / self._scales[1]
         order = self._dialect.z_order
         if end[2] != self._at[2]:
@@ -217,19 +217,15 @@ class _Reader:
     def _check_arc(self, block: Block, offset: tuple[float, float], end: Point) -> None:
         """That the firmware's formulas (L1284-1326) have a value, and nearly the right one."""
         i, j = offset
-        at_i = next(index for index, word in enumerate(block.words) if word[0] == "I")
         radius = math.hypot(i, j)
         chord = end[0] - self._at[0], end[1] - self._at[1]
         other = math.hypot(chord[0] - i, chord[1] - j)
         if radius == 0.0:
-            block.fail("an arc about its own start", word=at_i, mend="give I and J from the start")
+            _fail_at_i(block, "an arc about its own start", "give I and J from the start")
         spread, most = abs(radius - other) / self._scales[0], self._dialect.arc_spread_mm
         if spread > most:
-            block.fail(
-                f"the radii at the arc's start and end differ by {spread:.4g} mm",
-                word=at_i,
-                mend=f"they may differ by {most:g} mm",
-            )
+            message = f"the radii at the arc's start and end differ by {spread:.4g} mm"
+            _fail_at_i(block, message, f"they may differ by {most:g} mm")
         length = math.hypot(*chord)
         if length == 0.0:
             if self._dialect.full_circles == "refused":
@@ -241,12 +237,10 @@ class _Reader:
             return
         ratio = length / (2.0 * radius)
         if ratio > 1.0 + CHORD_GUARD:
-            block.fail(
+            message = (
                 "the arc's chord is longer than its diameter: the controller's arcsine has no "
-                "value",
-                word=at_i,
-                mend="write it in parts of 90°",
             )
+            _fail_at_i(block, f"{message}value", "write it in parts of 90°")
         if ratio > NEARLY_DIAMETER:
             self._note_miss(block, offset, chord)
 
@@ -266,3 +260,9 @@ class _Reader:
             if miss_mm > self._missed.most_mm:
                 self._missed.most_mm = miss_mm
                 self._missed.where = f"block {block.index + 1}"
+
+
+def _fail_at_i(block: Block, message: str, mend: str) -> NoReturn:
+    """ProgramError at the I word of an arc."""
+    at = next(index for index, (letter, _) in enumerate(block.words) if letter == "I")
+    block.fail(message, word=at, mend=mend)
