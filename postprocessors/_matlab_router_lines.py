@@ -10,6 +10,7 @@ of two units and counts `distance / 2 − 1` of them downwards (L5589-5729), so 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -100,38 +101,47 @@ class _Maker:
     def _on_grid(self, cuts: Cuts) -> Lines:
         """Vertices at the nearest point of the grid, the first one of a stroke not nearer to home
         than a chunk; PostError for those outside the area."""
-        snapped = []
-        begins = np.diff(cuts.stroke, prepend=-1) != 0
-        for points, first in ((cuts.start, begins), (cuts.end, np.zeros_like(begins))):
-            wanted = (points - self._zero) * UNITS_PER_MM
-            grid = self._dialect.grid_units
-            units = np.floor(wanted / grid + 0.5 + TIE_TOLERANCE) * grid
-            self._refuse_outside(cuts, units)
-            early = first & (units < CHUNK_UNITS).any(axis=1)
-            units[early] = np.maximum(units[early], self._least)
-            self.notes.late_starts += int(early.sum())
+        grid, count = self._dialect.grid_units, len(cuts.row)
+        rows = np.concatenate([cuts.row, cuts.row])
+        wanted = (np.concatenate([cuts.start, cuts.end]) - self._zero) * UNITS_PER_MM
+        units = np.floor(wanted / grid + 0.5 + TIE_TOLERANCE) * grid
+        self._refuse_outside(rows, units)
+        first = np.concatenate([np.diff(cuts.stroke, prepend=-1) != 0, np.zeros(count, np.bool_)])
+        early = first & (units < CHUNK_UNITS).any(axis=1)
+        units[early] = np.maximum(units[early], self._least)
+        self.notes.late_starts += int(early.sum())
+        if count:
             moved = np.hypot(*(units - wanted).T)
-            if len(moved):
-                row = int(cuts.row[int(np.argmax(moved))])
-                self.notes.snapped(float(moved.max()) * UNIT_MM, place(self._toolpath, row))
-            snapped.append(units.astype(np.int64))
-        return Lines(snapped[0], snapped[1], cuts.feed, cuts.row, cuts.stroke)
+            row = int(rows[int(np.argmax(moved))])
+            self.notes.snapped(float(moved.max()) * UNIT_MM, place(self._toolpath, row))
+        whole = units.astype(np.int64)
+        return Lines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
 
-    def _refuse_outside(self, cuts: Cuts, units: Floats) -> None:
+    def _refuse_outside(self, rows: Ints, units: Floats) -> None:
         for axis, name in enumerate("XY"):
             travel = (self._machine.axes.x, self._machine.axes.y)[axis].travel_mm
             most = MOST_NUMBER if travel is None else min(MOST_NUMBER, travel * UNITS_PER_MM)
             bad = ~((units[:, axis] >= 0.0) & (units[:, axis] <= most + TIE_TOLERANCE))
             if bad.any():
                 line = int(np.argmax(bad))
-                x, y, z = self._machine.controller.machine_zero_mm
                 raise PostError(
                     f"{name} {units[line, axis] * UNIT_MM:.1f} mm from home is outside of 0 to"
                     f" {most * UNIT_MM:g} mm",
-                    where=place(self._toolpath, int(cuts.row[line])),
-                    mend="use --origin lower-left, scale the drawing, or say where home lies: "
-                    f"--set controller.machine_zero_mm=[{x:g},{y:g},{z:g}]",
+                    where=place(self._toolpath, int(rows[line])),
+                    mend=self._room(units, axis, most),
                 )
+
+    def _room(self, units: Floats, axis: int, most: float) -> str:
+        """How to bring everything into the area along an axis: the place of home that does it."""
+        low, high = float(units[:, axis].min()), float(units[:, axis].max())
+        if not high - low <= most:
+            return "scale the drawing down"
+        # Whole millimetres, and one to spare where there is room for it.
+        zero = list(self._machine.controller.machine_zero_mm)
+        shift = min(math.ceil(-low * UNIT_MM) + 1.0, (most - high) * UNIT_MM)
+        zero[axis] -= shift
+        said = ",".join(f"{value:g}" for value in zero)
+        return f"use --origin lower-left, or --set controller.machine_zero_mm=[{said}]"
 
     def _mended(self, lines: Lines) -> Lines:
         """No distance of 1 and no line of no length."""
