@@ -9,7 +9,7 @@ nothing uses is an error, and so are two words of one group: controllers refuse 
 from __future__ import annotations
 
 import math
-from typing import Final, NoReturn
+from typing import Final
 
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
@@ -23,14 +23,17 @@ from ._gcode_rules import (
     ARC_CCW,
     BLEND,
     DWELL,
+    FIRST_FRAME,
     INCHES,
     LINE,
     M_CODES,
     MACHINE_FRAME,
     NO_MOTION,
     RAPID,
+    TOOL_LENGTH,
     Rules,
 )
+from ._gcode_spindle import MachineWords
 from ._gcode_words import Block
 
 MM_PER_INCH: Final = 25.4
@@ -39,7 +42,6 @@ MM_PER_INCH: Final = 25.4
 FEED_GUARD: Final = 1e-9
 """Part of a feed: a feed above its limit by less is at the limit."""
 
-SPINDLE: Final = {30: Kind.SPINDLE_CW, 40: Kind.SPINDLE_CCW, 50: Kind.SPINDLE_OFF}
 MOTION_GROUP: Final = "motion"
 
 
@@ -54,18 +56,16 @@ class ModalReader:
         self._absolute = True
         self._absolute_centres = False
         self._feed = 0.0
-        self._speed: float | None = None
-        self._spindle: Kind | None = None
-        self._tool: int | None = None
-        self._ended = False
+        self._frame = FIRST_FRAME
+        self._moved = False
         self._codes: dict[tuple[str, str], int] = {}
         self._notes = ReadNotes(machine.max_feed_mm_min)
+        self._machine = MachineWords(self.path, rules, self._notes)
         self._zero = machine.controller.machine_zero_mm
-        self._changed = False
 
     def block(self, block: Block) -> None:
         """Decode one block; ProgramError where the controller would refuse it."""
-        if self._ended:
+        if self._machine.ended:
             block.fail("a block after the end of the program", mend="remove it")
         self.path.block = block.index
         numbers: dict[str, float] = {}
@@ -76,20 +76,20 @@ class ModalReader:
                 code = self._code("G", text, block)
                 group = self._rules.groups[code]
                 if group in modes:
-                    self._fail(block, "G", text, f"two G words of one group ({group})")
+                    block.fail_at("G", f"two G words of one group ({group})", number=text)
                 modes[group] = code
             elif letter == "M":
                 m_codes.append(self._code("M", text, block))
             elif letter in numbers:
-                self._fail(block, letter, text, f"two {letter} words in one block")
+                block.fail_at(letter, f"two {letter} words in one block")
             else:
                 numbers[letter] = float(text)
         self._carry_out(block, modes, m_codes, numbers)
         if numbers:
             letter = next(iter(numbers))
-            self._fail(block, letter, None, f"nothing in the block uses the {letter} word")
+            block.fail_at(letter, f"nothing in the block uses the {letter} word")
         if m_codes:
-            self._stop(m_codes)
+            self._machine.stop(block, m_codes)
 
     def _carry_out(
         self, block: Block, modes: dict[str, int], m_codes: list[int], numbers: dict[str, float]
@@ -100,8 +100,7 @@ class ModalReader:
         if "F" in numbers:
             self._set_feed(block, numbers.pop("F") * self._mm)
         if m_codes or "S" in numbers or "T" in numbers:
-            self._changed = False
-            self._machine_words(block, m_codes, numbers)
+            self._machine.read(block, m_codes, numbers)
         once = modes.get("one block")
         if once == DWELL:
             self._dwell(block, numbers)
@@ -130,10 +129,10 @@ class ModalReader:
         exact = code / 10.0 == value
         name = f"{letter}{value:g}"
         if exact and name in self._rules.refused:
-            self._fail(block, letter, text, f"{name} {self._rules.refused[name]}")
+            block.fail_at(letter, f"{name} {self._rules.refused[name]}", number=text)
         fits = code in self._rules.groups if letter == "G" else code in M_CODES
         if not (exact and fits):
-            self._fail(block, letter, text, f"the controller does not know {letter}{text}")
+            block.fail_at(letter, f"the controller does not know {letter}{text}", number=text)
         self._codes[letter, text] = code
         return code
 
@@ -144,7 +143,7 @@ class ModalReader:
             mm = MM_PER_INCH if modes["units"] == INCHES else 1.0
             if mm != self._mm and "F" in numbers:
                 message = "a feed beside a change of units"
-                self._fail(block, "F", None, message, "say F in the next block")
+                block.fail_at("F", message, mend="say F in the next block")
             self._mm = mm
         if "distance" in modes:
             self._absolute = modes["distance"] == ABSOLUTE
@@ -153,67 +152,34 @@ class ModalReader:
         if modes.get("path") == BLEND:  # P is its tolerance, Q that of merging lines
             numbers.pop("P", None)
             numbers.pop("Q", None)
+        if modes.get("tool length") == TOOL_LENGTH:  # H tells of which tool
+            numbers.pop("H", None)
+        if "work frame" in modes:
+            self._set_frame(block, modes["work frame"])
+
+    def _set_frame(self, block: Block, frame: int) -> None:
+        """G54 to G59: whichever comes before the first move has its zero at part zero."""
+        if self._moved and frame != self._frame:
+            message = "another work frame, whose place only the controller knows"
+            block.fail_at(
+                "G", message, number=f"{frame // 10}", mend="write a program for each frame"
+            )
+        self._frame = frame
 
     def _set_feed(self, block: Block, feed: float) -> None:
         if feed <= 0.0:
-            self._fail(block, "F", None, "a feed that is not above 0")
+            block.fail_at("F", "a feed that is not above 0")
         if feed > self._notes.max_feed_mm_min * (1.0 + FEED_GUARD):
             self._notes.fast.append((block.index, feed))
         self._feed = feed
 
-    def _machine_words(self, block: Block, codes: list[int], numbers: dict[str, float]) -> None:
-        """Spindle and tool."""
-        groups = [M_CODES[code] for code in codes if M_CODES[code] != "coolant"]
-        if len(set(groups)) != len(groups):
-            self._fail(block, "M", None, "two M words of one group")
-        speed = numbers.pop("S", None)
-        if speed is not None and speed < 0.0:
-            self._fail(block, "S", None, "a speed below 0")
-        self._speed = self._speed if speed is None else speed
-        if "T" in numbers:
-            self._tool = self._whole(block, "T", numbers.pop("T"))
-        if 60 in codes or (0 in codes and self._rules.tools == "pause" and self._tool is not None):
-            self._change_tool(block)
-        turn = next((code for code in codes if code in SPINDLE), None)
-        if turn is not None:
-            self._spindle = None if turn == 50 else SPINDLE[turn]
-            if self._spindle is not None and self._speed is None:
-                self._fail(block, "M", None, "the spindle is started before an S word was said")
-            self.path.event(SPINDLE[turn], self._speed if self._spindle is not None else None)
-        elif speed is not None and self._spindle is not None:
-            self.path.event(self._spindle, speed)
-        if any(M_CODES[code] == "coolant" for code in codes):
-            self._notes.coolant.append(block.index)
-
-    def _change_tool(self, block: Block) -> None:
-        if self._rules.tools == "none":
-            self._fail(block, "M", None, "this controller knows no tool change")
-        if self._tool is None:
-            self._fail(block, "M", None, "a tool change before a T word was said")
-        self.path.event(Kind.TOOL_CHANGE, float(self._tool))
-        self._changed = True
-        if self._rules.tools == "change" and self._spindle is not None:
-            # M6 stops the spindle.
-            self._spindle = None
-        if self._rules.tools == "pause":
-            self._tool = None
-
-    def _stop(self, codes: list[int]) -> None:
-        """M2 and M30 end the program; M0 and M1 wait for the operator."""
-        for code in codes:
-            if code in (20, 300):
-                self.path.event(Kind.END)
-                self._ended = True
-            elif code in (0, 10) and not self._changed:
-                self._notes.pauses.append(self.path.block)
-
     def _dwell(self, block: Block, numbers: dict[str, float]) -> None:
         """G4 P: seconds."""
         if "P" not in numbers:
-            self._fail(block, "G", None, "a dwell without P", "write G4 P1.5 for 1.5 s")
+            block.fail_at("G", "a dwell without P", mend="write G4 P1.5 for 1.5 s")
         seconds = numbers.pop("P")
         if seconds < 0.0:
-            self._fail(block, "P", None, "a dwell below 0 s")
+            block.fail_at("P", "a dwell below 0 s")
         self.path.event(Kind.DWELL, seconds)
 
     def _home(self, block: Block, numbers: dict[str, float]) -> None:
@@ -243,6 +209,7 @@ class ModalReader:
                 axes = True
                 value = numbers.pop(axis) * self._mm
                 to[at] = value if self._absolute else to[at] + value
+        self._moved = self._moved or axes
         motion = self._motion
         if motion is None or motion == NO_MOTION:
             if axes:
@@ -263,21 +230,21 @@ class ModalReader:
         """G2 and G3, by centre or by radius, flat or helical."""
         x, y, _ = self.path.position
         if "R" in numbers and ("I" in numbers or "J" in numbers):
-            self._fail(block, "R", None, "an arc by its radius and by its centre at once")
+            block.fail_at("R", "an arc by its radius and by its centre at once")
         if "R" in numbers:
             radius = numbers.pop("R") * self._mm
             fault = centre_of_radius(
                 (x, y), (to[0], to[1]), radius, ccw, self._rules.chord_slack_mm
             )
             if isinstance(fault, str):
-                self._fail(block, "R", None, fault)
+                block.fail_at("R", fault)
             centre = fault
         else:
             centre = self._centre(block, (x, y), numbers)
             r1, r2 = math.dist(centre, (x, y)), math.dist(centre, to[:2])
             if fault := self._rules.arc_fault(r1, r2):
                 letter = "I" if any(word == "I" for word, _ in block.words) else "J"
-                self._fail(block, letter, None, fault)
+                block.fail_at(letter, fault)
         circle = Circle((x, y), (to[0], to[1]), centre, ccw)
         follow(self.path, circle, to[2], (self._feed, self._rules.full_turn_rad))
 
@@ -293,21 +260,3 @@ class ModalReader:
         if "I" not in numbers or "J" not in numbers:
             block.fail("with G90.1 an arc needs both I and J")
         return numbers.pop("I") * self._mm, numbers.pop("J") * self._mm
-
-    # Errors
-
-    def _whole(self, block: Block, letter: str, value: float) -> int:
-        if value < 0.0 or value != math.floor(value):
-            self._fail(block, letter, None, f"{letter} takes a whole number from 0")
-        return int(value)
-
-    def _fail(
-        self, block: Block, letter: str, text: str | None, message: str, mend: str = ""
-    ) -> NoReturn:
-        """ProgramError at the last word of that letter (and text)."""
-        at = [
-            index
-            for index, (word, number) in enumerate(block.words)
-            if word == letter and text in (None, number)
-        ]
-        block.fail(message, word=at[-1] if at else None, mend=mend)

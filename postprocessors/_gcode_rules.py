@@ -33,6 +33,12 @@ ABSOLUTE: Final = 900
 ABSOLUTE_CENTRES: Final = 901
 """G90.1."""
 
+FIRST_FRAME: Final = 540
+"""G54, in force when a program begins."""
+
+TOOL_LENGTH: Final = 430
+"""G43: coordinates are those of the tool's tip, as they are here anyway."""
+
 BLEND: Final = 640
 """G64."""
 
@@ -60,7 +66,7 @@ class Rules:
     `refused`: codes ("G55", "M6") that the controller knows but that have no place in a program
     here, and why. `first_motion`: the motion mode before any word says one (None: none).
     `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
-    `tools`: "change" (M6), "pause" (M0 beside a T word), or "none".
+    `tools`: "change" (M6), "pause" (M0 beside a T word), or "none"; T words go up to `most_tool`.
     """
 
     groups: Mapping[int, str]
@@ -70,3 +76,4 @@ class Rules:
     full_turn_rad: float
     chord_slack_mm: float
     tools: str = "none"
+    most_tool: int = 99_999

@@ -109,6 +109,17 @@ class Block:
         column = self.column(word or 0) if self.words else 1
         raise ProgramError(message, where=_place(self.index, self.line, column), mend=mend)
 
+    def fail_at(
+        self, letter: str, message: str, *, number: str | None = None, mend: str = ""
+    ) -> NoReturn:
+        """ProgramError at the last word of that letter (and number text)."""
+        at = [
+            index
+            for index, (other, text) in enumerate(self.words)
+            if other == letter and number in (None, text)
+        ]
+        self.fail(message, word=at[-1] if at else None, mend=mend)
+
 
 def blocks_of(data: bytes, lexing: Lexing) -> Iterator[Block]:
     """The blocks of a program one by one; ProgramError at the first that is none."""

@@ -16,6 +16,9 @@ from ._gcode_rules import Rules
 from ._gcode_words import Lexing, blocks_of
 from ._grbl_options import Dialect, dialect_of
 
+MOST_TOOL: Final = 255
+"""Beyond it grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
+
 GROUPS: Final = {
     **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
     **dict.fromkeys((40, 530), "one block"),
@@ -26,18 +29,19 @@ GROUPS: Final = {
     940: "feed mode",
     400: "cutter radius",
     490: "tool length",
-    540: "work frame",
+    **dict.fromkeys(range(540, 600, 10), "work frame"),
     610: "path",
 }
 
 _FRAME: Final = "moves part zero by what only the controller knows"
 _PLANE: Final = "is another plane; arcs lie in XY here"
 REFUSED: Final = {
-    **dict.fromkeys(("G10", "G92", "G92.1", "G55", "G56", "G57", "G58", "G59"), _FRAME),
+    **dict.fromkeys(("G10", "G92", "G92.1"), _FRAME),
     **dict.fromkeys(("G28", "G30"), "goes to a place that only the controller remembers"),
     **dict.fromkeys(("G28.1", "G30.1"), "remembers a place, which is not simulated"),
     **dict.fromkeys(("G18", "G19"), _PLANE),
     **dict.fromkeys(("G38.2", "G38.3", "G38.4", "G38.5"), "probes, which cannot be simulated"),
+    "G43": "is unknown to grbl, its error 20",
     "G43.1": "shifts Z by a tool length",
     "G93": "says feeds as inverse time, which is not read",
     "M6": "is unknown to grbl, its error 20",
@@ -86,4 +90,5 @@ def rules_of(dialect: Dialect) -> Rules:
         full_turn_rad=dialect.arc_full_turn_rad,
         chord_slack_mm=dialect.arc_chord_slack_mm,
         tools="pause" if dialect.tool_change == "pause" else "none",
+        most_tool=MOST_TOOL,
     )

@@ -15,7 +15,7 @@ HEADER = ("G17 G21 G90 G94", "G54")
 so it is not told so (G91.1)."""
 
 MOST_TOOL = 255
-"""`MAX_TOOL_NUMBER` of grbl's config.h."""
+"""`MAX_TOOL_NUMBER` of grbl's gcode.c."""
 
 
 def write_grbl(toolpath: Toolpath, machine: Machine) -> Program:

@@ -125,6 +125,18 @@ def test_homing_goes_to_machine_zero(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
+def test_the_work_frame_of_a_program_is_its_part_zero(name: str) -> None:
+    assert ends(read("G56\nG55 G0 X1\nG55 Y2\n", name)) == [(1, 0, 0), (1, 2, 0)]
+
+
+def test_lengths_of_tools_leave_the_tip_where_it_is_programmed() -> None:
+    path = read("T1 M6\nG0 X1\nG43 Z15. H1\nG49\nM2\n", "linuxcnc")
+    assert ends(path) == [(1, 0, 0), (1, 0, 15)]
+    with pytest.raises(ProgramError, match="G43 is unknown to grbl"):
+        read("G43 Z1")
+
+
+@pytest.mark.parametrize("name", TARGETS)
 def test_helices_become_lines_on_the_helix(name: str) -> None:
     path = read("F60 G0 X10 Z2\nG3 X10 Y0 Z-2 I-10\n", name)
     lines = path.end[path.kind == Kind.LINE]
@@ -197,7 +209,8 @@ BAD = [
     ("S-5\n", 1, 1, "a speed below 0"),
     ("M3 M4 S1\n", 1, 4, "two M words of one group"),
     ("M2\nG0 X1\n", 2, 1, "after the end"),
-    ("G55\n", 1, 1, "moves part zero"),
+    ("G0 X1\nG17 G55\n", 2, 5, "another work frame"),
+    ("G55\nG0 X1\nX0\nG54\n", 4, 1, "another work frame"),
     ("G92 X0\n", 1, 1, "moves part zero"),
     ("G28\n", 1, 1, "only the controller remembers"),
     ("G18\n", 1, 1, "another plane"),
@@ -233,7 +246,8 @@ def test_refused(name: str, text: str, line: int, column: int, message: str) -> 
     ("text", "message"),
     [
         ("G41 D1", "compensates for a tool"),
-        ("G43 H1", "compensates for a tool"),
+        ("G43.1 Z1", "compensates for a tool"),
+        ("H1", "nothing in the block uses the H word"),
         ("G81 X1 Z-1 R1", "is a cycle"),
         ("G33 Z-1 K1", "follows the spindle"),
         ("G5 X1", "a spline"),
@@ -253,6 +267,8 @@ def test_linuxcnc_refuses(text: str, message: str) -> None:
 def test_grbl_refuses() -> None:
     with pytest.raises(ProgramError, match="M6 is unknown to grbl, its error 20"):
         read("T1 M6")
+    with pytest.raises(ProgramError, match="T takes a whole number from 0 to 255"):
+        read("T256")
     with pytest.raises(ProgramError, match="a % that is not alone"):
         read("%\nG0 X1\n%\n")
     with pytest.raises(ProgramError, match="more than 79 characters"):
