@@ -38,10 +38,19 @@ class MachineFlags:
         """The target with the user's file and settings over it."""
         from camtool.machine.registry import load_target
 
-        if self.target is None:
+        name = self.name()
+        if name is None:
             raise click.UsageError("--target is missing; `camtool targets` lists the machines")
         file = Path(self.machine) if self.machine else None
-        return load_target(self.target, machine_file=file, settings=self.settings)
+        return load_target(name, machine_file=file, settings=self.settings)
+
+    def name(self) -> str | None:
+        """The target's name: as given, or as the machine file says; None when nobody does."""
+        if self.target is not None or self.machine is None:
+            return self.target
+        from camtool.machine.loader import extended_by
+
+        return extended_by(Path(self.machine))
 
 
 @dataclass(frozen=True)

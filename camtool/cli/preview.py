@@ -54,7 +54,7 @@ def preview(
 
     A file with the target's own extension (such as .pic) is taken for a program.
     """
-    if simulate and machine.target is None:
+    if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
     check_writable([output], [source])
 
@@ -77,7 +77,7 @@ def _scene(
     from camtool.planning.plan import plan
 
     title = Path(source).name
-    if machine.target is None:
+    if machine.name() is None:
         _refuse_program(source)
         read = drawing.read(source)
         return picture(title=Path(read.file).name, drawing=read)

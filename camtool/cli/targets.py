@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from typing import Any
 
 import click
@@ -11,25 +12,73 @@ import click
 from camtool.cli.options import talk_options
 
 
-@click.command(short_help="The machines, and everything about one.")
-@click.argument("name", required=False)
+class _Targets(click.Group):
+    """`new` is a command; every other word is the name of a target to show."""
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of this name, or the one that shows a target."""
+        return super().get_command(ctx, cmd_name) or show
+
+
+@click.group(
+    cls=_Targets,
+    short_help="The machines, and everything about one.",
+    invoke_without_command=True,
+    subcommand_metavar="[NAME | new NAME] [OPTIONS]",
+)
+@click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
+@talk_options
+@click.pass_context
+def targets(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> None:
+    """List the machines, show everything about the one called NAME, or begin a machine file.
+
+    \b
+    camtool targets                             all machines
+    camtool targets grbl                        everything about one
+    camtool targets new my-mill --extends grbl  my-mill.toml, to fill in
+    """
+    if context.invoked_subcommand is None:
+        _list(as_json)
+
+
+@click.command(short_help="Everything about one machine.")
 @click.option("--machine", metavar="FILE", help="A TOML file that extends the target's machine.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change one value.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
 @talk_options
-def targets(
-    name: str | None,
+@click.pass_context
+def show(
+    context: click.Context,
     machine: str | None,
     settings: tuple[str, ...],
     as_json: bool,
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """List the machines, or show everything about the one called NAME."""
-    if name is None:
-        _list(as_json)
-    else:
-        _show(name, machine, settings, as_json)
+    """Everything about one machine."""
+    _show(str(context.info_name), machine, settings, as_json)
+
+
+@targets.command(short_help="Begin a machine file.")
+@click.argument("name")
+@click.option("--extends", metavar="TARGET", required=True, help="The machine that it is like.")
+@click.option("-o", "--output", metavar="FILE", help="The file; - is stdout.  [NAME.toml]")
+@talk_options
+def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool) -> None:
+    """Write a machine file for NAME that extends TARGET, with every value as a comment."""
+    from camtool.cli.output import STDOUT, write_all
+    from camtool.cli.talk import say
+    from camtool.errors import OutputError
+    from camtool.machine.registry import list_target
+    from camtool.machine.template import machine_template
+
+    base = list_target(extends)
+    text = machine_template(name, extends, base.file.read_text(encoding="utf-8"), base.needs)
+    output = output or f"{name}.toml"
+    if output != STDOUT and os.path.lexists(output):
+        raise OutputError("exists already", file=output, mend="give another name with -o")
+    write_all({output: text.encode()})
+    say(f"written: {output}; take the # away from what differs", quiet=quiet)
 
 
 def _list(as_json: bool) -> None:

@@ -70,6 +70,19 @@ def build_machine(
     return convert({key: table[key] for key in table if key != NEEDS}, Machine, name)
 
 
+def extended_by(user_file: Path) -> str:
+    """The target that a user's machine file extends; MachineError when it names none."""
+    extends = read_table(user_file).get("extends")
+    if not isinstance(extends, str):
+        raise MachineError(
+            "does not say which target it extends",
+            file=str(user_file),
+            where="key extends",
+            mend='write extends = "grbl" (or another target) at its top, or give --target',
+        )
+    return extends
+
+
 def target_of(base: Table, base_name: str) -> Target:
     """The `[target]` of a target's table, which may lack what the user must give."""
     return convert(base.get("target", {}), Target, base_name, "target")

@@ -1,0 +1,101 @@
+"""`camtool targets`: the list, one machine, and a new machine file."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from camtool.machine.registry import target_names
+from tests.cli.conftest import Run
+
+
+def test_all_are_listed_and_what_the_user_must_give_is_said(camtool: Run) -> None:
+    done = camtool("targets")
+    assert done.returncode == 0
+    lines = done.stdout.decode().splitlines()
+    assert [line.split()[0] for line in lines] == target_names()
+    assert sum("needs --machine FILE: axes.x.coded_step_mm" in line for line in lines) == 1
+    assert [row["name"] for row in json.loads(camtool("targets", "--json").stdout)["targets"]] == (
+        target_names()
+    )
+
+
+@pytest.mark.parametrize("base", target_names())
+def test_a_new_machine_file_is_whole_and_changes_nothing_yet(
+    camtool: Run, tmp_path: Path, base: str
+) -> None:
+    done = camtool("targets", "new", "my-mill", "--extends", base)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "my-mill.toml").read_text()
+    said = tomllib.loads(text)
+    tables = {name: table for name, table in said.items() if isinstance(table, dict)}
+    assert said["extends"] == base
+    assert tables.pop("target") == {"name": "my-mill", "title": "my-mill"}
+    tables.update(tables.pop("axes"))
+    assert not any(tables.values())
+    shown = camtool("targets", base, "--machine", "my-mill.toml", "--json")
+    plain = camtool("targets", base, "--json")
+    if plain.returncode:  # a machine that needs the user
+        assert b"key is missing" in shown.stderr
+        assert "# coded_step_mm =     # you must say this" in text
+        return
+    mine, its = json.loads(shown.stdout), json.loads(plain.stdout)
+    assert mine.pop("target")["name"] == "my-mill"
+    its.pop("target")
+    assert mine == its
+
+
+def test_every_comment_of_a_new_file_is_a_value_when_uncommented(
+    camtool: Run, tmp_path: Path
+) -> None:
+    text = camtool("targets", "new", "my-mill", "--extends", "grbl", "-o", "-").stdout.decode()
+    head, _, rest = text.partition("[axes.x]")
+    whole = head + "[axes.x]" + rest.replace("\n# ", "\n")
+    (tmp_path / "whole.toml").write_text(whole)
+    mine = camtool("targets", "grbl", "--machine", "whole.toml", "--json")
+    assert mine.returncode == 0, mine.stderr
+    its = json.loads(camtool("targets", "grbl", "--json").stdout)
+    assert json.loads(mine.stdout)["axes"] == its["axes"]
+
+
+def test_a_machine_file_alone_says_which_target(camtool: Run, samples: Path) -> None:
+    camtool("targets", "new", "my-mill", "--extends", "grbl")
+    done = camtool("post", samples / "logo.dxf", "--machine", "my-mill.toml", "-o", "-")
+    assert done.returncode == 0, done.stderr
+    assert b"G21" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("new", "My Mill", "--extends", "grbl"), b"is no name for a machine"),
+        (("new", "../mill", "--extends", "grbl"), b"is no name for a machine"),
+        (("new", "mill", "--extends", "gbrl"), b"did you mean grbl"),
+        (("new", "mill"), b"--extends"),
+        (("gbrl",), b"did you mean grbl"),
+    ],
+)
+def test_wrong_use_says_what_to_do(
+    camtool: Run, tmp_path: Path, arguments: tuple[str, ...], words: bytes
+) -> None:
+    done = camtool("targets", *arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_existing_file_is_not_touched(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "my-mill.toml").write_text("mine")
+    done = camtool("targets", "new", "my-mill", "--extends", "grbl")
+    assert done.returncode == 2
+    assert (tmp_path / "my-mill.toml").read_text() == "mine"
+
+
+def test_a_machine_file_that_extends_nothing_is_refused(
+    camtool: Run, tmp_path: Path, samples: Path
+) -> None:
+    (tmp_path / "m.toml").write_text("[axes.x]\ntravel_mm = 5.0\n")
+    done = camtool("post", samples / "logo.dxf", "--machine", "m.toml")
+    assert done.returncode == 2
+    assert b"which target it extends" in done.stderr
