@@ -229,7 +229,7 @@ REFUSED = {
     ),
     "nearly too long": (
         builder().line(z=-1, feed=99).line(208, 10, feed=99),
-        r"machine_zero_mm=\[8,0,9\]",
+        r"machine_zero_mm=\[9,0,9\]",
     ),
     "too long": (
         builder().line(z=-1, feed=99).line(230, 10, feed=99),
