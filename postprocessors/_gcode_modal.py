@@ -17,22 +17,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 from ._gcode_circles import Circle, centre_of_radius, follow
 from ._gcode_notes import ReadNotes
-from ._gcode_rules import (
-    ABSOLUTE,
-    ABSOLUTE_CENTRES,
-    ARC_CCW,
-    BLEND,
-    DWELL,
-    FIRST_FRAME,
-    INCHES,
-    LINE,
-    M_CODES,
-    MACHINE_FRAME,
-    NO_MOTION,
-    RAPID,
-    TOOL_LENGTH,
-    Rules,
-)
+from ._gcode_rules import M_CODES, G, Rules
 from ._gcode_spindle import MachineWords
 from ._gcode_words import Block
 
@@ -56,7 +41,7 @@ class ModalReader:
         self._absolute = True
         self._absolute_centres = False
         self._feed = 0.0
-        self._frame = FIRST_FRAME
+        self._frame: int = G.FIRST_FRAME
         self._moved = False
         self._codes: dict[tuple[str, str], int] = {}
         self._notes = ReadNotes(machine.max_feed_mm_min)
@@ -102,9 +87,9 @@ class ModalReader:
         if m_codes or "S" in numbers or "T" in numbers:
             self._machine.read(block, m_codes, numbers)
         once = modes.get("one block")
-        if once == DWELL:
+        if once == G.DWELL:
             self._dwell(block, numbers)
-        elif once == MACHINE_FRAME:
+        elif once == G.MACHINE_FRAME:
             self._home(block, numbers)
         elif numbers or MOTION_GROUP in modes:
             self._move(block, numbers, said=MOTION_GROUP in modes)
@@ -140,19 +125,19 @@ class ModalReader:
         """Motion, units, distance and arc modes."""
         self._motion = modes.get(MOTION_GROUP, self._motion)
         if "units" in modes:
-            mm = MM_PER_INCH if modes["units"] == INCHES else 1.0
+            mm = MM_PER_INCH if modes["units"] == G.INCHES else 1.0
             if mm != self._mm and "F" in numbers:
                 message = "a feed beside a change of units"
                 block.fail_at("F", message, mend="say F in the next block")
             self._mm = mm
         if "distance" in modes:
-            self._absolute = modes["distance"] == ABSOLUTE
+            self._absolute = modes["distance"] == G.ABSOLUTE
         if "arc distance" in modes:
-            self._absolute_centres = modes["arc distance"] == ABSOLUTE_CENTRES
-        if modes.get("path") == BLEND:  # P is its tolerance, Q that of merging lines
+            self._absolute_centres = modes["arc distance"] == G.ABSOLUTE_CENTRES
+        if modes.get("path") == G.BLEND:  # P is its tolerance, Q that of merging lines
             numbers.pop("P", None)
             numbers.pop("Q", None)
-        if modes.get("tool length") == TOOL_LENGTH:  # H tells of which tool
+        if modes.get("tool length") == G.TOOL_LENGTH:  # H tells of which tool
             numbers.pop("H", None)
         if "work frame" in modes:
             self._set_frame(block, modes["work frame"])
@@ -187,7 +172,7 @@ class ModalReader:
         said = {axis: numbers.pop(axis) for axis in "XYZ" if axis in numbers}
         kinds = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}
         kind = kinds.get(tuple(said))
-        if self._motion != RAPID or kind is None or any(said.values()):
+        if self._motion != G.RAPID or kind is None or any(said.values()):
             block.fail(
                 "of machine coordinates only homing can be simulated",
                 mend="write G53 G0 X0 Y0 or G53 G0 Z0",
@@ -211,20 +196,20 @@ class ModalReader:
                 to[at] = value if self._absolute else to[at] + value
         self._moved = self._moved or axes
         motion = self._motion
-        if motion is None or motion == NO_MOTION:
+        if motion is None or motion == G.NO_MOTION:
             if axes:
                 block.fail("coordinates, and no motion word in force", mend="write G0 or G1")
         elif not axes:
-            if motion > LINE and said:
+            if motion > G.LINE and said:
                 block.fail("an arc without X or Y", mend="say where it ends")
-        elif motion == RAPID:
+        elif motion == G.RAPID:
             self.path.rapid(*to)
         elif self._feed == 0.0:
             block.fail("a feed move, and no feed yet", mend="say F first")
-        elif motion == LINE:
+        elif motion == G.LINE:
             self.path.line(*to, feed=self._feed)
         else:
-            self._arc(block, motion == ARC_CCW, to, numbers)
+            self._arc(block, motion == G.ARC_CCW, to, numbers)
 
     def _arc(self, block: Block, ccw: bool, to: list[float], numbers: dict[str, float]) -> None:
         """G2 and G3, by centre or by radius, flat or helical."""

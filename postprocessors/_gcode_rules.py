@@ -4,43 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Final
 
-RAPID: Final = 0
-"""G0, tenfold like all codes here."""
 
-LINE: Final = 10
-"""G1; G2 and G3 are above it."""
+class G(IntEnum):
+    """G words that a reader acts on, tenfold: G91.1 is 911. Arcs are above LINE."""
 
-ARC_CCW: Final = 30
-"""G3."""
+    RAPID = 0
+    LINE = 10
+    ARC_CCW = 30
+    DWELL = 40
+    INCHES = 200
+    TOOL_LENGTH = 430
+    MACHINE_FRAME = 530
+    FIRST_FRAME = 540
+    BLEND = 640
+    NO_MOTION = 800
+    ABSOLUTE = 900
+    ABSOLUTE_CENTRES = 901
 
-NO_MOTION: Final = 800
-"""G80: the motion mode in which coordinates have no meaning."""
 
-DWELL: Final = 40
-"""G4."""
+class M(IntEnum):
+    """M words that a reader acts on, tenfold."""
 
-MACHINE_FRAME: Final = 530
-"""G53: the coordinates of this block are the machine's own."""
+    PAUSE = 0
+    END = 20
+    SPINDLE_CW = 30
+    SPINDLE_CCW = 40
+    SPINDLE_OFF = 50
+    CHANGE = 60
+    END_AND_REWIND = 300
 
-INCHES: Final = 200
-"""G20."""
-
-ABSOLUTE: Final = 900
-"""G90."""
-
-ABSOLUTE_CENTRES: Final = 901
-"""G90.1."""
-
-FIRST_FRAME: Final = 540
-"""G54, in force when a program begins."""
-
-TOOL_LENGTH: Final = 430
-"""G43: coordinates are those of the tool's tip, as they are here anyway."""
-
-BLEND: Final = 640
-"""G64."""
 
 M_CODES: Final = {
     0: "stop",

@@ -9,20 +9,14 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
 from ._gcode_notes import ReadNotes
-from ._gcode_rules import M_CODES, Rules
+from ._gcode_rules import M_CODES, M, Rules
 from ._gcode_words import Block
 
-SPINDLE: Final = {30: Kind.SPINDLE_CW, 40: Kind.SPINDLE_CCW, 50: Kind.SPINDLE_OFF}
-"""M3, M4 and M5, tenfold."""
-
-CHANGE: Final = 60
-"""M6."""
-
-PAUSE: Final = 0
-"""M0."""
-
-ENDS: Final = frozenset({20, 300})
-"""M2 and M30."""
+SPINDLE: Final = {
+    M.SPINDLE_CW: Kind.SPINDLE_CW,
+    M.SPINDLE_CCW: Kind.SPINDLE_CCW,
+    M.SPINDLE_OFF: Kind.SPINDLE_OFF,
+}
 
 
 class MachineWords:
@@ -49,8 +43,8 @@ class MachineWords:
         self._speed = self._speed if speed is None else speed
         if "T" in numbers:
             self._tool = self._number_of_tool(block, numbers.pop("T"))
-        pauses = PAUSE in codes and self._rules.tools == "pause" and self._tool is not None
-        self._changed = CHANGE in codes or pauses
+        pauses = M.PAUSE in codes and self._rules.tools == "pause" and self._tool is not None
+        self._changed = M.CHANGE in codes or pauses
         if self._changed:
             self._change(block)
         self._turn(block, codes, said=speed is not None)
@@ -60,7 +54,7 @@ class MachineWords:
     def stop(self, block: Block, codes: list[int]) -> None:
         """Behind the block's motion: M2 and M30 end the program; M0 and M1 wait."""
         for code in codes:
-            if code in ENDS:
+            if code in (M.END, M.END_AND_REWIND):
                 self._path.event(Kind.END)
                 self.ended = True
             elif M_CODES[code] == "stop" and not self._changed:
@@ -68,7 +62,7 @@ class MachineWords:
 
     def _turn(self, block: Block, codes: list[int], *, said: bool) -> None:
         """The spindle's words; a speed alone tells the running spindle."""
-        turn = next((SPINDLE[code] for code in codes if code in SPINDLE), None)
+        turn = next((SPINDLE[M(code)] for code in codes if code in SPINDLE), None)
         if turn == Kind.SPINDLE_OFF:
             self._spindle = None
             self._path.event(turn)
