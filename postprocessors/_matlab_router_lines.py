@@ -176,7 +176,13 @@ class _Maker:
         share = 1.0 / slant if self._dialect.speed == "path" else 1.0
         wanted = np.minimum(lines.feed * share / self._unit, float(MOST_NUMBER))
         counts = np.floor(wanted + 0.5).astype(np.int64)
-        self._refuse_feed(lines, counts > self._most_counts, "above what its axes run at")
+        fast = counts > self._most_counts
+        if self._dialect.too_fast == "limited":
+            self.notes.limited = max(self.notes.limited, int(fast.sum()))
+            wanted = np.where(fast, self._most_counts, wanted)
+            counts = np.minimum(counts, self._most_counts)
+        else:
+            self._refuse_feed(lines, fast, "above what its axes run at")
         self._refuse_feed(lines, counts < 1, "below one count of the encoder in 5 ms")
         off = np.abs(wanted - counts) * self._unit
         self.notes.feed_off = max(self.notes.feed_off, float(off.max(initial=0.0)))
@@ -191,7 +197,7 @@ class _Maker:
                 f"feed {lines.feed[line]:g} mm/min is {what}",
                 where=place(self._toolpath, int(lines.row[line])),
                 mend=f"an axis runs at {self._unit:g} to {self._most_counts * self._unit:g}"
-                " mm/min",
+                " mm/min; --set dialect.too_fast=limited takes the highest",
             )
 
     def _speeds(self, lines: Lines) -> Ints:

@@ -29,6 +29,7 @@ class Notes:
     lost_place: str = ""
     bent: int = 0
     more_jobs: int = 0
+    limited: int = 0
     feed_off: float = 0.0
     faster: float = 1.0
 
@@ -131,6 +132,16 @@ class Notes:
 
     def _feeds(self) -> list[Finding]:
         found = []
+        if self.limited:
+            found.append(
+                Finding(
+                    Code.FEED_ROUNDED,
+                    Severity.WARNING,
+                    f"{self.limited} lines run at the highest speed of an axis, less than wanted",
+                    measured=float(self.limited),
+                    unit="moves",
+                )
+            )
         if self.feed_off > FEED_NOTICE:
             found.append(
                 Finding(

@@ -45,6 +45,7 @@ class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     profile: Literal["safe", "listing", "text"] = "safe"
     format: Literal["m", "stream"] = "m"
     speed: Literal["axis", "path"] = "axis"
+    too_fast: Literal["refused", "limited"] = "refused"
     arc_tolerance_mm: Positive = 0.05
     bend_tolerance_mm: Positive = 0.1
     plunge_mm: Positive = 10.0
@@ -104,6 +105,7 @@ class Dialect:
     `format` "m": the arrays as a Matlab file; "stream": the bytes of the serial line.
     `speed`: what a feed is: that of the faster axis, as the GUI computes ("axis"), or that of the
     tool along its line ("path").
+    `too_fast`: a feed above the highest speed of an axis is refused, or becomes that speed.
     `grid_units`: positions are whole multiples of so many tenths of a millimetre.
     `odd`: distances lose their odd tenth in the slaves, or do not.
     `first_y`: y of the first point is sent as digits, or as one character (L4306).
@@ -118,6 +120,7 @@ class Dialect:
     profile: str
     format: str
     speed: str
+    too_fast: str
     grid_units: int
     max_lines: int
     odd: str

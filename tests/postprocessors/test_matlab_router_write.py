@@ -157,6 +157,15 @@ def test_the_two_meanings_of_a_feed() -> None:
     assert Code.FEED_ROUNDED in codes(line)
 
 
+@pytest.mark.parametrize("speed", ["axis", "path"])
+def test_feeds_may_be_limited(speed: str) -> None:
+    line = strokes([(10, 10), (40, 50)], feed=1e6)
+    settings = (f"speed={speed}", "too_fast=limited")
+    assert arrays(program(line, *settings))[0]["velxy"] == [[360], [480]]
+    findings = router(*settings).post.write(line, router(*settings).machine).findings
+    assert (findings[0].code, findings[0].severity) == (Code.FEED_ROUNDED, Severity.WARNING)
+
+
 @given(
     st.integers(0, 1990),
     st.integers(0, 1990),
