@@ -94,18 +94,27 @@ def verify_program(
 
 
 def convert_program(
-    data: bytes, source: LoadedTarget, target: LoadedTarget, *, file: str, check: bool = True
+    data: bytes,
+    source: LoadedTarget,
+    target: LoadedTarget,
+    *,
+    file: str,
+    feed_mm_min: float | None = None,
+    check: bool = True,
 ) -> Posted:
     """A program of one target as the program of another, read back and judged against the first.
 
     What the first controller decodes is what the second one shall do; where its part zero was set
-    is left out, since a program begins there. ProgramError names file, block and column.
+    is left out, since a program begins there. `feed_mm_min` takes the place of all feeds, for
+    machines that are slower than the first. ProgramError names file, block and column.
     """
-    from camtool.toolpath.carried import carried_over
+    from camtool.toolpath.carried import at_feed, carried_over
 
     decoded = _read(data, source, file)
     same = source.machine.target.dialect == target.machine.target.dialect
     wanted = decoded if same else carried_over(decoded)
+    if feed_mm_min is not None:
+        wanted = at_feed(wanted, feed_mm_min)
     if worst(wanted.findings) >= Severity.ERROR:
         return Posted(wanted, None, None, None, wanted.findings)
     program = target.post.write(wanted, target.machine)

@@ -9,6 +9,7 @@ import click
 from camtool.cli.options import MachineFlags, talk_options
 from camtool.cli.output import STDOUT, check_writable, write_all
 from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.types import feed
 from camtool.cli.verify import read_bytes, shown
 
 
@@ -21,6 +22,9 @@ from camtool.cli.verify import read_bytes, shown
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change its values.")
 @click.option("--from-machine", metavar="FILE", help="A TOML file that extends that of --from.")
 @click.option("--from-set", multiple=True, metavar="KEY=VALUE", help="Change its values.")
+@click.option(
+    "--feed", "feed_mm_min", callback=feed, metavar="FEED", help="For all cuts, in mm/min."
+)
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
 @talk_options
@@ -33,6 +37,7 @@ def convert(
     settings: tuple[str, ...],
     from_machine: str | None,
     from_set: tuple[str, ...],
+    feed_mm_min: float | None,
     report: str | None,
     no_verify: bool,
     quiet: bool,
@@ -55,7 +60,12 @@ def convert(
 
     say_first_run(quiet=quiet)
     made = convert_program(
-        read_bytes(program), before, after, file=shown(program), check=not no_verify
+        read_bytes(program),
+        before,
+        after,
+        file=shown(program),
+        feed_mm_min=feed_mm_min,
+        check=not no_verify,
     )
     say_findings(made.findings, quiet=quiet, verbose=verbose)
     if made.failed or made.program is None:

@@ -9,6 +9,11 @@ import numpy as np
 from camtool.toolpath.moves import Kind, Toolpath
 
 
+def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:
+    """The same moves, all cuts at one feed."""
+    return replace(toolpath, feed=np.where(toolpath.is_feed, feed_mm_min, toolpath.feed))
+
+
 def carried_over(decoded: Toolpath) -> Toolpath:
     """The moves and events of a program, free of what belongs to its own machine alone.
 

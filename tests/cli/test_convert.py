@@ -58,6 +58,17 @@ def test_from_grbl_to_each_and_back(
     assert size["y"] == pytest.approx([0.0, 6.0], abs=slack)
 
 
+def test_a_feed_can_take_the_place_of_one_that_is_too_fast(camtool: Run) -> None:
+    program = COUPON.replace("F0.8", "F400").encode()
+    common = ("convert", "-", "--from", "grbl", "--to", "pic-mmh")
+    refused = camtool(*common, stdin=program)
+    assert refused.returncode == 2
+    assert b"feed" in refused.stderr
+    done = camtool(*common, "--feed", "1.2", stdin=program)
+    assert done.returncode == 0, done.stderr
+    assert b"F12;" in done.stdout
+
+
 def test_the_new_program_takes_the_name_of_the_old_one(camtool: Run, coupon: Path) -> None:
     done = camtool("convert", coupon, "--from", "grbl", "--to", "pic-mmh")
     assert done.returncode == 0, done.stderr
