@@ -26,11 +26,17 @@ Bytes = npt.NDArray[np.uint8]
 Bools = npt.NDArray[np.bool_]
 
 KEY: Final = 0x13
+"""The byte that opens the access (13H)."""
 FORWARD: Final = 3
+"""A motor turns forward (03H)."""
 BACKWARD: Final = 4
+"""A motor turns backward (04H)."""
 STOPPED: Final = 5
+"""A motor stands (05H)."""
 END_OF_PACKET: Final = 0x45
+"""The byte behind a packet (45H)."""
 END_OF_DATA: Final = 0x54
+"""The byte behind the last packet (54H)."""
 
 COLUMNS: Final = 18
 """Key, then M G PH PL for X and Y, a pair, the same for Z, a pair, end of packet."""

@@ -15,8 +15,11 @@ from ._i8751_faults import ByteFault, Decoded
 from ._i8751_options import RECORDS_PER_PACKET, Dialect
 
 ACCESS: Final = 0x13
+"""The byte that opens the access, as it is read."""
 PACKET_END: Final = 0x45
+"""The byte behind a packet, as it is read."""
 DATA_END: Final = 0x54
+"""The byte behind the last packet, as it is read."""
 
 _MOTOR: Final = rb"(?:\x05|([\x03\x04])(.)(.))"
 

@@ -25,11 +25,13 @@ from ._i8751_options import RECORDS_PER_PACKET, Dialect
 from ._i8751_records import Records
 
 LEAST_DECIMALS: Final = 3
+"""A listing has at least so many decimals of a millimetre."""
 
 STEPS_PER_LAST_DIGIT: Final = 0.05
 """The last decimal of a listing is worth this part of the finest step or less."""
 
 MOST_MESSAGE_CHARS: Final = 60
+"""A comment of the hex dump takes so much of a text, no more."""
 
 BYTES_WIDTH: Final = 24
 """The comments of the hex dump stand in one column."""

@@ -20,10 +20,14 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 CLOCK_HZ: Final = 12e6
+"""The controller's crystal."""
 DELAY_CYCLES: Final = {"thesis": (6156.0, 10272.0), "counted": (6120.0, 8196.0)}
 RAMP_STEPS: Final = 45
+"""Steps of the ramp, up and down."""
 RAMP_RELOAD: Final = 5
+"""What each step of the ramp takes off the timer's reload."""
 DECLARED_HZ: Final = 70.0
+"""The rate of steps that the thesis declares for the cruise."""
 
 
 class StepTimes:
