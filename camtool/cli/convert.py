@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
+from camtool.cli.finish import Asked, finish
 from camtool.cli.options import MachineFlags, talk_options
-from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.talk import say_first_run
 from camtool.cli.types import feed
 from camtool.cli.verify import read_bytes, shown
 
@@ -48,13 +46,10 @@ def convert(
     The moves that the first controller decodes are written for the second one, read back,
     simulated and compared with them. Exit code 1 (and no file) when something is wrong.
     """
-    if no_verify and report is not None:
-        raise click.UsageError(
-            "--json is the report of the verification that --no-verify leaves out"
-        )
     before = MachineFlags(source, from_machine, from_set).load()
     after = MachineFlags(target, machine, settings).load()
-    check_writable([output, report], [program])
+    asked = Asked(program, output, report)
+    asked.check(after.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import convert_program
 
@@ -67,23 +62,4 @@ def convert(
         feed_mm_min=feed_mm_min,
         check=not no_verify,
     )
-    say_findings(made.findings, quiet=quiet, verbose=verbose)
-    if made.failed or made.program is None:
-        say(f"camtool: error: {program}: nothing was written; mend the errors above", quiet=False)
-        return 1
-    output = output or _name_for(program, made.program.extension)
-    check_writable([output, report], [program])
-    files = {output: made.program.data}
-    if report is not None and made.verification is not None:
-        files[report] = made.verification.report.to_json().encode()
-    write_all(files)
-    if made.verification is not None:
-        say(made.verification.report.to_text(findings=False), quiet=quiet)
-    where = "stdout" if output == STDOUT else output
-    say(f"written: {where} ({len(made.program.data)} bytes)", quiet=quiet)
-    return 0
-
-
-def _name_for(program: str, extension: str) -> str:
-    """The new program's name when none is given: the old one's, here; stdin goes to stdout."""
-    return STDOUT if program == STDOUT else Path(program).stem + extension
+    return finish(made, asked, quiet=quiet, verbose=verbose)

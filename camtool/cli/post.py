@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.drawing import DrawingFlags, drawing_options
+from camtool.cli.finish import Asked, finish
 from camtool.cli.options import (
     JobFlags,
     MachineFlags,
@@ -15,8 +16,7 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
-from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.talk import say_first_run
 from camtool.cli.types import picture as picture_name
 
 if TYPE_CHECKING:
@@ -59,13 +59,9 @@ def post(
     and mechanics, and compared with the drawing. Exit code 1 (and no file) when something is
     wrong.
     """
-    if no_verify and report is not None:
-        raise click.UsageError(
-            "--json is the report of the verification that --no-verify leaves out"
-        )
     target = machine.load()
-    expected = output or _name_for(source, target.machine.target.extension)
-    check_writable([expected, preview, report], [source])
+    asked = Asked(source, output, report, preview)
+    asked.check(target.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import post_drawing
 
@@ -73,29 +69,13 @@ def post(
     wanted = job.job(drawing)
     read = drawing.read(source, target.machine, wanted)
     posted = post_drawing(read, wanted, target, check=not no_verify)
-    say_findings(posted.findings, quiet=quiet, verbose=verbose)
-    if posted.failed or posted.program is None:
-        say(f"camtool: error: {source}: nothing was written; mend the errors above", quiet=False)
-        return 1
-    # A dialect of several forms (binary, listing) says only now which extension it takes.
-    output = output or _name_for(source, posted.program.extension)
-    check_writable([output, preview, report], [source])
-    files = {output: posted.program.data}
-    if preview is not None:
-        files[preview] = _picture(preview, read, wanted, posted, target)
-    if report is not None and posted.verification is not None:
-        files[report] = posted.verification.report.to_json().encode()
-    write_all(files)
-    if posted.verification is not None:
-        say(posted.verification.report.to_text(findings=False), quiet=quiet)
-    where = "stdout" if output == STDOUT else output
-    say(f"written: {where} ({len(posted.program.data)} bytes)", quiet=quiet)
-    return 0
-
-
-def _name_for(source: str, extension: str) -> str:
-    """The program's name when none is given: the drawing's, here; stdin goes to stdout."""
-    return STDOUT if source == STDOUT else Path(source).stem + extension
+    return finish(
+        posted,
+        asked,
+        quiet=quiet,
+        verbose=verbose,
+        picture=lambda name: _picture(name, read, wanted, posted, target),
+    )
 
 
 def _picture(name: str, drawing: Drawing, job: Job, posted: Posted, target: LoadedTarget) -> bytes:
