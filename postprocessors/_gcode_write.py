@@ -9,9 +9,11 @@ anywhere. Comment lines and `%` are lines, but no blocks.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from importlib.metadata import version
 
+import msgspec
 import numpy as np
 
 from camtool.errors import PostError
@@ -107,7 +109,7 @@ def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[s
 
 
 def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[str]:
-    """Comment lines: the tool, the machine, units, and how far the program reaches."""
+    """Comment lines: the tool, machine, drawing and units, and how far the program reaches."""
     if dialect.comments == "none":
         return []
     style = NumberStyle(dialect.decimals)
@@ -115,12 +117,19 @@ def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list
         f"{axis} {' to '.join(say_column(reach, style))}"
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
     ]
+    made = [toolpath.made_from, f"settings {_digest(machine)}"] if toolpath.made_from else []
     lines = [
         f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
+        *made,
         "mm and mm/min - part zero at X0 Y0 Z0",
         *bounds,
     ]
     return [comment(line) for line in lines]
+
+
+def _digest(machine: Machine) -> str:
+    """Eight signs that change with any value of the machine."""
+    return hashlib.sha256(msgspec.json.encode(machine)).hexdigest()[:8]
 
 
 def _with_comments(

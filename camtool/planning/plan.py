@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import PurePath
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
@@ -53,7 +54,7 @@ def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
             )
         )
     findings.extend(_out_of_travel(toolpath, machine))
-    return replace(toolpath, findings=tuple(findings))
+    return replace(toolpath, findings=tuple(findings), made_from=PurePath(drawing.file).name)
 
 
 def _out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:

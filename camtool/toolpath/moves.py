@@ -63,8 +63,8 @@ class Toolpath:
     kind (N,) of Kind; end (N, 3) mm (an event repeats the position); centre (N, 2) mm, NaN where
     no arc; feed (N,) mm/min, NaN for rapids and events; value (N,), NaN where none; source (N,)
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
-    program block that the row was read from, −1 when planned; start (3,) mm. ValueError when
-    columns disagree.
+    program block that the row was read from, −1 when planned; start (3,) mm; `made_from` the name
+    of the drawing, "" when nobody knows. ValueError when columns disagree.
     """
 
     kind: Ints
@@ -77,6 +77,7 @@ class Toolpath:
     start: Floats
     texts: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    made_from: str = ""
 
     def __post_init__(self) -> None:
         count = len(self.kind)
