@@ -18,7 +18,9 @@ from camtool.toolpath.moves import Kind, Toolpath
 pytestmark = pytest.mark.benchmark
 MOVES = 100_000
 TEXT_TARGETS = [
-    name for name in ("grbl", "linuxcnc", "flashcut", "valcnc") if name in target_names()
+    name
+    for name in ("flashcut", "grbl", "linuxcnc", "pic-mmh", "valcnc")
+    if name in target_names()
 ]
 WORD = re.compile(r"([A-Z])(-?\d+(?:\.\d+)?)")
 
