@@ -2,7 +2,8 @@
 
 A run grows from its first point by doubling and then bisection, so n points cost O(n log n); every
 test of a run is a least-squares circle about the run's own middle (Kåsa's, which is linear:
-minimise Σ (x² + y² − 2ax − 2by − c)²). `tests/oracles/recognise.py` explodes arcs and judges what comes back.
+minimise Σ (x² + y² − 2ax − 2by − c)²). `tests/oracles/recognise.py` explodes arcs and judges what
+comes back.
 """
 
 from __future__ import annotations
