@@ -74,14 +74,14 @@ class Joints:
     branches: tuple[tuple[int, int], ...]
 
     def named(self, ends: Ends, layers: Sequence[str]) -> tuple[Branch, ...]:
-        """The branches with their places, in the order of place."""
+        """The branches with their places, in the order of place, layer and size."""
         found = [
             Branch(
                 (float(ends.points[end, 0]), float(ends.points[end, 1])), size, layers[end // 2]
             )
             for end, size in self.branches
         ]
-        return tuple(sorted(found, key=lambda branch: branch.at_mm))
+        return tuple(sorted(found, key=lambda branch: (branch.at_mm, branch.layer, branch.ends)))
 
 
 def joints(ends: Ends, reach: float) -> Joints:

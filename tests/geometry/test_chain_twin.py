@@ -48,7 +48,8 @@ def test_it_equals_the_twin(paths: list[Polyline], random: Random, gap: float) -
     for path, (_, other) in zip(found.lines, wanted.paths, strict=True):
         assert path.vertices == pytest.approx(other.vertices, abs=1e-12)
     assert sorted(g.size_mm for g in found.closed_gaps) == pytest.approx(sorted(wanted.gaps))
-    assert [(b.at_mm, b.ends) for b in found.branches] == wanted.branches
+    # Branches of two groups may stand at one place.
+    assert sorted((b.at_mm, b.ends) for b in found.branches) == sorted(wanted.branches)
 
 
 def shapes(found: Chained) -> list[tuple[bool, float, float]]:
