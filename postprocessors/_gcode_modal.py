@@ -199,7 +199,7 @@ class ModalReader:
         if motion is None or motion == G.NO_MOTION:
             if axes:
                 block.fail("coordinates, and no motion word in force", mend="write G0 or G1")
-        elif not axes:
+        elif not axes and not self._is_circle(motion, numbers, said=said):
             if motion > G.LINE and said:
                 block.fail("an arc without X or Y", mend="say where it ends")
         elif motion == G.RAPID:
@@ -210,6 +210,11 @@ class ModalReader:
             self.path.line(*to, feed=self._feed)
         else:
             self._arc(block, motion == G.ARC_CCW, to, numbers)
+
+    def _is_circle(self, motion: int, numbers: dict[str, float], *, said: bool) -> bool:
+        """Whether a block without X, Y and Z is a full circle about its I and J."""
+        has_centre = "I" in numbers or "J" in numbers
+        return self._rules.circle_without_end and motion > G.LINE and said and has_centre
 
     def _arc(self, block: Block, ccw: bool, to: list[float], numbers: dict[str, float]) -> None:
         """G2 and G3, by centre or by radius, flat or helical."""

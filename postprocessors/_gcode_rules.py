@@ -61,6 +61,7 @@ class Rules:
     `refused`: codes ("G55", "M6") that the controller knows but that have no place in a program
     here, and why. `first_motion`: the motion mode before any word says one (None: none).
     `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
+    `circle_without_end`: an arc that says only its centre is a full circle.
     `tools`: "change" (M6), "pause" (M0 beside a T word), or "none"; T words go up to `most_tool`.
     """
 
@@ -70,5 +71,6 @@ class Rules:
     arc_fault: Callable[[float, float], str]
     full_turn_rad: float
     chord_slack_mm: float
+    circle_without_end: bool = False
     tools: str = "none"
     most_tool: int = 99_999

@@ -36,6 +36,7 @@ LINE_CHARS: Final = 4096
 _NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?+|\.\d++)"
 _COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
 _ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
+_CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _LINE_END: Final = re.compile(r"\r\n|\n|\r")
 
 # What a sign means that begins no word: (message, mend).
@@ -60,7 +61,8 @@ class Lexing:
     spaces and tabs "anywhere" (even inside a number), "between" words (and around them), or
     "none". `parentheses`, `semicolon`: comments of that sign. `block_numbers`: a leading N word.
     `percent`: lines of a lone %. `line_chars`: longest line; `counts_blanks` tells whether blanks
-    and comments count for it (the controller may drop them as they come in).
+    and comments count for it (the controller may drop them as they come in). `foreign_comments`:
+    comments may hold signs beyond ASCII (grbl takes such bytes for commands, even there).
     """
 
     letters: str
@@ -73,6 +75,7 @@ class Lexing:
     line_chars: int = LINE_CHARS
     counts_blanks: bool = True
     comment_lines: bool = False
+    foreign_comments: bool = False
 
 
 class Block:
@@ -125,18 +128,20 @@ def blocks_of(data: bytes, lexing: Lexing) -> Iterator[Block]:
     """The blocks of a program one by one; ProgramError at the first that is none."""
     line_of_words, word = _patterns(lexing)
     index = 0
-    for number, raw in enumerate(_lines(data), 1):
-        text = raw.upper() if lexing.lower_case else raw
+    for number, raw in enumerate(_lines(data, lexing), 1):
+        text = raw
         comments: tuple[str, ...] = ()
         if "(" in text or ";" in text or ")" in text:
             comments = _comments(raw, index, number, lexing)
             text = _blanked(text, lexing)
+        if lexing.lower_case and text.isascii():
+            text = text.upper()
         if lexing.blanks == "anywhere":
             text = text.replace(" ", "").replace("\t", "")
         if len(raw if lexing.counts_blanks else text) > lexing.line_chars:
             message = f"the line has more than {lexing.line_chars} characters"
             raise _error(message, index, number, lexing.line_chars + 1, "shorten it")
-        if line_of_words.fullmatch(text) is None:
+        if not text.isascii() or line_of_words.fullmatch(text) is None:
             if lexing.percent and raw.strip() == "%":
                 continue
             raise _fault(raw, index, number, lexing)
@@ -160,17 +165,21 @@ def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
     return re.compile(line), re.compile(rf"([{letters}])({_NUMBER})")
 
 
-def _lines(data: bytes) -> list[str]:
-    """The lines; ProgramError at the first byte that is no printable ASCII, tab or line end."""
-    odd = _ODD.search(data)
+def _lines(data: bytes, lexing: Lexing) -> list[str]:
+    """The lines; ProgramError at the first byte that is no printable ASCII, tab or line end.
+
+    Where comments may hold other signs, each of their bytes stands as one: columns count bytes.
+    """
+    odd = (_CONTROL if lexing.foreign_comments else _ODD).search(data)
     if odd:
-        before = _LINE_END.split(data[: odd.start()].decode("ascii"))
+        before = _LINE_END.split(data[: odd.start()].decode("latin-1"))
         raise ProgramError(
             f"the byte 0x{data[odd.start()]:02x} belongs to no program",
             where=f"line {len(before)}, column {len(before[-1]) + 1}",
             mend="give a program of plain ASCII text",
         )
-    return data.decode("ascii").splitlines()
+    lines = _LINE_END.split(data.decode("latin-1"))
+    return lines if lines[-1] else lines[:-1]
 
 
 def _place(index: int, line: int, column: int) -> str:
@@ -203,7 +212,8 @@ def _comments(raw: str, index: int, line: int, lexing: Lexing) -> tuple[str, ...
     if odd:
         message = "a comment that is nested or not closed"
         raise _error(message, index, line, odd.start() + 1, "one ( and one ) for each comment")
-    return tuple(one[2] if one[1] is None else one[1] for one in found)
+    texts = (one[2] if one[1] is None else one[1] for one in found)
+    return tuple(text.encode("latin-1").decode("utf-8", errors="replace") for text in texts)
 
 
 def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:

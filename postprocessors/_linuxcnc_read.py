@@ -64,6 +64,7 @@ def read_linuxcnc(data: bytes, machine: Machine) -> Toolpath:
         percent=True,
         line_chars=dialect.line_chars,
         comment_lines=True,
+        foreign_comments=True,
     )
     reader = ModalReader(machine, rules_of(dialect))
     empty = True
@@ -100,5 +101,6 @@ def rules_of(dialect: Dialect) -> Rules:
         arc_fault=arc_fault,
         full_turn_rad=dialect.arc_full_turn_rad,
         chord_slack_mm=dialect.arc_chord_slack_mm,
+        circle_without_end=True,
         tools="change",
     )

@@ -194,7 +194,7 @@ BAD = [
     ("G1 X1 F0\n", 1, 7, "a feed that is not above 0"),
     ("G1 X1 F-5\n", 1, 7, "a feed that is not above 0"),
     ("F9 G2 X1 Y1\n", 1, 1, "without I, J or R"),
-    ("F9 G2 I1\n", 1, 1, "without X or Y"),
+    ("F9 G2\n", 1, 1, "without X or Y"),
     ("F9 G2 X0 Y0 R1\n", 1, 13, "has no centre"),
     ("F9 G2 X5 Y0 R1\n", 1, 13, "more than the radius"),
     ("F9 G2 X5 Y0 R5 I2\n", 1, 13, "by its radius and by its centre"),
@@ -356,3 +356,29 @@ def test_noise_is_read_or_refused(name: str, data: bytes) -> None:
 @pytest.mark.parametrize("name", TARGETS)
 def test_ten_megabytes_on_one_line_are_refused(name: str) -> None:
     assert outcome(b"G0 X1 Y1 " * 1_200_000, name).startswith("block 1, line 1, column")
+
+
+def test_foreign_signs_stand_in_comments_of_linuxcnc_alone() -> None:
+    text = "G21 G0 X1 (größer)\nM2\n".encode()
+    linuxcnc, grbl = load_target("linuxcnc"), load_target("grbl")
+    assert linuxcnc.post.read(text, linuxcnc.machine).end[0, 0] == 1.0
+    # grbl takes bytes above 7F for commands wherever they stand.
+    with pytest.raises(ProgramError, match="0xc3 belongs to no program"):
+        grbl.post.read(text, grbl.machine)
+    for outside in ("G0 Xß1\n", "G0 X1ß\n", "Gß0\n", "µ\n", "\x85G0 X1\n"):
+        with pytest.raises(ProgramError) as caught:
+            linuxcnc.post.read(outside.encode(), linuxcnc.machine)
+        assert "line 1, column" in str(caught.value.where)
+
+
+def test_a_circle_may_say_its_centre_alone_in_linuxcnc() -> None:
+    text = b"G21 F100 G0 X1\nG3 I2\nM2\n"
+    linuxcnc, grbl = load_target("linuxcnc"), load_target("grbl")
+    path = linuxcnc.post.read(text, linuxcnc.machine)
+    assert path.centre[1].tolist() == [3.0, 0.0]
+    assert path.sweeps()[1] == pytest.approx(6.283185307)
+    with pytest.raises(ProgramError, match="an arc without X or Y"):
+        grbl.post.read(text, grbl.machine)
+    for bad in (b"G21 F100 G3 R2\nM2\n", b"G21 F100 G3\nM2\n", b"G21 F100 G1 I2\nM2\n"):
+        with pytest.raises(ProgramError):
+            linuxcnc.post.read(bad, linuxcnc.machine)

@@ -95,6 +95,8 @@ FOREIGN = [
 ]
 ONLY_LINUXCNC = [
     "G90.1 F100 G0 X10 Y5\nG2 X0 Y5 I5 J5\nG91.1 G3 X10 Y5 I5\nM2",
+    "G21 G17 F100\nG0 X1 Y1\nG2 I0.5 J0.5\nG3 J-2\nG1 X3\nM2",
+    "G21 F100 (Fräsen µ ⌀)\nG1 X3 ; größer\nM2",
     "G64 P.02 Q.01 G0 X1\nG97 S100 M3\nG98 X2\nM2",
 ]
 
