@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, BinaryIO, Protocol, cast
 
 from camtool.errors import DrawingError
 from camtool.importers.options import DEFAULTS, ReadOptions
-from camtool.importers.read_format import BINARY_DXF, find_format
+from camtool.importers.read_format import find_format
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
-__all__ = ["BINARY_DXF", "MAX_FILE_BYTES", "STDIN", "find_format", "read_bytes", "read_drawing"]
+__all__ = ["MAX_FILE_BYTES", "STDIN", "find_format", "read_bytes", "read_drawing"]
 
 MAX_FILE_BYTES = 500_000_000
 """A larger file is refused before it is read: its drawing would not fit into memory."""

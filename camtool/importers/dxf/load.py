@@ -23,7 +23,6 @@ from typing import Any
 from camtool.errors import DrawingError
 from camtool.importers.dxf.tags import (
     AGAIN,
-    BINARY_DXF,
     Frame,
     Tags,
     ascii_tags,
@@ -33,6 +32,7 @@ from camtool.importers.dxf.tags import (
     header_of,
     lost,
 )
+from camtool.importers.read_format import BINARY_DXF
 
 MAX_BYTES = 100_000_000
 """Larger files are refused."""

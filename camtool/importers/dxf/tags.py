@@ -18,8 +18,6 @@ import numpy as np
 from camtool.errors import DrawingError
 from camtool.geometry.polylines import Ints
 
-BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
-
 AGAIN = "export it again from the program that made it, best as DXF R2000 or later"
 
 LARGEST_CODE, UNUSED_CODES = 1071, range(482, 999)

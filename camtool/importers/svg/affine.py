@@ -88,13 +88,6 @@ def scaling(x: float, y: float) -> Affine:
     return Affine(a=x, d=y)
 
 
-def parse_number(text: str, name: str) -> float:
-    """One number; DrawingError naming the attribute."""
-    if not NUMBER.fullmatch(text):
-        raise DrawingError(f"{name} {short(text)} is no number")
-    return in_bounds(float(text), name)
-
-
 def in_bounds(value: float, name: str) -> float:
     """The number itself; DrawingError when it belongs to no drawing."""
     if not abs(value) <= MAX_NUMBER:
