@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import Floats, Polyline
+from camtool.geometry.measure import path_lengths, sample
+from camtool.geometry.polylines import Floats, Polylines
 
 MARKS = 1024
 """About how many points of a source stand for it where only an upper bound is asked for."""
@@ -14,9 +14,10 @@ POINTS_AT_A_TIME = 256
 """How many points are measured at a time: it bounds the memory."""
 
 
-def marks_of(p: Polyline) -> Floats:
-    """(M, 2) points all along the path, M from half of MARKS to twice that."""
-    points = sample(p, length(p) / MARKS)
+def marks_of(lines: Polylines) -> Floats:
+    """(M, 2) points all along the paths, M up to twice MARKS."""
+    step = float(path_lengths(lines).sum()) / MARKS
+    points = np.concatenate([sample(p, step) for p in lines])
     return points[:: max(1, len(points) // MARKS)]
 
 

@@ -43,3 +43,6 @@ class OffsetOptions:
                 f"sliver_eps_mm of {self.sliver_eps_mm} is below {POSITION_EPS_MM}",
                 mend="no polyline has shorter segments",
             )
+
+
+DEFAULT_OPTIONS = OffsetOptions()

@@ -1,42 +1,15 @@
-"""The stages of an offset in their order."""
+"""Offsets of single paths, closed or open."""
 
 from __future__ import annotations
-
-import math
-from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from camtool.errors import GeometryError
-from camtool.geometry.intersect import self_crossings
-from camtool.geometry.offset.options import OffsetOptions
-from camtool.geometry.offset.raw import RawOffset, raw_offset
-from camtool.geometry.offset.slices import Slices, slice_elements, valid_slices
-from camtool.geometry.offset.stitch import (
-    clean_path,
-    path_of,
-    trace_loops,
-    without_dead_ends,
-    without_doubles,
-)
-from camtool.geometry.offset.trim import trim_raw
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polyline, Segments
+from camtool.geometry.offset.options import DEFAULT_OPTIONS, OffsetOptions
+from camtool.geometry.offset.shape import Stages, cleaned, is_nothing, shape_stages
+from camtool.geometry.offset.stitch import path_of
+from camtool.geometry.polylines import Bools, Ints, Polyline, Polylines
 from camtool.geometry.transform import reverse
-
-DEFAULT_OPTIONS = OffsetOptions()
-
-
-@dataclass(frozen=True, eq=False)
-class Stages:
-    """What each stage of one offset to the left gave: to print, to draw, to test."""
-
-    raw: RawOffset
-    trimmed: RawOffset
-    slices: Slices
-    valid: Bools
-    kept: Slices
-    loops: list[Ints]
 
 
 def offset(
@@ -51,14 +24,14 @@ def offset(
     """
     if not p.closed:
         return offset_open(p, distance_mm, options=options)
-    if _is_nothing(distance_mm):
+    if is_nothing(distance_mm):
         return [p]
     if distance_mm < 0.0:
         return [reverse(r) for r in offset(reverse(p), -distance_mm, options=options)]
     stages = offset_stages(p, distance_mm, options=options)
     elements = stages.trimmed.elements
     found = (path_of(rows, stages.kept, elements, closed=True) for rows in stages.loops)
-    return _clean(((vertices, True) for vertices in found), options)
+    return cleaned(((vertices, True) for vertices in found), options)
 
 
 def offset_open(
@@ -72,7 +45,7 @@ def offset_open(
     """
     if p.closed:
         raise GeometryError("a closed path has no ends", mend="use offset()")
-    if _is_nothing(distance_mm):
+    if is_nothing(distance_mm):
         return [p]
     if distance_mm < 0.0:
         return [reverse(r) for r in offset_open(reverse(p), -distance_mm, options=options)]
@@ -86,27 +59,14 @@ def offset_open(
         for loop in stages.loops
         for run, closed in _runs(loop, ahead[kept.element[loop]])
     ]
-    return _clean(found, options)
+    return cleaned(found, options)
 
 
 def offset_stages(
     p: Polyline, distance_mm: float, *, options: OffsetOptions, both_sides: bool = False
 ) -> Stages:
-    """All stages of the offset of a closed path to the left, by a distance above 0.
-
-    `both_sides` says that the left of the path is all there is around it (`there_and_back`).
-    """
-    raw = raw_offset(p, distance_mm, options)
-    trimmed = trim_raw(raw, p, distance_mm, options)
-    elements, others = trimmed.elements, None
-    # Only where a path meets itself can what is on its right end what is on its left.
-    if not both_sides and len(self_crossings(Segments.of(p))):
-        right = raw_offset(reverse(p), distance_mm, options)
-        others = trim_raw(right, p, distance_mm, options).elements
-    slices = slice_elements(elements, others, options)
-    valid = valid_slices(slices, elements, p, distance_mm, options)
-    kept = without_dead_ends(without_doubles(slices[valid], elements, options))
-    return Stages(raw, trimmed, slices, valid, kept, trace_loops(kept, elements))
+    """All stages of the offset of a closed path to the left, by a distance above 0."""
+    return shape_stages(Polylines.of([p]), distance_mm, options=options, both_sides=both_sides)
 
 
 def there_and_back(p: Polyline) -> Polyline:
@@ -122,15 +82,3 @@ def _runs(loop: Ints, ahead: Bools) -> list[tuple[Ints, bool]]:
     loop, ahead = np.roll(loop, -begin), np.roll(ahead, -begin)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], ahead.astype(np.int64), [0]])))
     return [(loop[low:high], False) for low, high in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _clean(found: Iterable[tuple[Floats, bool]], options: OffsetOptions) -> list[Polyline]:
-    paths = (clean_path(vertices, closed, options) for vertices, closed in found)
-    return [path for path in paths if path is not None]
-
-
-def _is_nothing(distance_mm: float) -> bool:
-    """True for a distance that moves nothing; GeometryError when it is not finite."""
-    if not math.isfinite(distance_mm):
-        raise GeometryError(f"an offset of {distance_mm} mm is not finite")
-    return abs(distance_mm) <= POSITION_EPS_MM

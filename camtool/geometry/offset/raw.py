@@ -8,7 +8,7 @@ import numpy as np
 
 from camtool.geometry.frames import Frames, dot, turned
 from camtool.geometry.offset.options import CUSP_EPS_RAD, OffsetOptions
-from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Segments
+from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,14 +21,14 @@ class RawOffset:
     join: Bools
 
 
-def raw_offset(p: Polyline, distance_mm: float, options: OffsetOptions) -> RawOffset:
-    """All that lies at `distance_mm` > 0 to the left of a closed path, and much that is nearer.
+def raw_offset(lines: Polylines, distance_mm: float, options: OffsetOptions) -> RawOffset:
+    """All that lies at `distance_mm` > 0 to the left of closed paths, and much that is nearer.
 
     An arc that bends left with a radius up to the distance has nothing there: every point beyond
     its centre is nearer to another of its points. Inner corners need no join: the elements
     beside them cross, there or elsewhere.
     """
-    segments = Segments.of(p)
+    segments = Segments.of(lines)
     frames = Frames.of(segments)
     end_tangent = frames.tangent_at(np.ones(len(segments)))
     start = segments.start + distance_mm * frames.normal
@@ -38,7 +38,7 @@ def raw_offset(p: Polyline, distance_mm: float, options: OffsetOptions) -> RawOf
 
     rows = np.arange(len(segments))
     shifted = Segments.between(start[keep], end[keep], segments.bulge[keep])
-    corner, joins = _joins(frames, end_tangent, distance_mm, options)
+    corner, joins = _joins(frames, frames.tangent[_following(lines)], distance_mm, options)
     source = np.concatenate([rows[keep], corner])
     join = np.repeat([False, True], [len(shifted), len(joins)])
     order = np.lexsort([join, source])
@@ -51,14 +51,14 @@ def raw_offset(p: Polyline, distance_mm: float, options: OffsetOptions) -> RawOf
 
 
 def _joins(
-    frames: Frames, end_tangent: Floats, distance_mm: float, options: OffsetOptions
+    frames: Frames, tangent: Floats, distance_mm: float, options: OffsetOptions
 ) -> tuple[Ints, Segments]:
     """Arcs about the outer corners, and the segment before each; two where one is above π.
 
     Where a path turns straight back, rounding alone says whether it turns left or right. It is
     then taken to turn right: an arc too much is invalid, or leads nowhere, and goes later.
     """
-    tangent = np.roll(frames.tangent, -1, axis=0)
+    end_tangent = frames.tangent_at(np.ones(len(tangent)))
     turn = np.arctan2(dot(turned(end_tangent), tangent), dot(end_tangent, tangent))
     turn = np.where(turn >= np.pi - CUSP_EPS_RAD, turn - 2.0 * np.pi, turn)
     parts = np.where(turn < -np.pi, 2, np.where(turn < 0.0, 1, 0))
@@ -75,6 +75,13 @@ def _joins(
     long = _longer(start, end, options.node_eps_mm)
     arcs = Segments.between(start[long], end[long], np.tan(0.25 * sweep[long]))
     return corner[long], arcs
+
+
+def _following(lines: Polylines) -> Ints:
+    """The row of the segment after each one of closed paths."""
+    following = np.arange(1, len(lines.vertices) + 1)
+    following[lines.offsets[1:] - 1] = lines.offsets[:-1]
+    return following
 
 
 def _rotated(vectors: Floats, angle: Floats) -> Floats:

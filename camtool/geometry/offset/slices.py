@@ -11,7 +11,7 @@ from camtool.geometry.intersect import Crossings, crossings, self_crossings
 from camtool.geometry.measure import point_at
 from camtool.geometry.offset.marks import at_most, marks_of
 from camtool.geometry.offset.options import OffsetOptions
-from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Segments
+from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
 
 MIDDLE = (0.5,)
 ALONG = (0.03, 0.2, 0.35, 0.65, 0.8, 0.97)
@@ -114,16 +114,20 @@ def _groups(count: int, one: Ints, two: Ints) -> Ints:
 
 
 def valid_slices(
-    slices: Slices, elements: Segments, p: Polyline, distance_mm: float, options: OffsetOptions
+    slices: Slices,
+    elements: Segments,
+    lines: Polylines,
+    distance_mm: float,
+    options: OffsetOptions,
 ) -> Bools:
-    """(S,) true where no measured point is nearer to the source p than the distance − eps.
+    """(S,) true where no measured point is nearer to the source than the distance − eps.
 
     The raw offset changes between valid and invalid only where it meets itself, so that one point
     would do; several guard against slices that are hardly too near anywhere.
     """
     least = distance_mm - options.validity_eps_mm
-    valid = at_most(_points(slices, elements, MIDDLE), marks_of(p)) >= least
-    source = Segments.of(p)
+    valid = at_most(_points(slices, elements, MIDDLE), marks_of(lines)) >= least
+    source = Segments.of(lines)
     for fractions in (MIDDLE, ALONG):
         rows = np.flatnonzero(valid)
         if len(rows) == 0:

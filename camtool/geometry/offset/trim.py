@@ -8,7 +8,7 @@ from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.offset.marks import at_most, marks_of
 from camtool.geometry.offset.options import OffsetOptions
 from camtool.geometry.offset.raw import RawOffset
-from camtool.geometry.polylines import Floats, Polyline, Segments
+from camtool.geometry.polylines import Floats, Polylines, Segments
 
 TRIM_ROUNDS = 12
 """How often the ends of an element are moved on, at most."""
@@ -17,8 +17,10 @@ TRIM_STEP_SHARE = 0.02
 """An end that moves on by less than this share of the distance is left where it is."""
 
 
-def trim_raw(raw: RawOffset, p: Polyline, distance_mm: float, options: OffsetOptions) -> RawOffset:
-    """The raw offset of p without what is surely too near at both ends of each element.
+def trim_raw(
+    raw: RawOffset, lines: Polylines, distance_mm: float, options: OffsetOptions
+) -> RawOffset:
+    """The raw offset of the paths without what is surely too near at both ends of each element.
 
     The distance from the source changes by no more than the way along an element: where it falls
     short by s, all is too near for the length s from there. The distance from some points of the
@@ -27,7 +29,7 @@ def trim_raw(raw: RawOffset, p: Polyline, distance_mm: float, options: OffsetOpt
     elements where the distance is large against them.
     """
     elements = raw.elements
-    marks = marks_of(p)
+    marks = marks_of(lines)
     lengths = segment_lengths(elements)
     low, high = np.zeros(len(elements)), np.ones(len(elements))
     for end, forth in ((low, 1.0), (high, -1.0)):
