@@ -1,53 +1,54 @@
-"""Contours linked to one toolpath: up, across, down, cut, and so on; home at the end."""
+"""Runs linked to one toolpath: up, across, down, cut, and so on; home at the end."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from camtool.errors import OptionError
-from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.planning.arcs import cuts
-from camtool.planning.job import Job
+from camtool.planning.items import Feeds, Run
+from camtool.planning.job import Job, Operation, Tool
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
 FEED_TOLERANCE = 1e-9
 """A feed may exceed the highest one by this part of it: by rounding alone."""
 
-
-@dataclass(frozen=True)
-class Heights:
-    """Z above the stock for rapids, and of the cut below it, mm; part zero lies on the stock."""
-
-    safe_z_mm: float
-    cut_z_mm: float
+Approach = Callable[[Run], tuple[float, float] | None]
+"""Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
 
 
-@dataclass(frozen=True)
-class Feeds:
-    """Feeds of cuts and of plunges, mm/min."""
+@dataclass(frozen=True, eq=False)
+class Worked:
+    """The runs of one operation, in order of cutting."""
 
-    cut_mm_min: float
-    plunge_mm_min: float
-
-
-def heights_of(job: Job, machine: Machine) -> Heights:
-    """The job's heights, or the machine's where the job is silent."""
-    safe = machine.defaults.safe_z_mm if job.safe_z_mm is None else job.safe_z_mm
-    depth = machine.defaults.cut_depth_mm if job.depth_mm is None else job.depth_mm
-    return Heights(safe, -depth)
+    operation: Operation
+    runs: Sequence[Run]
 
 
-def feeds_of(job: Job, machine: Machine) -> Feeds:
-    """The job's feeds, or the machine's; OptionError naming the highest feed when above it.
+def safe_z_of(job: Job, machine: Machine) -> float:
+    """The job's height of rapids above the stock, or the machine's, mm."""
+    return machine.defaults.safe_z_mm if job.safe_z_mm is None else job.safe_z_mm
 
-    Plunges that the job is silent about run at the feed of the cut, or at the highest that Z can.
+
+def depth_of(operation: Operation, machine: Machine) -> float:
+    """The operation's depth of cut below the stock top, or the machine's, mm."""
+    return machine.defaults.cut_depth_mm if operation.depth_mm is None else operation.depth_mm
+
+
+def feeds_of(operation: Operation, machine: Machine) -> Feeds:
+    """The operation's feeds, or the machine's; OptionError naming the highest when above it.
+
+    Plunges that nobody speaks of run at the feed of the cut, or at the highest that Z can.
     """
-    cut = machine.feed.default_mm_min if job.feed_mm_min is None else job.feed_mm_min
-    plunge = cut if job.plunge_feed_mm_min is None else job.plunge_feed_mm_min
-    if job.plunge_feed_mm_min is None and _above(cut, machine.max_plunge_mm_min):
+    said = operation.plunge_feed_mm_min
+    cut = operation.feed_mm_min
+    cut = machine.feed.default_mm_min if cut is None else cut
+    plunge = cut if said is None else said
+    if said is None and _above(cut, machine.max_plunge_mm_min):
         plunge = _sayable(machine.max_plunge_mm_min, machine)
     for name, flag, feed, highest in (
         ("feed", "--feed", cut, machine.max_feed_mm_min),
@@ -73,34 +74,57 @@ def _sayable(highest_mm_min: float, machine: Machine) -> float:
 
 
 def link(
-    paths: Sequence[Polyline],
-    names: Sequence[str],
-    job: Job,
-    heights: Heights,
-    feeds: Feeds,
+    worked: Sequence[Worked], safe_z_mm: float, approach: Approach | None = None
 ) -> ToolpathBuilder:
-    """All moves of a program: the tool starts at part zero on the stock and ends above it.
-
-    Each path is cut in one pass as it runs; `names` are the provenance of their rows.
-    """
-    builder = ToolpathBuilder().rapid(z=heights.safe_z_mm)
-    if job.spindle_rpm is not None:
-        builder.event(Kind.SPINDLE_CW, job.spindle_rpm)
-    for path, name in zip(paths, names, strict=True):
-        builder.source = name
-        _cut_one(builder, path, heights, feeds)
+    """All moves of a program: the tool starts at part zero on the stock and ends above it."""
+    builder = ToolpathBuilder().rapid(z=safe_z_mm)
+    tool: Tool | None = None
+    speed: float | None = None
+    for each in worked:
+        if not each.runs:
+            continue
+        builder.source = ""
+        if _changes(tool, each.operation.tool):
+            speed = _spin(builder, speed, None)
+            builder.event(Kind.TOOL_CHANGE, float(each.operation.tool.number or 0))
+        tool = each.operation.tool
+        speed = _spin(builder, speed, each.operation.spindle_rpm)
+        for run in each.runs:
+            _cut_one(builder, run, safe_z_mm, approach)
     builder.source = ""
-    if job.spindle_rpm is not None:
-        builder.event(Kind.SPINDLE_OFF)
+    _spin(builder, speed, None)
     return builder.rapid(0.0, 0.0).event(Kind.END)
 
 
-def _cut_one(builder: ToolpathBuilder, path: Polyline, heights: Heights, feeds: Feeds) -> None:
-    x, y = path.start.tolist()
-    builder.rapid(x, y).line(z=heights.cut_z_mm, feed=feeds.plunge_mm_min)
-    for cut in cuts(path):
-        if cut.centre is None:
-            builder.line(*cut.end, feed=feeds.cut_mm_min)
+def _changes(before: Tool | None, tool: Tool) -> bool:
+    """Whether the machine must be told of this tool: it has a number, and another was in."""
+    return tool.number is not None and (before is None or before.number != tool.number)
+
+
+def _spin(builder: ToolpathBuilder, speed: float | None, wanted: float | None) -> float | None:
+    """Bring the spindle from one speed to another, None being off; the new speed."""
+    if wanted != speed:
+        builder.event(Kind.SPINDLE_OFF if wanted is None else Kind.SPINDLE_CW, wanted)
+    return wanted
+
+
+def _cut_one(
+    builder: ToolpathBuilder, run: Run, safe_z_mm: float, approach: Approach | None
+) -> None:
+    builder.source = run.name
+    x, y, z, _ = run.vertices[0].tolist()
+    before = approach(run) if approach is not None else None
+    if before is not None:
+        builder.rapid(*before)
+    builder.rapid(x, y).line(z=z, feed=run.plunge_mm_min)
+    for cut in cuts(run.vertices, run.feed_mm_min):
+        x, y, z = cut.end
+        if math.isnan(cut.feed):
+            builder.rapid(x, y, z)
+        elif cut.centre is None:
+            builder.line(x, y, z, feed=cut.feed)
         else:
-            builder.arc(*cut.end, centre=cut.centre, ccw=cut.ccw, feed=feeds.cut_mm_min)
-    builder.rapid(z=heights.safe_z_mm)
+            builder.arc(x, y, z=z, centre=cut.centre, ccw=cut.ccw, feed=cut.feed)
+    if run.dwell_s > 0.0:
+        builder.event(Kind.DWELL, run.dwell_s)
+    builder.rapid(z=safe_z_mm)

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.geometry.measure import length
-from camtool.geometry.polylines import Polyline
+from camtool.geometry.measure import length, segment_lengths
+from camtool.geometry.polylines import Polyline, Segments
 from camtool.geometry.transform import reverse
-from camtool.planning.arcs import Cut, cuts, joints
+from camtool.planning.arcs import Cut, joints
+from camtool.planning.arcs import cuts as cuts_of_run
 from tests.strategies import polylines
 
 
@@ -26,13 +27,24 @@ def _arcs(sweeps: list[float], closed: bool = False, radius: float = 2.0) -> Pol
     return Polyline(vertices[:-1] if closed else vertices, closed)
 
 
+def cuts(path: Polyline, rise: float = 0.0) -> list[Cut]:
+    """The cuts of a run along the path that climbs evenly by `rise`."""
+    vertices = np.insert(path.vertices, 2, 0.0, axis=1)
+    if path.closed:
+        vertices = np.concatenate([vertices, vertices[:1]])
+    segments = Segments.of(path)
+    share = np.cumsum(np.concatenate([[0.0], segment_lengths(segments)]))
+    vertices[:, 2] = rise * share / share[-1]
+    return list(cuts_of_run(vertices, np.full(len(vertices) - 1, 5.0)))
+
+
 @pytest.mark.parametrize("sweeps", [[180, 180], [120, 120, 120], [90, 180, 90], [20] * 18])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_circle_is_one_arc_that_ends_where_it_starts(sweeps: list[float], turned: bool) -> None:
     path = _arcs(sweeps, closed=True)
     path = reverse(path) if turned else path
     (cut,) = cuts(path)
-    assert cut.end == (3.0, 1.0)
+    assert cut.end == (3.0, 1.0, 0.0)
     assert cut.centre == pytest.approx((1.0, 1.0))
     assert cut.ccw is not turned
     assert joints(path).all()
@@ -43,7 +55,7 @@ def test_parts_of_one_arc_are_one_and_others_stay() -> None:
     other = Polyline(np.concatenate([first.vertices, [[9.0, 9.0, 0.0]]]))
     found = list(cuts(other))
     assert [cut.centre is None for cut in found] == [False, True]
-    assert found[0].end == pytest.approx(tuple(first.end))
+    assert found[0].end == pytest.approx((*first.end, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -63,7 +75,7 @@ def test_no_others_are_put_together(vertices: list[list[float]]) -> None:
 def test_an_open_path_round_and_round_is_never_a_whole_circle_by_mistake() -> None:
     found = list(cuts(_arcs([150, 150, 59.999, 150, 150])))
     assert len(found) == 3
-    ends = [(3.0, 1.0), *[cut.end for cut in found]]
+    ends = [(3.0, 1.0), *[cut.end[:2] for cut in found]]
     for start, end in pairwise(ends):
         assert math.dist(start, end) > 1e-3
 
@@ -82,22 +94,22 @@ def test_cuts_run_from_vertex_to_vertex_and_are_as_long_as_the_path(
     split = _split(path, parts)
     found = list(cuts(split))
     assert len(found) <= len(split)
-    assert found[-1].end == pytest.approx(tuple(path.end))
+    assert found[-1].end == pytest.approx((*path.end, 0.0))
     at = tuple(path.start.tolist())
     total = 0.0
     for cut in found:
         total += _length(at, cut)
-        at = cut.end
+        at = cut.end[:2]
     assert total == pytest.approx(length(path), rel=1e-6)
 
 
 def _length(start: tuple[float, ...], cut: Cut) -> float:
     if cut.centre is None:
-        return math.dist(start, cut.end)
+        return math.dist(start, cut.end[:2])
     begin = math.atan2(start[1] - cut.centre[1], start[0] - cut.centre[0])
     end = math.atan2(cut.end[1] - cut.centre[1], cut.end[0] - cut.centre[0])
     turn = (end - begin) * (1.0 if cut.ccw else -1.0) % (2.0 * math.pi)
-    return math.dist(start, cut.centre) * (turn if cut.end != start else 2.0 * math.pi)
+    return math.dist(start, cut.centre) * (turn if cut.end[:2] != start else 2.0 * math.pi)
 
 
 def _split(path: Polyline, parts: int) -> Polyline:
@@ -121,3 +133,26 @@ def _split(path: Polyline, parts: int) -> Polyline:
     if not path.closed:
         rows.append(vertices[-1])
     return Polyline(np.array(rows), path.closed)
+
+
+def test_a_helix_is_one_arc_for_each_turn() -> None:
+    once = _arcs([180, 180], closed=True).vertices
+    vertices = np.insert(np.concatenate([once, once, once[:1]]), 2, 0.0, axis=1)
+    vertices[:, 2] = [0.0, -1.0, -2.0, -3.0, -4.0]
+    found = list(cuts_of_run(vertices, np.full(4, 5.0)))
+    assert [cut.end for cut in found] == [(3.0, 1.0, -2.0), (3.0, 1.0, -4.0)]
+
+
+@pytest.mark.parametrize(
+    ("z", "feed", "count"),
+    [
+        ([0.0, -1.0, -2.0], [5.0, 5.0], 1),
+        ([0.0, -1.0, -1.0], [5.0, 5.0], 2),  # a ramp that ends on the way
+        ([0.0, -1.0, -2.0], [5.0, 6.0], 2),  # two feeds
+    ],
+)
+def test_arcs_of_other_slopes_and_feeds_stay(
+    z: list[float], feed: list[float], count: int
+) -> None:
+    vertices = np.insert(_arcs([60, 60]).vertices, 2, z, axis=1)
+    assert len(list(cuts_of_run(vertices, np.array(feed)))) == count

@@ -1,0 +1,121 @@
+"""What operations make and the order arranges: items, and the runs that they become.
+
+    operation ─▶ Work: items ─order─▶ items with start and direction ─▶ runs ─link─▶ moves
+
+An item is cut in one go, before or after others. A `Contour` leaves its start (and perhaps its
+direction) to the order; a `Fixed` item is cut as it is. A `Run` is one stay of the tool in the
+stock: it goes down at its first point and comes up at its last one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camtool.findings import Finding
+from camtool.geometry.polylines import Floats, Ints, Polyline, Polylines
+from camtool.planning.job import Operation
+
+RAPID = float("nan")
+"""The feed of a part of a run that is a rapid (a drill between two pecks)."""
+
+
+@dataclass(frozen=True)
+class Feeds:
+    """Feeds of cuts and of plunges, mm/min."""
+
+    cut_mm_min: float
+    plunge_mm_min: float
+
+
+@dataclass(frozen=True)
+class Setting:
+    """An operation with what the machine adds to it: feeds; `levels_mm`, the z of its passes,
+    downwards, the last at the full depth; `safe_z_mm` above the stock top (z = 0)."""
+
+    operation: Operation
+    feeds: Feeds
+    levels_mm: tuple[float, ...]
+    safe_z_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """`vertices` (n, 4) of x, y, z, bulge in mm, work frame, n ≥ 1; the bulge belongs to the move
+    that leaves its vertex (with a change of z it is a helix); `feed_mm_min` (n−1,), RAPID (NaN)
+    for a rapid. The tool comes down from safe z to the first vertex at the plunge feed of
+    `plunge_mm_min`, and up from the last one as a rapid. `name` is the provenance of its moves,
+    `dwell_s` is spent at the last vertex."""
+
+    vertices: Floats
+    feed_mm_min: Floats
+    plunge_mm_min: float
+    name: str
+    dwell_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        count = len(self.vertices)
+        if count == 0 or self.vertices.shape != (count, 4):
+            raise ValueError(f"vertices have shape {self.vertices.shape}, wanted (n, 4)")
+        if self.feed_mm_min.shape != (count - 1,):
+            raise ValueError(f"{len(self.feed_mm_min)} feeds for {count} vertices")
+        if not np.isfinite(self.vertices).all():
+            raise ValueError("a vertex is not finite")
+
+
+@dataclass(frozen=True, eq=False)
+class Contour:
+    """One line of the tool's middle, to be cut at all levels of its setting.
+
+    `path` runs as it is to be cut unless `reversible`. `starts`: the vertices of a closed path at
+    which it may begin; empty: any that is no joint within an arc. `source`: the index of its path
+    in the placed drawing. `material_left`: what is to stay lies to the left of the path as it
+    runs; False: to the right; None: on both sides (engraved).
+    """
+
+    path: Polyline
+    setting: Setting
+    name: str
+    source: int
+    reversible: bool = False
+    starts: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    material_left: bool | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """Runs that are cut one after the other as they are: a pocket, a hole, a carved letter.
+
+    `outline`: a closed path around it, when there is one, for the nesting.
+    """
+
+    runs: tuple[Run, ...]
+    setting: Setting
+    name: str
+    source: int = -1
+    outline: Polyline | None = None
+
+
+Item = Contour | Fixed
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """What an operation made of its paths, and what it noticed."""
+
+    items: tuple[Item, ...]
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """The paths that an operation takes, in the work frame: `lines`; `source` (M,), the index of
+    each in the placed drawing; `names` for people; `points` (K, 2) mm, the marks of its layers,
+    with their `point_names`."""
+
+    lines: Polylines
+    source: Ints
+    names: tuple[str, ...]
+    points: Floats
+    point_names: tuple[str, ...]
