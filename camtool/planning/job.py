@@ -13,6 +13,7 @@ from typing import Any
 
 from camtool.errors import OptionError
 from camtool.patterns import matches
+from camtool.planning.contradictions import refuse_operation, refuse_placement
 from camtool.planning.ranges import above_zero, all_above_zero, at_least_zero, finite, one_of
 
 KINDS = ("profile", "pocket", "engrave", "drill", "vcarve")
@@ -200,6 +201,7 @@ class Operation:
                 f"step-over {self.step_over:g} is not above 0 and at most 1",
                 mend="give the part of the tool's diameter that each way takes, such as 0.4",
             )
+        refuse_operation(self)
 
     def takes(self, layer: str, colour: str = "") -> bool:
         """Whether the paths of this layer and colour are cut."""
@@ -231,6 +233,7 @@ class Placement:
         finite("rotation", self.rotate_rad, "rad")
         above_zero("scale", self.scale, "")
         all_above_zero("copies", self.copies)
+        refuse_placement(self)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,67 @@
+"""Settings of a job that are fine one by one and cannot be together: OptionError names the key."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from camtool.errors import OptionError
+
+if TYPE_CHECKING:
+    from camtool.planning.job import Operation, Placement
+
+
+def refuse_operation(operation: Operation) -> None:
+    """Refuse an operation whose settings contradict one another."""
+    depth, last = operation.depth_mm, operation.last_pass_mm
+    if depth is not None and last is not None and last > depth:
+        raise OptionError(
+            f"the last pass of {last:g} mm is deeper than the whole cut of {depth:g} mm",
+            where=f"{_named(operation)}key last_pass",
+            mend="give a smaller last pass, or a larger depth",
+        )
+
+
+def refuse_placement(placement: Placement) -> None:
+    """Refuse a placement of numbers that are none, and of settings that contradict each other."""
+    if placement.fit_mm is not None:
+        _refuse_fit(placement.fit_mm)
+        if placement.scale != 1.0:
+            raise OptionError(
+                f"scale {placement.scale:g} and fit contradict each other",
+                where="key scale",
+                mend="give one of the two",
+            )
+    place = () if isinstance(placement.origin, str) else placement.origin
+    for key, numbers in (("pitch", placement.pitch_mm), ("origin", place)):
+        if not all(map(math.isfinite, numbers)):
+            raise OptionError(f"{numbers} are no lengths", where=f"key {key}")
+    for what, count, pitch in zip(
+        ("columns", "rows"), placement.copies, placement.pitch_mm, strict=True
+    ):
+        if count > 1 and pitch == 0.0:
+            raise OptionError(
+                f"{count} {what} of copies lie on one another",
+                where="key copies",
+                mend="give the pitch from one copy to the next",
+            )
+    if placement.copies == (1, 1) and any(placement.pitch_mm):
+        raise OptionError(
+            "a pitch, but no copies",
+            where="key pitch",
+            mend="give copies too, such as 3x2, or leave the pitch out",
+        )
+
+
+def _refuse_fit(fit_mm: tuple[float, float]) -> None:
+    sane = all(math.isfinite(room) and room >= 0.0 for room in fit_mm)
+    if not sane or not any(fit_mm):
+        raise OptionError(
+            f"nothing fits into {fit_mm[0]:g} by {fit_mm[1]:g} mm",
+            where="key fit",
+            mend="give a width and a height above 0, or one of them and 0 for any",
+        )
+
+
+def _named(operation: Operation) -> str:
+    return f"operation {operation.name!r}, " if operation.name else ""

@@ -1,0 +1,261 @@
+"""The drawing in the work frame: mirrored, turned, scaled, repeated, its zero where the job says.
+
+    mirror ──▶ rotate ──▶ scale or fit ──▶ copies at their pitch ──▶ origin
+
+Every point goes through one map, p ↦ M p + d, with M = s · R · F: the scale s, the rotation R and
+the mirror F. All three keep angles, so a bulge keeps its size; a mirror changes its sign.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camtool.errors import GeometryError, OptionError
+from camtool.geometry.drawing import Drawing, FitError, Gap, Healing
+from camtool.geometry.measure import extents
+from camtool.geometry.polylines import Floats, Polylines
+from camtool.planning.job import Job, Placement
+
+MOST_POINTS = 10_000_000
+"""No more vertices than this are made by copies: far beyond any program, well within memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Map:
+    """p ↦ `matrix` p + `shift`: (2, 2) and (2,), mm; lengths grow `scale` times."""
+
+    matrix: Floats
+    shift: Floats
+    scale: float
+
+    def points(self, points: Floats) -> Floats:
+        """Points (K, 2) mm where they come to lie."""
+        return np.asarray(points @ self.matrix.T + self.shift)
+
+    def point(self, at_mm: tuple[float, float]) -> tuple[float, float]:
+        """A single point."""
+        x, y = self.points(np.array([at_mm]))[0].tolist()
+        return x, y
+
+    def vertices(self, vertices: Floats) -> Floats:
+        """Vertices (N, 3) of x, y, bulge: the bulge changes its sign with the handedness."""
+        flipped = np.linalg.det(self.matrix) < 0.0
+        bulge = 0.0 - vertices[:, 2] if flipped else vertices[:, 2]
+        return np.column_stack([self.points(vertices[:, :2]), bulge])
+
+    def moved(self, shift: Floats) -> _Map:
+        """The same, and then moved by `shift` (2,) mm."""
+        return replace(self, shift=self.shift + shift)
+
+
+def place(drawing: Drawing, job: Job) -> Drawing:
+    """The drawing in the work frame, as the job's placement says; itself when nothing changes.
+
+    Copies come one after the other, row by row: all paths and marks of the first, then of the
+    second, whose sources say so ("CIRCLE 2F copy 2"). Fit, lower left and centre take the box
+    around all that the operations take. What was found on reading stays in the drawing's frame.
+    Raises OptionError for a fit that cannot be, and for a scale that leaves no shape.
+    """
+    placement = job.placement
+    if placement == Placement():
+        return drawing
+    first, shifts = _first_map(drawing, job), _copy_shifts(placement)
+    _refuse_too_many(drawing, placement)
+    first = first.moved(-_origin(drawing, job, first, shifts))
+    if len(shifts) == 1 and _is_identity(first):
+        return drawing
+    maps = [first.moved(shift) for shift in shifts]
+    return replace(
+        _repeated(drawing, maps),
+        fit=FitError(drawing.fit.max_mm * first.scale, drawing.fit.rms_mm * first.scale),
+    )
+
+
+def _first_map(drawing: Drawing, job: Job) -> _Map:
+    """Mirror, rotation and scale about the drawing's zero."""
+    placement = job.placement
+    cosine, sine = _cosine_and_sine(placement.rotate_rad)
+    flip = np.diag([-1.0 if placement.mirror == axis else 1.0 for axis in ("x", "y")])
+    turned = _Map(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
+    scale = placement.scale
+    if placement.fit_mm is not None:
+        scale = _fitting_scale(placement.fit_mm, _box(drawing, job, turned), drawing.file)
+    return _Map(scale * turned.matrix, turned.shift, scale)
+
+
+def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:
+    """Those of the angle; exactly 0 and ±1 for quarter turns, so that squares stay square."""
+    quarters = angle_rad / (0.5 * math.pi)
+    if quarters == round(quarters):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarters) % 4]
+    return math.cos(angle_rad), math.sin(angle_rad)
+
+
+def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -> float:
+    """The largest scale at which the box (2, 2) is no larger than `fit_mm`; 0 there is any."""
+    sizes = np.zeros(2) if box is None else box[:, 1] - box[:, 0]
+    scales = [
+        room / size
+        for room, size in zip(fit_mm, sizes.tolist(), strict=True)
+        if room > 0.0 and size > 0.0
+    ]
+    if not scales:
+        raise OptionError(
+            f"what is cut is {sizes[0]:g} by {sizes[1]:g} mm,"
+            f" and no scale makes it {fit_mm[0]:g} by {fit_mm[1]:g} mm",
+            file=file,
+            where="key fit",
+            mend="fit the side that has a length, or give a scale",
+        )
+    return float(min(scales))
+
+
+def _origin(drawing: Drawing, job: Job, first: _Map, shifts: Floats) -> Floats:
+    """(2,) the place, before it is moved, that becomes part zero."""
+    origin = job.placement.origin
+    if not isinstance(origin, str):
+        return np.array(origin)
+    box = None if origin == "drawing" else _box(drawing, job, first)
+    if box is None:
+        return np.zeros(2)
+    low = box[:, 0] + shifts.min(axis=0)
+    high = box[:, 1] + shifts.max(axis=0)
+    return np.asarray(low if origin == "lower-left" else 0.5 * (low + high))
+
+
+def _box(drawing: Drawing, job: Job, where: _Map) -> Floats | None:
+    """(2, 2) the box of all that the operations take, there; None when they take nothing."""
+    paths, marks = taken(drawing, job)
+    boxes = []
+    if paths:
+        boxes.append(extents(_lines(drawing.paths.select(paths), [where])))
+    if marks:
+        points = where.points(np.array([drawing.marks[index].at_mm for index in marks]))
+        boxes.append(np.column_stack([points.min(axis=0), points.max(axis=0)]))
+    if not boxes:
+        return None
+    both = np.array(boxes)
+    return np.column_stack([both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)])
+
+
+def taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
+    """Indices of the paths that any operation takes, and of the marks that any one drills."""
+    drills = [operation for operation in job.operations if operation.kind == "drill"]
+    takes = _remembered(job.takes)
+    drilled = _remembered(lambda *names: any(drill.takes(*names) for drill in drills))
+    names = zip(drawing.layers, drawing.colours, strict=True)
+    return (
+        [index for index, each in enumerate(names) if takes(*each)],
+        [index for index, mark in enumerate(drawing.marks) if drilled(mark.layer, mark.colour)],
+    )
+
+
+def _remembered(takes: Callable[[str, str], bool]) -> Callable[[str, str], bool]:
+    """The same answers, each pattern matched once for a layer and colour."""
+    known: dict[tuple[str, str], bool] = {}
+
+    def asked(layer: str, colour: str) -> bool:
+        key = (layer, colour)
+        if key not in known:
+            known[key] = takes(layer, colour)
+        return known[key]
+
+    return asked
+
+
+def _copy_shifts(placement: Placement) -> Floats:
+    """(K, 2) mm, how far each copy lies from the first, row by row."""
+    columns, rows = placement.copies
+    row, column = np.divmod(np.arange(columns * rows), columns)
+    return np.asarray(np.column_stack([column, row]) * np.array(placement.pitch_mm))
+
+
+def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
+    columns, rows = placement.copies
+    count = columns * rows * (len(drawing.paths.vertices) + len(drawing.marks))
+    if count > MOST_POINTS:
+        raise OptionError(
+            f"{columns} by {rows} copies have {count} points, more than {MOST_POINTS}",
+            where="key copies",
+            mend="make fewer copies",
+        )
+
+
+def _is_identity(where: _Map) -> bool:
+    return np.array_equal(where.matrix, np.eye(2)) and not where.shift.any()
+
+
+def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
+    """All that has a place, once for each map."""
+    count = len(maps)
+    return replace(
+        drawing,
+        paths=_lines(drawing.paths, maps),
+        layers=drawing.layers * count,
+        colours=drawing.colours * count,
+        sources=tuple(_copy_name(s, n) for n in range(count) for s in drawing.sources),
+        line_types=drawing.line_types * count,
+        marks=tuple(
+            replace(mark, at_mm=where.point(mark.at_mm), source=_copy_name(mark.source, n))
+            for n, where in enumerate(maps)
+            for mark in drawing.marks
+        ),
+        gaps=_gaps(drawing.gaps, maps),
+        closed_gaps=_gaps(drawing.closed_gaps, maps),
+        healing=_healing(drawing, maps),
+    )
+
+
+def _lines(lines: Polylines, maps: list[_Map]) -> Polylines:
+    """The paths under each map, one map after the other."""
+    step = len(lines.vertices)
+    offsets = [lines.offsets[1:] + n * step for n in range(len(maps))]
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            vertices = np.concatenate([where.vertices(lines.vertices) for where in maps])
+        return Polylines(
+            vertices,
+            np.concatenate([lines.offsets[:1], *offsets]),
+            np.tile(lines.closed, len(maps)),
+        )
+    except GeometryError as error:
+        raise OptionError(
+            f"scaled {maps[0].scale:g} times, {error.where or 'a path'} has no shape:"
+            f" {error.message}",
+            where="key scale",
+            mend="give a scale nearer to 1, or check the units of the drawing",
+        ) from error
+
+
+def _copy_name(source: str, copy: int) -> str:
+    return source if copy == 0 else f"{source} copy {copy + 1}"
+
+
+def _gaps(gaps: tuple[Gap, ...], maps: list[_Map]) -> tuple[Gap, ...]:
+    return tuple(
+        replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
+        for where in maps
+        for gap in gaps
+    )
+
+
+def _healing(drawing: Drawing, maps: list[_Map]) -> Healing:
+    """The places of branches and crossings; what was counted on reading stays as it was."""
+    healing, paths = drawing.healing, len(drawing.paths)
+    return replace(
+        healing,
+        branches=tuple(
+            replace(branch, at_mm=where.point(branch.at_mm))
+            for where in maps
+            for branch in healing.branches
+        ),
+        crossings=tuple(
+            replace(each, at_mm=where.point(each.at_mm), path=each.path + n * paths)
+            for n, where in enumerate(maps)
+            for each in healing.crossings
+        ),
+    )
