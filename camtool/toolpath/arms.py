@@ -1,7 +1,8 @@
 """Arcs of a toolpath seen from their centres, and the points on them.
 
 An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the spiral
-between them: radius and Z change in proportion to the angle, so that both ends are met.
+between them; radius and, in a helix, Z change in proportion to the angle, so that both ends are
+met.
 """
 
 from __future__ import annotations

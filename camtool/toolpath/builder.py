@@ -47,11 +47,19 @@ class ToolpathBuilder:
         return self._move(Kind.LINE, (x, y, z), feed)
 
     def arc(
-        self, x: float, y: float, *, centre: tuple[float, float], ccw: bool, feed: float
+        self,
+        x: float,
+        y: float,
+        z: Coordinate = None,
+        *,
+        centre: tuple[float, float],
+        ccw: bool,
+        feed: float,
     ) -> ToolpathBuilder:
-        """Arc in XY about the absolute `centre`; a full circle when it ends where it starts."""
+        """Arc in XY about the absolute `centre`, with a `z` a helix; a full turn when it ends
+        above, below or at its start."""
         kind = Kind.ARC_CCW if ccw else Kind.ARC_CW
-        return self._move(kind, (x, y, None), feed, centre)
+        return self._move(kind, (x, y, z), feed, centre)
 
     def event(self, kind: Kind, value: float | None = None) -> ToolpathBuilder:
         """An event at the present position; `value` as `Kind` says."""

@@ -1,6 +1,7 @@
 """Toolpaths in fewer words: what a dialect cannot say, said by what it can.
 
     xy_then_z           moves of XY and Z at once become two: up before XY, down after
+    helices_to_steps    slopes and helices become flat pieces with small plunges between
     arcs_to_lines       chosen arcs become chords
     split_full_circles  an arc that ends where it starts becomes two halves
     arcs_within         arcs of more than a given sweep become equal parts
@@ -20,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.errors import OptionError, PostError
+from camtool.machine.model import Machine
 from camtool.toolpath.arms import Arms
 from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
 
@@ -30,6 +32,9 @@ MAX_CHORD_SWEEP_RAD = 0.5 * math.pi
 
 SWEEP_EPS_RAD = 1e-9
 """A sweep may exceed the one that is wanted by this much, by rounding alone, unsplit."""
+
+STEP_EPS = 1e-9
+"""A slope may exceed its number of whole steps by this part of one, by rounding alone."""
 
 MAX_PARTS = 10_000_000
 """A toolpath that would become more rows than this is refused: a tolerance far too fine."""
@@ -71,6 +76,31 @@ def xy_then_z(toolpath: Toolpath) -> Lowered:
     return _built(toolpath, row, kind, points, centre)
 
 
+def slope_step_mm(machine: Machine) -> float:
+    """How high the steps may be that stand for a slope, mm: as far as curves may stray from what
+    was drawn, and no less than a step of Z."""
+    return max(machine.defaults.fit_tolerance_mm, machine.axes.z.coded_step_mm)
+
+
+def helices_to_steps(toolpath: Toolpath, max_dz_mm: float) -> Lowered:
+    """Slopes and helices for machines that cannot move XY and Z together: each becomes the fewest
+    equal parts that rise or sink by `max_dz_mm` at most, and each part a flat move and one of Z.
+
+    Down comes after XY and up before it, so the tool is nowhere deeper than on the true slope, and
+    nowhere more than `max_dz_mm` above it. Rapids become two moves. Raises OptionError for a step
+    that is not above 0 and PostError for an arc without a centre or beyond `MAX_PARTS`.
+    """
+    if not (math.isfinite(max_dz_mm) and max_dz_mm > 0.0):
+        raise OptionError(f"step {max_dz_mm:g} mm of a slope is not above 0")
+    rise = np.abs(toolpath.end[:, 2] - toolpath.starts[:, 2]) if len(toolpath) else np.zeros(0)
+    flat = toolpath.end[:, :2] != toolpath.starts[:, :2]
+    sloping = toolpath.is_feed & (rise > 0.0) & (toolpath.is_arc | flat.any(axis=1))
+    parts = np.where(sloping, np.ceil(rise / max_dz_mm - STEP_EPS), 1.0)
+    arms = Arms(toolpath, toolpath.is_arc & sloping)
+    cut = _split(toolpath, arms, _Parts(parts, "use a larger step"))
+    return xy_then_z(cut.toolpath).after(cut)
+
+
 def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lowered:
     """The arcs among `rows` (N,) as chords that stray from them by `tolerance_mm` at most.
 
@@ -88,14 +118,15 @@ def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lower
     with np.errstate(divide="ignore"):
         half_sine = np.sqrt(np.minimum(tolerance_mm / (2.0 * largest), 1.0))
     chord = np.minimum(4.0 * np.arcsin(half_sine), MAX_CHORD_SWEEP_RAD)
-    return _split(toolpath, arms, np.ceil(np.abs(arms.sweep) / chord), lines=True)
+    parts = _of_rows(toolpath, arms, np.ceil(np.abs(arms.sweep) / chord))
+    return _split(toolpath, arms, parts, lines=True)
 
 
 def split_full_circles(toolpath: Toolpath) -> Lowered:
     """Arcs that end where they start, as two halves each; PostError for one without a centre."""
     same = (toolpath.end[:, :2] == toolpath.starts[:, :2]).all(axis=1)
     arms = Arms(toolpath, toolpath.is_arc & same)
-    return _split(toolpath, arms, np.full(len(arms.row), 2.0))
+    return _split(toolpath, arms, _of_rows(toolpath, arms, np.full(len(arms.row), 2.0)))
 
 
 def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> Lowered:
@@ -108,27 +139,45 @@ def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> Lowered:
         raise OptionError(f"sweep {max_sweep_rad:g} rad is not above 0")
     arms = Arms(toolpath, toolpath.is_arc)
     excess = np.maximum(np.abs(arms.sweep) - SWEEP_EPS_RAD, 0.0)
-    return _split(toolpath, arms, np.ceil(excess / max_sweep_rad))
+    return _split(toolpath, arms, _of_rows(toolpath, arms, np.ceil(excess / max_sweep_rad)))
 
 
-def _split(toolpath: Toolpath, arms: Arms, parts: Floats, *, lines: bool = False) -> Lowered:
-    """Each arc of `arms` in so many `parts` (J,) of equal sweep, at least one; `lines`: chords."""
-    parts = np.maximum(parts, 1.0)
-    if len(toolpath) + float(parts.sum()) > MAX_PARTS:
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Into how many equal parts each row (N,) is cut; `mend` for when they are too many."""
+
+    count: Floats
+    mend: str = "use a wider tolerance"
+
+
+def _of_rows(toolpath: Toolpath, arms: Arms, parts: Floats) -> _Parts:
+    """`parts` (J,) of the arcs, at least one; all other rows stay whole."""
+    count = np.ones(len(toolpath))
+    count[arms.row] = np.maximum(parts, 1.0)
+    return _Parts(count)
+
+
+def _split(toolpath: Toolpath, arms: Arms, parts: _Parts, *, lines: bool = False) -> Lowered:
+    """Each row in so many parts of equal way, arcs of `arms` in equal sweeps; `lines`: chords of
+    these."""
+    if float(parts.count.sum()) > MAX_PARTS:
         raise PostError(
-            f"arcs would become more than {MAX_PARTS} moves",
-            where=f"move {arms.row[parts.argmax()]}",
-            mend="use a wider tolerance",
+            f"the toolpath would become more than {MAX_PARTS} moves",
+            where=f"move {int(parts.count.argmax())}",
+            mend=parts.mend,
         )
-    counts = np.ones(len(toolpath), dtype=np.int64)
-    counts[arms.row] = parts.astype(np.int64)
+    counts = parts.count.astype(np.int64)
     row, part = _repeated(counts)
     points = toolpath.end[row]
     inner = np.flatnonzero(part + 1 < counts[row])
-    arm_of_row = np.zeros(len(toolpath), dtype=np.int64)
-    arm_of_row[arms.row] = np.arange(len(arms.row))
     share = (part[inner] + 1) / counts[row[inner]]
-    points[inner] = arms.points(arm_of_row[row[inner]], share)
+    begin = toolpath.starts[row[inner]]
+    points[inner] = begin + share[:, None] * (points[inner] - begin)
+    arm_of_row = np.full(len(toolpath), -1, dtype=np.int64)
+    arm_of_row[arms.row] = np.arange(len(arms.row))
+    arm = arm_of_row[row[inner]]
+    on_arc = np.flatnonzero(arm >= 0)
+    points[inner[on_arc]] = arms.points(arm[on_arc], share[on_arc])
     kind, centre = toolpath.kind.copy(), toolpath.centre.copy()
     if lines:
         kind[arms.row], centre[arms.row] = Kind.LINE, np.nan

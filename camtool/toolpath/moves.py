@@ -1,7 +1,8 @@
 """The Toolpath: canonical moves and events, in columns, in the order of execution.
 
-A row is either a move (RAPID, LINE, ARC_CW, ARC_CCW) or an event (spindle, dwell, ...). Arcs lie
-in the XY plane; G02 is ARC_CW seen from +Z. A full circle is an arc whose end is its start.
+A row is either a move (RAPID, LINE, ARC_CW, ARC_CCW) or an event (spindle, dwell, ...). Arcs turn
+in the XY plane; G02 is ARC_CW seen from +Z. A full circle is an arc whose end is its start. An arc
+that ends at another height is a helix of one turn at most, Z in proportion to the angle.
 Frame: work frame (part zero), mm; feeds in mm/min. Row i starts where row i−1 ended; row 0 starts
 at `start`. Planning builds it, posts write it, a post's reader gives it back, simulation runs it.
 """

@@ -39,6 +39,40 @@ def xy_then_z(toolpath: Toolpath) -> list[Piece]:
     return pieces
 
 
+def helices_to_steps(toolpath: Toolpath, max_dz: float) -> list[Piece]:
+    """Each slope in the fewest parts of at most max_dz: rise, then along; or along, then sink."""
+    pieces = []
+    for move in toolpath:
+        (x0, y0, z0), (x1, y1, z1) = move.start, move.end
+        arc = move.centre is not None
+        still = not arc and (x0, y0) == (x1, y1)
+        if move.kind > Kind.ARC_CCW or still or z0 == z1:
+            pieces.append(Piece(move.kind, move.end, move.centre, move.index))
+            continue
+        straight = Kind.LINE if arc else move.kind
+        count = 1
+        while move.kind != Kind.RAPID and abs(z1 - z0) / count > max_dz * (1 + 1e-12):
+            count += 1
+        here = move.start
+        for k in range(1, count + 1):
+            share = k / count
+            there = (
+                point_of(move, share)
+                if arc
+                else tuple(a + (b - a) * share for a, b in zip(move.start, move.end, strict=True))
+            )
+            there = move.end if k == count else there
+            if there[2] > here[2]:
+                pieces.append(Piece(straight, (here[0], here[1], there[2]), None, move.index))
+                pieces.append(Piece(move.kind, there, move.centre, move.index))
+            else:
+                flat = (there[0], there[1], here[2])
+                pieces.append(Piece(move.kind, flat, move.centre, move.index))
+                pieces.append(Piece(straight, there, None, move.index))
+            here = there
+    return pieces
+
+
 def sweep_of(move: Move) -> float:
     """Signed sweep of an arc, rad; a full turn when it ends where it starts."""
     assert move.centre is not None

@@ -16,11 +16,14 @@ from camtool.toolpath.lower import (
     Lowered,
     arcs_to_lines,
     arcs_within,
+    helices_to_steps,
+    slope_step_mm,
     split_full_circles,
     xy_then_z,
 )
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles import lowering
+from tests.oracles.dense_moves import pic_mmh
 from tests.strategies import coordinates
 
 CLOSE_MM = 1e-9
@@ -51,17 +54,14 @@ def toolpaths(draw: st.DrawFn) -> Toolpath:
 
 
 def _add_arc(draw: st.DrawFn, b: ToolpathBuilder, feed: float, *, full: bool) -> None:
-    x, y, z = b.position
+    x, y, _ = b.position
     radius, turn = draw(st.floats(0.01, 10.0)), draw(st.floats(0.0, 6.28))
     centre = (x + radius * math.cos(turn), y + radius * math.sin(turn))
     far = turn + math.pi + draw(st.floats(-6.2, 6.2).filter(lambda sweep: abs(sweep) > 1e-3))
     spiral = radius * draw(st.sampled_from([1.0, 1.0, 1.001]))
     end = (centre[0] + spiral * math.cos(far), centre[1] + spiral * math.sin(far))
-    b.arc(*((x, y) if full else end), centre=centre, ccw=draw(st.booleans()), feed=feed)
-    height = draw(heights)
-    if height != z and draw(st.booleans()):  # a helix: the builder itself makes none
-        b.moved_to(b.position[0], b.position[1], height)
-        b._rows[-1] = (*b._rows[-1][:3], height, *b._rows[-1][4:])
+    to = (x, y) if full else end
+    b.arc(*to, draw(st.none() | heights), centre=centre, ccw=draw(st.booleans()), feed=feed)
 
 
 def agrees(lowered: Lowered, given_: Toolpath, wanted: list[lowering.Piece]) -> None:
@@ -99,6 +99,43 @@ def test_xy_then_z_is_its_twin(toolpath: Toolpath) -> None:
     in_xy = made.is_arc | (made.end[:, :2] != begin[:, :2]).any(axis=1)
     assert not (in_xy & (made.end[:, 2] != begin[:, 2])).any()
     assert np.array_equal(xy_then_z(made).toolpath.end, made.end)
+
+
+@given(toolpaths(), st.sampled_from([0.1, 0.3, 0.5, 7.0]))
+def test_steps_of_slopes_are_their_twins(toolpath: Toolpath, step: float) -> None:
+    lowered = helices_to_steps(toolpath, step)
+    agrees(lowered, toolpath, lowering.helices_to_steps(toolpath, step))
+    assert np.array_equal(xy_then_z(lowered.toolpath).row, np.arange(len(lowered.row)))
+
+
+@given(toolpaths(), st.sampled_from([0.1, 0.3, 0.5, 7.0]))
+def test_steps_are_never_below_the_slope_and_little_above(toolpath: Toolpath, step: float) -> None:
+    lowered = helices_to_steps(toolpath, step)
+    given_, made = list(toolpath), list(lowered.toolpath)
+    for row in np.flatnonzero(toolpath.is_feed).tolist():
+        wanted = given_[row]
+        pieces = [made[index] for index in np.flatnonzero(lowered.row == row)]
+        flat = [piece for piece in pieces if piece.centre or piece.start[:2] != piece.end[:2]]
+        for number, piece in enumerate(flat):
+            assert piece.start[2] == piece.end[2]
+            for share in (
+                number / len(flat),
+                (number + 0.5) / len(flat),
+                (number + 1) / len(flat),
+            ):
+                true = wanted.start[2] + share * (wanted.end[2] - wanted.start[2])
+                assert -1e-9 <= piece.end[2] - true <= step + 1e-9
+
+
+def test_a_slope_of_whole_steps_has_so_many() -> None:
+    ramp = ToolpathBuilder().line(3.0, z=-0.3, feed=1).finish()
+    assert len(helices_to_steps(ramp, 0.1).toolpath) == 6
+    assert len(helices_to_steps(ramp, 0.099).toolpath) == 8
+
+
+def test_the_step_of_a_machine_is_its_tolerance_or_a_step_of_z() -> None:
+    assert slope_step_mm(pic_mmh()) == 0.0005
+    assert slope_step_mm(pic_mmh("axes.z.coded_step_mm=0.04")) == 0.04
 
 
 @given(toolpaths(), st.sampled_from([1e-4, 0.003, 0.1, 30.0]), st.data())
@@ -193,6 +230,7 @@ def empty() -> Toolpath:
     [
         xy_then_z,
         split_full_circles,
+        lambda t: helices_to_steps(t, 1.0),
         lambda t: arcs_within(t, 1.0),
         lambda t: arcs_to_lines(t, t.is_arc, 0.1),
     ],
@@ -207,6 +245,8 @@ def test_bad_tolerances_and_sweeps(bad: float) -> None:
         arcs_to_lines(empty(), np.zeros(0, dtype=np.bool_), bad)
     with pytest.raises(OptionError, match="sweep"):
         arcs_within(empty(), bad)
+    with pytest.raises(OptionError, match="step"):
+        helices_to_steps(empty(), bad)
 
 
 def test_an_arc_without_a_centre_is_named() -> None:
@@ -219,6 +259,9 @@ def test_far_too_many_chords_are_refused_before_they_are_made() -> None:
     arc = ToolpathBuilder((1e6, 0, 0)).arc(1e6, 0, centre=(0, 0), ccw=True, feed=1).finish()
     with pytest.raises(PostError, match="wider tolerance"):
         arcs_to_lines(arc, arc.is_arc, 1e-9)
+    slope = ToolpathBuilder().line(1, z=-1e3, feed=1).finish()
+    with pytest.raises(PostError, match=r"move 0: .* larger step"):
+        helices_to_steps(slope, 1e-6)
 
 
 def test_an_arc_about_its_own_start_is_cut_without_noise() -> None:

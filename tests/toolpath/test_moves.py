@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.toolpath.arms import Arms
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -31,6 +32,19 @@ def test_iterator_gives_what_was_built() -> None:
     assert moves[2].value == 1.5
     assert moves[2].source == ""
     assert moves[3].end == (1.0, 0.0, 0.0)
+
+
+def test_an_arc_with_z_is_a_helix() -> None:
+    path = ToolpathBuilder((1.0, 0.0, 0.0)).arc(0, 1, -2.0, centre=(0, 0), ccw=True, feed=1.0)
+    path.arc(0, 1, -3.0, centre=(0, 0), ccw=False, feed=1.0)
+    quarter, turn = path.finish()
+    assert (quarter.start, quarter.end) == ((1.0, 0.0, 0.0), (0.0, 1.0, -2.0))
+    assert turn.end == (0.0, 1.0, -3.0)
+    assert path.finish().sweeps() == pytest.approx([math.pi / 2, -2 * math.pi])
+    points = Arms(path.finish(), path.finish().is_arc).points(np.array([0, 1]), np.full(2, 0.5))
+    assert points == pytest.approx(
+        np.array([[math.sqrt(0.5), math.sqrt(0.5), -1.0], [0.0, -1.0, -2.5]])
+    )
 
 
 def test_messages_keep_their_text() -> None:
