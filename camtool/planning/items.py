@@ -71,7 +71,8 @@ class Contour:
     `path` runs as it is to be cut unless `reversible`. `starts`: the vertices of a closed path at
     which it may begin; empty: any that is no joint within an arc. `source`: the index of its path
     in the placed drawing. `material_left`: what is to stay lies to the left of the path as it
-    runs; False: to the right; None: on both sides (engraved).
+    runs; False: to the right; None: on both sides (engraved). `outline`: the closed path that this
+    one is a part of, for the nesting; None: the path itself.
     """
 
     path: Polyline
@@ -81,6 +82,7 @@ class Contour:
     reversible: bool = False
     starts: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     material_left: bool | None = None
+    outline: Polyline | None = None
 
 
 @dataclass(frozen=True, eq=False)
