@@ -1,0 +1,84 @@
+"""The first tour, by nearest neighbours, and which items are near to which.
+
+An item may be taken when everything before it has been taken; its rows lie in the tree all the
+time, and are switched on then.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from camtool.kernels.tour_tree import nearest_owners, nearest_row, switch, tree_of
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+NEAR = 10
+"""Neighbours of an item of one place: work against length."""
+
+NEAR_EACH = 3
+"""Neighbours of each place of an item of many, at least."""
+
+
+@njit(cache=True)
+def nearest_first(
+    ends: Floats, first: Ints, after_first: Ints, after: Ints, waits: Ints, start: Floats
+) -> Ints:
+    """Rows (M,) in order: from `start` (2,) always to the nearest row that may be taken.
+
+    `ends` (S, 4): entry x, y and exit x, y; item i owns the rows from first[i] to first[i + 1];
+    after[after_first[i] : after_first[i + 1]] may come after item i only, and `waits` (M,) counts
+    for each item what must come before it. Shorter than M when items wait for each other.
+    """
+    count, x, y = len(first) - 1, start[0], start[1]
+    rows, owner = np.empty(count, np.int64), np.empty(first[-1], np.int64)
+    tree, on, waiting = tree_of(ends[:, :2]), np.ones(first[-1], np.int64), waits.copy()
+    for i in range(count):
+        owner[first[i] : first[i + 1]] = i
+        if waiting[i] > 0:
+            for row in range(first[i], first[i + 1]):
+                on[row] = 0
+                switch(tree, row, -1)
+    for rank in range(count):
+        chosen = nearest_row(tree, on, x, y)
+        if chosen < 0:
+            return rows[:rank]
+        rows[rank], item = chosen, owner[chosen]
+        x, y = ends[chosen, 2], ends[chosen, 3]
+        for row in range(first[item], first[item + 1]):
+            on[row] = 0
+            switch(tree, row, -1)
+        for k in range(after_first[item], after_first[item + 1]):
+            later = after[k]
+            waiting[later] -= 1
+            if waiting[later] == 0:
+                for row in range(first[later], first[later + 1]):
+                    on[row] = 1
+                    switch(tree, row, 1)
+    return rows
+
+
+@njit(cache=True)
+def neighbours(points: Floats, owner: Ints, count: int) -> tuple[Ints, Ints]:
+    """Neighbours of item i: near[near_first[i] : near_first[i + 1]], by places (N, 2) of items.
+
+    `owner` (N,) ascends. Each place brings its nearest items; what several bring comes once.
+    """
+    tree = tree_of(points)
+    place_first = np.searchsorted(owner, np.arange(count + 1))
+    near_first = np.zeros(count + 1, np.int64)
+    near = np.empty(len(points) * NEAR_EACH + count * (NEAR + NEAR_EACH), np.int64)
+    seen, total = np.full(count, -1), 0
+    for i in range(count):
+        places = place_first[i + 1] - place_first[i]
+        most = max(NEAR_EACH, (NEAR + places - 1) // max(places, 1))
+        for place in range(place_first[i], place_first[i + 1]):
+            for other in nearest_owners(tree, owner, place, most):
+                if seen[other] != i:
+                    seen[other] = i
+                    near[total] = other
+                    total += 1
+        near_first[i + 1] = total
+    return near[:total].copy(), near_first

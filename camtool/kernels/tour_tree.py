@@ -1,0 +1,157 @@
+"""A tree of points in the plane whose points can be switched off, asked for the nearest ones.
+
+    Node k holds rows[begin[k] : begin[k] + size[k]] and its halves are the nodes 2k + 1, 2k + 2.
+
+What makes it exact: a node is left out only when its box lies farther away than what has been
+found. Equal distances go to the lower row. Nothing depends on how the points are spread.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+LEAF = 6
+"""A node of so many points is not halved any more: work alone."""
+
+DEEPEST = 64
+"""Nodes that wait while the tree is walked: more than levels of any tree that fits in memory."""
+
+
+class Tree(NamedTuple):
+    """`points` (N, 2); `rows` (N,) sorted by node; per node `begin`, `size`, `box` (low x, low y,
+    high x, high y) and `live`, the points that are switched on; `leaf` (N,), each point's node."""
+
+    points: Floats
+    rows: Ints
+    begin: Ints
+    size: Ints
+    box: Floats
+    live: Ints
+    leaf: Ints
+
+
+@njit(cache=True)
+def tree_of(points: Floats) -> Tree:
+    """The tree of these points, N ≥ 1, all switched on."""
+    count, levels = len(points), 0
+    while count >> levels > LEAF:
+        levels += 1
+    nodes = (2 << levels) - 1
+    inner = (1 << levels) - 1
+    rows = np.arange(count)
+    begin, size = np.zeros(nodes, np.int64), np.zeros(nodes, np.int64)
+    box, leaf = np.empty((nodes, 4)), np.zeros(count, np.int64)
+    size[0] = count
+    for k in range(nodes):
+        part = rows[begin[k] : begin[k] + size[k]].copy()
+        box[k, 0], box[k, 1] = points[part, 0].min(), points[part, 1].min()
+        box[k, 2], box[k, 3] = points[part, 0].max(), points[part, 1].max()
+        if k >= inner:
+            leaf[part] = k
+            continue
+        axis = 0 if box[k, 2] - box[k, 0] >= box[k, 3] - box[k, 1] else 1
+        rows[begin[k] : begin[k] + size[k]] = part[np.argsort(points[part, axis])]
+        half = size[k] // 2
+        begin[2 * k + 1], size[2 * k + 1] = begin[k], half
+        begin[2 * k + 2], size[2 * k + 2] = begin[k] + half, size[k] - half
+    return Tree(points, rows, begin, size, box, size.copy(), leaf)
+
+
+@njit(cache=True)
+def switch(tree: Tree, row: int, change: int) -> None:
+    """Switch a point off (−1) or on (+1); it must be the other way before."""
+    node = tree.leaf[row]
+    while True:
+        tree.live[node] += change
+        if node == 0:
+            return
+        node = (node - 1) // 2
+
+
+@njit(cache=True)
+def _apart(tree: Tree, node: int, x: float, y: float) -> float:
+    """Squared distance from a point to a node's box."""
+    dx = max(tree.box[node, 0] - x, x - tree.box[node, 2], 0.0)
+    dy = max(tree.box[node, 1] - y, y - tree.box[node, 3], 0.0)
+    return float(dx * dx + dy * dy)
+
+
+@njit(cache=True)
+def nearest_row(tree: Tree, on: Ints, x: float, y: float) -> int:
+    """The nearest point that is switched on, `on` (N,) 1 or 0; −1 when none is."""
+    waiting, top, inner = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
+    waiting[0] = 0
+    found, best = -1, np.inf
+    while top > 0:
+        top -= 1
+        node = waiting[top]
+        if tree.live[node] == 0 or _apart(tree, node, x, y) > best:
+            continue
+        if node < inner:
+            left_first = _apart(tree, 2 * node + 1, x, y) <= _apart(tree, 2 * node + 2, x, y)
+            waiting[top] = 2 * node + (2 if left_first else 1)
+            waiting[top + 1] = 2 * node + (1 if left_first else 2)
+            top += 2
+            continue
+        for k in range(tree.begin[node], tree.begin[node] + tree.size[node]):
+            row = tree.rows[k]
+            if on[row]:
+                dx, dy = tree.points[row, 0] - x, tree.points[row, 1] - y
+                apart = dx * dx + dy * dy
+                if apart < best or (apart == best and row < found):
+                    found, best = row, apart
+    return found
+
+
+@njit(cache=True)
+def nearest_owners(tree: Tree, owner: Ints, row: int, most: int) -> Ints:
+    """The owners nearest to a point, but its own: up to `most`, each once, nearest first."""
+    x, y = tree.points[row, 0], tree.points[row, 1]
+    waiting, top, inner = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
+    waiting[0] = 0
+    found, apart = np.full(most, -1), np.full(most, np.inf)
+    while top > 0:
+        top -= 1
+        node = waiting[top]
+        if _apart(tree, node, x, y) > apart[most - 1]:
+            continue
+        if node < inner:
+            left_first = _apart(tree, 2 * node + 1, x, y) <= _apart(tree, 2 * node + 2, x, y)
+            waiting[top] = 2 * node + (2 if left_first else 1)
+            waiting[top + 1] = 2 * node + (1 if left_first else 2)
+            top += 2
+            continue
+        for k in range(tree.begin[node], tree.begin[node] + tree.size[node]):
+            other = tree.rows[k]
+            if owner[other] != owner[row]:
+                dx, dy = tree.points[other, 0] - x, tree.points[other, 1] - y
+                _enter(found, apart, owner[other], dx * dx + dy * dy)
+    return found[found >= 0]
+
+
+@njit(cache=True)
+def _enter(found: Ints, apart: Floats, owner: int, distance: float) -> None:
+    """Put an owner into the sorted list, or move it up when it is there already."""
+    at = len(found) - 1
+    if (distance, owner) >= (apart[at], found[at] if found[at] >= 0 else owner + 1):
+        return
+    for k in range(len(found)):
+        if found[k] == owner:
+            if apart[k] <= distance:
+                return
+            at = k
+            break
+    while at > 0 and (distance, owner) < (
+        apart[at - 1],
+        found[at - 1] if found[at - 1] >= 0 else owner + 1,
+    ):
+        found[at], apart[at] = found[at - 1], apart[at - 1]
+        at -= 1
+    found[at], apart[at] = owner, distance
