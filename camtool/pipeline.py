@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from camtool.preview.draw import Scene
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
+    from camtool.verify.report import Before
     from camtool.verify.verify import Verification
 
 
@@ -49,9 +50,11 @@ def post_drawing(
     drawing: Drawing, job: Job, target: LoadedTarget, *, check: bool = True
 ) -> Posted:
     """Plan, write, read back, simulate and judge; `check=False` leaves out the last two."""
-    from camtool.planning.plan import plan
+    from camtool.planning.plan import planned
+    from camtool.verify.report import Planned, certain
 
-    wanted = plan(drawing, job, target.machine)
+    plan = planned(drawing, job, target.machine)
+    wanted = plan.toolpath
     findings = _merged(drawing.findings, wanted.findings)
     if worst(findings) >= Severity.ERROR:
         return Posted(wanted, None, None, None, findings)
@@ -64,9 +67,16 @@ def post_drawing(
     if not check:
         return Posted(wanted, program, decoded, None, findings)
     verification = _judged(
-        program.data, decoded, target.machine, wanted, drawing, source=drawing.file
+        program.data, decoded, target.machine, wanted, plan.placed, source=drawing.file
     )
     findings = _merged(findings, verification.findings, without=repeated)
+    verification = verification.with_planning(
+        Planned(
+            rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in plan.steps)),
+            rapid_mm=certain(sum(step.rapid_mm for step in plan.steps)),
+        ),
+        _before(drawing, job, target),
+    )
     return Posted(wanted, program, decoded, verification.with_findings(findings), findings)
 
 
@@ -85,9 +95,10 @@ def verify_program(
     wanted = None
     if drawing is not None:
         from camtool.planning.job import Job
-        from camtool.planning.plan import plan
+        from camtool.planning.plan import planned
 
-        wanted = plan(drawing, job or Job(), target.machine)
+        plan = planned(drawing, job or Job(), target.machine)
+        wanted, drawing = plan.toolpath, plan.placed
     return decoded, _judged(
         data, decoded, target.machine, wanted, drawing, source=source, interpolator=interpolator
     )
@@ -127,6 +138,20 @@ def convert_program(
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
 
+def _before(drawing: Drawing, job: Job, target: LoadedTarget) -> Before | None:
+    """The job without what it does against reversals; None when it does nothing."""
+    from camtool.verify.report import Before
+
+    if job.minimise != "reversals" and not job.approach:
+        return None
+    made = post_drawing(drawing, replace(job, minimise="rapids", approach=False), target)
+    if made.verification is None or made.failed:
+        return Before()
+    report = made.verification.report
+    cutting, air = report.reversals.cutting, report.reversals.air
+    return Before(cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s)
+
+
 def _read(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     """The decoded program; ProgramError names the file too."""
     try:
@@ -148,22 +173,20 @@ def picture(
 ) -> Scene:
     """The scene of whatever is there; with a verification, the slides' path by its error.
 
-    `job` tells where its origin puts the drawing in the work frame.
+    `job` tells where it places the drawing in the work frame.
     """
     from camtool.preview.scene import Scene, scene_of_drawing
 
     if drawing is not None and toolpath is None:
         return replace(scene_of_drawing(drawing), title=title)
-    shift = (0.0, 0.0)
     if drawing is not None and job is not None:
-        from camtool.planning.profile import origin_shift
+        from camtool.planning.place import place
 
-        shift = origin_shift(drawing, job)
+        drawing = place(drawing, job)
     trace = verification.trace if verification is not None else None
     return Scene(
         title=title,
         drawing=drawing,
-        drawing_shift_mm=shift,
         toolpath=toolpath,
         trace_points=trace.points if trace is not None else None,
         trace_error_mm=trace.error_mm if trace is not None else None,

@@ -19,7 +19,7 @@ from camtool.cli.types import feed, length
 
 if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
-    from camtool.planning.job import Job
+    from camtool.planning.job import job_of
 
 SIDES = ("auto", "on", "outside", "inside")
 ORIGINS = ("drawing", "lower-left", "centre")
@@ -62,7 +62,7 @@ class JobFlags:
 
     def job(self, drawing: DrawingFlags) -> Job:
         """The job of the file, with the given flags and layers over it."""
-        from camtool.planning.job import Job
+        from camtool.planning.job import job_of
 
         settings: dict[str, Any] = {}
         if self.file is not None:
@@ -74,7 +74,7 @@ class JobFlags:
         )
         if drawing.layers:
             settings["layers"] = drawing.layers
-        return Job(**settings)
+        return job_of(**settings)
 
 
 def machine_options(command: Command) -> Command:

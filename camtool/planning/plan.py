@@ -1,77 +1,217 @@
 """The plan: a drawing and a job become the toolpath of a machine.
 
-contours ──order──▶ paths in order, each from its start ──link──▶ toolpath ──▶ checked
+    drawing ─place─▶ in the work frame ─choose─▶ paths of an operation ─its kind─▶ items
+    items ─reversals─▶ items ─order─▶ items with start and direction ─runs─▶ runs
+    runs of all operations ─link─▶ toolpath ─▶ checked
+
+Operations follow each other as the job lists them; each is put into order on its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import PurePath
+
+import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
-from camtool.planning.job import Job
-from camtool.planning.link import feeds_of, heights_of, link
-from camtool.planning.order import order, ordered
-from camtool.planning.profile import contours, path_name
-from camtool.toolpath.extents import toolpath_extents
+from camtool.planning.choose import choose
+from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
+from camtool.planning.job import Job, Operation
+from camtool.planning.levels import levels
+from camtool.planning.link import Approach, Worked, depth_of, feeds_of, link, safe_z_of
+from camtool.planning.place import place
 from camtool.toolpath.moves import Toolpath
+
+Point = tuple[float, float]
+HOME: Point = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What became of one operation: what it took, its items as the operation made them, the
+    runs in order of cutting, and how far rapids go in XY: as drawn, and as ordered, mm."""
+
+    operation: Operation
+    chosen: Chosen
+    work: Work
+    runs: tuple[Run, ...]
+    findings: tuple[Finding, ...]
+    rapid_drawn_mm: float
+    rapid_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Every stage of a plan: the drawing in the work frame, the operations, the toolpath."""
+
+    placed: Drawing
+    steps: tuple[Step, ...]
+    toolpath: Toolpath
 
 
 def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
     """The toolpath that cuts the drawing, work frame, with the findings of planning.
 
-    Contours run as they are drawn, inner ones before those that hold them, in one pass at the
-    depth of the job. Feeds are the job's or the machine's own; the dialect rounds them.
-    OptionError for a feed above the machine's highest and for layers that the drawing has not.
+    OptionError for what the job asks and the drawing or the machine cannot give.
     """
-    feeds, heights = feeds_of(job, machine), heights_of(job, machine)
-    wanted = contours(drawing, job)
-    way = order(wanted.lines)
-    names = [path_name(drawing, int(wanted.source[path])) for path in way.path]
-    toolpath = link(ordered(wanted.lines, way), names, job, heights, feeds).finish()
-    findings = list(wanted.findings)
-    if drawing.marks:
-        findings.append(
+    return planned(drawing, job, machine).toolpath
+
+
+def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
+    """The plan with all its stages; see `plan`."""
+    from camtool.planning.checks import checked
+
+    placed = place(drawing, job)
+    here, steps = HOME, []
+    for operation in job.operations:
+        step = _step(placed, job, setting_of(operation, job, machine), machine, here)
+        here = _end(step.runs, here)
+        steps.append(step)
+    worked = [Worked(step.operation, step.runs) for step in steps]
+    approach = _approach(machine) if job.approach or job.minimise == "reversals" else None
+    toolpath = link(worked, safe_z_of(job, machine), approach).finish()
+    findings = [finding for step in steps for finding in step.findings]
+    findings += _left_over(placed, job, any(step.runs for step in steps))
+    findings += checked(toolpath, job, machine)
+    made_from = PurePath(drawing.file).name
+    toolpath = replace(toolpath, findings=tuple(findings), made_from=made_from)
+    return Plan(placed, tuple(steps), toolpath)
+
+
+def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
+    """The operation with the machine's numbers where it is silent; OptionError when too fast."""
+    return Setting(
+        operation,
+        feeds_of(operation, machine),
+        levels(depth_of(operation, machine), operation.step_down_mm, operation.last_pass_mm),
+        safe_z_of(job, machine),
+    )
+
+
+def work_of(chosen: Chosen, setting: Setting) -> Work:
+    """The items that the operation makes of its paths."""
+    return _kind(setting.operation.kind)(chosen, setting)
+
+
+def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
+    """Imported where it is used: carving needs more than engraving."""
+    if kind == "pocket":
+        from camtool.planning.pocket import pocket
+
+        return pocket
+    if kind == "engrave":
+        from camtool.planning.engrave import engrave
+
+        return engrave
+    if kind == "drill":
+        from camtool.planning.drill import drill
+
+        return drill
+    if kind == "vcarve":
+        from camtool.planning.vcarve import vcarve
+
+        return vcarve
+    from camtool.planning.profile import profile
+
+    return profile
+
+
+def _step(placed: Drawing, job: Job, setting: Setting, machine: Machine, here: Point) -> Step:
+    """One operation from what it takes to its runs, for a tool that stands at `here`."""
+    from camtool.planning.order import best_order, choices_of, chosen_path, drawn, travel_mm
+    from camtool.planning.precedence import must_precede
+    from camtool.planning.runs import runs_of
+
+    chosen = choose(placed, setting.operation)
+    work = work_of(chosen, setting)
+    items: tuple[Item, ...] = tuple(_with_starts(item) for item in work.items)
+    findings = list(work.findings)
+    choices = choices_of(items)
+    before = travel_mm(choices, drawn(choices), here, HOME)
+    if job.minimise == "reversals":
+        from camtool.planning.reversals import fewer_reversals
+
+        items, noticed = fewer_reversals(items, machine)
+        findings += noticed
+        choices = choices_of(items)
+    rows = best_order(choices, must_precede(items), here, HOME)
+    keep_out = chosen.lines.select(np.flatnonzero(chosen.lines.closed).tolist())
+    runs: list[Run] = []
+    for row in rows.tolist():
+        item = items[int(choices.owner[row])]
+        if isinstance(item, Contour):
+            made, noticed = runs_of(item, chosen_path(items, choices, row), _around(keep_out))
+            findings += noticed
+            runs += made
+        else:
+            runs += item.runs
+    after = travel_mm(choices, rows, here, HOME)
+    return Step(setting.operation, chosen, work, tuple(runs), tuple(findings), before, after)
+
+
+def _around(keep_out: Polylines) -> Polylines | None:
+    return keep_out if len(keep_out) else None
+
+
+def _with_starts(item: Item) -> Item:
+    """A closed contour with the places where its operation lets it begin."""
+    if not isinstance(item, Contour) or not item.path.closed or len(item.starts):
+        return item
+    rule = item.setting.operation.start
+    if rule == "nearest":
+        return item
+    from camtool.planning.starts import with_starts
+
+    path, starts = with_starts(item.path, rule)
+    return replace(item, path=path, starts=starts)
+
+
+def _end(runs: tuple[Run, ...], here: Point) -> Point:
+    """Where the tool comes up after the runs."""
+    if not runs:
+        return here
+    x, y = runs[-1].vertices[-1, :2].tolist()
+    return x, y
+
+
+def _approach(machine: Machine) -> Approach:
+    from camtool.planning.approach import approach_from
+
+    return lambda run: approach_from(run, machine)
+
+
+def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
+    """What is drawn and not cut: points that nobody drills, or all of it."""
+    found: list[Finding] = []
+    drills = [operation for operation in job.operations if operation.kind == "drill"]
+    left = [
+        mark
+        for mark in placed.marks
+        if job.takes(mark.layer, mark.colour)
+        and not any(operation.takes(mark.layer, mark.colour) for operation in drills)
+    ]
+    if left:
+        found.append(
             Finding(
-                Code.ENTITY_SKIPPED,
+                Code.MARKS_NOT_CUT,
                 Severity.WARNING,
-                f"{len(drawing.marks)} single points are not cut: a profile follows lines",
-                measured=float(len(drawing.marks)),
+                f"{len(left)} single points are not cut: a profile follows lines",
+                measured=float(len(left)),
             )
         )
-    if len(wanted.lines) == 0 and (len(drawing.paths) > 0 or drawing.marks):
-        findings.append(
+    if not cuts and (len(placed.paths) or placed.marks):
+        found.append(
             Finding(
                 Code.NOTHING_DRAWN,
                 Severity.ERROR,
                 "no contour is left to cut"
-                + (": use a smaller tool, or --side on" if len(drawing.paths) else ""),
-                where=drawing.file,
+                + (": use a smaller tool, or --side on" if len(placed.paths) else ""),
+                where=placed.file,
             )
         )
-    findings.extend(_out_of_travel(toolpath, machine))
-    return replace(toolpath, findings=tuple(findings), made_from=PurePath(drawing.file).name)
-
-
-def _out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
-    """Axes on which the toolpath, part zero included, spans more than they can travel."""
-    for name, axis, (low, high) in zip(
-        "XYZ", machine.axes, toolpath_extents(toolpath).tolist(), strict=True
-    ):
-        span = high - low
-        if axis.travel_mm is None or span <= axis.travel_mm + POSITION_EPS_MM:
-            continue
-        yield Finding(
-            Code.OUT_OF_TRAVEL,
-            Severity.ERROR,
-            f"{name} spans {span:.4f} mm with part zero, more than its travel of"
-            f" {axis.travel_mm:g} mm: use --origin lower-left, or scale the drawing",
-            where=f"axis {name}, from {low:.4f} to {high:.4f} mm",
-            measured=span,
-            limit=axis.travel_mm,
-            unit="mm",
-        )
+    return found

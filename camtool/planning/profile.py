@@ -1,179 +1,224 @@
 """Profiles: on which lines the middle of the tool runs.
 
-    drawing ──layers──▶ chosen paths ──origin──▶ work frame ──side──▶ offset contours
-
-`auto` cuts closed paths that nothing or an even number of others hold on their outside (parts,
-islands) and the others on their inside (holes). Open paths have no inside: the tool runs on them.
-Every contour keeps the direction in which it was drawn.
+`auto` takes all closed paths together as one shape: what an odd number of them hold is the part,
+and the tool runs round it, a tool's radius (and the allowance) away: outside of parts and
+islands, inside of holes. Where parts lie nearer to each other than the tool is wide, one contour
+runs round both. `outside` and `inside` take each closed path on its own. Open paths have no
+inside: the tool runs on them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.distance import approach
-from camtool.geometry.drawing import Drawing
-from camtool.geometry.measure import extents, path_extents, signed_areas
-from camtool.geometry.nest import nesting
-from camtool.geometry.polylines import Floats, Ints, Polyline, Polylines
-from camtool.geometry.transform import lines_moved
-from camtool.planning.job import Job
+from camtool.geometry.distance import approach, nearest
+from camtool.geometry.measure import extents, path_extents, point_at, signed_areas
+from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.geometry.transform import reverse
+from camtool.planning.items import Chosen, Contour, Setting, Work
+from camtool.planning.places import at_place, tool_name
 
 GOUGE_TOLERANCE_MM = 1e-4
 """Another contour may be cut into by this much before it is a gouge: a tenth of a micrometre."""
 
-
-@dataclass(frozen=True, eq=False)
-class Contours:
-    """What the middle of the tool follows, work frame, mm: `lines` (M paths); `source` (M,), the
-    index of the path in the drawing that each came from; and what was noticed."""
-
-    lines: Polylines
-    source: Ints
-    findings: tuple[Finding, ...] = ()
+SLOT_TOLERANCE_MM = 5e-4
+"""A slot or hole narrower than the tool by this much or less counts as wide as the tool."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Chosen:
-    """The paths of the job's layers in the work frame, with their names for people."""
+class _Line:
+    """A line of the tool's middle; what is to stay lies to its left, or (False) to its right;
+    `of`: the chosen paths that it belongs to, the one it mostly follows first."""
 
-    lines: Polylines
-    index: Ints
-    names: tuple[str, ...]
-
-
-def contours(drawing: Drawing, job: Job) -> Contours:
-    """The lines that the middle of the tool follows; a stage of its own, to compare and draw.
-
-    OptionError when the drawing has paths, but none on the job's layers.
-    """
-    chosen = _chosen(drawing, job)
-    lines: list[Polyline] = []
-    source: list[int] = []
-    findings: list[Finding] = []
-    if len(chosen.lines):
-        for index, distance in enumerate(_distances(chosen.lines, job)):
-            results, noticed = _tool_lines(chosen, index, float(distance), job)
-            lines.extend(results)
-            source.extend([index] * len(results))
-            findings.extend(noticed)
-    paths, rows = Polylines.of(lines), np.array(source, dtype=np.int64)
-    findings.extend(_gouges(paths, rows, chosen, job))
-    return Contours(paths, chosen.index[rows], tuple(findings))
+    path: Polyline
+    left: bool
+    of: tuple[int, ...]
 
 
-def origin_shift(drawing: Drawing, job: Job) -> tuple[float, float]:
-    """(dx, dy) mm that brings the drawing into the work frame, as the job's origin says.
+@dataclass(eq=False)
+class _Found:
+    """What comes together while the paths of an operation are gone through."""
 
-    Lower left and centre are those of the box around the paths that are cut, as they are drawn.
-    """
-    index = _on_layers(drawing, job)
-    if job.origin == "drawing" or len(index) == 0:
-        return 0.0, 0.0
-    (xmin, xmax), (ymin, ymax) = extents(drawing.paths.select(index)).tolist()
-    if job.origin == "lower-left":
-        return -xmin, -ymin
-    return -0.5 * (xmin + xmax), -0.5 * (ymin + ymax)
+    lines: list[_Line] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
 
-def path_name(drawing: Drawing, index: int) -> str:
-    """Layer and source of a path, as provenance and places in messages show it."""
-    return f"{drawing.layers[index]}/{drawing.sources[index]}"
-
-
-def _on_layers(drawing: Drawing, job: Job) -> list[int]:
-    return [index for index, layer in enumerate(drawing.layers) if job.takes(layer)]
-
-
-def _chosen(drawing: Drawing, job: Job) -> _Chosen:
-    index = _on_layers(drawing, job)
-    if not index and len(drawing.paths):
-        known = ", ".join(sorted(set(drawing.layers)))
-        raise OptionError(
-            f"no path lies on the layers {', '.join(job.layers)}",
-            file=drawing.file,
-            mend=f"the drawing has: {known}",
-        )
-    lines = lines_moved(drawing.paths.select(index), *origin_shift(drawing, job))
-    names = tuple(path_name(drawing, i) for i in index)
-    return _Chosen(lines, np.array(index, dtype=np.int64), names)
-
-
-def _distances(lines: Polylines, job: Job) -> Floats:
-    """(M,) signed offset of each path, positive to the left of travel; 0 on the line.
-
-    The inside of a path drawn CCW is on its left.
-    """
-    if job.side == "on" or job.radius_mm == 0.0:
-        return np.zeros(len(lines))
-    if job.side == "auto":
-        inward = nesting(lines).depth % 2 == 1
+def profile(chosen: Chosen, setting: Setting) -> Work:
+    """The contours of an operation of the kind profile, in the order of their paths."""
+    operation = setting.operation
+    closed = np.flatnonzero(chosen.lines.closed).tolist()
+    opens = np.flatnonzero(~chosen.lines.closed).tolist()
+    found = _Found()
+    if operation.side == "on" or operation.tool.radius_mm + operation.allowance_mm == 0.0:
+        opens = list(range(len(chosen.lines)))
+    elif operation.side == "auto":
+        _together(chosen, closed, setting, found)
     else:
-        inward = np.full(len(lines), job.side == "inside")
-    left = inward == (signed_areas(lines) > 0.0)
-    return np.where(lines.closed, np.where(left, job.radius_mm, -job.radius_mm), 0.0)
+        for k in closed:
+            _alone(chosen, k, setting, found)
+        found.findings += _gouges(chosen, setting, found.lines)
+        found.findings += (_no_side(chosen, k, operation.side) for k in opens)
+    items = [_beside(line, chosen, setting) for line in found.lines]
+    items += [_on_line(chosen, k, setting) for k in opens]
+    return Work(tuple(sorted(items, key=lambda item: item.source)), tuple(found.findings))
 
 
-def _tool_lines(
-    chosen: _Chosen, index: int, distance: float, job: Job
-) -> tuple[list[Polyline], list[Finding]]:
-    """What the tool follows for one path, and what is to be said about it."""
-    path = chosen.lines[index]
-    if distance != 0.0:
-        from camtool.geometry.offset import offset
+def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
+    """Round the shape of all closed paths at once."""
+    from camtool.geometry.regions import oriented
+    from camtool.planning.reach import unreached_findings
 
-        results = offset(path, distance)
-        return results, [] if results else [_too_small(chosen, index, job)]
-    sided = job.side in ("outside", "inside") and job.radius_mm > 0.0
-    if path.closed or not sided:
-        return [path], []
-    finding = Finding(
+    if not closed:
+        return
+    shape = oriented(chosen.lines.select(closed))
+    for path in _offset(shape, -_away(setting), setting):
+        of = tuple(closed[k] for k in _sources(path, shape))
+        found.lines.append(_Line(path, True, of))
+        found.findings += _joined(chosen, of, setting)
+    reached = {k for line in found.lines for k in line.of}
+    for place, k in enumerate(closed):
+        if k not in reached:
+            hole = Polylines.of([reverse(shape[place])])
+            _too_narrow(chosen, k, hole, setting, found)
+    free = Polylines.of(reverse(path) for path in shape)
+    found.findings += unreached_findings(free, setting)
+
+
+def _alone(chosen: Chosen, k: int, setting: Setting, found: _Found) -> None:
+    """Round or within one path, whatever the others are."""
+    path = chosen.lines[k]
+    ring = Polylines.of([path if signed_areas(chosen.lines.select([k]))[0] > 0 else reverse(path)])
+    within = setting.operation.side == "inside"
+    lines = _offset(ring, _away(setting) if within else -_away(setting), setting)
+    found.lines += (_Line(line, not within, (k,)) for line in lines)
+    if within and len(lines) == 0:
+        _too_narrow(chosen, k, ring, setting, found)
+
+
+def _offset(shape: Polylines, distance_mm: float, setting: Setting) -> Polylines:
+    from camtool.geometry.offset import offset_shape
+
+    operation = setting.operation
+    return offset_shape(
+        shape, distance_mm, joins=operation.joins, mitre_limit=operation.mitre_limit
+    )
+
+
+def _away(setting: Setting) -> float:
+    """How far the tool's middle is from the drawn line, mm."""
+    return setting.operation.tool.radius_mm + setting.operation.allowance_mm
+
+
+def _sources(path: Polyline, shape: Polylines) -> tuple[int, ...]:
+    """The paths of the shape to which the segments of an offset path are nearest, the one that
+    is nearest to most of them first."""
+    segments = Segments.of(path)
+    middles = point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
+    source = Segments.of(shape)
+    of = source.path[nearest(middles, source).segment]
+    which, count = np.unique(of, return_counts=True)
+    return tuple(which[np.argsort(-count, kind="stable")].tolist())
+
+
+def _too_narrow(chosen: Chosen, k: int, ring: Polylines, setting: Setting, found: _Found) -> None:
+    """A path (its inside is the left of `ring`) that the tool does not fit into, or just so."""
+    lines = _offset(ring, max(_away(setting) - SLOT_TOLERANCE_MM, 0.0), setting)
+    where = at_place(chosen.names[k], extents(ring).mean(axis=1))
+    called, area = tool_name(setting.operation.tool), abs(float(signed_areas(ring)[0]))
+    if len(lines):
+        found.lines += (_Line(line, False, (k,)) for line in lines)
+        found.findings.append(
+            Finding(
+                Code.SLOT_AS_WIDE,
+                Severity.INFO,
+                f"{called} is as wide as this contour: it runs along its middle",
+                where=where,
+            )
+        )
+        return
+    found.findings.append(
+        Finding(
+            Code.CONTOUR_TOO_SMALL,
+            Severity.WARNING,
+            f"{called} does not fit into this contour of {area:.6g} mm²: it is not cut",
+            where=where,
+            measured=area,
+            unit="mm2",
+        )
+    )
+
+
+def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[Finding]:
+    """Said of a line that runs round several paths at once: between them nothing is cut."""
+    first = chosen.lines[of[0]]
+    for k in of[1:]:
+        near = approach(first, chosen.lines[k])
+        if near.distance >= 2.0 * _away(setting) - GOUGE_TOLERANCE_MM:
+            continue
+        yield Finding(
+            Code.UNREACHED,
+            Severity.WARNING,
+            f"{tool_name(setting.operation.tool)} does not fit between {chosen.names[of[0]]} and"
+            f" {chosen.names[k]}, {near.distance:.4g} mm apart: they stay joined there",
+            where=at_place(chosen.names[of[0]], near.point),
+            measured=near.distance,
+            limit=2.0 * _away(setting),
+            unit="mm",
+        )
+
+
+def _beside(line: _Line, chosen: Chosen, setting: Setting) -> Contour:
+    """The line as the operation's direction has it: climbing, what is to stay is on the right."""
+    wanted = setting.operation.direction
+    k = line.of[0]
+    if wanted == "drawn":
+        areas = signed_areas(Polylines.of([line.path, chosen.lines[k]]))
+        turn = bool((areas[0] > 0.0) != (areas[1] > 0.0))
+    else:
+        turn = line.left == (wanted == "climb")
+    path, left = (reverse(line.path), not line.left) if turn else (line.path, line.left)
+    return Contour(path, setting, chosen.names[k], int(chosen.source[k]), material_left=left)
+
+
+def _on_line(chosen: Chosen, k: int, setting: Setting) -> Contour:
+    """A path itself; an open one may be cut from either end."""
+    path = chosen.lines[k]
+    return Contour(
+        path, setting, chosen.names[k], int(chosen.source[k]), reversible=not path.closed
+    )
+
+
+def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
+    return Finding(
         Code.OPEN_CONTOUR_ON_LINE,
         Severity.WARNING,
-        f"an open contour has no {job.side}: the tool runs on the line",
-        where=_at(chosen.names[index], path.start),
-    )
-    return [path], [finding]
-
-
-def _too_small(chosen: _Chosen, index: int, job: Job) -> Finding:
-    one = Polylines.of([chosen.lines[index]])
-    area = abs(float(signed_areas(one)[0]))
-    return Finding(
-        Code.CONTOUR_TOO_SMALL,
-        Severity.WARNING,
-        f"a tool of {job.tool_diameter_mm:g} mm does not fit into this contour of {area:.6g} mm²:"
-        " it is not cut",
-        where=_at(chosen.names[index], extents(one).mean(axis=1)),
-        measured=area,
-        unit="mm2",
+        f"an open contour has no {side}: the tool runs on the line",
+        where=at_place(chosen.names[k], chosen.lines[k].start),
     )
 
 
-def _gouges(lines: Polylines, source: Ints, chosen: _Chosen, job: Job) -> Iterator[Finding]:
+def _gouges(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Finding]:
     """Where the tool, following an offset contour, would cut into another closed contour."""
-    limit = job.radius_mm - GOUGE_TOLERANCE_MM
-    if job.side == "on" or limit <= 0.0:
-        return
-    for one, other in _neighbours(lines, chosen.lines, job.radius_mm):
-        mine = int(source[one])
-        if mine == other or not (chosen.lines.closed[mine] and chosen.lines.closed[other]):
+    radius = setting.operation.tool.radius_mm
+    paths = Polylines.of(line.path for line in lines)
+    for one, other in _neighbours(paths, chosen.lines, radius):
+        mine = lines[one].of[0]
+        if mine == other or not chosen.lines.closed[other]:
             continue
-        near = approach(lines[one], chosen.lines[other])
-        if near.distance < limit:
+        near = approach(paths[one], chosen.lines[other])
+        if near.distance < radius - GOUGE_TOLERANCE_MM:
             yield Finding(
                 Code.GOUGE,
                 Severity.WARNING,
-                f"a tool of {job.tool_diameter_mm:g} mm cuts"
-                f" {job.radius_mm - near.distance:.4g} mm into {chosen.names[other]}",
-                where=_at(chosen.names[mine], np.array(near.point)),
+                f"{tool_name(setting.operation.tool)} cuts"
+                f" {radius - near.distance:.4g} mm into {chosen.names[other]}",
+                where=at_place(chosen.names[mine], near.point),
                 measured=near.distance,
-                limit=job.radius_mm,
+                limit=radius,
                 unit="mm",
             )
 
@@ -189,7 +234,3 @@ def _neighbours(lines: Polylines, others: Polylines, reach: float) -> Iterator[t
 
     one, other = shapely.STRtree(boxes(others, 0.0)).query(boxes(lines, reach))
     return zip(one.tolist(), other.tolist(), strict=True)
-
-
-def _at(name: str, point: Floats) -> str:
-    return f"{name} at X {point[0]:.4f} Y {point[1]:.4f}"

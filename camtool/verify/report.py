@@ -138,6 +138,24 @@ class FindingReport(msgspec.Struct, frozen=True):
     unit: str = ""
 
 
+class Planned(msgspec.Struct, frozen=True):
+    """What planning gained: how far rapids go in XY, mm, with everything in the order and from
+    the starts in which it was drawn, and as it was put into order."""
+
+    rapid_drawn_mm: float
+    rapid_mm: float
+
+
+class Before(msgspec.Struct, frozen=True):
+    """The same job without `--minimise reversals` and `--approach`: reversals of X and Y, the
+    largest predicted error, the time. Null where that job could not be made."""
+
+    reversals_cutting: int | None = None
+    reversals_air: int | None = None
+    total_max_um: float | None = None
+    time_s: float | None = None
+
+
 class Report(msgspec.Struct, frozen=True):
     """Everything that a verification found. `blocks`, `bytes` None when no program was given."""
 
@@ -159,6 +177,8 @@ class Report(msgspec.Struct, frozen=True):
     time_split_s: TimeSplit
     interpolator: str
     camtool_version: str
+    planned: Planned | None = None
+    before: Before | None = None
 
     def to_json(self) -> str:
         """Indented JSON with keys in the order of the record, and a newline at the end."""

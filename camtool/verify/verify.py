@@ -15,6 +15,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import msgspec
+
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
@@ -32,7 +34,7 @@ from camtool.verify.held import held
 from camtool.verify.match import Goal, own_match
 from camtool.verify.motion import Tally, batches
 from camtool.verify.noticed import motion_findings
-from camtool.verify.report import Report
+from camtool.verify.report import Before, Planned, Report
 from camtool.verify.result import Result
 from camtool.verify.slides import SlidePass
 from camtool.verify.trace import Trace, TraceBuffer
@@ -51,6 +53,11 @@ class Verification:
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
         """The same with these findings, in the report too."""
         return replace(self, report=self.report.with_findings(findings), findings=findings)
+
+    def with_planning(self, planned: Planned, before: Before | None) -> Verification:
+        """The same with what planning gained in the report."""
+        report = msgspec.structs.replace(self.report, planned=planned, before=before)
+        return replace(self, report=report)
 
 
 def verify(

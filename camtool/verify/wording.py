@@ -74,11 +74,28 @@ def _facts(report: Report) -> Iterator[tuple[str, str]]:
         "reversals",
         f"X {total.x}, Y {total.y}, Z {total.z} (while cutting X {cutting.x}, Y {cutting.y})",
     )
+    if report.planned is not None:
+        far, drawn = report.planned.rapid_mm, report.planned.rapid_drawn_mm
+        yield "rapids", f"{_mm(far)} mm in XY (as drawn {_mm(drawn)} mm)"
+    if report.before is not None:
+        yield "before", _before(report)
     error = report.error_um.total
     yield "error", f"{_um(error.max)} µm at most, rms {_um(error.rms)}, p95 {_um(error.p95)}"
     yield "by source", _error_sources(report)
     if report.closure_um is not None:
         yield "closure", f"{report.closure_um:.2f} µm"
+
+
+def _before(report: Report) -> str:
+    """What the same job would be without what was done against reversals."""
+    before = report.before
+    if before is None or before.time_s is None:
+        return "not known: the job cannot be cut without --minimise reversals"
+    error, time = f"{_um(before.total_max_um)} µm", clock(before.time_s)
+    return (
+        f"{before.reversals_cutting} reversals while cutting, {before.reversals_air} in the air,"
+        f" error {error}, time {time}"
+    )
 
 
 def _error_sources(report: Report) -> str:

@@ -16,7 +16,7 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
 from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing, verify_program
-from camtool.planning.job import Job
+from camtool.planning.job import job_of
 
 pytestmark = pytest.mark.benchmark
 ROOT = Path(__file__).parents[2]
@@ -43,12 +43,12 @@ def test_stages(benchmark: Any, stage: str) -> None:
     target = load_target("pic-mmh")
     options = ReadOptions(tolerance_mm=target.machine.defaults.fit_tolerance_mm)
     drawing = read_drawing(LOGO, options=options)
-    program = post_drawing(drawing, Job(), target).program
+    program = post_drawing(drawing, job_of(), target).program
     assert program is not None
     work = {
         "read": lambda: read_drawing(LOGO, options=options),
-        "post --no-verify": lambda: post_drawing(drawing, Job(), target, check=False),
-        "post": lambda: post_drawing(drawing, Job(), target),
+        "post --no-verify": lambda: post_drawing(drawing, job_of(), target, check=False),
+        "post": lambda: post_drawing(drawing, job_of(), target),
         "verify --against": lambda: verify_program(
             program.data, target, source="logo.pic", drawing=drawing
         ),
@@ -87,7 +87,7 @@ def test_growth(benchmark: Any, count: int, tmp_path: Path) -> None:
     target = load_target("pic-mmh")
 
     def work() -> int:
-        posted = post_drawing(read_drawing(file), Job(), target, check=False)
+        posted = post_drawing(read_drawing(file), job_of(), target, check=False)
         assert posted.program is not None
         return len(posted.program.row_of_block)
 

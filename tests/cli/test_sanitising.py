@@ -9,7 +9,7 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes
 from camtool.machine.registry import load_target, target_names
 from camtool.pipeline import post_drawing
-from camtool.planning.job import Job
+from camtool.planning.job import job_of
 from camtool.toolpath.moves import Toolpath
 
 NASTY = (
@@ -48,11 +48,11 @@ def test_no_name_changes_a_program(target: str, samples: Path) -> None:
     loaded = load_target(
         target, machine_file=sample if sample.exists() else None, settings=settings
     )
-    plain = post_drawing(read_bytes(svg("plain"), "plain.svg"), Job(), loaded, check=False)
+    plain = post_drawing(read_bytes(svg("plain"), "plain.svg"), job_of(), loaded, check=False)
     assert plain.decoded is not None, plain.findings
     for name in NASTY:
         drawing = read_bytes(svg(name), f"{name}.svg", ReadOptions(format="svg"))
-        made = post_drawing(drawing, Job(), loaded, check=False)
+        made = post_drawing(drawing, job_of(), loaded, check=False)
         assert made.program is not None
         assert made.decoded is not None
         assert moves(made.decoded) == moves(plain.decoded), name
@@ -65,7 +65,7 @@ def test_the_header_names_drawing_and_settings(target: str) -> None:
     for settings in ([], ["axes.x.travel_mm=99.0"]):
         loaded = load_target(target, settings=settings)
         drawing = read_bytes(svg("CUT"), "some/folder/part 7.svg")
-        made = post_drawing(drawing, Job(), loaded, check=False)
+        made = post_drawing(drawing, job_of(), loaded, check=False)
         assert made.program is not None
         texts.append(made.program.data.decode())
     assert all("(part 7.svg)" in text for text in texts)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from camtool.errors import OptionError
-from camtool.planning.job import Job
+from camtool.planning.job import job_of
 
 BAD = [
     ("tool_diameter_mm", -0.1),
@@ -34,20 +34,20 @@ BAD = [
 @pytest.mark.parametrize(("name", "value"), BAD)
 def test_what_no_job_can_be_is_refused_with_a_mend(name: str, value: Any) -> None:
     with pytest.raises(OptionError) as caught:
-        Job(**{name: value})
+        job_of(**{name: value})
     assert caught.value.mend
     assert "\n" not in str(caught.value)
 
 
 def test_a_job_says_nothing_unless_told() -> None:
-    job = Job()
+    job = job_of()
     assert (job.tool_diameter_mm, job.side, job.origin, job.layers) == (0.0, "auto", "drawing", ())
     assert job.feed_mm_min is job.depth_mm is job.safe_z_mm is job.spindle_rpm is None
 
 
 def test_the_known_words_are_told() -> None:
     with pytest.raises(OptionError, match="on, outside, inside, auto"):
-        Job(side="left")
+        job_of(side="left")
 
 
 @pytest.mark.parametrize(
@@ -62,4 +62,4 @@ def test_the_known_words_are_told() -> None:
     ],
 )
 def test_layers_are_chosen_by_pattern(patterns: tuple[str, ...], layer: str, taken: bool) -> None:
-    assert Job(layers=patterns).takes(layer) is taken
+    assert job_of(layers=patterns).takes(layer) is taken

@@ -17,7 +17,7 @@ from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import reverse
 from camtool.machine.model import Machine
-from camtool.planning.job import Job
+from camtool.planning.job import Job, job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.drawings import drawing_of
@@ -43,7 +43,7 @@ def _errors(toolpath: Toolpath) -> list[Code]:
 
 
 def test_a_circle_is_up_across_down_round_up_home(machine: Machine) -> None:
-    toolpath = plan(drawing_of([_circle(2, 1, 1)], ["CUT"]), Job(), machine)
+    toolpath = plan(drawing_of([_circle(2, 1, 1)], ["CUT"]), job_of(), machine)
     rows = [(row.kind.name, row.end, row.feed, row.source) for row in toolpath]
     name = "CUT/PATH 0"
     assert rows == [
@@ -60,12 +60,12 @@ def test_a_circle_is_up_across_down_round_up_home(machine: Machine) -> None:
 
 
 def test_a_circle_drawn_clockwise_is_cut_clockwise(machine: Machine) -> None:
-    toolpath = plan(drawing_of([reverse(_circle(2, 1, 1))]), Job(), machine)
+    toolpath = plan(drawing_of([reverse(_circle(2, 1, 1))]), job_of(), machine)
     assert _kinds(toolpath)[3] == "ARC_CW"
 
 
 def test_the_job_is_heard(machine: Machine) -> None:
-    job = Job(
+    job = job_of(
         feed_mm_min=1.0,
         plunge_feed_mm_min=0.4,
         safe_z_mm=0.5,
@@ -93,7 +93,7 @@ def test_the_job_is_heard(machine: Machine) -> None:
 
 
 def test_plunges_run_at_the_feed_of_the_cut_unless_told(machine: Machine) -> None:
-    toolpath = plan(drawing_of([_circle(2, 1, 1)]), Job(feed_mm_min=0.3), machine)
+    toolpath = plan(drawing_of([_circle(2, 1, 1)]), job_of(feed_mm_min=0.3), machine)
     assert toolpath.feed[toolpath.is_feed].tolist() == [0.3, 0.3]
 
 
@@ -104,7 +104,7 @@ def test_a_feed_above_the_highest_is_refused_with_one_that_works(
     made = drawing_of([_circle(2, 1, 1)])
 
     def job(feed: float) -> Job:
-        return Job(feed_mm_min=feed) if which == 0 else Job(plunge_feed_mm_min=feed)
+        return job_of(feed_mm_min=feed) if which == 0 else job_of(plunge_feed_mm_min=feed)
 
     with pytest.raises(OptionError, match=r"1\.394 mm/min") as caught:
         plan(made, job(1.4), machine)
@@ -114,24 +114,28 @@ def test_a_feed_above_the_highest_is_refused_with_one_that_works(
 
 
 def test_a_part_beyond_the_travel_is_an_error_with_a_mend(machine: Machine) -> None:
-    toolpath = plan(drawing_of([_circle(9, 6, 2)]), Job(), machine)
+    toolpath = plan(drawing_of([_circle(9, 6, 2)]), job_of(), machine)
     assert _errors(toolpath) == [Code.OUT_OF_TRAVEL, Code.OUT_OF_TRAVEL]
     first = toolpath.findings[0]
     assert (first.limit, first.unit) == (10.0, "mm")
     assert first.measured == pytest.approx(11.0)
     assert first.where.startswith("axis X")
     assert "--origin lower-left" in first.message
-    assert _errors(plan(drawing_of([_circle(9, 6, 2)]), Job(origin="lower-left"), machine)) == []
+    assert (
+        _errors(plan(drawing_of([_circle(9, 6, 2)]), job_of(origin="lower-left"), machine)) == []
+    )
 
 
 def test_part_zero_belongs_to_the_travel(machine: Machine) -> None:
     # 2 mm wide, but 12 mm from where the tool starts.
-    assert _errors(plan(drawing_of([_circle(11, 1, 1)]), Job(), machine)) == [Code.OUT_OF_TRAVEL]
+    assert _errors(plan(drawing_of([_circle(11, 1, 1)]), job_of(), machine)) == [
+        Code.OUT_OF_TRAVEL
+    ]
 
 
 def test_a_part_as_large_as_the_travel_fits(machine: Machine) -> None:
-    assert _errors(plan(drawing_of([_box(0, 0, 10, 7)]), Job(), machine)) == []
-    assert _errors(plan(drawing_of([_box(0, 0, 10, 7.001)]), Job(), machine)) == [
+    assert _errors(plan(drawing_of([_box(0, 0, 10, 7)]), job_of(), machine)) == []
+    assert _errors(plan(drawing_of([_box(0, 0, 10, 7.001)]), job_of(), machine)) == [
         Code.OUT_OF_TRAVEL
     ]
 
@@ -139,11 +143,11 @@ def test_a_part_as_large_as_the_travel_fits(machine: Machine) -> None:
 def test_arcs_count_with_their_extremes(machine: Machine) -> None:
     # Its vertices lie within 10 mm, but the left of its half circle is at −3.5.
     bow = Polyline(np.array([[0.0, 0, -1], [0, 7, 0], [6.6, 7, 0]]))
-    assert _errors(plan(drawing_of([bow]), Job(), machine)) == [Code.OUT_OF_TRAVEL]
+    assert _errors(plan(drawing_of([bow]), job_of(), machine)) == [Code.OUT_OF_TRAVEL]
 
 
 def test_when_no_contour_is_left_that_is_an_error(machine: Machine) -> None:
-    job = Job(tool_diameter_mm=3.0, side="inside")
+    job = job_of(tool_diameter_mm=3.0, side="inside")
     toolpath = plan(drawing_of([_circle(2, 1, 1)]), job, machine)
     codes = [finding.code for finding in toolpath.findings]
     assert codes == [Code.CONTOUR_TOO_SMALL, Code.NOTHING_DRAWN]
@@ -151,13 +155,13 @@ def test_when_no_contour_is_left_that_is_an_error(machine: Machine) -> None:
 
 
 def test_an_empty_drawing_gives_no_cuts(machine: Machine) -> None:
-    toolpath = plan(drawing_of([]), Job(), machine)
+    toolpath = plan(drawing_of([]), job_of(), machine)
     assert _kinds(toolpath) == ["RAPID", "RAPID", "END"]
     assert toolpath.findings == ()
 
 
 def test_findings_of_the_contours_are_kept(machine: Machine) -> None:
-    job = Job(tool_diameter_mm=0.5)
+    job = job_of(tool_diameter_mm=0.5)
     toolpath = plan(drawing_of([_circle(2, 2, 1), _circle(4.3, 2, 1)]), job, machine)
     assert [finding.code for finding in toolpath.findings] == [Code.GOUGE, Code.GOUGE]
 
@@ -167,7 +171,7 @@ def test_every_contour_is_cut_once_at_depth_and_rapids_stay_up(
     machine: Machine, paths: list[Polyline]
 ) -> None:
     made = drawing_of(paths)
-    toolpath = plan(made, Job(), machine)
+    toolpath = plan(made, job_of(), machine)
     starts, ends = toolpath.starts, toolpath.end
     level = starts[:, 2] == ends[:, 2]
     cutting = toolpath.is_feed & level
@@ -190,6 +194,6 @@ def test_every_contour_is_cut_once_at_depth_and_rapids_stay_up(
 def test_single_points_are_named_and_alone_they_are_nothing_to_cut(machine: Machine) -> None:
     point = Mark((1.0, 2.0), "DRILL", "", "POINT 1")
     circle = replace(drawing_of([_circle(2, 1, 1)], ["CUT"]), marks=(point,))
-    assert [f.code for f in plan(circle, Job(), machine).findings] == [Code.ENTITY_SKIPPED]
+    assert [f.code for f in plan(circle, job_of(), machine).findings] == [Code.ENTITY_SKIPPED]
     alone = replace(drawing_of([], []), marks=(point,))
-    assert _errors(plan(alone, Job(), machine)) == [Code.NOTHING_DRAWN]
+    assert _errors(plan(alone, job_of(), machine)) == [Code.NOTHING_DRAWN]

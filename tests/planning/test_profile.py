@@ -3,23 +3,51 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import given
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Severity
+from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import nearest
-from camtool.geometry.measure import extents, sample, signed_areas
+from camtool.geometry.drawing import Drawing
+from camtool.geometry.measure import sample, signed_areas
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.transform import reverse
-from camtool.planning.job import Job
-from camtool.planning.profile import Contours, contours, origin_shift
+from camtool.planning.choose import choose
+from camtool.planning.items import Contour, Feeds, Setting
+from camtool.planning.job import Job, job_of
+from camtool.planning.profile import profile
 from tests.drawings import drawing_of
 from tests.strategies import contours as star_contours
 
 R = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Contours:
+    """The lines of a profile's contours, the path that each came from, and the findings."""
+
+    lines: Polylines
+    source: np.ndarray
+    findings: tuple[Finding, ...]
+    items: tuple[Contour, ...]
+
+
+def contours(drawing: Drawing, job: Job) -> Contours:
+    (operation,) = job.operations
+    setting = Setting(operation, Feeds(1.0, 1.0), (-0.1,), 1.0)
+    work = profile(choose(drawing, operation), setting)
+    items = tuple(item for item in work.items if isinstance(item, Contour))
+    assert len(items) == len(work.items)
+    return Contours(
+        Polylines.of(item.path for item in items),
+        np.array([item.source for item in items], dtype=np.int64),
+        work.findings,
+        items,
+    )
 
 
 def _circle(x: float, y: float, radius: float) -> Polyline:
@@ -46,7 +74,7 @@ def _areas(found: Contours) -> list[float]:
 def test_sides(turned: bool) -> None:
     circle = reverse(_circle(0, 0, 2)) if turned else _circle(0, 0, 2)
     for side, radius in (("on", 2.0), ("outside", 2 + R), ("inside", 2 - R), ("auto", 2 + R)):
-        found = contours(drawing_of([circle]), Job(tool_diameter_mm=2 * R, side=side))
+        found = contours(drawing_of([circle]), job_of(tool_diameter_mm=2 * R, side=side))
         assert _areas(found) == [pytest.approx(math.pi * radius**2)]
         assert found.findings == ()
         # The direction of the drawing is kept.
@@ -56,7 +84,7 @@ def test_sides(turned: bool) -> None:
 def test_a_point_without_width_runs_on_every_line() -> None:
     paths = [_box(0, 0, 9, 9), _circle(4, 4, 2), _line(1, 1, 2, 1)]
     for side in ("on", "outside", "inside", "auto"):
-        found = contours(drawing_of(paths), Job(side=side))
+        found = contours(drawing_of(paths), job_of(side=side))
         assert np.array_equal(found.lines.vertices, Polylines.of(paths).vertices)
         assert found.source.tolist() == [0, 1, 2]
         assert found.findings == ()
@@ -64,30 +92,28 @@ def test_a_point_without_width_runs_on_every_line() -> None:
 
 def test_auto_goes_round_parts_and_within_holes() -> None:
     paths = [_circle(0, 0, 1), _circle(0, 0, 3), _circle(0, 0, 5), _circle(20, 0, 1)]
-    found = contours(drawing_of(paths), Job(tool_diameter_mm=2 * R))
+    found = contours(drawing_of(paths), job_of(tool_diameter_mm=2 * R))
     radii = [math.sqrt(area / math.pi) for area in _areas(found)]
     assert radii == pytest.approx([1 + R, 3 - R, 5 + R, 1 + R])
 
 
 def test_only_chosen_layers_nest() -> None:
     made = drawing_of([_circle(0, 0, 1), _circle(0, 0, 3)], ["IN", "FRAME"])
-    found = contours(made, Job(tool_diameter_mm=2 * R, layers=("IN",)))
+    found = contours(made, job_of(tool_diameter_mm=2 * R, layers=("IN",)))
     assert found.source.tolist() == [0]
     assert _areas(found) == [pytest.approx(math.pi * (1 + R) ** 2)]
-    later = contours(made, Job(tool_diameter_mm=2 * R, layers=("FR*",)))
+    later = contours(made, job_of(tool_diameter_mm=2 * R, layers=("FR*",)))
     assert later.source.tolist() == [1]
 
 
 def test_layers_that_are_not_there_are_named_with_those_that_are() -> None:
     with pytest.raises(OptionError, match="FRAME, IN") as caught:
-        contours(drawing_of([_circle(0, 0, 1)] * 2, ["IN", "FRAME"]), Job(layers=("CUT",)))
+        contours(drawing_of([_circle(0, 0, 1)] * 2, ["IN", "FRAME"]), job_of(layers=("CUT",)))
     assert caught.value.file == "test.dxf"
 
 
 def test_an_empty_drawing_has_no_contours() -> None:
-    for origin in ("drawing", "lower-left", "centre"):
-        found = contours(drawing_of([]), Job(layers=("CUT",), origin=origin))
-        assert len(found.lines) == 0
+    assert len(contours(drawing_of([]), job_of(layers=("CUT",))).lines) == 0
 
 
 @pytest.mark.parametrize(
@@ -95,7 +121,7 @@ def test_an_empty_drawing_has_no_contours() -> None:
 )
 def test_open_paths_are_cut_on_the_line(side: str, count: int) -> None:
     path = _line(1, 1, 2, 1)
-    found = contours(drawing_of([path]), Job(tool_diameter_mm=1.0, side=side))
+    found = contours(drawing_of([path]), job_of(tool_diameter_mm=1.0, side=side))
     assert np.array_equal(found.lines.vertices, path.vertices)
     assert _codes(found) == [Code.OPEN_CONTOUR_ON_LINE] * count
     assert all(f.where == "0/PATH 0 at X 1.0000 Y 1.0000" for f in found.findings)
@@ -104,7 +130,7 @@ def test_open_paths_are_cut_on_the_line(side: str, count: int) -> None:
 def test_a_contour_that_the_tool_does_not_fit_into_is_named() -> None:
     found = contours(
         drawing_of([_circle(3, 4, 1), _box(9, 9, 99, 99)]),
-        Job(tool_diameter_mm=2.5, side="inside"),
+        job_of(tool_diameter_mm=2.5, side="inside"),
     )
     assert found.source.tolist() == [1]
     (finding,) = found.findings
@@ -133,15 +159,15 @@ def test_a_contour_may_fall_apart() -> None:
         ),
         True,
     )
-    found = contours(drawing_of([dumbbell]), Job(tool_diameter_mm=1.0, side="inside"))
+    found = contours(drawing_of([dumbbell]), job_of(tool_diameter_mm=1.0, side="inside"))
     assert found.source.tolist() == [0, 0]
     # The tool looks a little into the neck.
     assert _areas(found) == pytest.approx([4.0, 4.0], rel=1e-3)
 
 
-def test_parts_nearer_than_the_tool_is_wide_are_gouged() -> None:
+def test_parts_nearer_than_the_tool_is_wide_are_gouged_when_cut_one_by_one() -> None:
     paths = [_circle(0, 0, 1), _circle(2.3, 0, 1)]
-    found = contours(drawing_of(paths), Job(tool_diameter_mm=0.5))
+    found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5, side="outside"))
     assert _codes(found) == [Code.GOUGE, Code.GOUGE]
     first = found.findings[0]
     assert first.severity == Severity.WARNING
@@ -152,47 +178,87 @@ def test_parts_nearer_than_the_tool_is_wide_are_gouged() -> None:
     assert "0/PATH 1" in first.message
 
 
+@pytest.mark.parametrize(("apart", "count"), [(2.49, 1), (2.5, 2), (2.51, 2), (2.0, 1)])
+def test_one_line_runs_round_parts_that_are_too_near(apart: float, count: int) -> None:
+    paths = [_circle(0, 0, 1), _circle(apart, 0, 1)]
+    found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5))
+    assert len(found.lines) == count
+    joined = [finding for finding in found.findings if "stay joined" in finding.message]
+    assert len(joined) == 2 - count
+    for finding in joined:
+        assert finding.code == Code.UNREACHED
+        assert finding.measured == pytest.approx(apart - 2.0, abs=1e-9)
+        assert "0/PATH 0" in finding.message
+        assert "0/PATH 1" in finding.message
+    for line in found.lines:
+        for path in paths:
+            away = nearest(sample(line, 0.01), Segments.of(path)).distance
+            assert away.min() >= 0.25 - 1e-6
+
+
 @pytest.mark.parametrize(
     "paths",
     [
-        [_circle(0, 0, 1), _circle(2.5, 0, 1)],  # just room for the tool
+        [_circle(0, 0, 1), _circle(2.51, 0, 1)],  # just room for the tool
         [_circle(0, 0, 1), _circle(0, 0, 1)],  # a double
         [_circle(0, 0, 1), _line(1.2, -5, 1.2, 5)],  # an open path is no part
         [_circle(0, 0, 1), _circle(0, 0, 3)],  # a hole in a part
     ],
 )
 def test_no_gouge(paths: list[Polyline]) -> None:
-    assert contours(drawing_of(paths), Job(tool_diameter_mm=0.5)).findings == ()
-
-
-def test_parts_that_touch_leave_no_room_for_the_tool() -> None:
-    found = contours(drawing_of([_circle(0, 0, 1), _circle(2.0, 0, 1)]), Job(tool_diameter_mm=0.5))
-    assert [finding.measured for finding in found.findings] == [0.0, 0.0]
+    assert contours(drawing_of(paths), job_of(tool_diameter_mm=0.5)).findings == ()
 
 
 def test_on_the_line_nothing_is_a_gouge() -> None:
     paths = [_circle(0, 0, 1), _circle(2.1, 0, 1)]
-    assert contours(drawing_of(paths), Job(tool_diameter_mm=0.5, side="on")).findings == ()
+    assert contours(drawing_of(paths), job_of(tool_diameter_mm=0.5, side="on")).findings == ()
 
 
-def test_origins_take_the_chosen_paths() -> None:
-    made = drawing_of([_circle(5, 7, 2), _box(-50, -50, 50, 50)], ["CUT", "FRAME"])
-    for origin, shift in (
-        ("drawing", (0.0, 0.0)),
-        ("lower-left", (-3.0, -5.0)),
-        ("centre", (-5.0, -7.0)),
+@pytest.mark.parametrize("width", [0.5, 0.5 - 4e-4])
+def test_a_hole_as_wide_as_the_tool_is_cut_along_its_middle(width: float) -> None:
+    slot = Polyline(np.array([[0.0, 0, 0], [3, 0, 1], [3, width, 0], [0, width, 1.0]]), True)
+    outer = _box(-3, -3, 6, 3)
+    for job in (
+        job_of(tool_diameter_mm=0.5),
+        job_of(tool_diameter_mm=0.5, side="inside"),
     ):
-        job = Job(origin=origin, layers=("CUT",))
-        assert origin_shift(made, job) == pytest.approx(shift)
-        box = extents(contours(made, job).lines).mean(axis=1)
-        assert box == pytest.approx(np.array([5.0, 7.0]) + shift)
+        found = contours(drawing_of([slot, outer]), job)
+        (at,) = [place for place, k in enumerate(found.source.tolist()) if k == 0]
+        assert found.lines[at].vertices[:, 1] == pytest.approx(0.5 * width, abs=5e-4)
+        assert Code.SLOT_AS_WIDE in _codes(found)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("direction", "right"), [("climb", True), ("conventional", False)])
+def test_climbing_keeps_what_stays_on_the_right(turned: bool, direction: str, right: bool) -> None:
+    paths = [_circle(0, 0, 1), _circle(0, 0, 3)]
+    paths = [reverse(path) for path in paths] if turned else paths
+    for side in ("auto", "outside", "inside"):
+        job = job_of(tool_diameter_mm=2 * R, side=side, direction=direction)
+        found = contours(drawing_of(paths), job)
+        assert [item.material_left for item in found.items] == [not right] * 2
+        for item, line in zip(found.items, found.lines, strict=True):
+            # Where the drawn line is nearest, there is what stays.
+            start = line.vertices[0, :2]
+            grown = np.hypot(*start) > np.hypot(*paths[item.source].start)
+            towards = -start if grown else start
+            ahead = sample(line, 1e-4)[1] - start
+            left = ahead[0] * towards[1] - ahead[1] * towards[0] > 0.0
+            assert left is not right
+
+
+def test_an_allowance_is_left_on_the_wall() -> None:
+    job = job_of(tool_diameter_mm=2 * R, side="outside", allowance_mm=0.1)
+    assert _areas(contours(drawing_of([_circle(0, 0, 2)]), job)) == [
+        pytest.approx(math.pi * (2.1 + R) ** 2)
+    ]
 
 
 @given(star_contours())
 def test_the_tool_just_touches_the_contour_and_never_crosses_it(path: Polyline) -> None:
     made = drawing_of([path])
     for side in ("outside", "inside"):
-        found = contours(made, Job(tool_diameter_mm=2 * R, side=side))
+        found = contours(made, job_of(tool_diameter_mm=2 * R, side=side))
         for line in found.lines:
             away = nearest(sample(line, 0.2), Segments.of(path)).distance
             assert away == pytest.approx(R, abs=1e-5)

@@ -8,7 +8,7 @@ import numpy as np
 
 from camtool.importers.read import read_drawing
 from camtool.machine.registry import LoadedTarget, load_target
-from camtool.planning.job import Job
+from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -62,7 +62,7 @@ def strokes(*paths: Sequence[Point], feed: float = 225.0) -> Toolpath:
 def posted(sample: str, target: LoadedTarget) -> bytes:
     """The program of a sample file."""
     drawing = read_drawing(ROOT / "samples" / sample)
-    return bytes(target.post.write(plan(drawing, Job(), target.machine), target.machine).data)
+    return bytes(target.post.write(plan(drawing, job_of(), target.machine), target.machine).data)
 
 
 def arrays(program: bytes) -> list[dict[str, list[list[int]]]]:

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from camtool.errors import ProgramError
 from camtool.importers.read import read_drawing
 from camtool.machine.registry import load_target
-from camtool.planning.job import Job
+from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -69,7 +69,7 @@ def test_the_path_mode_is_the_one_asked_for(path: str, tmp_path: Path) -> None:
 def test_the_logo(name: str, tmp_path: Path) -> None:
     target = load_target(name)
     drawing = read_drawing(Path(__file__).parents[2] / "samples" / "logo.dxf")
-    program = target.post.write(plan(drawing, Job(), target.machine), target.machine)
+    program = target.post.write(plan(drawing, job_of(), target.machine), target.machine)
     compare(target.post.read(program.data, target.machine), program.data, tmp_path)
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from camtool.importers.read import read_drawing
-from camtool.planning.job import Job
+from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.moves import Move
 from tests.oracles.corte_recto import walk
@@ -17,7 +17,7 @@ LOGO = ROOT / "samples" / "logo.dxf"
 def test_every_step_stays_near_what_was_wanted() -> None:
     """Within the tolerance of lines, that of arcs, and half a step in X and in Y."""
     target = loaded()
-    wanted = plan(read_drawing(LOGO), Job(), target.machine)
+    wanted = plan(read_drawing(LOGO), job_of(), target.machine)
     program = target.post.write(wanted, target.machine)
     read = target.post.read(program.data, target.machine)
     moves = list(wanted)

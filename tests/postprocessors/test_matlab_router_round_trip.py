@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from camtool.findings import Severity, worst
 from camtool.machine.registry import LoadedTarget
 from camtool.pipeline import post_drawing
-from camtool.planning.job import Job
+from camtool.planning.job import job_of
 from tests.postprocessors.router_parts import (
     ROOT,
     Point,
@@ -114,7 +114,7 @@ def test_samples_are_posted_and_verified(sample: str, form: str) -> None:
     from camtool.importers.read import read_drawing
 
     target = router(f"format={form}")
-    posting = post_drawing(read_drawing(ROOT / "samples" / sample), Job(), target)
+    posting = post_drawing(read_drawing(ROOT / "samples" / sample), job_of(), target)
     assert not posting.failed
     assert posting.verification is not None
     codes = {finding.code.name for finding in posting.findings}

@@ -53,7 +53,7 @@ WANTED_KEYS = {
 """The keys that users rely on: they may never be renamed or dropped (design, section 4)."""
 
 ADDED_KEYS = {
-    "": "contours time_split_s interpolator camtool_version",
+    "": "contours time_split_s interpolator camtool_version planned before",
     "reversals": "cutting air",
     "error_um.interpolation": "lines_max arcs_max lines_steps arcs_steps",
     "circles.0": "D_um direction z_mm",
