@@ -1,0 +1,238 @@
+"""Drilling: single points and small circles become holes.
+
+    marks, circles ──each place once──▶ holes ──pecks──▶ one Fixed item per hole
+
+The tip goes to the full depth, and no farther: a hole that is to go through with its whole
+diameter needs a depth greater by the height of the cone, ½·diameter / tan(½·tip angle).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.measure import path_extents, sample
+from camtool.geometry.polylines import Bools, Floats, Polyline, Segments
+from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
+from camtool.planning.job import Operation
+
+ROUND_SHARE = 1e-3
+"""A closed path is a circle when its points are off the mean radius by no more than this share
+of it, or `ROUND_MM` if that is more."""
+
+ROUND_MM = 5e-3
+"""A closed path is a circle when its points are off the mean radius by no more than this."""
+
+SAMPLES_ROUND = 64.0
+"""At least so many points of a path are looked at to see whether it is a circle."""
+
+SAME_HOLE_MM = 1e-2
+"""Holes whose centres are nearer than this are one."""
+
+HOLE_SIZE_MM = 1e-2
+"""A circle fits a drill when their diameters differ by no more than this."""
+
+PECK_TOP_MM = 0.5
+"""Between two pecks the drill comes up to this height above the stock, or to safe z if lower."""
+
+PECK_CLEARANCE_MM = 0.2
+"""A drill goes back as a rapid to this height above the last depth, or to half a peck if lower."""
+
+NAMES_SHOWN = 3
+"""So many paths are named in a finding; the others are counted."""
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A place (x, y) mm to drill; `diameter_mm` of its circle, None for a mark; `source`, the
+    index of its path in the placed drawing, −1 for a mark."""
+
+    at_mm: tuple[float, float]
+    diameter_mm: float | None
+    name: str
+    source: int = -1
+    outline: Polyline | None = None
+
+
+def drill(chosen: Chosen, setting: Setting) -> Work:
+    """One Fixed item for each mark and each circle up to the largest hole of the operation.
+
+    Places that are drawn twice are drilled once; of concentric circles the one nearest to the
+    drill's diameter counts. What is no hole for this drill is named in a finding; when nothing
+    is left that is an error.
+    """
+    operation = setting.operation
+    circles, others = _circles(chosen)
+    limit = _largest(operation)
+    small = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit + HOLE_SIZE_MM]
+    large = [hole for hole in circles if hole not in small]
+    marks = [
+        Hole((float(x), float(y)), None, name)
+        for (x, y), name in zip(chosen.points, chosen.point_names, strict=True)
+    ]
+    holes = each_once([*marks, *small], operation.tool.diameter_mm)
+    findings = [
+        *_too_large(large, limit),
+        *_no_circles(others),
+        *_other_sizes(holes, operation),
+        *_nothing(holes, operation),
+    ]
+    items = (
+        Fixed((_run(hole, setting),), setting, hole.name, hole.source, hole.outline)
+        for hole in holes
+    )
+    return Work(tuple(items), tuple(findings))
+
+
+def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
+    """Centre (x, y) mm and diameter mm of a closed path that is a full circle, else None."""
+    if not path.closed:
+        return None
+    (xmin, xmax), (ymin, ymax) = _box(path)
+    centre = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax))
+    radius = 0.25 * (xmax - xmin + ymax - ymin)
+    segments = Segments.of(path)
+    points = sample(path, 2.0 * math.pi * radius / SAMPLES_ROUND)
+    off = np.abs(np.hypot(*(points - centre).T) - radius).max()
+    round_enough = off <= max(ROUND_MM, ROUND_SHARE * radius) and off < 0.5 * radius
+    once_round = bool(segments.is_arc.all()) and _turns_once(segments.sweep)
+    return (centre, 2.0 * radius) if round_enough and once_round else None
+
+
+def _turns_once(sweep: Floats) -> bool:
+    """Whether arcs that all turn one way make one full turn."""
+    one_way = bool((sweep > 0.0).all() or (sweep < 0.0).all())
+    return one_way and abs(abs(float(sweep.sum())) - 2.0 * math.pi) < 0.5 * math.pi
+
+
+def _box(path: Polyline) -> list[list[float]]:
+    from camtool.geometry.polylines import Polylines
+
+    box: list[list[float]] = path_extents(Polylines.of([path]))[0].tolist()
+    return box
+
+
+def each_once(holes: list[Hole], drill_mm: float) -> list[Hole]:
+    """The holes in their order without those at a place that another one has; circles go before
+    marks, and of circles that whose diameter is nearest to the drill's."""
+
+    def misfit(index: int) -> tuple[float, int]:
+        diameter = holes[index].diameter_mm
+        return (math.inf if diameter is None else abs(diameter - drill_mm), index)
+
+    places = np.array([hole.at_mm for hole in holes]).reshape(-1, 2)
+    taken: Bools = np.zeros(len(holes), dtype=np.bool_)
+    kept: list[int] = []
+    for index in sorted(range(len(holes)), key=misfit):
+        if taken[index]:
+            continue
+        kept.append(index)
+        taken |= np.hypot(*(places - places[index]).T) <= SAME_HOLE_MM
+    return [holes[index] for index in sorted(kept)]
+
+
+def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
+    """Depths below the stock top at which the drill turns back, equal steps, the last the full
+    depth; ValueError for a depth that is not above 0."""
+    if not depth_mm > 0.0:
+        raise ValueError(f"a hole {depth_mm} mm deep")
+    whole = depth_mm if peck_mm is None else peck_mm
+    count = math.ceil(depth_mm / whole * (1.0 - np.finfo(float).eps))
+    return [depth_mm * (step + 1) / count for step in range(count)]
+
+
+def _run(hole: Hole, setting: Setting) -> Run:
+    """Down and up in the hole: cut a peck, rapid out, rapid back to just above it, and so on."""
+    operation, feed = setting.operation, setting.feeds.plunge_mm_min
+    top = min(PECK_TOP_MM, setting.safe_z_mm)
+    depths = peck_depths(-setting.levels_mm[-1], operation.peck_mm)
+    above = min(PECK_CLEARANCE_MM, 0.5 * depths[0])
+    heights, feeds = [-depths[0]], []
+    for last, depth in zip(depths, depths[1:], strict=False):
+        heights += [top, above - last, -depth]
+        feeds += [RAPID, RAPID, feed]
+    vertices = np.array([(*hole.at_mm, z, 0.0) for z in heights])
+    return Run(vertices, np.array(feeds), feed, hole.name, operation.dwell_s)
+
+
+def _circles(chosen: Chosen) -> tuple[list[Hole], list[str]]:
+    """The full circles of the paths, and the names of the other paths."""
+    holes, others = [], []
+    for path, source, name in zip(chosen.lines, chosen.source, chosen.names, strict=True):
+        circle = circle_of(path)
+        if circle is None:
+            others.append(name)
+        else:
+            holes.append(Hole(*circle, name, int(source), path))
+    return holes, others
+
+
+def _largest(operation: Operation) -> float:
+    """Circles up to this diameter are drilled."""
+    if operation.max_hole_mm is not None:
+        return operation.max_hole_mm
+    return operation.tool.diameter_mm or math.inf
+
+
+def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:
+    if holes:
+        largest = max(hole.diameter_mm or 0.0 for hole in holes)
+        yield Finding(
+            Code.NOT_DRILLED,
+            Severity.WARNING,
+            f"circles of more than {limit:g} mm are not drilled: {len(holes)}, up to"
+            f" {largest:.6g} mm",
+            where=_named([hole.name for hole in holes]),
+            measured=largest,
+            limit=limit,
+            unit="mm",
+        )
+
+
+def _no_circles(names: list[str]) -> Iterator[Finding]:
+    if names:
+        yield Finding(
+            Code.NOT_DRILLED,
+            Severity.WARNING,
+            f"only full circles and single points are drilled: {len(names)} other paths are not",
+            where=_named(names),
+            measured=float(len(names)),
+        )
+
+
+def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
+    """One finding for each diameter that is not the drill's."""
+    wanted = operation.tool.diameter_mm
+    by_size: dict[float, list[str]] = {}
+    for hole in holes:
+        if wanted and hole.diameter_mm and abs(hole.diameter_mm - wanted) > HOLE_SIZE_MM:
+            by_size.setdefault(round(hole.diameter_mm, 3), []).append(hole.name)
+    for size, names in sorted(by_size.items()):
+        yield Finding(
+            Code.HOLE_SIZE,
+            Severity.WARNING,
+            f"{len(names)} circles of {size:g} mm are drilled with a drill of {wanted:g} mm",
+            where=_named(names),
+            measured=wanted,
+            limit=size,
+            unit="mm",
+        )
+
+
+def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
+    if not holes:
+        yield Finding(
+            Code.NOTHING_DRAWN,
+            Severity.ERROR,
+            "there is no hole to drill: no single point, and no circle that is small enough",
+            where=f"operation {operation.name!r}",
+        )
+
+
+def _named(names: list[str]) -> str:
+    more = len(names) - NAMES_SHOWN
+    return ", ".join(names[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,31 @@
+"""Engraving: the middle of the tool runs on the line itself.
+
+Open paths stay open and may be cut from either end; closed ones keep the direction in which they
+are drawn and may begin anywhere. The material stays on both sides.
+"""
+
+from __future__ import annotations
+
+from camtool.errors import OptionError
+from camtool.planning.items import Chosen, Contour, Setting, Work
+
+
+def engrave(chosen: Chosen, setting: Setting) -> Work:
+    """One Contour for each path, as it is drawn.
+
+    Climb and conventional are sides of a wall, and a groove has two of them: OptionError for a
+    direction other than "drawn".
+    """
+    operation = setting.operation
+    if operation.direction != "drawn":
+        raise OptionError(
+            f"engraving on the line is neither {operation.direction} nor the other way",
+            where=f"operation {operation.name!r}, key direction",
+            mend='leave it out, or write "drawn"',
+        )
+    return Work(
+        tuple(
+            Contour(path, setting, name, int(source), reversible=not path.closed)
+            for path, source, name in zip(chosen.lines, chosen.source, chosen.names, strict=True)
+        )
+    )
