@@ -27,6 +27,12 @@ MM_PER_UNIT: dict[str, float] = {
 }
 """Length units that a user may write, as mm (CSS 2.1 for pt, pc, q and px at 96 dpi)."""
 
+RAD_PER_UNIT: dict[str, float] = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
+"""Units of angles that a user may write, as rad."""
+
+S_PER_UNIT: dict[str, float] = {"s": 1.0, "ms": 0.001, "min": 60.0}
+"""Units of times that a user may write, as s."""
+
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*([^\d\s].*?)?\s*")
 
@@ -60,6 +66,32 @@ def parse_feed(text: str, *, name: str = "feed") -> float:
     if minutes is None or factor is None:
         raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use mm/min or mm/s")
     return value * factor * minutes
+
+
+def parse_angle(text: str, *, name: str = "angle") -> float:
+    """`"30"`, `"30deg"`, `"30°"` or `"0.5rad"` as rad: a bare number is degrees.
+
+    >>> parse_angle("180deg"), parse_angle("0.5 rad")
+    (3.141592653589793, 0.5)
+    """
+    value, unit = _split(text, name)
+    factor = RAD_PER_UNIT.get(unit.lower() or "deg")
+    if factor is None:
+        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use deg or rad")
+    return value * factor
+
+
+def parse_time(text: str, *, name: str = "time") -> float:
+    """`"0.5"`, `"0.5s"`, `"200ms"` or `"1min"` as s: a bare number is seconds.
+
+    >>> parse_time("0.5"), parse_time("200 ms")
+    (0.5, 0.2)
+    """
+    value, unit = _split(text, name)
+    factor = S_PER_UNIT.get(unit.lower() or "s")
+    if factor is None:
+        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use s, ms or min")
+    return value * factor
 
 
 def _split(text: str, name: str) -> tuple[float, str]:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.units import MM_PER_UNIT, parse_feed, parse_length
+from camtool.units import MM_PER_UNIT, parse_angle, parse_feed, parse_length, parse_time
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_every_unit_multiplies(value: float, unit: str) -> None:
 
 @given(st.text(max_size=12))
 def test_any_text_gives_a_finite_number_or_an_option_error(text: str) -> None:
-    for parse in (parse_length, parse_feed):
+    for parse in (parse_length, parse_feed, parse_angle, parse_time):
         try:
             value = parse(text)
         except OptionError:
@@ -66,3 +66,30 @@ def test_feeds(text: str, mm_min: float) -> None:
 def test_bad_feeds(text: str) -> None:
     with pytest.raises(OptionError):
         parse_feed(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "rad"),
+    [("90", math.pi / 2), ("90deg", math.pi / 2), ("-45°", -math.pi / 4), ("0.5 rad", 0.5)],
+)
+def test_angles(text: str, rad: float) -> None:
+    assert parse_angle(text) == rad
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("2", 2.0), ("0.5s", 0.5), ("200 ms", 0.2), ("1.5min", 90.0)]
+)
+def test_times(text: str, seconds: float) -> None:
+    assert parse_time(text) == pytest.approx(seconds, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["right", "3mm", "3s", "nan", "", "inf"])
+def test_bad_angles(text: str) -> None:
+    with pytest.raises(OptionError):
+        parse_angle(text)
+
+
+@pytest.mark.parametrize("text", ["soon", "3mm", "3deg", "nan", "3h"])
+def test_bad_times(text: str) -> None:
+    with pytest.raises(OptionError):
+        parse_time(text)

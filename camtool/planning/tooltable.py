@@ -1,0 +1,99 @@
+"""Tool tables of LinuxCNC: the tools that a machine holds, by number.
+
+    T1 P1 Z0.511 D0.125 ;1/8 end mill
+
+A line holds words, a letter and a number each, in any order; T (the tool) and P (its pocket) must
+be there, each tool once. Behind `;` stands a remark. A line without words is passed over. Format:
+LinuxCNC's manual, "Tool Table Format". Lengths are in the machine's units, which the file does
+not say; the diameter is what is used here.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from camtool.errors import OptionError
+
+WORDS = "TPXYZABCUVWDIJQ"
+"""Letters of the words: tool, pocket, offsets of nine axes, diameter, front and back angle of a
+turning tool, orientation."""
+
+_WORD = re.compile(r"([A-Za-z])([+-]?(?:\d+(?:\.\d*)?|\.\d+))")
+_WHOLE = re.compile(r"\d+")
+
+
+@dataclass(frozen=True)
+class TableTool:
+    """One line: `number` and `pocket`; `diameter` in the table's unit, None when it has no D;
+    the other words by letter in `offsets`; the `remark` as it stands."""
+
+    number: int
+    pocket: int
+    diameter: float | None
+    offsets: Mapping[str, float]
+    remark: str
+    line: int
+
+
+def read_tool_table(text: str, file: str) -> dict[int, TableTool]:
+    """The tools of a table by number, in the order of its lines.
+
+    OptionError names file and line for what is no word, comes twice, is missing or out of range.
+    """
+    tools: dict[int, TableTool] = {}
+    for row, line in enumerate(text.split("\n"), start=1):
+        words, _, remark = line.partition(";")
+        if not words.strip():
+            continue
+        try:
+            tool = _tool(dict(_words(words)), remark.strip(), row)
+            if tool.number in tools:
+                raise OptionError(
+                    f"tool {tool.number} stands in line {tools[tool.number].line} already",
+                    mend="give each tool once",
+                )
+        except OptionError as error:
+            error.file, error.where = file, f"line {row}"
+            raise
+        tools[tool.number] = tool
+    return tools
+
+
+def _words(text: str) -> Iterator[tuple[str, str]]:
+    """Letter and number of each word; OptionError for anything else, and for a letter twice."""
+    seen: set[str] = set()
+    for word in text.split():
+        match = _WORD.fullmatch(word)
+        letter = match[1].upper() if match else ""
+        if match is None or letter not in WORDS:
+            raise OptionError(
+                f"{word!r} is no word of a tool table", mend="write it like T1 P1 Z0.511 D0.125"
+            )
+        if letter in seen:
+            raise OptionError(f"the word {letter} comes twice", mend="give each word once")
+        seen.add(letter)
+        yield letter, match[2]
+
+
+def _tool(words: dict[str, str], remark: str, line: int) -> TableTool:
+    number, pocket = (_whole(words, letter) for letter in "TP")
+    diameter = float(words.pop("D")) if "D" in words else None
+    if diameter is not None and not 0.0 <= diameter < math.inf:
+        raise OptionError(f"D{diameter:g} is no diameter", mend="give a D of 0 or more")
+    offsets = {letter: float(value) for letter, value in words.items()}
+    return TableTool(number, pocket, diameter, offsets, remark, line)
+
+
+def _whole(words: dict[str, str], letter: str) -> int:
+    """The number of a word that must be there, and whole."""
+    if letter not in words:
+        raise OptionError(
+            f"the word {letter} is missing", mend=f"give every tool a T and a P, such as {letter}1"
+        )
+    text = words.pop(letter)
+    if not _WHOLE.fullmatch(text):
+        raise OptionError(f"{letter}{text} is no whole number", mend=f"write it like {letter}1")
+    return int(text)
