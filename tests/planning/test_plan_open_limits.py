@@ -6,8 +6,9 @@ import pytest
 from camtool.errors import OptionError
 from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline
-from camtool.planning.job import job_of
-from camtool.planning.link import Feeds, feeds_of
+from camtool.planning.items import Feeds
+from camtool.planning.job import Operation, job_of
+from camtool.planning.link import feeds_of
 from camtool.planning.plan import plan
 from camtool.verify.verify import verify
 from tests.drawings import drawing_of
@@ -16,8 +17,8 @@ from tests.oracles.path_machine import path_machine
 
 def test_without_limits_every_feed_and_every_size_is_taken() -> None:
     machine = path_machine()
-    assert feeds_of(job_of(), machine) == Feeds(100.0, 100.0)
-    assert feeds_of(job_of(feed_mm_min=1e6), machine) == Feeds(1e6, 1e6)
+    assert feeds_of(Operation(), machine) == Feeds(100.0, 100.0)
+    assert feeds_of(Operation(feed_mm_min=1e6), machine) == Feeds(1e6, 1e6)
     ring = Polyline(np.array([[0.0, 500.0, 1.0], [1000.0, 500.0, 1.0]]), closed=True)
     drawing = drawing_of([ring])
     toolpath = plan(drawing, job_of(feed_mm_min=1e6), machine)
@@ -34,14 +35,14 @@ def test_without_limits_every_feed_and_every_size_is_taken() -> None:
 def test_the_limit_that_is_said_holds_and_the_mend_can_be_said(setting: str, highest: str) -> None:
     machine = path_machine(setting)
     with pytest.raises(OptionError, match=f"above {highest}") as caught:
-        feeds_of(job_of(feed_mm_min=300.0), machine)
+        feeds_of(Operation(feed_mm_min=300.0), machine)
     assert f"--feed {highest} or less" in caught.value.mend
-    assert feeds_of(job_of(feed_mm_min=float(highest)), machine).cut_mm_min == float(highest)
+    assert feeds_of(Operation(feed_mm_min=float(highest)), machine).cut_mm_min == float(highest)
 
 
 def test_plunges_that_nobody_asked_for_are_no_faster_than_z() -> None:
     machine = path_machine("axes.z.max_rate_mm_min=30.5")
-    assert feeds_of(job_of(), machine) == Feeds(100.0, 30.0)
-    assert feeds_of(job_of(feed_mm_min=20.0), machine) == Feeds(20.0, 20.0)
+    assert feeds_of(Operation(), machine) == Feeds(100.0, 30.0)
+    assert feeds_of(Operation(feed_mm_min=20.0), machine) == Feeds(20.0, 20.0)
     with pytest.raises(OptionError, match="plunge feed 40"):
-        feeds_of(job_of(plunge_feed_mm_min=40.0), machine)
+        feeds_of(Operation(plunge_feed_mm_min=40.0), machine)
