@@ -1,4 +1,5 @@
-"""Writes the sample drawings of camtool: logo.dxf, logo.svg, star.csv and coupon.dxf.
+"""Writes the sample drawings of camtool: logo.dxf, logo.svg, star.csv, coupon.dxf and
+plate.dxf.
 
     python samples/make_samples.py [FOLDER]
 
@@ -145,6 +146,58 @@ def coupon() -> Sheet:
     return Sheet("backlash coupon", (10.0, 7.0), layers, {})
 
 
+def rounded(left: float, low: float, right: float, high: float, radius: float) -> Polyline:
+    """A rectangle with round corners, CCW."""
+    quarter = math.tan(math.pi / 8.0)
+    corners_of = [
+        (right, low, -1.0, 0.0, 0.0, 1.0),
+        (right, high, 0.0, -1.0, -1.0, 0.0),
+        (left, high, 1.0, 0.0, 0.0, -1.0),
+        (left, low, 0.0, 1.0, 1.0, 0.0),
+    ]
+    vertices = []
+    for x, y, before_x, before_y, after_x, after_y in corners_of:
+        vertices.append((x + radius * before_x, y + radius * before_y, quarter))
+        vertices.append((x + radius * after_x, y + radius * after_y, 0.0))
+    return Polyline(vertices)
+
+
+def straight(points: list[tuple[float, float]], closed: bool = True) -> Polyline:
+    """Straight lines through points."""
+    return Polyline([(x, y, 0.0) for x, y in points], closed)
+
+
+def plate() -> Sheet:
+    """A front plate, 80 by 50 mm, with everything that a mill does: a layer for each operation."""
+    star_points = [
+        cmath.rect(6.0 if k % 2 == 0 else 2.6, math.radians(90.0 + 36.0 * k)) + (66.0 + 35.0j)
+        for k in range(10)
+    ]
+    window = [(8, 8), (26, 8), (26, 17), (17, 17), (17, 26), (8, 26)]
+    bend = math.tan(math.radians(120.0) / 4.0)
+    wave = [(8.0 + 6.0 * k, 42.0, bend if k % 2 else -bend) for k in range(6)]
+    layers = [
+        Layer("OUTLINE", 5, "#0000ff", [rounded(0.0, 0.0, 80.0, 50.0, 6.0)]),
+        Layer("WINDOW", 3, "#00ff00", [straight([(float(x), float(y)) for x, y in window])]),
+        Layer(
+            "POCKET",
+            1,
+            "#ff0000",
+            [rounded(32.0, 8.0, 56.0, 32.0, 4.0), Circle((44.0, 20.0), 4.0)],
+        ),
+        Layer("SLOT", 6, "#ff00ff", [rounded(61.0, 8.0, 74.0, 24.0, 2.0)]),
+        Layer(
+            "HOLES",
+            2,
+            "#ffff00",
+            [Circle((x, y), 1.5) for x, y in ((4, 4), (76, 4), (76, 46), (4, 46))],
+        ),
+        Layer("LINES", 4, "#00ffff", [Polyline(wave, closed=False)]),
+        Layer("SIGN", 7, "#000000", [straight([xy(z) for z in star_points])]),
+    ]
+    return Sheet("front plate", (80.0, 50.0), layers, {})
+
+
 def star() -> str:
     """The star as CSV."""
     rows = [
@@ -164,6 +217,7 @@ def main(folder: Path) -> None:
         "logo.svg": svg(logo()),
         "star.csv": star(),
         "coupon.dxf": dxf(coupon()),
+        "plate.dxf": dxf(plate()),
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="ascii", newline="\n")

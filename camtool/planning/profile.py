@@ -17,7 +17,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, nearest
 from camtool.geometry.measure import extents, path_extents, point_at, signed_areas
-from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.geometry.transform import reverse
 from camtool.planning.items import Chosen, Contour, Setting, Work
 from camtool.planning.places import at_place, tool_name
@@ -70,7 +70,7 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
 def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
     """Round the shape of all closed paths at once."""
     from camtool.geometry.regions import oriented
-    from camtool.planning.reach import unreached_findings
+    from camtool.planning.uncut import unreached_findings
 
     if not closed:
         return
@@ -81,7 +81,7 @@ def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found
         found.findings += _joined(chosen, of, setting)
     reached = {k for line in found.lines for k in line.of}
     for place, k in enumerate(closed):
-        if k not in reached:
+        if k not in reached and not _is_double(shape, place):
             hole = Polylines.of([reverse(shape[place])])
             _too_narrow(chosen, k, hole, setting, found)
     free = Polylines.of(reverse(path) for path in shape)
@@ -103,6 +103,8 @@ def _offset(shape: Polylines, distance_mm: float, setting: Setting) -> Polylines
     from camtool.geometry.offset import offset_shape
 
     operation = setting.operation
+    if operation.joins == "round":
+        return offset_shape(shape, distance_mm)
     return offset_shape(
         shape, distance_mm, joins=operation.joins, mitre_limit=operation.mitre_limit
     )
@@ -122,6 +124,17 @@ def _sources(path: Polyline, shape: Polylines) -> tuple[int, ...]:
     of = source.path[nearest(middles, source).segment]
     which, count = np.unique(of, return_counts=True)
     return tuple(which[np.argsort(-count, kind="stable")].tolist())
+
+
+def _is_double(shape: Polylines, place: int) -> bool:
+    """Whether an earlier path of the shape runs along all of this one."""
+    segments = Segments.of(shape)
+    mine, earlier = segments[segments.path == place], segments[segments.path < place]
+    if len(earlier) == 0:
+        return False
+    middles = point_at(mine, np.arange(len(mine)), np.full(len(mine), 0.5))
+    points = np.concatenate([mine.start, middles])
+    return bool((nearest(points, earlier).distance <= POSITION_EPS_MM).all())
 
 
 def _too_narrow(chosen: Chosen, k: int, ring: Polylines, setting: Setting, found: _Found) -> None:
