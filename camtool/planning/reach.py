@@ -1,0 +1,203 @@
+"""What a round tool cannot touch: a region without the same region opened by a disc.
+
+A disc of radius r that stays in a region covers the region shrunk by r and grown again. What that
+leaves are the feet of corners and places narrower than the tool. Both boundaries are lines and
+arcs, and the inner one never crosses the outer one: they run together, part, and meet again.
+
+    region  ─ stretches that do not run together with the opened one ──┐
+    opened  ─ stretches that do not run together with the region, back ┴─▶ closed: the pieces
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.distance import nearest
+from camtool.geometry.frames import Frames
+from camtool.geometry.measure import extents, point_at, segment_lengths, signed_areas
+from camtool.geometry.offset import offset_shape
+from camtool.geometry.offset.slices import merge_points
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Bools,
+    Floats,
+    Ints,
+    Polyline,
+    Polylines,
+    Segments,
+)
+from camtool.geometry.regions import regions
+from camtool.geometry.transform import reverse
+from camtool.planning.along import Along
+
+TOGETHER_MM = 5e-6
+"""Two boundaries nearer than this run together: above the error of two offsets in a row."""
+
+SAME_PLACE_MM = 2e-5
+"""Ends of stretches nearer than this are one place."""
+
+LEAST_FOOT = 1e-3
+"""Pieces smaller than this part of the tool's disc are left out: the foot of a square corner is
+0.068 of it, that of a corner of 156 degrees is just so large."""
+
+PROBES = (0.3, 0.5, 0.7)
+"""Where a stretch between two vertices is measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unreached:
+    """A piece that the tool cannot touch: `area_mm2`; `at_mm` (x, y), its vertex farthest from
+    what is reached; and its `outline`, the outer path CCW and any holes CW."""
+
+    area_mm2: float
+    at_mm: tuple[float, float]
+    outline: Polylines
+
+
+def opened(region: Polylines, tool_radius_mm: float) -> Polylines:
+    """What a disc covers that stays in a region (on the left of its closed paths)."""
+    return offset_shape(offset_shape(region, tool_radius_mm), -tool_radius_mm)
+
+
+def unreached(
+    region: Polylines, tool_radius_mm: float, *, least_foot: float = LEAST_FOOT
+) -> list[Unreached]:
+    """The pieces of a region that a disc within it does not cover, the largest first.
+
+    The region is on the left of its closed paths, which may also be the holes of an endless one.
+    Pieces smaller than `least_foot` of the disc's area are left out. GeometryError for open paths.
+    """
+    if tool_radius_mm <= POSITION_EPS_MM or len(region) == 0:
+        return []
+    reached = opened(region, tool_radius_mm)
+    least = least_foot * np.pi * tool_radius_mm**2
+    found = []
+    for piece in regions(_without(region, reached)):
+        area = float(signed_areas(piece).sum())
+        if area >= least:
+            found.append(Unreached(area, _far_place(piece, reached), piece))
+    return sorted(found, key=lambda piece: (-piece.area_mm2, piece.at_mm))
+
+
+def _far_place(piece: Polylines, reached: Polylines) -> tuple[float, float]:
+    """The vertex of the piece farthest from what is reached; its middle when nothing is."""
+    if len(reached) == 0:
+        x, y = extents(piece).mean(axis=1).tolist()
+        return x, y
+    points = piece.vertices[:, :2]
+    x, y = points[nearest(points, Segments.of(reached)).distance.argmax()].tolist()
+    return x, y
+
+
+def _without(region: Polylines, reached: Polylines) -> Polylines:
+    """The closed paths around what is in the region and not in `reached`, a part of it."""
+    if len(reached) == 0:
+        return region
+    stretches = [*_apart(region, reached), *map(reverse, _apart(reached, region))]
+    whole = [path for path in stretches if path.closed]
+    return Polylines.of([*whole, *_closed([path for path in stretches if not path.closed])])
+
+
+def _apart(lines: Polylines, other: Polylines) -> list[Polyline]:
+    """The stretches of closed paths that do not run together with others: closed where whole."""
+    segments = Segments.of(lines)
+    row, low, high = _split(segments, other.vertices[:, :2])
+    parts = np.array(PROBES)
+    probes = (low[:, None] + (high - low)[:, None] * parts).ravel()
+    points = point_at(segments, np.repeat(row, len(parts)), probes)
+    distance = nearest(points, Segments.of(other)).distance.reshape(-1, len(parts))
+    together = np.asarray((distance <= TOGETHER_MM).all(axis=1))
+    lengths = segment_lengths(segments)
+    found: list[Polyline] = []
+    for index, path in enumerate(lines):
+        mine = np.flatnonzero(segments.path[row] == index)
+        if together[mine].all():
+            continue
+        along = Along.of(path)
+        first = int(row[mine[0]])
+        begin = along.reach[row[mine] - first] + low[mine] * lengths[row[mine]]
+        found += _stretches(along, begin, ~together[mine])
+    return found
+
+
+def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
+    """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
+    near = nearest(points, segments)
+    on = near.distance <= TOGETHER_MM
+    row = near.segment[on]
+    frames = Frames.of(segments)[row]
+    along = frames.along(points[on])
+    within = (along > TOGETHER_MM) & (along < frames.length - TOGETHER_MM)
+    row, part = row[within], (along / frames.length)[within]
+    rows = np.concatenate([np.arange(len(segments)), row])
+    low = np.concatenate([np.zeros(len(segments)), part])
+    order = np.lexsort([low, rows])
+    rows, low = rows[order], low[order]
+    last = np.concatenate([rows[1:] != rows[:-1], [True]])
+    high = np.where(last, 1.0, np.concatenate([low[1:], [1.0]]))
+    return rows, low, high
+
+
+def _stretches(along: Along, begin: Floats, wanted: Bools) -> list[Polyline]:
+    """The runs of wanted parts of a closed path, whose parts begin at these lengths."""
+    if wanted.all():
+        return [along.path]
+    turn = int(np.argmin(wanted))
+    wanted, begin = np.roll(wanted, -turn), np.roll(begin, -turn)
+    begin = np.where(np.arange(len(begin)) < len(begin) - turn, begin, begin + along.total_mm)
+    ends = np.concatenate([begin, [begin[0] + along.total_mm]])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], wanted.astype(np.int64), [0]])))
+    found = []
+    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        vertices = along.piece(float(ends[first]), float(ends[last]))
+        if np.hypot(*np.diff(vertices[:, :2], axis=0).T).min() > POSITION_EPS_MM:
+            found.append(Polyline(vertices))
+    return found
+
+
+def _closed(stretches: list[Polyline]) -> list[Polyline]:
+    """Open stretches joined to closed paths; those that lead nowhere are left out."""
+    if not stretches:
+        return []
+    ends = np.array([[path.start, path.end] for path in stretches]).reshape(-1, 2)
+    node = merge_points(ends, SAME_PLACE_MM)[0].reshape(-1, 2)
+    leaving: dict[int, list[int]] = defaultdict(list)
+    for row, place in enumerate(node[:, 0].tolist()):
+        leaving[place].append(row)
+    frames = [Frames.of(Segments.of(path)) for path in stretches]
+    free = np.ones(len(stretches), dtype=np.bool_)
+    found = []
+    for first in range(len(stretches)):
+        path = [first] if free[first] else []
+        while path and node[path[-1], 1] != node[first, 0]:
+            free[path[-1]] = False
+            ways = [row for row in leaving[int(node[path[-1], 1])] if free[row]]
+            if not ways:
+                path = []
+                break
+            turns = [_turn(frames[path[-1]], frames[row]) for row in ways]
+            path.append(ways[int(np.argmax(turns))])
+        if path:
+            free[path] = False
+            found += _joined([stretches[row] for row in path])
+    return found
+
+
+def _turn(arriving: Frames, leaving: Frames) -> float:
+    """The angle from the end of one stretch to the start of another, left positive."""
+    x, y = arriving.tangent_at(np.ones(len(arriving.length)))[-1]
+    u, v = leaving.tangent[0]
+    return float(np.arctan2(x * v - y * u, x * u + y * v))
+
+
+def _joined(stretches: list[Polyline]) -> list[Polyline]:
+    """Stretches that follow each other as one closed path; none when it is but a speck."""
+    vertices = np.concatenate([path.vertices[:-1] for path in stretches])
+    step = np.roll(vertices[:, :2], -1, axis=0) - vertices[:, :2]
+    vertices = vertices[np.hypot(*step.T) > SAME_PLACE_MM]
+    if len(vertices) < 2 or (len(vertices) == 2 and not vertices[:, 2].any()):
+        return []
+    return [Polyline(vertices, closed=True)]
