@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from camtool.geometry.frames import Frames
+from camtool.geometry.distance import nearest
+from camtool.geometry.frames import Frames, dot, turned
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polyline, Segments
 
@@ -36,6 +38,18 @@ class Along:
         reach = np.concatenate([[0.0], np.cumsum(segment_lengths(segments))])
         return cls(path, segments, reach)
 
+    @cached_property
+    def turns(self) -> Floats:
+        """(n,) rad by which the path turns at the start of each segment, left positive; 0 at the
+        start of an open one."""
+        frames = Frames.of(self.segments)
+        before = np.roll(frames.tangent_at(np.ones(len(self.segments))), 1, axis=0)
+        cross = dot(turned(before), frames.tangent)
+        turns = np.arctan2(cross, dot(before, frames.tangent))
+        if not self.path.closed:
+            turns[0] = 0.0
+        return turns
+
     @property
     def total_mm(self) -> float:
         """The length of the path."""
@@ -43,13 +57,37 @@ class Along:
 
     def at(self, lengths: Floats) -> Floats:
         """(J, 2) the places at these lengths (J,) mm."""
-        row, part = self._where(lengths)
+        row, part = self._where(lengths, 0.0)
         return point_at(self.segments, row, part)
 
     def directions(self, lengths: Floats) -> Floats:
         """(J, 2) the unit tangents at these lengths (J,) mm; at a vertex, of what follows it."""
-        row, part = self._where(lengths)
+        row, part = self._where(lengths, POSITION_EPS_MM)
         return Frames.of(self.segments[row]).tangent_at(part)
+
+    def arrivals(self, lengths: Floats) -> Floats:
+        """(J, 2) the unit tangents at these lengths (J,) mm; at a vertex, of what leads to it."""
+        row, part = self._where(lengths, -POSITION_EPS_MM)
+        return Frames.of(self.segments[row]).tangent_at(part)
+
+    def nearest_to(self, point: tuple[float, float]) -> float:
+        """The length at which the path is nearest to a point (x, y) mm.
+
+        Told from the start of an arc of the curvature k, with the point at x along the tangent
+        and y along the left normal, the foot of the point is  atan2(k x, 1 − k y) / k  along.
+        """
+        where = np.array([point])
+        found = nearest(where, self.segments)
+        row = int(found.segment[0])
+        frame = Frames.of(self.segments[found.segment])
+        q = where - frame.start
+        x, y = float(dot(q, frame.tangent)[0]), float(dot(q, frame.normal)[0])
+        k, size = float(frame.curvature[0]), float(frame.length[0])
+        foot = x if k == 0.0 else math.atan2(k * x, 1.0 - k * y) / k
+        begin = float(self.reach[row])
+        tries = begin + np.array([min(max(foot, 0.0), size), 0.0, size])
+        apart = self.at(tries) - where
+        return float(tries[np.hypot(apart[:, 0], apart[:, 1]).argmin()])
 
     def piece(self, begin: float, end: float) -> Floats:
         """(k, 3) x, y, bulge from one length to another, backwards when `end` is the lower one.
@@ -57,10 +95,11 @@ class Along:
         Vertices nearer than POSITION_EPS_MM to an end are that end. The last bulge is 0.
         """
         if end < begin:
-            return _reversed(self.piece(end, begin))
+            return backwards(self.piece(end, begin))
         rows, low, high = self._spans(begin, end)
-        sweep = np.arctan(self.segments.bulge[rows])
-        bulge = np.tan((high - low) * sweep)
+        whole = self.segments.bulge[rows]
+        part = high - low
+        bulge = np.where(part == 1.0, whole, np.tan(part * np.arctan(whole)))
         vertices = np.column_stack([point_at(self.segments, rows, low), bulge])
         last = point_at(self.segments, rows[-1:], high[-1:])
         return np.concatenate([vertices, np.column_stack([last, [0.0]])])
@@ -82,18 +121,23 @@ class Along:
         high = np.where(start + length - end > POSITION_EPS_MM, (end - start) / length, 1.0)
         return row, low, high
 
-    def _where(self, lengths: Floats) -> tuple[Ints, Floats]:
-        """The segment of each length and the part of it; ends of open paths reach no further."""
-        inside = np.mod(lengths, self.total_mm) if self.path.closed else lengths
-        row = np.searchsorted(self.reach, inside, side="right") - 1
+    def _where(self, lengths: Floats, ahead_mm: float) -> tuple[Ints, Floats]:
+        """The segment that is so far ahead of each length, and the part of it at the length.
+
+        Ends of open paths reach no further.
+        """
+        inside = lengths
+        if self.path.closed:
+            inside = np.mod(lengths + ahead_mm, self.total_mm) - ahead_mm
+        row = np.searchsorted(self.reach, inside + ahead_mm, side="right") - 1
         row = np.clip(row, 0, len(self.segments) - 1)
         part = (inside - self.reach[row]) / (self.reach[row + 1] - self.reach[row])
         return row, np.clip(part, 0.0, 1.0)
 
 
-def _reversed(vertices: Floats) -> Floats:
-    """Vertices (k, 3) of an open path the other way."""
+def backwards(vertices: Floats) -> Floats:
+    """Vertices (k, 3) of x, y, bulge of an open path, travelled the other way."""
     back = vertices[::-1].copy()
-    back[:, 2] = 0.0
     back[:-1, 2] = 0.0 - vertices[-2::-1, 2]
+    back[-1:, 2] = 0.0
     return back

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from camtool.planning.job import Tool
+from camtool.planning.job import Operation, Tool
 
 
 def at_place(name: str, point: Sequence[float]) -> str:
@@ -16,3 +16,8 @@ def tool_name(tool: Tool) -> str:
     """The tool by its diameter, and its name if it has one."""
     called = f" ({tool.name})" if tool.name else ""
     return f"a tool of {tool.diameter_mm:g} mm{called}"
+
+
+def key_of(operation: Operation, key: str) -> str:
+    """Where a setting of an operation stands in its job."""
+    return f"operation {operation.name or operation.kind!r}, key {key}"

@@ -3,10 +3,25 @@
 A *profile* is a list of knots (length, z) in the order of travel: between two knots the tool
 follows the path, forwards or backwards, and z changes in proportion to the length; two knots of
 the same length are a move straight up or down.
+
+Round a closed path a ramp slopes until it reaches the level, the tool goes on at it, and begins
+to slope to the next level where it has been once round: no lap takes more than one step down, and
+the last one is flat all round. `B` is where the bottom is reached, `S` the start of the path: the
+ramp begins so far before the start that B falls on it, and the last lap begins and ends there.
+
+    z  0 ╲
+         │ ╲____________
+      z1 │              ╲
+         │               ╲_B____________________
+      z2 │                 S                    S
+
+On an open path the tool goes down to and fro near the end where it is, back to that end, and then
+along the level to the other end, which takes away what the ramp left.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -19,23 +34,58 @@ from camtool.planning.items import Feeds
 
 Knots = list[tuple[float, float]]
 
+MOST_LAPS = 1000.0
+"""A ramp as long as more laps than this (ways along an open path) is not made."""
 
-def laps(along: Along, levels_mm: Sequence[float], overlap_mm: float) -> Knots:
+
+def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> Knots:
     """Round a closed path at each level, straight down from one to the next at the start."""
     knots: Knots = []
     for turn, z in enumerate(levels_mm):
-        knots += [(turn * along.total_mm, z), ((turn + 1) * along.total_mm, z)]
-    knots.append((len(levels_mm) * along.total_mm + overlap_mm, levels_mm[-1]))
+        knots += [(turn * total_mm, z), ((turn + 1) * total_mm, z)]
+    knots.append((len(levels_mm) * total_mm + overlap_mm, levels_mm[-1]))
     return knots
 
 
-def to_and_fro(along: Along, levels_mm: Sequence[float]) -> Knots:
-    """From end to end of an open path at each level, straight down at the ends."""
+def spiral(
+    total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
+) -> Knots:
+    """Round a closed path, sloping from the stock top to each level, and once flat at the last."""
+    knots: Knots = [(0.0, 0.0)]
+    begin = above = 0.0
+    for z in levels_mm:
+        ramp = (above - z) / math.tan(angle_rad)
+        knots += [(begin, above), (begin + ramp, z)]
+        begin, above = begin + max(ramp, total_mm), z
+    bottom = knots[-1][0]
+    knots.append((bottom + total_mm + overlap_mm, above))
+    before = bottom % total_mm
+    return [(length - before, z) for length, z in knots]
+
+
+def to_and_fro(
+    total_mm: float, levels_mm: Sequence[float], above_mm: float, angle_rad: float | None
+) -> Knots:
+    """Along an open path at each level, from the end where the level before ended.
+
+    Down from `above_mm` and between the levels straight (None), or sloping by the angle.
+    """
     knots: Knots = []
     for turn, z in enumerate(levels_mm):
-        ends = (0.0, along.total_mm) if turn % 2 == 0 else (along.total_mm, 0.0)
-        knots += [(ends[0], z), (ends[1], z)]
+        way: Knots = [(0.0, z), (total_mm, z)]
+        if angle_rad is not None:
+            way = [*_zigzag(total_mm, above_mm, z, angle_rad), (total_mm, z)]
+        knots += [(total_mm - s, height) for s, height in way] if turn % 2 else way
+        above_mm = z
     return knots
+
+
+def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> Knots:
+    """Down at the start of an open path, to and fro as often as needed."""
+    ramp = (above_mm - z_mm) / math.tan(angle_rad)
+    legs = 2 * math.ceil(ramp / (2.0 * total_mm))
+    drop = (above_mm - z_mm) / legs
+    return [(leg % 2 * ramp / legs, above_mm - leg * drop) for leg in range(legs)] + [(0.0, z_mm)]
 
 
 def lifted(along: Along, knots: Knots) -> Floats:
@@ -63,9 +113,10 @@ def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:
     """
     across = _lengths(vertices[:, [0, 1, 3]])
     rise = np.abs(np.diff(vertices[:, 2]))
-    with np.errstate(divide="ignore", over="ignore"):
-        limit = feeds.plunge_mm_min * np.hypot(across, rise) / rise
-    return np.where(rise > 0.0, np.minimum(feeds.cut_mm_min, limit), feeds.cut_mm_min)
+    sloping = rise > 0.0
+    limit = feeds.plunge_mm_min * np.hypot(across, rise) / np.where(sloping, rise, 1.0)
+    feed = np.where(sloping, np.minimum(feeds.cut_mm_min, limit), feeds.cut_mm_min)
+    return np.where(across > 0.0, feed, feeds.plunge_mm_min)
 
 
 def _lengths(vertices: Floats) -> Floats:

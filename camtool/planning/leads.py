@@ -1,0 +1,211 @@
+"""How the tool comes to a contour and leaves it: along its tangent, or in a quarter arc.
+
+      line                    arc                   T  the direction of travel at the contour
+                                   ╭── C            n  the free side, away from what is to stay
+    ──────▶ P ═══ T ══▶            │                C  = P + n R, the arc's centre; it begins at
+                              ╰────P ═══ T ══▶         C − T R and ends at P along T
+
+A lead may lie where the tool does no harm: nowhere on the other side of the contour, on which the
+material is that is to stay, and nowhere nearer to other wanted lines than the tool's radius. Both
+are decided exactly: cut where it meets the contour, each of its pieces lies on one side, and so
+its middle tells which. A lead that does no good is halved, and at last left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.distance import nearest, paired_distances, points_to_segments
+from camtool.geometry.frames import Frames, dot
+from camtool.geometry.intersect import crossings
+from camtool.geometry.measure import point_at, segment_boxes, signed_area
+from camtool.geometry.nest import inside
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
+from camtool.planning.along import Along, backwards
+from camtool.planning.items import Contour
+from camtool.planning.job import Lead
+from camtool.planning.places import at_place
+
+LEAD_SLACK_MM = 1e-4
+"""A lead may come nearer to wanted material than the tool's radius by this much: a tenth of a
+micrometre."""
+
+QUARTER = math.tan(math.pi / 8.0)
+"""The bulge of a quarter of a circle."""
+
+LEAD_HALVINGS = 4
+"""So often a lead that does not fit is halved before it is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Border:
+    """What leads must keep to: `line`, the contour, with the tool free on its left or right
+    (`free_left`; None: nowhere); and `keep_out`, with the distance `reach_mm` to stay away."""
+
+    line: Polyline
+    free_left: bool | None
+    keep_out: Segments
+    reach_mm: float
+
+    @classmethod
+    def of(cls, contour: Contour, keep_out: Polylines | None) -> Border:
+        """The border of a contour. What an engraved one cuts into is not kept from its leads."""
+        line, left = contour.path, contour.material_left
+        if contour.outline is not None:
+            line = contour.outline
+            left = None if left is None else left != runs_back(line, contour.path)
+        reach = contour.setting.operation.tool.radius_mm
+        others = Segments.of(Polylines.of([]) if keep_out is None else keep_out)
+        if left is None and len(others):
+            cut = points_to_segments(contour.path.vertices[:, :2], others).min(axis=0) < reach
+            others = others[~np.isin(others.path, others.path[cut])]
+        return cls(line, None if left is None else not left, others, reach)
+
+    def allows(self, lead: Segments) -> bool:
+        """Whether the tool does no harm along this one line or arc."""
+        return self._is_far(lead) and (self.free_left is None or self._is_beside(lead))
+
+    def _is_far(self, lead: Segments) -> bool:
+        box, boxes = segment_boxes(lead)[0], segment_boxes(self.keep_out)
+        apart = np.maximum(boxes[:, :2] - box[2:], box[:2] - boxes[:, 2:])
+        rows = np.flatnonzero((apart < self.reach_mm).all(axis=1))
+        distance, _ = paired_distances(lead[np.zeros_like(rows)], self.keep_out[rows])
+        return bool((distance >= self.reach_mm - LEAD_SLACK_MM).all())
+
+    def _is_beside(self, lead: Segments) -> bool:
+        """Whether no piece of the lead lies on the side of the contour that is not free."""
+        meets = crossings(lead, Segments.of(self.line))
+        parts = np.unique(np.concatenate([[0.0, 1.0], meets.ta]))
+        rows = np.zeros(len(parts) - 1, dtype=np.int64)
+        left = left_of(self.line, point_at(lead, rows, 0.5 * (parts[:-1] + parts[1:])))
+        return bool(((left if self.free_left else -left) >= -LEAD_SLACK_MM).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Leads:
+    """The way to a contour and away from it, (k, 3) x, y, bulge, k = 0 or 2, both with the place
+    at the contour; and what did not fit."""
+
+    to: Floats
+    away: Floats
+    findings: tuple[Finding, ...]
+
+
+def leads_of(
+    contour: Contour, along: Along, ends: tuple[float, float], keep_out: Polylines | None
+) -> Leads:
+    """The leads of a contour that is cut as `along` from one length to another, its `ends`."""
+    operation = contour.setting.operation
+    nothing = np.empty((0, 3))
+    if operation.lead_in.kind == operation.lead_out.kind == "none":
+        return Leads(nothing, nothing, ())
+    border = Border.of(contour, keep_out)
+    side = contour.material_left
+    if side is not None and runs_back(contour.path, along.path):
+        side = not side
+    findings: list[Finding] = []
+    made = []
+    for name, lead, length, sign in (
+        ("lead-in", operation.lead_in, ends[0], -1.0),
+        ("lead-out", operation.lead_out, ends[1], 1.0),
+    ):
+        place = along.at(np.array([length]))[0]
+        ahead = sign * (along.directions if sign < 0.0 else along.arrivals)(np.array([length]))[0]
+        vertices, size = _longest(lead, (place, ahead), _bend(sign, side), border)
+        if size < lead.length_mm and lead.kind != "none":
+            findings.append(_shortened(name, lead, size, at_place(contour.name, place.tolist())))
+        made.append(backwards(vertices) if sign < 0.0 else vertices)
+    return Leads(made[0], made[1], tuple(findings))
+
+
+def _bend(sign: float, material_left: bool | None) -> float:
+    """Bulge of a lead that goes away from the contour: a quarter arc to the free side.
+
+    Seen along the way out, what is free on the right of the travel is so of a lead-out too, and
+    on the left of a lead-in, which is seen backwards.
+    """
+    if material_left is None:
+        return 0.0
+    return QUARTER * (-sign if material_left else sign)
+
+
+def _longest(
+    lead: Lead, at: tuple[Floats, Floats], bulge: float, border: Border
+) -> tuple[Floats, float]:
+    """The lead as a way out from its place at the contour, as long as does no harm; its size."""
+    place, ahead = at
+    size = lead.length_mm
+    for _ in range(LEAD_HALVINGS + 1 if lead.kind != "none" else 0):
+        end, bend = place + size * ahead, 0.0
+        if lead.kind == "arc" and bulge != 0.0:
+            left = np.array([-ahead[1], ahead[0]])
+            end, bend = end + math.copysign(size, bulge) * left, bulge
+        way = Segments.between(place[None], end[None], np.array([bend]))
+        if size > POSITION_EPS_MM and border.allows(way):
+            return np.array([[*place, bend], [*end, 0.0]]), size
+        size *= 0.5
+    return np.empty((0, 3)), 0.0
+
+
+def runs_back(path: Polyline, other: Polyline) -> bool:
+    """Whether `other`, a part of the path or all of it, is travelled the other way."""
+    there = Along.of(other)
+    middle = 0.5 * there.reach[1:2]
+    point, ahead = there.at(middle), there.directions(middle)
+    segments = Segments.of(path)
+    row = points_to_segments(point, segments).argmin(axis=1)
+    frame = Frames.of(segments[row])
+    here = frame.tangent_at(frame.along(point) / frame.length)
+    return bool(dot(here, ahead)[0] < 0.0)
+
+
+def left_of(path: Polyline, points: Floats) -> Floats:
+    """(J,) distances of points (J, 2) from a path, positive to its left, negative to its right.
+
+    Left of a closed path is its inside when it runs CCW. Beside an open path the nearest point
+    tells: within a line or arc by its side of it, at a vertex by the middle of the directions
+    there; and beyond its ends, the tangents go on.
+    """
+    segments = Segments.of(path)
+    if path.closed:
+        within = inside(points, segments)
+        distance = nearest(points, segments).distance
+        return np.where(within == (signed_area(path) > 0.0), distance, -distance)
+    found = nearest(points, segments)
+    frames = Frames.of(segments)
+    near = frames[found.segment]
+    q = points - near.start
+    power = near.curvature * dot(q, q) - 2.0 * dot(near.normal, q)
+    left = np.where(power > 0.0, -found.distance, found.distance)
+    ahead = frames.tangent_at(np.zeros(len(segments)))
+    behind = frames.tangent_at(np.ones(len(segments)))
+    for j in range(len(points)):
+        row = int(found.segment[j])
+        for vertex in (row, row + 1):
+            arm = points[j] - path.vertices[vertex, :2]
+            if math.hypot(*arm) > found.distance[j] + POSITION_EPS_MM:
+                continue
+            into = behind[vertex - 1] if vertex > 0 else np.zeros(2)
+            out = ahead[vertex] if vertex < len(segments) else np.zeros(2)
+            across = float(np.cross(into + out, arm))
+            at_end = vertex in (0, len(segments))
+            left[j] = across if at_end else math.copysign(found.distance[j], across)
+    return left
+
+
+def _shortened(name: str, lead: Lead, size: float, where: str) -> Finding:
+    what = f"is {size:.4g} mm" if size else "is left out"
+    return Finding(
+        Code.LEAD_LEFT_OUT,
+        Severity.WARNING,
+        f"the {name} {what} instead of {lead.length_mm:g} mm: there is no room for it beside what"
+        " is to stay",
+        where=where,
+        measured=size,
+        limit=lead.length_mm,
+        unit="mm",
+    )

@@ -1,0 +1,220 @@
+"""Tabs: where along a contour the tool keeps above a bridge that holds the part.
+
+The tool sweeps a disc of radius r along its path. Of the material between two places A and B of
+the path, where it goes up and comes down again, a bridge of the width w is left when
+
+    |A B| = w + 2 r,
+
+seen straight across: along a line the raised piece is w + 2 r long, along an arc a bit longer. Its
+sides are straight up and down, or slope; the bridge is w wide at its top. Sloping sides keep to
+the angle of the entry when that is a ramp, so that the tool never goes down more steeply.
+
+Tabs stand in the middle of equal shares of the path. One that would stand on a corner moves
+within its share to the nearest place where it does not, if there is one. The start of a closed
+path is where two shares meet, so that no tab stands on the seam.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from camtool.errors import OptionError
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
+from camtool.planning.along import Along
+from camtool.planning.items import Contour
+from camtool.planning.job import Operation
+from camtool.planning.places import at_place, key_of
+from camtool.planning.ramps import Knots
+
+SIDE_ANGLE_RAD = 0.25 * math.pi
+"""How steep the sides of ramped tabs are when the tool may plunge."""
+
+COUNT_SLACK = 1e-9
+"""The path may be longer than tabs times their spacing by this part, by rounding."""
+
+TAB_CORNER_RAD = 0.1
+"""A path that turns by more than this at a vertex has a corner, where no tab is put."""
+
+PLACES_PER_SIDE = 32
+"""So many places on either side of the middle of its share are tried for a tab on a corner."""
+
+WIDTH_ROUNDS = 60
+"""Halvings that find how long a tab is on a bend."""
+
+
+@dataclass(frozen=True)
+class Tab:
+    """A bridge: over the lengths `begin` to `end` the tool is at `top_mm` or higher, and to both
+    sides the height falls by `fall` mm per mm (infinite: straight down)."""
+
+    begin: float
+    end: float
+    top_mm: float
+    fall: float
+
+    def foot(self, bottom_mm: float) -> float:
+        """How long the slope to each side is that reaches down to the bottom, mm."""
+        return (self.top_mm - bottom_mm) / self.fall
+
+    def moved(self, by_mm: float) -> Tab:
+        """The tab so much further along."""
+        return Tab(self.begin + by_mm, self.end + by_mm, self.top_mm, self.fall)
+
+    def height(self, length: float) -> float:
+        """The lowest z that the tab allows at this length."""
+        apart = max(self.begin - length, length - self.end, 0.0)
+        return self.top_mm - (self.fall * apart if apart else 0.0)
+
+
+def tabs_of(contour: Contour, along: Along) -> tuple[list[Tab], list[Finding]]:
+    """The tabs of a contour whose path, from its start, is `along`; and those that do not fit.
+
+    OptionError for tabs that are higher than the cut is deep or longer than the path together.
+    """
+    operation = contour.setting.operation
+    tabs = operation.tabs
+    if tabs is None:
+        return [], []
+    bottom = contour.setting.levels_mm[-1]
+    if tabs.height_mm > -bottom + POSITION_EPS_MM:
+        raise OptionError(
+            f"tabs of {tabs.height_mm:g} mm are higher than the cut of {-bottom:g} mm is deep",
+            where=key_of(operation, "tabs"),
+            mend="lower the tabs, or cut deeper",
+        )
+    model = Tab(0.0, tabs.width_mm + operation.tool.diameter_mm, bottom + tabs.height_mm, math.inf)
+    if tabs.ramped:
+        slopes = operation.entry.kind != "plunge"
+        angle = min(SIDE_ANGLE_RAD, operation.entry.angle_rad) if slopes else SIDE_ANGLE_RAD
+        model = Tab(0.0, model.end, model.top_mm, math.tan(angle))
+    foot = model.foot(bottom)
+    count = _count(along.total_mm, operation, model.end + 2.0 * foot)
+    found = [_fitted(along, model, foot, (which, count)) for which in range(count)]
+    findings = [
+        _left_out(contour, along, (which + 0.5) / count * along.total_mm)
+        for which, tab in enumerate(found)
+        if tab is None
+    ]
+    return [tab for tab in found if tab is not None], findings
+
+
+def raised(knots: Knots, tabs: list[Tab], total_mm: float | None) -> Knots:
+    """The profile, kept above the tabs; `total_mm`: the length of a closed path, round which
+    they come again, None for an open one."""
+    if not tabs:
+        return knots
+    result = knots[:1]
+    for (begin, z_begin), (end, z_end) in pairwise(knots):
+        if begin == end:
+            result.append((end, z_end))
+            continue
+        slope = (z_end - z_begin) / (end - begin)
+        near = _between(tabs, total_mm, min(begin, end), max(begin, end))
+        places = {begin, end}
+        for tab in near:
+            places.update(_breaks(tab, begin, z_begin, slope))
+        inside = sorted(p for p in places if min(begin, end) <= p <= max(begin, end))
+        for p, q in pairwise(inside if begin < end else inside[::-1]):
+            # The height of a straight tab jumps at its ends: the middle tells which side this is.
+            over = [tab for tab in near if tab.height(0.5 * (p + q)) > -math.inf]
+            for place in (p, q):
+                line = z_end if place == end else z_begin + slope * (place - begin)
+                knot = (place, max([line, *(tab.height(place) for tab in over)]))
+                if knot != result[-1]:
+                    result.append(knot)
+    return result
+
+
+def _between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -> list[Tab]:
+    """The tabs between two lengths, round a closed path as often as they come."""
+    if total_mm is None:
+        return tabs
+    laps = range(math.floor(low / total_mm), math.floor(high / total_mm) + 1)
+    return [tab.moved(lap * total_mm) for lap in laps for tab in tabs]
+
+
+def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]:
+    """Lengths at which a line of z, sloping from a place, and the height of a tab may part."""
+    places = [tab.begin, tab.end]
+    if slope != 0.0:
+        places.append(begin + (tab.top_mm - z_begin) / slope)
+    if math.isinf(tab.fall):
+        return places
+    for corner, fall in ((tab.begin, tab.fall), (tab.end, -tab.fall)):
+        if fall != slope:
+            # top + fall (s − corner) = z + slope (s − begin)
+            here = tab.top_mm + fall * (begin - corner) - z_begin
+            places.append(begin + here / (slope - fall))
+    return places
+
+
+def _count(total_mm: float, operation: Operation, length_mm: float) -> int:
+    """How many tabs of this length; OptionError when together they are longer than the path."""
+    tabs = operation.tabs
+    assert tabs is not None
+    count = tabs.count
+    if tabs.spacing_mm is not None:
+        count = math.ceil(total_mm / tabs.spacing_mm * (1.0 - COUNT_SLACK))
+    assert count is not None
+    if count * length_mm > total_mm * (1.0 + COUNT_SLACK):
+        raise OptionError(
+            f"{count} tabs of {length_mm:.4g} mm (with the tool's diameter) are longer than the"
+            f" contour of {total_mm:.4g} mm",
+            where=key_of(operation, "tabs"),
+            mend="give fewer or narrower tabs, or leave small contours to another operation",
+        )
+    return count
+
+
+def _fitted(along: Along, model: Tab, foot: float, share: tuple[int, int]) -> Tab | None:
+    """The tab in this one of so many shares of the path; None when it has no room there."""
+    which, count = share
+    size = along.total_mm / count
+    low, high = which * size, (which + 1) * size
+    corners = along.reach[: len(along.turns)][np.abs(along.turns) > TAB_CORNER_RAD]
+    fallback = None
+    for step in range(2 * PLACES_PER_SIDE):
+        # The middle, then in turn to both sides of it.
+        side = (step + 1) // 2 * (1 if step % 2 else -1)
+        centre = low + size * (0.5 + 0.5 * side / PLACES_PER_SIDE)
+        half = _half(along, centre, model.end, min(centre - low, high - centre) - foot)
+        if half is None:
+            continue
+        tab = Tab(centre - half, centre + half, model.top_mm, model.fall)
+        if not ((corners > tab.begin - foot) & (corners < tab.end + foot)).any():
+            return tab
+        fallback = fallback or tab
+    return fallback
+
+
+def _half(along: Along, centre: float, chord: float, room: float) -> float | None:
+    """Half the length about a place whose ends are so far apart; None beyond the room there is."""
+
+    def short(halves: Floats) -> Bools:
+        ends = along.at(centre + halves) - along.at(centre - halves)
+        return np.asarray(np.hypot(ends[:, 0], ends[:, 1]) < chord - POSITION_EPS_MM)
+
+    tries = np.linspace(0.5 * chord, max(room, 0.5 * chord), PLACES_PER_SIDE)
+    enough = np.flatnonzero(~short(tries))
+    if 0.5 * chord > room or len(enough) == 0:
+        return None
+    high = float(tries[enough[0]])
+    low = float(tries[max(enough[0] - 1, 0)])
+    for _ in range(WIDTH_ROUNDS if high > low else 0):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if short(np.array([middle]))[0] else (low, middle)
+    return high
+
+
+def _left_out(contour: Contour, along: Along, length: float) -> Finding:
+    return Finding(
+        Code.TAB_LEFT_OUT,
+        Severity.WARNING,
+        "the contour bends too sharply for a tab of this width: it has one less",
+        where=at_place(contour.name, along.at(np.array([length]))[0].tolist()),
+    )
