@@ -6,8 +6,8 @@ import numpy as np
 
 from camtool.errors import GeometryError
 from camtool.geometry.offset.options import DEFAULT_OPTIONS, OffsetOptions
-from camtool.geometry.offset.shape import Stages, cleaned, is_nothing, shape_stages
-from camtool.geometry.offset.stitch import path_of
+from camtool.geometry.offset.shape import Stages, is_nothing, offset_shape, shape_stages
+from camtool.geometry.offset.stitch import paths_of
 from camtool.geometry.polylines import Bools, Ints, Polyline, Polylines
 from camtool.geometry.transform import reverse
 
@@ -28,10 +28,7 @@ def offset(
         return [p]
     if distance_mm < 0.0:
         return [reverse(r) for r in offset(reverse(p), -distance_mm, options=options)]
-    stages = offset_stages(p, distance_mm, options=options)
-    elements = stages.trimmed.elements
-    found = (path_of(rows, stages.kept, elements, closed=True) for rows in stages.loops)
-    return cleaned(((vertices, True) for vertices in found), options)
+    return list(offset_shape(Polylines.of([p]), distance_mm, options=options))
 
 
 def offset_open(
@@ -54,12 +51,9 @@ def offset_open(
     elements, kept = stages.trimmed.elements, stages.kept
     around_end = stages.trimmed.join & (stages.trimmed.source == len(p) - 1)
     ahead = (stages.trimmed.source < len(p)) & ~around_end
-    found = [
-        (path_of(run, kept, elements, closed=closed), closed)
-        for loop in stages.loops
-        for run, closed in _runs(loop, ahead[kept.element[loop]])
-    ]
-    return cleaned(found, options)
+    runs = [run for loop in stages.loops for run in _runs(loop, ahead[kept.element[loop]])]
+    closed = np.array([is_all for _, is_all in runs], dtype=np.bool_)
+    return list(paths_of([run for run, _ in runs], closed, kept, elements, options))
 
 
 def offset_stages(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.geometry.frames import Frames, dot, turned
+from camtool.geometry.offset.curves import next_rows
 from camtool.geometry.offset.options import CUSP_EPS_RAD, OffsetOptions
 from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
 
@@ -38,7 +39,7 @@ def raw_offset(lines: Polylines, distance_mm: float, options: OffsetOptions) -> 
 
     rows = np.arange(len(segments))
     shifted = Segments.between(start[keep], end[keep], segments.bulge[keep])
-    corner, joins = _joins(frames, frames.tangent[_following(lines)], distance_mm, options)
+    corner, joins = _joins(frames, frames.tangent[next_rows(lines)], distance_mm, options)
     source = np.concatenate([rows[keep], corner])
     join = np.repeat([False, True], [len(shifted), len(joins)])
     order = np.lexsort([join, source])
@@ -75,13 +76,6 @@ def _joins(
     long = _longer(start, end, options.node_eps_mm)
     arcs = Segments.between(start[long], end[long], np.tan(0.25 * sweep[long]))
     return corner[long], arcs
-
-
-def _following(lines: Polylines) -> Ints:
-    """The row of the segment after each one of closed paths."""
-    following = np.arange(1, len(lines.vertices) + 1)
-    following[lines.offsets[1:] - 1] = lines.offsets[:-1]
-    return following
 
 
 def _rotated(vectors: Floats, angle: Floats) -> Floats:

@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from camtool.errors import GeometryError
-from camtool.geometry.intersect import self_crossings
+from camtool.geometry.offset.curves import Curves, meets_itself
 from camtool.geometry.offset.options import DEFAULT_OPTIONS, OffsetOptions
 from camtool.geometry.offset.raw import RawOffset, raw_offset
 from camtool.geometry.offset.slices import Slices, slice_elements, valid_slices
 from camtool.geometry.offset.stitch import (
-    clean_path,
-    path_of,
+    paths_of,
     trace_loops,
     without_dead_ends,
     without_doubles,
 )
 from camtool.geometry.offset.trim import trim_raw
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
-    Polyline,
-    Polylines,
-    Segments,
-)
-from camtool.geometry.transform import reverse
+from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Ints, Polylines, Segments
+from camtool.geometry.transform import lines_reversed
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +50,11 @@ def offset_shape(
     if is_nothing(distance_mm) or len(lines) == 0:
         return lines
     if distance_mm < 0.0:
-        grown = offset_shape(_reversed(lines), -distance_mm, options=options)
-        return _reversed(grown)
+        grown = offset_shape(lines_reversed(lines), -distance_mm, options=options)
+        return lines_reversed(grown)
     stages = shape_stages(lines, distance_mm, options=options)
-    elements = stages.trimmed.elements
-    found = (path_of(rows, stages.kept, elements, closed=True) for rows in stages.loops)
-    return Polylines.of(cleaned(((vertices, True) for vertices in found), options))
+    closed = np.ones(len(stages.loops), dtype=np.bool_)
+    return paths_of(stages.loops, closed, stages.kept, stages.trimmed.elements, options)
 
 
 def shape_stages(
@@ -77,29 +68,18 @@ def shape_stages(
 
     `both_sides` says that the left of the paths is all there is around them (`there_and_back`).
     """
+    source = Curves.of(Segments.of(lines))
     raw = raw_offset(lines, distance_mm, options)
-    trimmed = trim_raw(raw, lines, distance_mm, options)
+    trimmed = trim_raw(raw, source, distance_mm, options)
     elements, others = trimmed.elements, None
     # Only where paths meet can what is on their right end what is on their left.
-    if not both_sides and len(self_crossings(Segments.of(lines))):
-        back = _reversed(lines)
-        right = raw_offset(back, distance_mm, options)
-        others = trim_raw(right, back, distance_mm, options).elements
+    if not both_sides and meets_itself(lines, POSITION_EPS_MM):
+        right = raw_offset(lines_reversed(lines), distance_mm, options)
+        others = trim_raw(right, source, distance_mm, options).elements
     slices = slice_elements(elements, others, options)
-    valid = valid_slices(slices, elements, lines, distance_mm, options)
+    valid = valid_slices(slices, elements, source, distance_mm, options)
     kept = without_dead_ends(without_doubles(slices[valid], elements, options))
-    loops = sorted(trace_loops(kept, elements), key=lambda rows: int(rows.min()))
-    return Stages(raw, trimmed, slices, valid, kept, loops)
-
-
-def _reversed(lines: Polylines) -> Polylines:
-    return Polylines.of([reverse(p) for p in lines])
-
-
-def cleaned(found: Iterable[tuple[Floats, bool]], options: OffsetOptions) -> list[Polyline]:
-    """The clean paths of vertices, each with whether it is closed, that have any substance."""
-    paths = (clean_path(vertices, closed, options) for vertices, closed in found)
-    return [path for path in paths if path is not None]
+    return Stages(raw, trimmed, slices, valid, kept, trace_loops(kept, elements))
 
 
 def is_nothing(distance_mm: float) -> bool:

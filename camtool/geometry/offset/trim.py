@@ -1,55 +1,43 @@
-"""Stage 2: elements without the ends that are too near to the source, if cheaply told."""
+"""Stage 2: elements without the ends that are too near to the source."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from camtool.geometry.measure import point_at, segment_lengths
-from camtool.geometry.offset.marks import at_most, marks_of
+from camtool.geometry.measure import point_at
+from camtool.geometry.offset.curves import Curves, curve_rows_of
 from camtool.geometry.offset.options import OffsetOptions
 from camtool.geometry.offset.raw import RawOffset
-from camtool.geometry.polylines import Floats, Polylines, Segments
+from camtool.geometry.polylines import Floats, Segments
 
-TRIM_ROUNDS = 12
-"""How often the ends of an element are moved on, at most."""
-
-TRIM_STEP_SHARE = 0.02
-"""An end that moves on by less than this share of the distance is left where it is."""
+TRIM_SPARE = 10.0
+"""Ends stay that are too near by so many times `validity_eps_mm`: the tips that are left beyond
+the last cut are then judged to be invalid."""
 
 
 def trim_raw(
-    raw: RawOffset, lines: Polylines, distance_mm: float, options: OffsetOptions
+    raw: RawOffset, source: Curves, distance_mm: float, options: OffsetOptions
 ) -> RawOffset:
-    """The raw offset of the paths without what is surely too near at both ends of each element.
+    """The raw offset of a source without what is surely too near at both ends of each element.
 
-    The distance from the source changes by no more than the way along an element: where it falls
-    short by s, all is too near for the length s from there. The distance from some points of the
-    source is no less than that, and will do. What goes could never be kept, and what is kept is
-    not cut by it: this only saves cuts, which would grow with the square of the number of
-    elements where the distance is large against them.
+    What goes could never be kept, and what is kept is not cut by it: this only saves cuts, which
+    would grow with the square of the number of elements where the distance is large against them.
     """
-    elements = raw.elements
-    marks = marks_of(lines)
-    lengths = segment_lengths(elements)
-    low, high = np.zeros(len(elements)), np.ones(len(elements))
-    for end, forth in ((low, 1.0), (high, -1.0)):
-        moving = np.flatnonzero(low < high)
-        for _ in range(TRIM_ROUNDS):
-            distance = at_most(point_at(elements, moving, end[moving]), marks)
-            step = distance_mm - options.validity_eps_mm - distance
-            on = step > TRIM_STEP_SHARE * distance_mm
-            moving = moving[on]
-            end[moving] += forth * step[on] / lengths[moving]
-            moving = moving[low[moving] < high[moving]]
+    from camtool.kernels.offset_near import trimmed_ends
+
+    least = distance_mm - TRIM_SPARE * options.validity_eps_mm
+    ends = trimmed_ends(curve_rows_of(raw.elements), source.rows, source.tree, least)
+    low, high = ends.T
     keep = np.flatnonzero(low < high)
-    trimmed = _between(elements, low, high)[keep]
+    trimmed = _between(raw.elements[keep], low[keep], high[keep])
     return RawOffset(trimmed, raw.source[keep], raw.join[keep])
 
 
 def _between(elements: Segments, low: Floats, high: Floats) -> Segments:
     """The part of each element between two fractions; elements that are whole stay the same."""
-    rows = np.arange(len(elements))
-    start, end = point_at(elements, rows, low), point_at(elements, rows, high)
-    bulge = np.tan(0.25 * elements.sweep * (high - low))
-    whole = (low == 0.0) & (high == 1.0)
-    return Segments.between(start, end, np.where(whole, elements.bulge, bulge))
+    cut = np.flatnonzero((low != 0.0) | (high != 1.0))
+    start, end, bulge = elements.start.copy(), elements.end.copy(), elements.bulge.copy()
+    start[cut] = point_at(elements, cut, low[cut])
+    end[cut] = point_at(elements, cut, high[cut])
+    bulge[cut] = np.tan(0.25 * elements.sweep[cut] * (high - low)[cut])
+    return Segments.between(start, end, bulge)

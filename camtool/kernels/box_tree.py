@@ -1,0 +1,74 @@
+"""A binary tree of boxes over rows in their order: what is far away is left out at once.
+
+Nodes are in heap order, the root is 1; node i has the children 2i and 2i + 1, and each leaf holds
+`LEAF` rows that follow each other. Along a path neighbours in the list are neighbours in the
+plane, so no row needs to be moved. What makes it exact: comparisons of the given numbers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+Floats = npt.NDArray[np.float64]
+
+LEAF = 4
+"""Rows in a leaf."""
+
+DEPTH = 128
+"""Room for a stack of nodes: far more than twice the levels of any tree."""
+
+
+@njit(cache=True)
+def tree_of(boxes: Floats) -> Floats:
+    """(2L, 4) boxes of the nodes over `boxes` (K, 4); the L leaves are the last."""
+    leaves = 1
+    while leaves * LEAF < len(boxes):
+        leaves *= 2
+    tree = np.empty((2 * leaves, 4))
+    tree[:, :2], tree[:, 2:] = np.inf, -np.inf
+    for row in range(len(boxes)):
+        _widen(tree, leaves + row // LEAF, boxes[row])
+    for node in range(leaves - 1, 0, -1):
+        _widen(tree, node, tree[2 * node])
+        _widen(tree, node, tree[2 * node + 1])
+    return tree
+
+
+@njit(cache=True)
+def _widen(tree: Floats, node: int, box: Floats) -> None:
+    for k in range(2):
+        tree[node, k] = min(tree[node, k], box[k])
+        tree[node, k + 2] = max(tree[node, k + 2], box[k + 2])
+
+
+@njit(cache=True)
+def rows_under(tree: Floats, node: int, count: int) -> tuple[int, int]:
+    """The rows low … high − 1 of `count` in all that a node holds."""
+    leaves = len(tree) // 2
+    span = LEAF
+    while node < leaves:
+        node *= 2
+        span *= 2
+    low = min((node - leaves) * LEAF, count)
+    return low, min(low + span, count)
+
+
+@njit(cache=True)
+def apart_square(tree: Floats, node: int, x: float, y: float) -> float:
+    """Square of the distance of a point from the box of a node."""
+    dx = max(tree[node, 0] - x, 0.0, x - tree[node, 2])
+    dy = max(tree[node, 1] - y, 0.0, y - tree[node, 3])
+    return float(dx * dx + dy * dy)
+
+
+@njit(cache=True)
+def touch(one: Floats, i: int, other: Floats, j: int) -> bool:
+    """Whether box i of one list and box j of another have a point in common."""
+    return bool(
+        one[i, 0] <= other[j, 2]
+        and other[j, 0] <= one[i, 2]
+        and one[i, 1] <= other[j, 3]
+        and other[j, 1] <= one[i, 3]
+    )

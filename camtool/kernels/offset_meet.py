@@ -1,0 +1,190 @@
+"""Where many lines and arcs meet: pairs from a tree of boxes, each pair met exactly.
+
+The rules are those of camtool.geometry.intersect, which is the vectorised twin: the four ends and
+the two common points of the whole curves are measured, and count when they are within eps of both
+curves and of the range of both, and not within 2 eps of one that counted before.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from camtool.kernels.box_tree import DEPTH, LEAF, touch
+from camtool.kernels.offset_curves import (
+    AX,
+    AY,
+    BEND,
+    BX,
+    BY,
+    LENGTH,
+    SWEEP,
+    TX,
+    TY,
+    Floats,
+    along,
+    gap_to,
+)
+
+Ints = npt.NDArray[np.int64]
+
+X, Y, TA, TB = range(4)
+"""The columns of a meeting: its place, and the fractions of both curves there."""
+
+MOST_MEETINGS = 6
+"""Two curves have four ends and two common points."""
+
+
+@njit(cache=True)
+def pairs_of(boxes: Floats, others: Floats, tree: Floats, own: bool) -> tuple[Ints, Ints]:
+    """Rows (J,), (J,) of `boxes` and of `others`, over which `tree` stands, that touch.
+
+    `own` says that both are the same: then each pair comes once, the lesser row first.
+    """
+    room = 4 * len(boxes) + 16
+    one, other = np.empty(room, np.int64), np.empty(room, np.int64)
+    leaves, count = len(tree) // 2, 0
+    stack = np.empty(DEPTH, np.int64)
+    for i in range(len(boxes)):
+        height, stack[0] = 1, 1
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if not touch(boxes, i, tree, node):
+                continue
+            if node < leaves:
+                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+                height += 2
+                continue
+            low = (node - leaves) * LEAF
+            first = max(low, i + 1) if own else low
+            for j in range(first, min(low + LEAF, len(others))):
+                if touch(boxes, i, others, j):
+                    if count == len(one):
+                        one, other = np.append(one, one), np.append(other, other)
+                    one[count], other[count] = i, j
+                    count += 1
+    return one[:count].copy(), other[:count].copy()
+
+
+@njit(cache=True)
+def meetings_of(
+    a: Floats, b: Floats, one: Ints, other: Ints, eps: float
+) -> tuple[Ints, Ints, Floats]:
+    """The rows of a and b (J,), (J,) and the meetings (J, 4) of the pairs one[k], other[k]."""
+    room = len(one) + MOST_MEETINGS + 16
+    row_a, row_b = np.empty(room, np.int64), np.empty(room, np.int64)
+    found = np.empty((room, 4))
+    count = 0
+    for k in range(len(one)):
+        if count + MOST_MEETINGS > len(row_a):
+            row_a, row_b = np.append(row_a, row_a), np.append(row_b, row_b)
+            found = np.concatenate((found, found))
+        more = _meet(a, b, one[k], other[k], (eps, found[count : count + MOST_MEETINGS]))
+        for m in range(count, count + more):
+            row_a[m], row_b[m] = one[k], other[k]
+        count += more
+    return row_a[:count].copy(), row_b[:count].copy(), found[:count].copy()
+
+
+@njit(cache=True)
+def _meet(a: Floats, b: Floats, i: int, j: int, into: tuple[float, Floats]) -> int:
+    """How many meetings row i of a and row j of b have; they are written into the rows given."""
+    eps, found = into
+    count = 0
+    for k in range(4):
+        curves, row = (a, i) if k < 2 else (b, j)
+        x = curves[row, AX] if k % 2 == 0 else curves[row, BX]
+        y = curves[row, AY] if k % 2 == 0 else curves[row, BY]
+        count += _taken(a, b, i, j, (x, y, eps, found, count))
+    first, second = _common_points(a, b, i, j)
+    for x, y in (first, second):
+        # No NaN passes: curves that miss each other by far have no common points.
+        if gap_to(a, i, x, y) <= eps and not _together(a, b, i, j, (x, y, eps)):
+            count += _taken(a, b, i, j, (x, y, eps, found, count))
+    return count
+
+
+@njit(cache=True)
+def _taken(
+    a: Floats, b: Floats, i: int, j: int, into: tuple[float, float, float, Floats, int]
+) -> int:
+    """1 when the point is a meeting, which is then written down, else 0."""
+    x, y, eps, found, count = into
+    if not (gap_to(a, i, x, y) <= eps and gap_to(b, j, x, y) <= eps):
+        return 0
+    on_a, on_b = along(a, i, x, y), along(b, j, x, y)
+    if not (-eps <= on_a <= a[i, LENGTH] + eps and -eps <= on_b <= b[j, LENGTH] + eps):
+        return 0
+    for k in range(count):
+        if math.hypot(found[k, X] - x, found[k, Y] - y) <= 2.0 * eps:
+            return 0
+    found[count, X], found[count, Y] = x, y
+    found[count, TA] = _fraction(on_a, a[i, LENGTH], eps)
+    found[count, TB] = _fraction(on_b, b[j, LENGTH], eps)
+    return 1
+
+
+@njit(cache=True)
+def _fraction(length: float, whole: float, eps: float) -> float:
+    """Fraction of the whole length, exactly 0 or 1 within eps of an end."""
+    if length >= whole - eps:
+        return 1.0
+    return 0.0 if length <= eps else length / whole
+
+
+@njit(cache=True)
+def _together(a: Floats, b: Floats, i: int, j: int, at: tuple[float, float, float]) -> bool:
+    """Whether the curves stay within eps of each other all along, from a common point.
+
+    There rounding alone would place a crossing; the ends of what they share are found as ends.
+    """
+    x, y, eps = at
+    shorter = min(a[i, LENGTH], b[j, LENGTH])
+    ax, ay = _tangent(a, i, along(a, i, x, y))
+    bx, by = _tangent(b, j, along(b, j, x, y))
+    way = -1.0 if ax * bx + ay * by < 0.0 else 1.0
+    bend = abs(a[i, BEND] - way * b[j, BEND])
+    return bool(abs(ax * by - ay * bx) * shorter + 0.5 * bend * shorter**2 <= eps)
+
+
+@njit(cache=True)
+def _tangent(curves: Floats, i: int, length: float) -> tuple[float, float]:
+    turn = length * curves[i, SWEEP] / curves[i, LENGTH]
+    cosine, sine = math.cos(turn), math.sin(turn)
+    tx, ty = curves[i, TX], curves[i, TY]
+    return cosine * tx - sine * ty, cosine * ty + sine * tx
+
+
+@njit(cache=True, error_model="numpy")
+def _common_points(
+    a: Floats, b: Floats, i: int, j: int
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The two points that the whole curves share (intersect.py derives them); NaN if none.
+
+    Where they miss each other, both are the point of the common line nearest to the rounder one.
+    """
+    if abs(b[j, BEND]) < abs(a[i, BEND]):
+        a, b, i, j = b, a, j, i
+    # Row j of b is the rounder one now; all is told from its start.
+    k_flat, k_round = a[i, BEND], b[j, BEND]
+    nx, ny, mx, my = -b[j, TY], b[j, TX], -a[i, TY], a[i, TX]
+    wx, wy = a[i, AX] - b[j, AX], a[i, AY] - b[j, AY]
+    ratio = 0.0 if k_round == 0.0 else k_flat / k_round
+    across_x, across_y = mx + k_flat * wx - ratio * nx, my + k_flat * wy - ratio * ny
+    height = 0.5 * k_flat * (wx * wx + wy * wy) + mx * wx + my * wy
+    size = math.hypot(across_x, across_y)
+    ux, uy = across_x / size, across_y / size
+    fx, fy = height / size * ux, height / size * uy
+    # On the line foot + τ (−uy, ux):  k τ² − 2 β τ + γ = 0.
+    beta = ny * ux - nx * uy
+    gamma = k_round * (fx * fx + fy * fy) - 2.0 * (nx * fx + ny * fy)
+    root = beta * beta - k_round * gamma
+    stable = beta + math.copysign(math.sqrt(max(root, 0.0)), beta)
+    two = gamma / stable if root > 0.0 or k_round == 0.0 else stable / k_round
+    one = two if k_round == 0.0 else stable / k_round
+    ox, oy = b[j, AX] + fx, b[j, AY] + fy
+    return (ox - one * uy, oy + one * ux), (ox - two * uy, oy + two * ux)
