@@ -44,7 +44,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     dialect = dialect_of(machine)
     check_plain(toolpath, machine)
     feeds, feed_note = feed_units(toolpath, machine)
-    lowered, split_note = split_z(toolpath)
+    lowered, split_note = split_z(toolpath, machine)
     rules = ArcRules(dialect.decimals, dialect.full_circles, MOST_MM)
     rows = plain_rows(lowered.toolpath, rules)
     of_row = lowered.row[rows.row]

@@ -16,7 +16,7 @@ units may come out as nearly a full turn, and a short one of a large radius as a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -46,11 +46,13 @@ RULE_MARGIN: Final = 0.9
 
 @dataclass(frozen=True)
 class Piece:
-    """One row in place of an arc: its kind, end (x, y) and offset of the centre (i, j), units."""
+    """One row in place of an arc: its kind, end (x, y) and offset of the centre (i, j), units.
+    `share`: the part of a helix's rise that is made at its end."""
 
     kind: Kind
     end: tuple[int, int]
     offset: tuple[int, int] = (0, 0)
+    share: float = 1.0
 
 
 @dataclass
@@ -153,8 +155,9 @@ def _mended(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: Gco
     counts = arcs.counts
     wanted = _Wanted(toolpath.starts[row, :2], toolpath.centre[row], toolpath.end[row, :2], sweep)
     if (begin == stop).all() and abs(sweep) < math.pi:
-        counts.dropped += 1
-        arcs.pieces[row] = []
+        rises = toolpath.end[row, 2] != toolpath.starts[row, 2]
+        counts.dropped += not rises
+        arcs.pieces[row] = [Piece(Kind.LINE, _pair(stop))] if rises else []
         return
     whole = bool((wanted.start == wanted.end).all())
     huge = math.dist(wanted.start, wanted.centre) > dialect.arc_most_radius_mm
@@ -242,7 +245,9 @@ def _two(
         _as_it_is(first, (begin, mid), kind, dialect) or _one(first, (begin, mid), kind, dialect),
         _as_it_is(second, (mid, stop), kind, dialect) or _one(second, (mid, stop), kind, dialect),
     ]
-    return [piece for piece in pieces if piece] if all(pieces) else None
+    if pieces[0] is None or pieces[1] is None:
+        return None
+    return [replace(pieces[0], share=0.5), pieces[1]]
 
 
 def _as_it_is(
@@ -265,14 +270,15 @@ def _lines(wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> l
     unit = 10.0**-dialect.decimals
     ratio = min(0.5, LINE_SAGITTA_UNITS * unit / (2.0 * radius)) if radius > 0.0 else 0.5
     count = max(1, math.ceil(abs(wanted.sweep) / (4.0 * math.asin(math.sqrt(ratio)))))
-    inner = wanted.at(np.arange(1, count) / count)
-    ends = [*units_of(inner, dialect.decimals), stop]
+    shares = np.arange(1, count) / count
+    inner = units_of(wanted.at(shares), dialect.decimals)
     pieces, at = [], begin
-    for point in ends:
+    for point, share in zip(inner, shares.tolist(), strict=True):
         if (point != at).any():
-            pieces.append(Piece(Kind.LINE, _pair(point)))
+            pieces.append(Piece(Kind.LINE, _pair(point), share=share))
             at = point
-    return pieces
+    # Says nothing when the last chord was too small, but for the rest of a helix's rise.
+    return [*pieces, Piece(Kind.LINE, _pair(stop))]
 
 
 def _pair(point: Ints) -> tuple[int, int]:

@@ -83,14 +83,8 @@ def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend:
 
 
 def _check_arcs(toolpath: Toolpath) -> None:
-    """Arcs lie in XY, have a centre, and one radius."""
+    """Arcs have a centre, and one radius."""
     is_arc, starts = toolpath.is_arc, toolpath.starts
-    _refuse(
-        is_arc & (starts[:, 2] != toolpath.end[:, 2]),
-        toolpath,
-        lambda row: "an arc that moves Z too",
-        "lower it to lines",
-    )
     with np.errstate(invalid="ignore", over="ignore"):
         centred = np.abs(toolpath.centre).max(axis=1, initial=0.0) < np.inf
         out = np.hypot(*(starts[:, :2] - toolpath.centre).T)

@@ -1,15 +1,11 @@
-"""Geometry of arcs as their readers need it: centre from radius, turn, chords of a helix."""
+"""Geometry of arcs as their readers need it: centre from radius, and turn."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 from camtool.toolpath.builder import ToolpathBuilder
-
-HELIX_SAGITTA_MM: Final = 0.0005
-"""Chords in place of a helical arc stray from it by no more."""
 
 Point = tuple[float, float]
 
@@ -54,45 +50,18 @@ def turn_of(circle: Circle) -> float:
     return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)
 
 
-def chords(circle: Circle, z: float, to_z: float, full: bool) -> list[tuple[float, float, float]]:
-    """Ends (x, y, z) of equal chords along a helical arc; the last is the very end.
-
-    A chord over the angle a strays by 2 R sin²(a/4); radius and height run evenly.
-    """
-    cx, cy = circle.centre
-    r1, r2 = math.dist(circle.start, circle.centre), math.dist(circle.end, circle.centre)
-    sign = 1.0 if circle.ccw else -1.0
-    turn = math.tau if full else (sign * turn_of(circle)) % math.tau
-    ratio = min(0.5, HELIX_SAGITTA_MM / (2.0 * max(r1, r2)))
-    count = max(1, math.ceil(turn / (4.0 * math.asin(math.sqrt(ratio)))))
-    first = math.atan2(circle.start[1] - cy, circle.start[0] - cx)
-    ends = []
-    for index in range(1, count):
-        part = index / count
-        radius, angle = r1 + (r2 - r1) * part, first + sign * turn * part
-        x, y = cx + radius * math.cos(angle), cy + radius * math.sin(angle)
-        ends.append((x, y, z + (to_z - z) * part))
-    return [*ends, (*circle.end, to_z)]
-
-
 def follow(
     path: ToolpathBuilder, circle: Circle, to_z: float, feed_and_turn: tuple[float, float]
 ) -> None:
-    """The rows of an arc read at the path's position; chords where it is helical.
+    """The rows of an arc read at the path's position, a helix where it rises or sinks.
 
     `feed_and_turn`: mm/min, and the turn (rad) below which the controller takes an arc for a full
     circle: it is that then, and a line to its end.
     """
     feed, full_turn_rad = feed_and_turn
-    z = path.position[2]
     same = circle.start == circle.end
     full = same or abs(turn_of(circle)) <= full_turn_rad
-    if to_z != z:
-        for x, y, height in chords(circle, z, to_z, full):
-            path.line(x, y, height, feed=feed)
-        return
-    path.arc(
-        *(circle.start if full else circle.end), centre=circle.centre, ccw=circle.ccw, feed=feed
-    )
+    end = circle.start if full else circle.end
+    path.arc(*end, to_z, centre=circle.centre, ccw=circle.ccw, feed=feed)
     if full and not same:
         path.line(*circle.end, feed=feed)

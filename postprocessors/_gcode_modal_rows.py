@@ -49,8 +49,11 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     kind, end, offset = arcs.kind[of], arcs.end[of], arcs.offset[of]
     first = np.cumsum(many) - many
     for row, pieces in arcs.pieces.items():
+        sunk = int(arcs.end[row - 1, 2]) if row else 0
+        rise = int(arcs.end[row, 2]) - sunk
         for at, piece in enumerate(pieces, int(first[row])):
-            kind[at], end[at, :2], offset[at] = piece.kind, piece.end, piece.offset
+            height = sunk + round(rise * piece.share)
+            kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
     before = np.concatenate([np.zeros((1, 3), dtype=np.int64), end])[: len(end)]
     motion = kind <= Kind.ARC_CCW
     is_arc = motion & (kind >= Kind.ARC_CW)

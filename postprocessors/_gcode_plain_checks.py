@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 
 import numpy as np
 
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
-from camtool.toolpath.lower import Lowered, xy_then_z
+from camtool.toolpath.lower import Lowered, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ._gcode_checks import check, place
@@ -20,10 +19,7 @@ HOMES = (Kind.HOME_XY, Kind.HOME_Z)
 
 def check_plain(toolpath: Toolpath, machine: Machine) -> None:
     """PostError for the first row that has no meaning here, named as the toolpath numbers it."""
-    # Helices are no fault: they are split. So all else is looked at as if it were level.
-    level = toolpath.end.copy()
-    level[:, 2] = toolpath.start[2]
-    check(replace(toolpath, end=level), machine)
+    check(toolpath, machine)
     for row in np.flatnonzero(~toolpath.is_motion).tolist():
         kind = Kind(int(toolpath.kind[row]))
         if kind in HOMES:
@@ -42,9 +38,10 @@ def check_plain(toolpath: Toolpath, machine: Machine) -> None:
             raise PostError("moves follow the end of the program", where=place(toolpath, row + 1))
 
 
-def split_z(toolpath: Toolpath) -> tuple[Lowered, Finding | None]:
-    """XY and Z apart, and MOVE_SPLIT when a feed move had to be."""
-    lowered = xy_then_z(toolpath)
+def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, Finding | None]:
+    """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
+    step_mm = slope_step_mm(machine)
+    lowered = helices_to_steps(toolpath, step_mm)
     twice = np.bincount(lowered.row, minlength=len(toolpath)) > 1
     twice &= toolpath.is_feed
     if not twice.any():
@@ -52,8 +49,11 @@ def split_z(toolpath: Toolpath) -> tuple[Lowered, Finding | None]:
     return lowered, Finding(
         Code.MOVE_SPLIT,
         Severity.WARNING,
-        f"{int(twice.sum())} feed moves in XY and Z were split: up first, down last",
+        f"{int(twice.sum())} feed moves in XY and Z became steps of at most {step_mm:g} mm, flat "
+        "and then down, or up and then flat: nowhere deeper than the slope",
         where=place(toolpath, int(twice.argmax())),
+        measured=step_mm,
+        unit="mm",
     )
 
 

@@ -2,8 +2,8 @@
 
 A record moves X and Y, waits T1, moves Z, waits T2 (L4151-4167). Every end is rounded to whole
 steps from part zero, never from the record before, so that rounding does not add up. Arcs become
-chords, moves of XY and Z at once become two, lines are cut where their dog-leg would stray too
-far (`_i8751_dogleg`) and where a motor would make more steps than two bytes can say.
+chords, slopes become flat moves and small ones of Z, lines are cut where their dog-leg would stray
+too far (`_i8751_dogleg`) and where a motor would make more steps than two bytes can say.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from camtool.errors import PostError
 from camtool.machine.model import Machine
-from camtool.toolpath.lower import arcs_to_lines, xy_then_z
+from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ._i8751_check import place
@@ -36,8 +36,9 @@ class Counts:
 
     arcs: int = 0
     chords: int = 0
-    two_moves: int = 0
-    two_moves_place: str = ""
+    slopes: int = 0
+    slopes_place: str = ""
+    slope_step_mm: float = 0.0
     cut_lines: int = 0
     cut_pieces: int = 0
     long_moves: int = 0
@@ -67,12 +68,14 @@ class Records:
 def records_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Records:
     """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
     counts = Counts()
-    lowered, row = _lowered(toolpath, dialect, counts)
+    lowered, row = _lowered(toolpath, slope_step_mm(machine), dialect, counts)
     targets = _rounded(lowered, machine)
     deltas = np.diff(targets, axis=0, prepend=np.zeros((1, 3), dtype=np.int64))
     _check_events_stand(lowered, deltas)
     pieces = _cut_rows(lowered, deltas, machine, dialect, counts)
-    counts.dropped = int((lowered.is_motion & ~deltas.any(axis=1)).sum())
+    # Parts of slopes may be small: only whole rows are missed.
+    whole = np.bincount(row, minlength=len(toolpath))[row] == 1
+    counts.dropped = int((lowered.is_motion & ~deltas.any(axis=1) & whole).sum())
     counts.feeds = int(toolpath.is_feed.sum())
     each = np.where(deltas.any(axis=1), 1, 0)
     for index, parts in pieces.items():
@@ -94,14 +97,15 @@ def records_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Record
     return records
 
 
-def _lowered(toolpath: Toolpath, dialect: Dialect, counts: Counts) -> tuple[Toolpath, Ints]:
+def _lowered(
+    toolpath: Toolpath, step_mm: float, dialect: Dialect, counts: Counts
+) -> tuple[Toolpath, Ints]:
     """Lines of XY or Z only, and the row of the toolpath that each came from."""
-    two = xy_then_z(toolpath)
-    doubled = two.row[1:] == two.row[:-1]
-    # A rapid in two parts is as good as one; a cut in two parts is another cut.
-    cut = np.flatnonzero(doubled & two.toolpath.is_feed[1:])
-    counts.two_moves = len(cut)
-    counts.two_moves_place = place(toolpath, int(two.row[cut[0]])) if len(cut) else ""
+    two = helices_to_steps(toolpath, step_mm)
+    # A rapid in two parts is as good as one; a cut in steps is another cut.
+    cut = (np.bincount(two.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
+    counts.slopes, counts.slope_step_mm = int(cut.sum()), step_mm
+    counts.slopes_place = place(toolpath, int(cut.argmax())) if counts.slopes else ""
     arcs = two.toolpath.is_arc
     lines = arcs_to_lines(two.toolpath, arcs, dialect.arc_tolerance_mm)
     counts.arcs = int(arcs.sum())

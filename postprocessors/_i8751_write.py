@@ -45,13 +45,15 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
 
 def _findings(counts: Counts, dialect: Dialect) -> Iterator[Finding]:
     """One finding for each kind of change that was made."""
-    if counts.two_moves:
+    if counts.slopes:
         yield Finding(
             Code.MOVE_SPLIT,
             Severity.WARNING,
-            f"{counts.two_moves} feed moves in XY and Z were split: up first, down last, "
-            "because Z moves alone",
-            where=counts.two_moves_place,
+            f"{counts.slopes} feed moves in XY and Z became steps of at most "
+            f"{counts.slope_step_mm:g} mm, nowhere deeper than the slope, because Z moves alone",
+            where=counts.slopes_place,
+            measured=counts.slope_step_mm,
+            unit="mm",
         )
     if counts.arcs:
         yield Finding(

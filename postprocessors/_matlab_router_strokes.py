@@ -121,6 +121,15 @@ def _refuse_depths(
             mend="set the third number of controller.machine_zero_mm: plunge less depth",
         )
     bad = cut & ~(np.abs(z - depth) <= DEPTH_TOLERANCE_MM)
+    slopes = toolpath.is_feed & (toolpath.end != toolpath.starts)[:, 2]
+    slopes &= (toolpath.end != toolpath.starts)[:, :2].any(axis=1) | toolpath.is_arc
+    _refuse(
+        bad & slopes[rows],
+        rows,
+        toolpath,
+        f"a slope in the stock: this machine only cuts at Z {depth:g} mm",
+        "enter by a plunge, without tabs, and cut in one pass",
+    )
     if bad.any():
         wanted = float(z[int(np.argmax(bad))])
         x, y, _ = machine.controller.machine_zero_mm

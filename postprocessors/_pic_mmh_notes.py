@@ -16,6 +16,7 @@ class Notes:
     arcs_as_lines: int = 0
     split: int = 0
     split_place: str = ""
+    split_step_mm: float = 0.0
     mended: int = 0
     remainder_um: float = 0.0
     remainder_place: str = ""
@@ -30,9 +31,12 @@ class Notes:
                 Finding(
                     Code.MOVE_SPLIT,
                     Severity.WARNING,
-                    f"{self.split} feed moves in XY and Z were split: up first, down last, "
-                    "because a block moves either XY or Z",
+                    f"{self.split} feed moves in XY and Z became steps of at most "
+                    f"{self.split_step_mm:g} mm, nowhere deeper than the slope, because a block "
+                    "moves either XY or Z",
                     where=self.split_place,
+                    measured=self.split_step_mm,
+                    unit="mm",
                 )
             )
         if collapsed := self.dropped + self.arcs_as_lines:

@@ -16,6 +16,7 @@ import numpy as np
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine, pic_mmh_controller
+from camtool.toolpath.lower import helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from camtool.toolpath.program import Program
 
@@ -92,16 +93,25 @@ class _Writer:
         dialect = dialect_of(machine)
         self.blocks: list[str] = []
         self.rows: list[int] = []
-        self._toolpath = toolpath
         self._machine = machine
         self._dialect = dialect
         self._say = SAY[dialect.form]
+        self._wanted = toolpath
         check_motion(toolpath, machine)
-        self._numbers = numbers_of(toolpath, machine, dialect)
-        self._notes = Notes()
+        # Refuses by the numbers of the rows that were given, before these are lowered.
+        self._feed_finding = numbers_of(toolpath, machine, dialect).feed_finding
+        step_mm = slope_step_mm(machine)
+        lowered = helices_to_steps(toolpath, step_mm)
+        self._toolpath, self._row = lowered.toolpath, lowered.row.tolist()
+        self._numbers = numbers_of(lowered.toolpath, machine, dialect)
+        self._notes = Notes(split_step_mm=step_mm)
+        self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
+        if (slopes := self._split & toolpath.is_feed).any():
+            self._notes.split = int(slopes.sum())
+            self._notes.split_place = place(toolpath, int(slopes.argmax()))
         self._units = [0, 0, 0]
         self._steps = [0, 0, 0]
-        self._starts = toolpath.starts[:, :2]
+        self._starts = lowered.toolpath.starts[:, :2]
 
     @property
     def _grid(self) -> Grid:
@@ -126,37 +136,31 @@ class _Writer:
 
     def findings(self) -> tuple[Finding, ...]:
         """What was noticed, one finding per kind."""
-        feed = self._numbers.feed_finding
         return (
-            *([feed] if feed else []),
+            *([self._feed_finding] if self._feed_finding else []),
             *self._notes.findings(self._grid.step_mm * 1000.0),
             *too_long(self.blocks, self._dialect.buffer_chars),
         )
 
+    def _place(self, row: int) -> str:
+        """The given row that a row of the lowered toolpath came from."""
+        return place(self._wanted, self._row[row])
+
     def _send(self, block: str, row: int) -> None:
         self.blocks.append(block)
-        self.rows.append(row)
+        self.rows.append(self._row[row] if row >= 0 else -1)
 
     def _motion(self, row: int, kind: Kind) -> None:
-        """XY and Z in blocks of their own: up before XY, down after it."""
+        """A block that moves XY or Z: no row moves both."""
         x, y, z = self._numbers.end_steps[row]
-        rise = z - self._steps[2]
-        is_arc = kind >= Kind.ARC_CW
-        flat = is_arc or x != self._steps[0] or y != self._steps[1]
-        if not flat and not rise:
-            self._notes.dropped += 1
-            return
-        if flat and rise and kind != Kind.RAPID:
-            self._notes.split += 1
-            self._notes.split_place = self._notes.split_place or place(self._toolpath, row)
-        if rise > 0:
+        if z != self._steps[2]:
             self._send_z(row, kind)
-        if is_arc:
+        elif kind >= Kind.ARC_CW:
             self._arc(row, kind)
-        elif flat:
+        elif [x, y] != self._steps[:2]:
             self._send_xy(row, WORD[kind], self._numbers.end_units[row], (x, y))
-        if rise < 0:
-            self._send_z(row, kind)
+        elif not self._split[self._row[row]]:  # parts of slopes may be small
+            self._notes.dropped += 1
 
     def _send_z(self, row: int, kind: Kind) -> None:
         word = "G00" if kind == Kind.RAPID else "G01"
@@ -234,7 +238,7 @@ class _Writer:
         if hits(arc, at, landing.iteration) != landing.iteration:
             raise PostError(
                 "internal fault: the arc as written would not end where it was planned to",
-                where=place(self._toolpath, row),
+                where=self._place(row),
             )
 
     def _mend(self, row: int, arc: Arc, landing: Landing) -> None:
@@ -247,7 +251,7 @@ class _Writer:
         self._notes.mended += 1
         if rest > self._notes.remainder_um:
             self._notes.remainder_um = rest
-            self._notes.remainder_place = place(self._toolpath, row)
+            self._notes.remainder_place = self._place(row)
         self._lines(row, at, -left if arc.clockwise else left)
 
     def _lines(self, row: int, start: Floats, sweep_rad: float) -> None:
@@ -258,7 +262,7 @@ class _Writer:
         if not grid.fits(ends[:-1]).all():
             raise PostError(
                 "an arc that has to be written as lines leaves the five digits of a coordinate",
-                where=place(self._toolpath, row),
+                where=self._place(row),
                 mend="keep every coordinate within ±99.999 mm",
             )
         units = [*grid.units(ends[:-1]).tolist(), self._numbers.end_units[row][:2]]
@@ -270,9 +274,7 @@ class _Writer:
     def _event(self, row: int, kind: Kind) -> None:
         """Events of the dialect; messages have no word in it and are not sent."""
         if kind == Kind.END:
-            raise PostError(
-                "moves follow the end of the program", where=place(self._toolpath, row)
-            )
+            raise PostError("moves follow the end of the program", where=self._place(row))
         if kind == Kind.HOME_XY:
             self._send("G28X0Y0;", row)
             self._home((0, 1))
@@ -283,21 +285,21 @@ class _Writer:
             if any(self._steps):
                 raise PostError(
                     "part zero can only be set at part zero",
-                    where=place(self._toolpath, row),
+                    where=self._place(row),
                     mend="set it first, before any move",
                 )
             self._send("G54;", row)
         elif kind != Kind.MESSAGE:
-            blocks, rounded = event_words(self._toolpath, row)
+            blocks, rounded = event_words(self._wanted, self._row[row])
             for block in blocks:
                 self._send(block, row)
             if rounded:
                 self._notes.rounded += 1
-                self._notes.rounded_place = self._notes.rounded_place or place(self._toolpath, row)
+                self._notes.rounded_place = self._notes.rounded_place or self._place(row)
         if self._numbers.end_steps[row] != self._steps:
             raise PostError(
                 f"a {kind.name} cannot end at another place than where the controller stands then",
-                where=place(self._toolpath, row),
+                where=self._place(row),
                 mend="give the row the position of the tool (machine zero after homing)",
             )
 

@@ -53,7 +53,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     dialect = dialect_of(machine)
     check_plain(toolpath, machine)
     scales = scales_of(machine, dialect)
-    lowered, split_note = split_z(toolpath)
+    lowered, split_note = split_z(toolpath, machine)
     lowered, squeezed = _arcs_lowered(lowered, scales, machine, dialect)
     rules = ArcRules(dialect.decimals, "halves", MOST_UNITS, chord_fits=True)
     rows = plain_rows(_scaled(lowered.toolpath, scales), rules)

@@ -95,7 +95,7 @@ def helices_to_steps(toolpath: Toolpath, max_dz_mm: float) -> Lowered:
     rise = np.abs(toolpath.end[:, 2] - toolpath.starts[:, 2]) if len(toolpath) else np.zeros(0)
     flat = toolpath.end[:, :2] != toolpath.starts[:, :2]
     sloping = toolpath.is_feed & (rise > 0.0) & (toolpath.is_arc | flat.any(axis=1))
-    parts = np.where(sloping, np.ceil(rise / max_dz_mm - STEP_EPS), 1.0)
+    parts = np.where(sloping, np.maximum(np.ceil(rise / max_dz_mm - STEP_EPS), 1.0), 1.0)
     arms = Arms(toolpath, toolpath.is_arc & sloping)
     cut = _split(toolpath, arms, _Parts(parts, "use a larger step"))
     return xy_then_z(cut.toolpath).after(cut)

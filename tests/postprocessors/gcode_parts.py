@@ -71,7 +71,8 @@ def toolpaths(draw: st.DrawFn, most_rows: int = 12) -> Toolpath:
 
 
 def _arc(draw: st.DrawFn, path: ToolpathBuilder, feed: float) -> None:
-    """An arc from where the tool is: any radius, direction and sweep, full circles too."""
+    """An arc from where the tool is: any radius, direction and sweep, full circles and helices
+    too."""
     x, y, _ = path.position
     radius = 10.0 ** draw(st.floats(math.log10(LEAST_RADIUS_MM), math.log10(60.0)))
     away, ccw = draw(st.floats(0.0, 2.0 * math.pi)), draw(st.booleans())
@@ -90,6 +91,7 @@ def _arc(draw: st.DrawFn, path: ToolpathBuilder, feed: float) -> None:
     path.arc(
         float(end[0]),
         float(end[1]),
+        draw(st.none() | st.floats(-3.0, 0.0)),
         centre=(float(centre[0]), float(centre[1])),
         ccw=ccw,
         feed=feed,

@@ -97,24 +97,27 @@ def _exact_arc(
 def anywhere(draw: st.DrawFn, kinds: Kinds, most_rows: int = 10) -> Toolpath:
     """Rows off any grid: helices, full and nearly full circles, specks and shallow arcs too."""
     number = st.floats(-9.0, 9.0)
-    path = ToolpathBuilder().rapid(draw(number), draw(number), 1.0)
+    near = st.floats(-0.08, 0.08)  # of a height: slopes become many steps
+    path = ToolpathBuilder().rapid(draw(number), draw(number), 0.0)
     for _ in range(draw(st.integers(1, most_rows))):
         feed = draw(st.sampled_from(kinds.feeds))
         choice = draw(st.sampled_from("rzlhaaaa"))
         if choice == "a":
-            any_arc(draw, path, feed)
+            any_arc(draw, path, feed, draw(st.none() | near))
         elif choice == "h":
-            path.line(draw(number), draw(number), draw(number), feed=feed)
+            path.line(draw(number), draw(number), draw(near), feed=feed)
         elif choice == "z":
-            path.line(z=draw(number), feed=feed)
+            path.line(z=draw(near), feed=feed)
         elif choice == "r":
-            path.rapid(draw(number), draw(number), draw(number))
+            path.rapid(draw(number), draw(number), draw(near))
         else:
             path.line(draw(number), draw(number), feed=feed)
     return path.event(Kind.END).finish()
 
 
-def any_arc(draw: st.DrawFn, path: ToolpathBuilder, feed: float) -> None:
+def any_arc(
+    draw: st.DrawFn, path: ToolpathBuilder, feed: float, to_z: float | None = None
+) -> None:
     """An arc of 1 µm to 100 mm radius and any sweep."""
     x, y, _ = path.position
     radius = 10.0 ** draw(st.floats(-3.0, 2.0))
@@ -134,7 +137,7 @@ def any_arc(draw: st.DrawFn, path: ToolpathBuilder, feed: float) -> None:
     to = angle + (sweep if ccw else -sweep)
     full = sweep == 2.0 * math.pi
     end = (x, y) if full else (cx + radius * math.cos(to), cy + radius * math.sin(to))
-    path.arc(*end, centre=(cx, cy), ccw=ccw, feed=feed)
+    path.arc(*end, to_z, centre=(cx, cy), ccw=ccw, feed=feed)
 
 
 def judge(target: LoadedTarget, wanted: Toolpath, unit_mm: float) -> Program:

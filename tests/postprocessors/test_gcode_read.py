@@ -137,15 +137,12 @@ def test_lengths_of_tools_leave_the_tip_where_it_is_programmed() -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_helices_become_lines_on_the_helix(name: str) -> None:
-    path = read("F60 G0 X10 Z2\nG3 X10 Y0 Z-2 I-10\n", name)
-    lines = path.end[path.kind == Kind.LINE]
-    np.testing.assert_allclose(np.hypot(lines[:, 0], lines[:, 1]), 10.0, atol=1e-9)
-    turn = np.arctan2(lines[:-1, 1], lines[:-1, 0]) % (2 * math.pi)
-    np.testing.assert_allclose(lines[:-1, 2], 2.0 - 4.0 * turn / (2 * math.pi), atol=1e-9)
-    chord = np.hypot(*(np.diff(lines[:, :2], axis=0)).T).max()
-    assert 10.0 - math.sqrt(100.0 - chord * chord / 4.0) <= 0.0005 + 1e-9
-    assert lines[-1].tolist() == [10.0, 0.0, -2.0]
+def test_helices_are_read_as_such(name: str) -> None:
+    path = read("F60 G0 X10 Z2\nG3 X10 Y0 Z-2 I-10\nG2 X0 Y10 Z-1 I-10 J0\n", name)
+    assert path.kind.tolist() == [Kind.RAPID, Kind.ARC_CCW, Kind.ARC_CW]
+    assert path.end.tolist() == [[10, 0, 2], [10, 0, -2], [0, 10, -1]]
+    assert path.centre[1:].tolist() == [[0, 0], [0, 0]]
+    assert path.sweeps()[1:] == pytest.approx([2.0 * math.pi, -1.5 * math.pi])
 
 
 def test_a_turn_of_next_to_nothing_is_a_full_circle_to_grbl() -> None:

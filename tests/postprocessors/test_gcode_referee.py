@@ -4,7 +4,6 @@ readers make of it, and what our writers were given. Skipped where LinuxCNC is n
 import subprocess
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
@@ -15,7 +14,7 @@ from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.oracles.rs274 import PRINTED_MM, RS274, compare, interpreted, motions, needs_rs274
+from tests.oracles.rs274 import RS274, compare, interpreted, motions, needs_rs274
 from tests.postprocessors.gcode_parts import part, toolpaths
 
 pytestmark = needs_rs274
@@ -116,17 +115,12 @@ def test_programs_that_grbl_has_no_words_for(text: str, tmp_path: Path) -> None:
     compare(target.post.read(text.encode(), target.machine), text.encode(), tmp_path)
 
 
-def test_helices_keep_to_the_arc(tmp_path: Path) -> None:
-    text = b"G0 X10 Z2\nG3 X0 Y10 Z0 I-10 J0 F100\nG2 X0 Y10 Z-1 I0 J-5\nM2"
-    target = load_target("linuxcnc")
-    ours = target.post.read(text, target.machine)
-    theirs = motions(interpreted(text, tmp_path))
-    lines = ours.end[ours.kind == Kind.LINE]
-    first = lines[:, 2] >= 0.0
-    np.testing.assert_allclose(np.hypot(*lines[first, :2].T), 10.0, atol=1e-9)
-    np.testing.assert_allclose(np.hypot(lines[~first, 0], lines[~first, 1] - 5.0), 5.0, atol=1e-9)
-    np.testing.assert_allclose(lines[first][-1], theirs[1][1:4], atol=PRINTED_MM)
-    np.testing.assert_allclose(lines[-1], theirs[2][1:4], atol=PRINTED_MM)
+@pytest.mark.parametrize("name", TARGETS)
+def test_helices_are_theirs(name: str, tmp_path: Path) -> None:
+    text = b"G0 X10 Z2\nG3 X0 Y10 Z0 I-10 J0 F100\nG2 X0 Y10 Z-1 I0 J-5\nG2 X5 Y5 R5 Z1\nM2"
+    target = load_target(name)
+    compare(target.post.read(text, target.machine), text, tmp_path)
+    assert motions(interpreted(text, tmp_path))[1:4, 3].tolist() == [0.0, -1.0, 1.0]
 
 
 EDGES = [

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -217,14 +216,28 @@ def test_refused(name: str, path: ToolpathBuilder, message: str) -> None:
         write(path.finish(), name)
 
 
-def test_an_arc_that_rises_is_refused() -> None:
-    flat = ToolpathBuilder().rapid(1, 0).arc(0, 1, centre=(0.0, 0.0), ccw=True, feed=9).finish()
-    end = np.array(flat.end)
-    end[1, 2] = 1.0
-    import dataclasses
+@pytest.mark.parametrize("name", TARGETS)
+def test_an_arc_that_sinks_is_a_helix(name: str) -> None:
+    path = ToolpathBuilder().rapid(1, 0).arc(0, 1, -0.5, centre=(0.0, 0.0), ccw=True, feed=9)
+    path.arc(0, 1, -1.0, centre=(0.0, 0.0), ccw=True, feed=9)
+    assert blocks(path.finish(), name)[-4:-2] == [
+        "G3 X0.000 Y1.000 Z-0.500 I-1.000 J0.000 F9",
+        "X0.000 Y1.000 Z-1.000 I0.000 J-1.000",
+    ]
+    halves = blocks(path.finish(), name, "dialect.full_circles=halves")
+    assert halves[-4] == "X0.000 Y-1.000 Z-0.750 I0.000 J-1.000"
 
-    with pytest.raises(PostError, match="an arc that moves Z too"):
-        write(dataclasses.replace(flat, end=end))
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_helices_too_small_for_arcs_sink_all_the_same(name: str) -> None:
+    path = ToolpathBuilder().rapid(1, 0)
+    path.arc(1.0001, 0.0, -0.5, centre=(1.00005, 0.0), ccw=True, feed=9)
+    path.arc(1.0, 0.0003, -0.75, centre=(1.0001, 0.0002), ccw=True, feed=9)
+    assert [block for block in blocks(path.finish(), name) if "Z" in block] == [
+        "G1 Z-0.500 F9",
+        "Z-0.750",
+        "G0 Z0.000",
+    ]
 
 
 def test_grbl_cannot_count_long_dwells() -> None:

@@ -298,6 +298,14 @@ def test_events_that_the_master_has_and_has_not() -> None:
 def test_moves_of_xy_and_z_are_parted() -> None:
     path = builder().line(10.4, 10, -1, feed=99).line(20, 10, feed=99).rapid(20, 20, 9)
     assert Code.MOVE_SPLIT in codes(path.event(Kind.END).finish())
+    # A ramp down from the top and its way back: travel, then all of it at the one depth.
+    assert program(path.finish()) == program(strokes([(10.4, 10), (20, 10)], feed=99))
+
+
+def test_a_slope_within_the_stock_is_refused() -> None:
+    path = builder().line(12, 10, -0.5, feed=99).line(14, 10, -1, feed=99).line(20, 10, feed=99)
+    with pytest.raises(PostError, match=r"move \d+: a slope in the stock"):
+        program(path.finish())
 
 
 @pytest.mark.parametrize("y", [1.3, 25.6])

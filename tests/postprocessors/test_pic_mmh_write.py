@@ -91,7 +91,7 @@ def test_after_homing_the_controller_stands_at_machine_zero() -> None:
 def test_rows_of_blocks() -> None:
     target = load_target("pic-mmh")
     path = ToolpathBuilder().event(Kind.SET_ZERO).line(1, 1, feed=1).line(1, 1, feed=1)
-    path.line(2, 2, 1, feed=1).event(Kind.END)
+    path.line(2, 2, 0.0005, feed=1).event(Kind.END)
     program = target.post.write(path.finish(), target.machine)
     assert program.data.decode().splitlines()[0::5] == ["G54;", "M30;"]
     assert program.row_of_block.tolist() == [0, -1, 1, 3, 3, 4]
@@ -106,7 +106,32 @@ def test_up_comes_first_and_down_last() -> None:
     assert [block[3] for block in written(path)] == ["Z", "X", "X", "Z"]
     assert findings(path) == {}
     path.line(3, 0, -1, feed=1).arc(3, 2, centre=(3, 1), ccw=True, feed=1)
-    assert Code.MOVE_SPLIT in findings(path)
+    assert (
+        "1 feed moves in XY and Z became steps of at most 0.0005 mm"
+        in (findings(path)[Code.MOVE_SPLIT])
+    )
+
+
+def test_slopes_and_helices_become_small_steps() -> None:
+    path = ToolpathBuilder().line(0.9, 0, -0.0015, feed=1)
+    path.arc(0.9, 0, -0.001, centre=(0.5, 0), ccw=True, feed=1)
+    assert written(path) == [
+        "G01X00300.00Y00000.00F10;",
+        "G01Z-00000.50F10;",
+        "G01X00600.00Y00000.00F10;",
+        "G01Z-00001.00F10;",
+        "G01X00900.00Y00000.00F10;",
+        "G01Z-00001.50F10;",
+        "G01Z-00001.00F10;",
+        "G03X00900.00Y00000.00I00500.00J00000.00F10;",
+    ]
+    assert "2 feed moves" in findings(path)[Code.MOVE_SPLIT]
+
+
+def test_errors_name_the_given_move_behind_a_slope() -> None:
+    path = ToolpathBuilder().line(1, 0, -0.01, feed=1).rapid(0, 0, 0).event(Kind.DWELL, -1)
+    with pytest.raises(PostError, match="move 2: dwell -1 cannot be said"):
+        written(path)
 
 
 def test_feeds_are_rounded_down_and_told() -> None:
