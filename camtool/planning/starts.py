@@ -34,10 +34,7 @@ def with_starts(
         turns = np.abs(along.turns) > START_CORNER_RAD
         around = np.abs(along.segments.radius - tool_radius_mm) <= POSITION_EPS_MM
         return path, np.flatnonzero(turns | around)
-    if isinstance(rule, str):
-        length = _middle(along)
-    else:
-        length = along.nearest_to(rule)
+    length = _middle(along) if isinstance(rule, str) else along.nearest_to(rule)
     begun, start = _with_vertex(along, length)
     return begun, np.array([start], dtype=np.int64)
 

@@ -1,0 +1,147 @@
+"""Reliefs: at a sharp inner corner a round tool goes a bit further, so that nothing is left of it.
+
+A tool of radius r that runs at the distance d from two walls (d = r, and the allowance) stands at
+V when it turns, and leaves what lies between its edge and the corner C of the part:
+
+    dog-bone   from V towards C and back, to where C is at the distance d from the tool's middle;
+    overcut    from V along the longer wall and back, to where that is so.
+
+    ════════════╗C           |V C| = d / sin(α/2) for straight walls that meet at the angle α:
+         V ·  ╱ ║            the dog-bone is d (1/sin(α/2) − 1) long, the overcut d / tan(α/2).
+         ───· V'║
+
+A corner that is rounded in the drawing, by however small an arc, is not sharp.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.errors import OptionError
+from camtool.geometry.distance import paired_distances, points_to_segments
+from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
+from camtool.planning.along import Along
+from camtool.planning.job import CORNERS
+
+RELIEF_LEAST_MM = 1e-3
+"""A corner that the tool's edge misses by no more than this gets no relief."""
+
+RELIEF_MATCH_MM = 1e-5
+"""The tool stands at a corner when its distances from both walls differ by no more than this."""
+
+RELIEF_TURN_RAD = 1e-2
+"""Where the contour or the tool's path turns by no more than this, there is no corner."""
+
+RELIEF_SLACK_MM = 1e-4
+"""A relief may come nearer to other wanted lines than the tool's radius by this much."""
+
+
+@dataclass(frozen=True, eq=False)
+class Relieved:
+    """The path with its reliefs; `left` (K, 2) mm, the corners that got none because the tool
+    would have cut into other wanted lines."""
+
+    path: Polyline
+    left: Floats
+
+
+def relieved(
+    path: Polyline,
+    original: Polyline | None,
+    tool_radius_mm: float,
+    kind: str,
+    keep_out: Polylines | None = None,
+) -> Relieved:
+    """A contour of the tool's middle with reliefs at the sharp inner corners of the `original`.
+
+    `kind` is one of CORNERS; without an original nothing is known about its corners, and none is
+    relieved. Reliefs come nowhere nearer to the lines of `keep_out`, and to the walls of the
+    original beyond the corner, than the tool's radius. OptionError for an unknown kind.
+    """
+    if kind not in CORNERS:
+        raise OptionError(f"unknown relief {kind!r}", mend=f"use one of {', '.join(CORNERS)}")
+    nothing = np.empty((0, 2))
+    if kind == "none" or original is None or tool_radius_mm == 0.0:
+        return Relieved(path, nothing)
+    along, walls = Along.of(path), Along.of(original)
+    others = (
+        walls.segments if keep_out is None else Segments.of(Polylines.of([original, *keep_out]))
+    )
+    bends = set(np.flatnonzero(np.abs(along.turns) > RELIEF_TURN_RAD).tolist())
+    rows: list[Floats] = []
+    left: list[Floats] = []
+    for vertex in range(len(path.vertices)):
+        rows.append(path.vertices[vertex : vertex + 1])
+        if vertex not in bends:
+            continue
+        for corner in _corners_at(path.vertices[vertex, :2], walls, tool_radius_mm):
+            way = _way(along, vertex, walls, corner, kind)
+            if _is_clear(way, walls.segments.start[corner], others, tool_radius_mm):
+                back = np.array([[*way[1], 0.0], path.vertices[vertex]])
+                rows[-1] = np.concatenate([rows[-1], back])
+                rows[-1][-3, 2] = 0.0
+            else:
+                left.append(walls.segments.start[corner])
+    reliefs = Polyline(np.concatenate(rows), path.closed)
+    return Relieved(reliefs, np.array(left).reshape(-1, 2))
+
+
+def _corners_at(v: Floats, walls: Along, tool_radius_mm: float) -> list[int]:
+    """The corners (vertices of the walls) that a tool at V misses and is equally far from both
+    walls of."""
+    distance = points_to_segments(v[None], walls.segments)[0]
+    away = float(distance.min())
+    if away < tool_radius_mm - RELIEF_MATCH_MM:
+        return []
+    near = distance <= away + RELIEF_MATCH_MM
+    both = near & np.roll(near, 1) & (np.abs(walls.turns) > RELIEF_TURN_RAD)
+    reach = np.hypot(*(walls.segments.start - v).T)
+    return np.flatnonzero(both & (reach > away + RELIEF_LEAST_MM)).tolist()
+
+
+def _way(along: Along, vertex: int, walls: Along, corner: int, kind: str) -> Floats:
+    """(2, 2) from V to where the tool's edge touches the corner."""
+    v, c = along.path.vertices[vertex, :2], walls.segments.start[corner]
+    away = float(points_to_segments(v[None], walls.segments).min())
+    arm = c - v
+    if kind == "overcut":
+        ahead = _along_longer(along, vertex, walls, corner)
+        foot = float(arm @ ahead)
+        beside = math.sqrt(max(float(arm @ arm) - foot * foot, 0.0))
+        if beside <= away + RELIEF_MATCH_MM:
+            back = math.sqrt(max(away * away - beside * beside, 0.0))
+            return np.array([v, v + (foot - back) * ahead])
+    # Beside a bent wall the way along it may not come near enough to the corner.
+    return np.array([v, c - arm * (away / math.hypot(*arm))])
+
+
+def _along_longer(along: Along, vertex: int, walls: Along, corner: int) -> Floats:
+    """The direction (2,) in which the tool goes on beyond V along the longer wall.
+
+    Of two as long it is the one nearer to the X axis, so that symmetric parts stay symmetric.
+    """
+    here = along.reach[vertex : vertex + 1]
+    before = along.at(here - 0.5 * np.diff(along.reach)[vertex - 1])
+    pair = np.array([corner - 1, corner]) % len(walls.segments)
+    beside = points_to_segments(before, walls.segments[pair])[0]
+    coming, going = np.diff(walls.reach)[pair[:: 1 if beside[0] <= beside[1] else -1]]
+    ahead, back = along.arrivals(here)[0], -along.directions(here)[0]
+    if abs(coming - going) <= POSITION_EPS_MM:
+        return np.asarray(ahead if abs(ahead[0]) >= abs(back[0]) else back)
+    return np.asarray(ahead if coming > going else back)
+
+
+def _is_clear(way: Floats, corner: Floats, others: Segments, tool_radius_mm: float) -> bool:
+    """Whether a tool that goes this way cuts into no wanted line but those at the corner."""
+    low, high = way.min(axis=0) - tool_radius_mm, way.max(axis=0) + tool_radius_mm
+    boxes = segment_boxes(others)
+    rows = np.flatnonzero(((boxes[:, :2] < high) & (boxes[:, 2:] > low)).all(axis=1))
+    at_corner = points_to_segments(corner[None], others[rows])[0] <= RELIEF_MATCH_MM
+    rows = rows[~at_corner]
+    move = Segments.between(way[:1], way[1:], np.zeros(1))
+    distance, _ = paired_distances(move[np.zeros_like(rows)], others[rows])
+    return bool((distance >= tool_radius_mm - RELIEF_SLACK_MM).all())
