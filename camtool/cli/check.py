@@ -11,6 +11,7 @@ import click
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import talk_options
 from camtool.cli.output import check_writable, write_all
+from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
 
-@click.command(short_help="What is in a drawing.")
+@click.command(cls=SectionedCommand, short_help="What is in a drawing.")
 @click.argument("source", metavar="DRAWING")
 @click.option("--json", "report", metavar="FILE", help="The same as JSON; - is stdout.")
 @click.option(

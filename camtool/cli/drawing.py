@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from camtool.cli.gather import decorate, gather
+from camtool.cli.sections import option
 from camtool.cli.types import length
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 FORMATS = ("dxf", "svg", "points", "solid")
+_READ, _CHOSEN = "How the drawing is read", "Which part of it"
 TEXTS = ("skip", "outline", "stroke")
 
 
@@ -33,13 +35,15 @@ class DrawingFlags:
     given: dict[str, Any]
 
     def read(self, name: str, machine: Machine | None = None, job: Job | None = None) -> Drawing:
-        """The drawing (`-` is stdin), of the job's layers when there is a job.
+        """The drawing (`-` is stdin), of the layers that the job's operations take.
 
-        Tolerances that no flag gives are the machine's, or else the importer's.
+        Tolerances that no flag gives are the machine's, or else the importer's. OptionError for
+        a layer or colour of the job that the drawing has not, unless flags restrict it.
         """
+        from camtool.cli.joblayers import layers_of, refuse_unmatched, unmatched
         from camtool.importers.options import ReadOptions, Selection
         from camtool.importers.read import read_drawing
-        from camtool.importers.select import colour_named
+        from camtool.importers.select import NoMatchError, colour_named
 
         settings: dict[str, Any] = {}
         if machine is not None:
@@ -47,12 +51,20 @@ class DrawingFlags:
             settings["gap_mm"] = machine.defaults.gap_mm
         settings.update({key: value for key, value in self.given.items() if value is not None})
         settings["select"] = Selection(
-            layers=self.layers if job is None else job.layers,
+            layers=self.layers or (() if job is None else layers_of(job)),
             exclude_layers=self.exclude_layers,
             colours=tuple(colour_named(colour) for colour in self.colours),
             line_types=self.line_types,
         )
-        return read_drawing(Path(name), options=ReadOptions(**settings))
+        try:
+            drawing = read_drawing(Path(name), options=ReadOptions(**settings))
+        except NoMatchError as error:
+            if job is None or error.pattern not in layers_of(job) or self.layers:
+                raise
+            raise unmatched(error, job) from error
+        if job is not None and not (self.layers or self.exclude_layers or self.colours):
+            refuse_unmatched(drawing, job)
+        return drawing
 
 
 def drawing_options(command: Command) -> Command:
@@ -76,19 +88,20 @@ def _read_flags() -> list[Callable[..., Any]]:
     """How geometry is read."""
     tolerance, gap = "How near arcs come to fitted curves.", "Ends nearer than this are joined."
     return [
-        click.option("--format", type=click.Choice(FORMATS), help="Do not guess it."),
-        click.option("--units", metavar="UNIT", help="Unit of the drawing: mm, in, um, px ..."),
-        click.option("--dpi", type=float, help="Pixels per inch of an SVG.  [96]"),
-        click.option(
-            "--tolerance", "tolerance_mm", callback=length, metavar="LENGTH", help=tolerance
+        option(_READ, "--format", type=click.Choice(FORMATS), help="Do not guess it."),
+        option(_READ, "--units", metavar="UNIT", help="Unit of the drawing: mm, in, um, px ..."),
+        option(_READ, "--dpi", type=float, help="Pixels per inch of an SVG.  [96]"),
+        option(
+            _READ, "--tolerance", "tolerance_mm", callback=length, metavar="LENGTH", help=tolerance
         ),
-        click.option("--gap", "gap_mm", callback=length, metavar="LENGTH", help=gap),
+        option(_READ, "--gap", "gap_mm", callback=length, metavar="LENGTH", help=gap),
         _switch("--across-layers", "across_layers", "Join ends of different layers too."),
         _switch("--recognise-arcs", "recognise_arcs", "Chords on one circle become arcs again."),
-        click.option("--text", type=click.Choice(TEXTS), help="What to do with text.  [skip]"),
+        option(_READ, "--text", type=click.Choice(TEXTS), help="What to do with text.  [skip]"),
         _switch("--dimensions", "dimensions", "Read the lines of dimensions too."),
-        click.option("--layout", metavar="NAME", help="A layout of a DXF, not model space."),
-        click.option(
+        option(_READ, "--layout", metavar="NAME", help="A layout of a DXF, not model space."),
+        option(
+            _READ,
             "--section-z",
             "section_z_mm",
             callback=length,
@@ -111,11 +124,11 @@ def _selection_flags() -> list[Callable[..., Any]]:
 
 def _switch(flag: str, name: str, text: str) -> Callable[..., Any]:
     """A flag that is None unless given, so that a default stays one."""
-    return click.option(flag, name, is_flag=True, default=None, help=text)
+    return option(_READ, flag, name, is_flag=True, default=None, help=text)
 
 
 def _patterns(flag: str, text: str) -> Callable[..., Any]:
-    return click.option(flag, multiple=True, metavar="PATTERN", help=text)
+    return option(_CHOSEN, flag, multiple=True, metavar="PATTERN", help=text)
 
 
 _SELECTION_FLAGS = ("layer", "exclude_layer", "colour", "line_type")

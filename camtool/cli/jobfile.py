@@ -1,85 +1,117 @@
-"""Job files: a flat TOML table that says what the job flags say, read as strictly as a machine.
+"""Job files: TOML that says how a drawing is cut, read as strictly as a machine's.
 
-tool_diameter = "0.2mm"     # lengths and feeds take units, bare numbers are mm and mm/min
-side = "auto"
-layers = ["CUT", "ENG*"]
+    safe_z = "0.5mm"                # the job as a whole
+    depth = "0.1mm"                 # keys of operations up here hold for all that know them
+    [place]                         # the drawing in the work frame
+    [stock]
+    [tools.finish]
+    [[operations]]                  # in the order in which they are cut
+
+A file without `[[operations]]` is one operation, whose keys stand at its top. docs/jobs.md
+explains every key. What is read here is not yet a job: `jobbuild` lays the flags over it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from camtool.cli.jobgiven import Given, Table, table_of
+from camtool.cli.jobkeys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, TOOL_NAME, WHOLE
 from camtool.errors import MachineError, OptionError
 from camtool.machine.loader import read_table
-from camtool.units import parse_feed, parse_length
+
+OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
+"""Keys of `[[operations]]`."""
+
+TABLES = ("place", "stock", "tools", "operations")
+"""Tables of a job file."""
+
+AT_THE_TOP = (*WHOLE, *OF_OPERATIONS, "origin", *TABLES)
+"""Keys at the top of a job file; the origin may stand here too."""
 
 
-def read_job_file(path: Path) -> dict[str, Any]:
-    """Fields of `camtool.planning.job.Job`; OptionError names file, key and mend."""
+@dataclass(frozen=True)
+class Said:
+    """What a file, or the flags, say of a job: its tables as given. `defaults` hold for all
+    `operations`; None are the operations of the other source."""
+
+    whole: Table = field(default_factory=Table)
+    place: Table = field(default_factory=Table)
+    stock: Table | None = None
+    tools: Mapping[str, Table] = field(default_factory=dict)
+    defaults: Table = field(default_factory=Table)
+    operations: tuple[Table, ...] | None = None
+    folder: Path = Path()
+
+
+def read_job_file(path: Path) -> Said:
+    """The tables of a job file; OptionError names file, table, key and mend."""
     try:
-        table = read_table(path)
+        values = read_table(path)
     except MachineError as error:
         raise OptionError(error.message, file=error.file, mend=error.mend) from error
-    job: dict[str, Any] = {}
-    for key, value in table.items():
-        if key not in _KEYS:
-            raise OptionError(
-                "unknown key",
-                file=str(path),
-                where=f"key {key}",
-                mend=f"known: {', '.join(_KEYS)}",
-            )
-        field, convert = _KEYS[key]
-        try:
-            job[field] = convert(value)
-        except (OptionError, TypeError, ValueError) as error:
-            message = error.message if isinstance(error, OptionError) else str(error)
-            raise OptionError(message, file=str(path), where=f"key {key}") from error
-    return job
+    file = str(path)
+    top = table_of(values, AT_THE_TOP, "", file)
+    defaults = top.only(OF_OPERATIONS)
+    operations = _operations(values, file)
+    if operations is None:
+        defaults, operations = Table(file=file), (defaults,)
+    elif "name" in defaults.given:
+        raise defaults.given["name"].refused(
+            "every operation needs a name of its own", "move it into [[operations]]"
+        )
+    return Said(
+        whole=top.only(WHOLE),
+        place=_place(top, values, file),
+        stock=table_of(values["stock"], STOCK, "table [stock]", file)
+        if "stock" in values
+        else None,
+        tools=_tools(values, file),
+        defaults=defaults,
+        operations=operations,
+        folder=path.parent,
+    )
 
 
-def _length(value: object) -> float:
-    return parse_length(_number_text(value))
+def _operations(values: dict[str, Any], file: str) -> tuple[Table, ...] | None:
+    """The tables of `[[operations]]`, None without any."""
+    if "operations" not in values:
+        return None
+    rows = values["operations"]
+    if not isinstance(rows, list) or not rows:
+        raise OptionError(
+            "is no list of operations",
+            file=file,
+            where="key operations",
+            mend="begin each operation with [[operations]]",
+        )
+    return tuple(
+        table_of(row, OF_OPERATIONS, f"table [[operations]] {_called(n, row)}", file)
+        for n, row in enumerate(rows, start=1)
+    )
 
 
-def _feed(value: object) -> float:
-    return parse_feed(_number_text(value))
+def _called(number: int, row: object) -> str:
+    name = row.get("name") if isinstance(row, dict) else None
+    return f"{number} {name!r}" if isinstance(name, str) else str(number)
 
 
-def _number_text(value: object) -> str:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise TypeError(f"{value!r} is no number")
-    return value if isinstance(value, str) else repr(value)
+def _place(top: Table, values: dict[str, Any], file: str) -> Table:
+    place = table_of(values.get("place", {}), PLACE, "table [place]", file)
+    if "origin" in top.given and "origin" in place.given:
+        raise top.given["origin"].refused("stands in [place] too", "give it once")
+    return place.over(top.only(["origin"]))
 
 
-def _word(value: object) -> str:
-    if not isinstance(value, str):
-        raise TypeError(f"{value!r} is no text")
-    return value
-
-
-def _speed(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"{value!r} is no number of rev/min")
-    return float(value)
-
-
-def _words(value: object) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise TypeError(f"{value!r} is no list of layers")
-    return tuple(_word(item) for item in value)
-
-
-_KEYS: dict[str, tuple[str, Callable[[object], Any]]] = {
-    "tool_diameter": ("tool_diameter_mm", _length),
-    "side": ("side", _word),
-    "feed": ("feed_mm_min", _feed),
-    "plunge_feed": ("plunge_feed_mm_min", _feed),
-    "depth": ("depth_mm", _length),
-    "safe_z": ("safe_z_mm", _length),
-    "spindle": ("spindle_rpm", _speed),
-    "origin": ("origin", _word),
-    "layers": ("layers", _words),
-}
+def _tools(values: dict[str, Any], file: str) -> dict[str, Table]:
+    tools = values.get("tools", {})
+    if not isinstance(tools, dict):
+        raise Given(tools, "key tools", file).refused(
+            "is no table of tools", "begin each tool with [tools.NAME]"
+        )
+    return {
+        name: table_of(tool, TOOL, f"table [tools.{name}]", file) for name, tool in tools.items()
+    }

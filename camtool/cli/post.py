@@ -9,13 +9,13 @@ import click
 
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.finish import Asked, finish
+from camtool.cli.jobflags import JobFlags, job_options
 from camtool.cli.options import (
-    JobFlags,
     MachineFlags,
-    job_options,
     machine_options,
     talk_options,
 )
+from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say_first_run
 from camtool.cli.types import picture as picture_name
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job
 
 
-@click.command(short_help="Drawing to verified program.")
+@click.command(cls=SectionedCommand, short_help="Drawing to verified program.")
 @click.argument("source", metavar="DRAWING")
 @machine_options
 @click.option("-o", "--output", metavar="FILE", help="The program; - is stdout.  [DRAWING.ext]")

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.drawing import DrawingFlags, drawing_options
+from camtool.cli.jobflags import JobFlags, job_options
 from camtool.cli.options import (
-    JobFlags,
     MachineFlags,
-    job_options,
     machine_options,
     talk_options,
 )
 from camtool.cli.output import check_writable, write_all
+from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 from camtool.cli.verify import read_bytes
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from camtool.preview.draw import Scene
 
 
-@click.command(short_help="Picture of a drawing, toolpath or program.")
+@click.command(cls=SectionedCommand, short_help="Picture of a drawing, toolpath or program.")
 @click.argument("source", metavar="FILE")
 @click.option(
     "-o",

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from camtool.cli.drawing import DrawingFlags, drawing_options
+from camtool.cli.jobflags import JobFlags, job_options
 from camtool.cli.options import (
     INTERPOLATORS,
-    JobFlags,
     MachineFlags,
-    job_options,
     machine_options,
     talk_options,
 )
 from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
 from camtool.errors import ProgramError
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from camtool.machine.model import Interpolator
 
 
-@click.command(short_help="Simulate and judge a program.")
+@click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")
 @click.argument("program", metavar="PROGRAM")
 @machine_options
 @click.option("--against", metavar="DRAWING", help="The drawing that it should make.")

@@ -20,6 +20,18 @@ from camtool.patterns import matches
 NAMED = 12
 """So many names are listed when a pattern chooses none of them."""
 
+
+class NoMatchError(DrawingError):
+    """A pattern that chooses nothing of a drawing."""
+
+    def __init__(self, what: str, pattern: str, file: str, known: Sequence[str]) -> None:
+        listed = ", ".join(sorted(known)[:NAMED]) + (" …" if len(known) > NAMED else "")
+        super().__init__(
+            f"no {what} matches {pattern!r}", file=file, mend=f"it has {listed or 'none'}"
+        )
+        self.pattern = pattern
+
+
 NO_LINE_TYPE = "continuous"
 """The line type of an entity that names none."""
 
@@ -75,17 +87,14 @@ def matching(
 ) -> set[str] | None:
     """The names that any pattern matches, None without patterns.
 
-    DrawingError for a pattern that matches none, listing the names there are.
+    NoMatchError for a pattern that matches none, listing the names there are.
     """
     if not patterns:
         return None
     known = list(dict.fromkeys(names))
     for pattern in patterns:
         if not any(matches((pattern,), name) for name in known):
-            listed = ", ".join(sorted(known)[:NAMED]) + (" …" if len(known) > NAMED else "")
-            raise DrawingError(
-                f"no {what} matches {pattern!r}", file=file, mend=f"it has {listed or 'none'}"
-            )
+            raise NoMatchError(what, pattern, file, known)
     return {name for name in known if matches(patterns, name)}
 
 

@@ -1,0 +1,62 @@
+"""The layers and colours of a job's operations, and what of them a drawing has.
+
+A pattern that chooses nothing is an error that names what there is: a misspelt layer must not
+leave a part of the work undone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from camtool.errors import OptionError
+from camtool.importers.select import NAMED, NoMatchError
+from camtool.patterns import matches
+
+if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
+    from camtool.planning.job import Job, Operation
+
+
+def layers_of(job: Job) -> tuple[str, ...]:
+    """Patterns of all layers that the job needs; empty when an operation takes any."""
+    if not all(operation.layers for operation in job.operations):
+        return ()
+    return tuple(dict.fromkeys(p for operation in job.operations for p in operation.layers))
+
+
+def refuse_unmatched(drawing: Drawing, job: Job) -> None:
+    """OptionError for a pattern of an operation that no path and no mark of the drawing has."""
+    layers = {*drawing.layers, *(mark.layer for mark in drawing.marks)}
+    colours = {*drawing.colours, *(mark.colour for mark in drawing.marks)}
+    for number, operation in enumerate(job.operations, start=1):
+        for what, patterns, known in (
+            ("layer", operation.layers, layers),
+            ("colour", operation.colours, colours),
+        ):
+            for pattern in patterns:
+                if not any(matches((pattern,), name) for name in known):
+                    raise OptionError(
+                        f"no {what} matches {pattern!r}",
+                        file=drawing.file,
+                        where=f"{_called(operation, number)}key {what}s",
+                        mend=f"it has {_listed(known)}",
+                    )
+
+
+def unmatched(error: NoMatchError, job: Job) -> OptionError:
+    """The reader's complaint about a layer of the job, with the operation that wants it."""
+    rows = enumerate(job.operations, start=1)
+    called = next(_called(each, n) for n, each in rows if error.pattern in each.layers)
+    return OptionError(
+        error.message, file=error.file, where=f"{called}key layers", mend=error.mend
+    )
+
+
+def _called(operation: Operation, number: int) -> str:
+    return f"operation {number} {operation.name!r}, " if operation.name else ""
+
+
+def _listed(known: Iterable[str]) -> str:
+    names = sorted(name or '""' for name in known)
+    return (", ".join(names[:NAMED]) + (" …" if len(names) > NAMED else "")) or "none"
