@@ -9,6 +9,7 @@ from typing import Final
 
 from camtool.errors import PostError
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.tools import mounted_before
 
 from ._gcode_checks import place
 from ._gcode_format import NumberStyle, say_number, values_of
@@ -26,11 +27,13 @@ EventWords = Callable[["Event"], str]
 
 @dataclass(frozen=True)
 class Event:
-    """A row that is no motion; `where` names it in errors."""
+    """A row that is no motion; `where` names it in errors. `mounted_before`: a tool change before
+    the first move at a feed."""
 
     kind: Kind
     value: float
     where: str
+    mounted_before: bool = False
 
     def refuse(self, message: str, mend: str = "") -> PostError:
         """The error that says why this event cannot be sent."""
@@ -52,9 +55,13 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
     blocks: dict[int, str] = {}
     rounded: list[int] = []
     spindle_on = False
+    mounted = mounted_before(toolpath)
     for row in (~toolpath.is_motion).nonzero()[0].tolist():
         event = Event(
-            Kind(int(toolpath.kind[row])), float(toolpath.value[row]), place(toolpath, row)
+            Kind(int(toolpath.kind[row])),
+            float(toolpath.value[row]),
+            place(toolpath, row),
+            bool(mounted[row]),
         )
         if event.kind == Kind.END:
             if row != len(toolpath) - 1:
@@ -65,7 +72,8 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
                     "part zero can only be set at part zero", "set it first, before any move"
                 )
         elif event.kind != Kind.MESSAGE:
-            blocks[row] = words(event)
+            if block := words(event):
+                blocks[row] = block
             spindle_on = (spindle_on or event.kind in SPINDLE) and event.kind != Kind.SPINDLE_OFF
             if _is_rounded(event):
                 rounded.append(row)

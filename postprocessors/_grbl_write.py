@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
+from camtool.toolpath.tools import mounted_before
 
 from ._gcode_events import Event, common_words, tool_number
 from ._gcode_write import Style, write_program
@@ -18,16 +22,28 @@ MOST_TOOL = 255
 """`MAX_TOOL_NUMBER` of grbl's gcode.c."""
 
 
+MOUNT_FIRST = Finding(
+    Code.EVENT_LEFT_OUT,
+    Severity.INFO,
+    "the tool is not said, since grbl knows no tool change: mount it before the program",
+)
+
+
 def write_grbl(toolpath: Toolpath, machine: Machine) -> Program:
     """The program; PostError names the move that cannot be said or done."""
     dialect = dialect_of(machine)
     style = Style(dialect, HEADER, lambda event: _words(event, dialect))
-    return write_program(toolpath, machine, style)
+    program = write_program(toolpath, machine, style)
+    if dialect.tool_change == "pause" or not mounted_before(toolpath).any():
+        return program
+    return replace(program, findings=(*program.findings, MOUNT_FIRST))
 
 
 def _words(event: Event, dialect: Dialect) -> str:
     """The block of an event."""
     if event.kind == Kind.TOOL_CHANGE:
+        if dialect.tool_change == "refuse" and event.mounted_before:
+            return ""
         if dialect.tool_change == "refuse":
             raise event.refuse(
                 "grbl knows no tool change",

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from camtool.errors import PostError
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.tools import mounted_before
 
 from ._i8751_options import Dialect
 
@@ -23,7 +24,6 @@ MOST_DWELL_S: Final = 36_000.0
 """A longer dwell (10 hours) is taken for a mistake."""
 
 REFUSED: Final = {
-    Kind.TOOL_CHANGE: "this machine has no stop for a tool change",
     Kind.HOME_XY: "this machine has no limit switches to go home to",
     Kind.HOME_Z: "this machine has no limit switches to go home to",
 }
@@ -66,6 +66,12 @@ def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend:
 
 def _check_events(toolpath: Toolpath) -> None:
     kind, value = toolpath.kind, toolpath.value
+    _refuse(
+        (kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
+        toolpath,
+        lambda row: "this machine has no stop for a tool change",
+        "write a program for each tool",
+    )
     for refused, message in REFUSED.items():
         _refuse(
             kind == refused,

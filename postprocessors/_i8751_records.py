@@ -46,6 +46,7 @@ class Counts:
     dwells_rounded: int = 0
     spindle: int = 0
     spindle_place: str = ""
+    tools: int = 0
     feeds: int = 0
 
 
@@ -232,6 +233,8 @@ class _Plain:
                 messages.append((record + len(own), text))
             elif kind == Kind.END:
                 end_row = int(row[index])
+            elif kind == Kind.TOOL_CHANGE:
+                self.counts.tools += 1
             elif kind != Kind.SET_ZERO:
                 self._note_spindle(index)
         at = [record for record, _, _ in own]

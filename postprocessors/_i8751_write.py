@@ -106,6 +106,12 @@ def _left_out(counts: Counts) -> Iterator[Finding]:
             Severity.INFO,
             f"{counts.dwells_rounded} dwells were rounded up to whole seconds",
         )
+    if counts.tools:
+        yield Finding(
+            Code.EVENT_LEFT_OUT,
+            Severity.INFO,
+            "the tool is not said: mount it before the program",
+        )
     if counts.spindle:
         yield Finding(
             Code.EVENT_LEFT_OUT,

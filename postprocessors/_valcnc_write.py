@@ -21,6 +21,7 @@ from camtool.machine.model import Machine
 from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
+from camtool.toolpath.tools import mounted_before
 
 from ._gcode_checks import place
 from ._gcode_format import Floats, NumberStyle, first_too_long, say_units
@@ -52,6 +53,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
     dialect = dialect_of(machine)
     check_plain(toolpath, machine)
+    _check_tools(toolpath)
     scales = scales_of(machine, dialect)
     lowered, split_note = split_z(toolpath, machine)
     lowered, squeezed = _arcs_lowered(lowered, scales, machine, dialect)
@@ -80,6 +82,17 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
             *left_out(toolpath, UNSAID, "this machine has no codes but G00 to G03; do it by hand"),
         ),
     )
+
+
+def _check_tools(toolpath: Toolpath) -> None:
+    """Nothing would stop the machine for another tool."""
+    bad = (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath)
+    if bad.any():
+        raise PostError(
+            "this machine has no code that stops it for a tool change",
+            where=place(toolpath, int(bad.argmax())),
+            mend="write a program for each tool",
+        )
 
 
 def _arcs_lowered(

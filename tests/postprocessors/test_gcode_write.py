@@ -105,8 +105,13 @@ def test_tools() -> None:
     path = ToolpathBuilder().event(Kind.TOOL_CHANGE, 3).finish()
     assert blocks(path, "linuxcnc") == ["T3 M6", "M2"]
     assert blocks(path, "grbl", "dialect.tool_change=pause") == ["T3 M0", "M2"]
-    with pytest.raises(PostError, match=r"move 0: grbl knows no tool change; .*pause"):
-        blocks(path, "grbl")
+    assert blocks(path, "grbl") == ["M2"]
+    assert [finding.code for finding in write(path, "grbl").findings] == [Code.EVENT_LEFT_OUT]
+    second = (
+        ToolpathBuilder().event(Kind.TOOL_CHANGE, 3).line(1, feed=9).event(Kind.TOOL_CHANGE, 4)
+    )
+    with pytest.raises(PostError, match=r"move 2: grbl knows no tool change; .*pause"):
+        blocks(second.finish(), "grbl")
 
 
 EVIL = [

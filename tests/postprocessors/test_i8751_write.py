@@ -171,6 +171,12 @@ def test_what_cannot_be_said_is_told() -> None:
     assert by_code[Code.MOVE_SPLIT].severity == Severity.WARNING
 
 
+def test_the_first_tool_is_mounted_by_hand() -> None:
+    program = write(ToolpathBuilder().event(Kind.TOOL_CHANGE, 2).line(1, feed=30))
+    assert program.data == write(ToolpathBuilder().line(1, feed=30)).data
+    assert Code.EVENT_LEFT_OUT in codes(program)
+
+
 def nan_arc() -> ToolpathBuilder:
     return ToolpathBuilder().arc(1, 0, centre=(math.nan, 0), ccw=True, feed=9)
 
@@ -180,7 +186,10 @@ REFUSED = {
     "less than a step": (ToolpathBuilder().line(0.001, feed=9), "nothing moves"),
     "start": (ToolpathBuilder((0, 0, 1)).line(1, feed=9), "starts at (0, 0, 1) mm"),
     "home": (ToolpathBuilder().event(Kind.HOME_Z), "move 0: this machine has no limit switches"),
-    "tool": (ToolpathBuilder().event(Kind.TOOL_CHANGE, 2), "no stop for a tool change"),
+    "tool": (
+        ToolpathBuilder().line(1, feed=9).event(Kind.TOOL_CHANGE, 2),
+        "move 1: this machine has no stop for a tool change",
+    ),
     "zero": (ToolpathBuilder().rapid(1).event(Kind.SET_ZERO), "move 1: part zero is where"),
     "long dwell": (ToolpathBuilder().event(Kind.DWELL, 36_001), "dwell 36001 s"),
     "no dwell": (ToolpathBuilder().event(Kind.DWELL), "dwell nan s"),

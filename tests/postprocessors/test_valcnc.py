@@ -131,6 +131,13 @@ def test_feeds_and_events_that_have_no_word_are_found() -> None:
     assert "SPINDLE_CW" in found[Code.EVENT_LEFT_OUT].message
 
 
+def test_nothing_stops_for_another_tool() -> None:
+    path = ToolpathBuilder().event(Kind.TOOL_CHANGE, 1).line(1, feed=14400)
+    assert write(path.finish()) == write(ToolpathBuilder().line(1, feed=14400).finish())
+    with pytest.raises(PostError, match=r"move 2: .* tool change; write a program for each"):
+        write(path.event(Kind.TOOL_CHANGE, 2).finish())
+
+
 def test_texts_of_drawings_never_reach_a_program() -> None:
     path = ToolpathBuilder().message("a\nG00 X0Y0Z-9\n(;%").rapid(1.0, 0.0)
     path.source = "\nG00 X9Y9Z9"
