@@ -19,11 +19,10 @@ import numpy as np
 
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines
-from camtool.geometry.transform import reverse
-from camtool.planning.along import Along
 from camtool.planning.clip import outside_parts
 from camtool.planning.pocket_parts import parts_of
-from camtool.planning.pocket_route import Rails, closest, route, tidy
+from camtool.planning.pocket_route import Rails, closest
+from camtool.planning.pocket_way import Way
 
 SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Parts of the step that are tried where it leaves tips: rings alone make a calmer way."""
@@ -90,31 +89,20 @@ def _tips(core: Polylines, shrunk: Polylines, steps: Steps) -> list[Polyline]:
 
 
 def ring_ways(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
-    """(n, 3) x, y, bulge: one open path over all rings, and the cell that it begins in.
+    """(n, 3) x, y, bulge: an open path over all rings, and the cell that it begins in.
 
-    Several paths only where rounding hides the way from one ring to the next (`route`).
+    Several paths only where rounding hides the way from one ring to the next (`Way`).
     """
-    ways: list[Floats] = []
-    way: list[Floats] = []
-    first: Cell | None = None
+    way = Way()
+    first = None
     for cell, around in _inside_out(root, way):
-        first, rails = first or cell, around.rails
-        left = [Along.of(path) for path in (*cell.tips, *cell.rails.region)]
-        while left:
-            here = way[-1][-1, :2] if way else left[0].path.start
-            stroke = _nearest(left, here, steps.forward)
-            link = route(here, stroke[0, :2], rails) if way else stroke[:1]
-            if link is None:
-                ways.append(_chained(way))
-                way.clear()
-                link = stroke[:1]
-            way += [link, stroke]
-            rails = cell.rails
-    assert first is not None
-    return [*ways, _chained(way)], first
+        first = first or cell
+        paths = (*cell.tips, *cell.rails.region)
+        way.cut_all(paths, cell.rails, around.rails, steps.forward)
+    return way.ways(), first or root
 
 
-def _inside_out(root: Cell, way: list[Floats]) -> Iterator[tuple[Cell, Cell]]:
+def _inside_out(root: Cell, way: Way) -> Iterator[tuple[Cell, Cell]]:
     """All cells, each after its inner ones, with the cell in which the tool can come to it.
 
     The highest first; later the one nearest to the end of the way so far, which grows meanwhile.
@@ -129,36 +117,13 @@ def _inside_out(root: Cell, way: list[Floats]) -> Iterator[tuple[Cell, Cell]]:
             around = None
             continue
         around = around or cell
-        if way:
-            here = way[-1][-1, :2]
-            pick = min(range(len(left)), key=lambda row: _distance(left[row], here))
-        else:
-            pick = max(range(len(left)), key=lambda row: (left[row].height, -row))
-        chosen = left.pop(pick)
+        chosen = left.pop(_pick(left, way.here))
         stack.append((chosen, list(chosen.inner)))
 
 
-def _distance(cell: Cell, point: Floats) -> float:
-    return min(closest(along, point)[0] for along in cell.rails.paths)
-
-
-def _nearest(left: list[Along], here: Floats, forward: bool) -> Floats:
-    """Takes the path nearest to a place away: its vertices (k, 3) as it is cut from there."""
-    ways = [closest(along, here) if along.path.closed else _ends(along, here) for along in left]
-    pick = min(range(len(ways)), key=lambda row: ways[row][0])
-    along, begin = left.pop(pick), ways[pick][1]
-    if along.path.closed:
-        total = along.total_mm if forward else -along.total_mm
-        return along.piece(begin, begin + total)
-    return (along.path if begin == 0.0 else reverse(along.path)).vertices
-
-
-def _ends(along: Along, here: Floats) -> tuple[float, float]:
-    """Distance to the nearer end of an open path, and the length along it to that end."""
-    to_start, to_end = np.hypot(*(along.path.vertices[[0, -1], :2] - here).T).tolist()
-    return (to_start, 0.0) if to_start <= to_end else (to_end, along.total_mm)
-
-
-def _chained(parts: list[Floats]) -> Floats:
-    """Open paths, each of which begins where the one before it ends, as one."""
-    return tidy(np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]]))
+def _pick(cells: list[Cell], here: Floats | None) -> int:
+    """The cell nearest to a place; the highest when the tool is nowhere yet."""
+    if here is None:
+        return max(range(len(cells)), key=lambda row: (cells[row].height, -row))
+    apart = [min(closest(along, here)[0] for along in cell.rails.paths) for cell in cells]
+    return int(np.argmin(apart))

@@ -1,0 +1,108 @@
+"""Slow, obvious twin of a pocket: discs put down along the moves, and regions of fine chords.
+
+Arcs are chords here; nothing of camtool is used beyond the records.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from camtool.geometry.polylines import Polyline, Polylines
+from camtool.planning.items import Run
+from tests.oracles.offset import GRID_MM, chords, dense, distance, inside, near_region
+
+CHORD_RAD = 0.05
+"""Sweep of the chords that stand for arcs."""
+
+
+def at_depth(runs: Sequence[Run], z: float) -> list[Polyline]:
+    """The stretches of the runs at one height, seen from above."""
+    found = []
+    for run in runs:
+        level = np.abs(run.vertices[:, 2] - z) < 1e-9
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], level.astype(int), [0]])))
+        for low, high in zip(edges[::2], edges[1::2], strict=True):
+            rows = run.vertices[low:high, [0, 1, 3]]
+            moved = np.concatenate([[True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > 1e-6])
+            if moved.sum() > 1:
+                found.append(Polyline(rows[moved]))
+    return found
+
+
+def area_of(region: Polylines) -> shapely.Geometry:
+    """What an odd number of the closed paths enclose."""
+    area = shapely.Polygon()
+    for path in region:
+        ring = shapely.make_valid(shapely.Polygon(chords(path, CHORD_RAD)))
+        area = shapely.symmetric_difference(area, ring, grid_size=GRID_MM)
+    return area
+
+
+def swept(paths: Sequence[Polyline], radius_mm: float) -> shapely.Geometry:
+    """What a disc covers on its way along the paths."""
+    parts = [near_region(path, radius_mm, CHORD_RAD) for path in paths]
+    return shapely.union_all(parts, grid_size=GRID_MM)
+
+
+def opened(area: shapely.Geometry, radius_mm: float) -> shapely.Geometry:
+    """What discs cover that lie wholly in an area."""
+    near = swept(_boundary(area), radius_mm)
+    middle = shapely.difference(area, near, grid_size=GRID_MM)
+    around = swept(_boundary(middle), radius_mm)
+    return shapely.union(middle, around, grid_size=GRID_MM)
+
+
+def _boundary(area: shapely.Geometry) -> list[Polyline]:
+    rings = [
+        ring
+        for part in shapely.get_parts(area)
+        if part.geom_type == "Polygon"
+        for ring in (part.exterior, *part.interiors)
+    ]
+    found = []
+    for ring in rings:
+        points = shapely.get_coordinates(ring)[:-1]
+        step = np.hypot(*(np.roll(points, -1, axis=0) - points).T)
+        points = points[step > 1e-6]
+        if len(points) > 2:
+            found.append(Polyline(np.column_stack([points, np.zeros(len(points))]), True))
+    return found
+
+
+def complaints(
+    runs: Sequence[Run], region: Polylines, radius_mm: float, z: float, *, share: float = 1e-3
+) -> list[str]:
+    """What is wrong with runs that shall clear a region down to z with a tool of this radius."""
+    paths = at_depth(runs, z)
+    wanted = opened(area_of(region), radius_mm)
+    got = swept(paths, radius_mm)
+    found = []
+    missed = shapely.difference(wanted, got, grid_size=GRID_MM).area
+    if missed > share * wanted.area:
+        found.append(f"{missed} of {wanted.area} mm² left over")
+    beyond = shapely.difference(got, wanted, grid_size=GRID_MM).area
+    if beyond > share * wanted.area:
+        found.append(f"{beyond} mm² cut beyond {wanted.area} mm²")
+    return found + gouges(runs, region, radius_mm)
+
+
+def gouges(runs: Sequence[Run], region: Polylines, radius_mm: float) -> list[str]:
+    """How far the tool is nearer to the boundary of the region than its radius, anywhere."""
+    found = []
+    for run in runs:
+        rows = run.vertices[:, [0, 1, 3]]
+        moved = np.concatenate([[True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > 1e-6])
+        rows = rows[moved]
+        points = dense(Polyline(rows), 9) if len(rows) > 1 else rows[:, :2]
+        apart = np.min([distance(points, path) for path in region], axis=0)
+        if apart.min() < radius_mm - 1e-5:
+            found.append(f"{radius_mm - apart.min()} mm into the wall")
+        rings = [chords(path, 1e-3 * math.pi) for path in region]
+        clear = apart > 1e-3
+        if not inside(points[clear], rings).all():
+            found.append("outside of the region")
+    return found
