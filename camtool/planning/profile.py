@@ -10,7 +10,7 @@ inside: the tool runs on them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -62,6 +62,8 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
             _alone(chosen, k, setting, found)
         found.findings += _gouges(chosen, setting, found.lines)
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
+    if operation.corners != "none":
+        found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
     items = [_beside(line, chosen, setting) for line in found.lines]
     items += [_on_line(chosen, k, setting) for k in opens]
     return Work(tuple(sorted(items, key=lambda item: item.source)), tuple(found.findings))
@@ -182,6 +184,29 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
             limit=2.0 * _away(setting),
             unit="mm",
         )
+
+
+def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Finding]) -> _Line:
+    """The line with reliefs at the sharp inner corners of the paths that it belongs to."""
+    from camtool.planning.corners import relieved
+
+    tool, path = setting.operation.tool, line.path
+    for k in line.of:
+        others = (np.arange(len(chosen.lines)) != k) & chosen.lines.closed
+        keep_out = chosen.lines.select(np.flatnonzero(others).tolist())
+        kind = setting.operation.corners
+        done = relieved(path, chosen.lines[k], tool.radius_mm, kind, keep_out)
+        path = done.path
+        findings += (
+            Finding(
+                Code.NOT_RELIEVED,
+                Severity.WARNING,
+                f"{tool_name(tool)} finds no room for a relief at this corner",
+                where=at_place(chosen.names[k], corner),
+            )
+            for corner in done.left.tolist()
+        )
+    return replace(line, path=path)
 
 
 def _beside(line: _Line, chosen: Chosen, setting: Setting) -> Contour:

@@ -21,12 +21,17 @@ MOST_PLACES = 12
 
 
 def unreached_findings(region: Polylines, setting: Setting) -> list[Finding]:
-    """What a tool within the region (on the left of its closed paths) cannot touch."""
+    """What a tool within the region (on the left of its closed paths) cannot touch.
+
+    Feet of corners are not told where the operation makes reliefs.
+    """
     tool = setting.operation.tool
     pieces = unreached(region, tool.radius_mm)
     largest_foot = CORNER_SHARE * np.pi * tool.radius_mm**2
     wide = [piece for piece in pieces if piece.area_mm2 > largest_foot]
     feet = [piece for piece in pieces if piece.area_mm2 <= largest_foot]
+    if setting.operation.corners != "none":
+        feet = []
     return [*_places(wide, tool_name(tool)), *_corners(feet, tool_name(tool))]
 
 

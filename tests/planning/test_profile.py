@@ -267,3 +267,22 @@ def test_the_tool_just_touches_the_contour_and_never_crosses_it(path: Polyline) 
         else:
             bigger = sum(_areas(found)) > abs(signed_areas(made.paths)[0])
             assert bigger == (side == "outside")
+
+
+@pytest.mark.parametrize("kind", ["dogbone", "overcut"])
+def test_reliefs_reach_into_the_corners(kind: str) -> None:
+    job = job_of(tool_diameter_mm=2 * R, side="inside", corners=kind)
+    found = contours(drawing_of([_box(0, 0, 4, 3)]), job)
+    assert found.findings == ()
+    corners = np.array([[0.0, 0.0], [4, 0], [4, 3], [0, 3]])
+    away = nearest(corners, Segments.of(found.lines)).distance
+    assert away == pytest.approx(R, abs=1e-6)
+
+
+def test_a_corner_without_room_for_a_relief_is_told() -> None:
+    # A hole's corner beside another hole's wall: the relief would cut through it.
+    paths = [_box(0, 0, 4, 3), _box(4.02, 0.0, 6, 3)]
+    job = job_of(tool_diameter_mm=2 * R, side="inside", corners="dogbone")
+    found = contours(drawing_of(paths), job)
+    assert set(_codes(found)) <= {Code.NOT_RELIEVED, Code.GOUGE}
+    assert Code.NOT_RELIEVED in _codes(found)
