@@ -34,7 +34,7 @@ from camtool.planning.items import Feeds
 
 Knots = list[tuple[float, float]]
 
-MOST_LAPS = 1000.0
+MOST_LAPS = 200.0
 """A ramp as long as more laps than this (ways along an open path) is not made."""
 
 

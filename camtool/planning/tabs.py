@@ -5,9 +5,11 @@ the path, where it goes up and comes down again, a bridge of the width w is left
 
     |A B| = w + 2 r,
 
-seen straight across: along a line the raised piece is w + 2 r long, along an arc a bit longer. Its
-sides are straight up and down, or slope; the bridge is w wide at its top. Sloping sides keep to
-the angle of the entry when that is a ramp, so that the tool never goes down more steeply.
+seen straight across: along a line the raised piece is w + 2 r long, along an arc a bit longer. No
+other part of the path may come as near to the middle of A B as these two: it would cut the bridge
+(as in a slot hardly wider than the tool, where there is nothing to hold on to). The sides of a tab
+are straight up and down, or slope; the bridge is w wide at its top. Slopes keep to the angle of
+the entry when that is a ramp, so that the tool never goes down more steeply.
 
 Tabs stand in the middle of equal shares of the path. One that would stand on a corner moves
 within its share to the nearest place where it does not, if there is one. The start of a closed
@@ -24,7 +26,8 @@ import numpy as np
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
+from camtool.geometry.distance import points_to_segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Segments
 from camtool.planning.along import Along
 from camtool.planning.items import Contour
 from camtool.planning.job import Operation
@@ -42,6 +45,9 @@ TAB_CORNER_RAD = 0.1
 
 PLACES_PER_SIDE = 32
 """So many places on either side of the middle of its share are tried for a tab on a corner."""
+
+TAB_SLACK_MM = 1e-5
+"""A bridge may be narrower than asked by this much."""
 
 WIDTH_ROUNDS = 60
 """Halvings that find how long a tab is on a bend."""
@@ -186,6 +192,8 @@ def _fitted(along: Along, model: Tab, foot: float, share: tuple[int, int]) -> Ta
         if half is None:
             continue
         tab = Tab(centre - half, centre + half, model.top_mm, model.fall)
+        if not _stays(along, tab):
+            continue
         if not ((corners > tab.begin - foot) & (corners < tab.end + foot)).any():
             return tab
         fallback = fallback or tab
@@ -197,7 +205,7 @@ def _half(along: Along, centre: float, chord: float, room: float) -> float | Non
 
     def short(halves: Floats) -> Bools:
         ends = along.at(centre + halves) - along.at(centre - halves)
-        return np.asarray(np.hypot(ends[:, 0], ends[:, 1]) < chord - POSITION_EPS_MM)
+        return np.asarray(np.hypot(ends[:, 0], ends[:, 1]) < chord - TAB_SLACK_MM)
 
     tries = np.linspace(0.5 * chord, max(room, 0.5 * chord), PLACES_PER_SIDE)
     enough = np.flatnonzero(~short(tries))
@@ -211,10 +219,25 @@ def _half(along: Along, centre: float, chord: float, room: float) -> float | Non
     return high
 
 
+def _stays(along: Along, tab: Tab) -> bool:
+    """Whether no other part of the path comes nearer to the middle of the bridge than its ends."""
+    ends = along.at(np.array([tab.begin, tab.end]))
+    rest = [(0.0, tab.begin), (tab.end, along.total_mm)]
+    if along.path.closed:
+        rest = [(tab.end, tab.begin + along.total_mm)]
+    far = 0.5 * math.hypot(*(ends[1] - ends[0])) - TAB_SLACK_MM
+    for begin, end in rest:
+        piece = along.piece(begin, end)
+        segments = Segments.between(piece[:-1, :2], piece[1:, :2], piece[:-1, 2])
+        if points_to_segments(ends.mean(axis=0)[None], segments).min() < far:
+            return False
+    return True
+
+
 def _left_out(contour: Contour, along: Along, length: float) -> Finding:
     return Finding(
         Code.TAB_LEFT_OUT,
         Severity.WARNING,
-        "the contour bends too sharply for a tab of this width: it has one less",
+        "there is no room for a tab of this width: the contour has one less",
         where=at_place(contour.name, along.at(np.array([length]))[0].tolist()),
     )

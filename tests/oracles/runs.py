@@ -1,0 +1,74 @@
+"""What a run of the tool cuts, the plain way: many points along it, one after the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.planning.items import Run
+from tests.oracles.arcs import FLAT, centre_of
+
+Floats = npt.NDArray[np.float64]
+
+
+def run_points(vertices: Floats, step_mm: float) -> Floats:
+    """(n, 3) places along vertices (k, 4) of x, y, z, bulge, not farther apart than the step.
+
+    On an arc the angle, and with it z, goes evenly.
+    """
+    rows = [vertices[:1, :3]]
+    for here, there in pairwise(vertices):
+        size = move_length(here, there)
+        share = np.linspace(0.0, 1.0, max(2, math.ceil(size / step_mm) + 1))[1:, None]
+        z = here[2] + share * (there[2] - here[2])
+        if abs(here[3]) < FLAT:
+            rows.append(np.hstack([here[:2] + share * (there[:2] - here[:2]), z]))
+            continue
+        centre, radius = centre_of(here[:2], there[:2], float(here[3]))
+        start = math.atan2(*(here[:2] - centre)[::-1])
+        angle = start + share * 4.0 * math.atan(here[3])
+        rows.append(np.hstack([centre + radius * np.hstack([np.cos(angle), np.sin(angle)]), z]))
+    return np.concatenate(rows)
+
+
+def move_length(here: Floats, there: Floats) -> float:
+    """Length of one move between rows of x, y, z, bulge, seen from above; z when straight down."""
+    chord = float(np.hypot(*(there[:2] - here[:2])))
+    if chord == 0.0:
+        return abs(float(there[2] - here[2]))
+    if abs(here[3]) < FLAT:
+        return chord
+    _, radius = centre_of(here[:2], there[:2], float(here[3]))
+    return radius * 4.0 * math.atan(abs(here[3]))
+
+
+def steepest(vertices: Floats) -> float:
+    """The steepest slope (fall over length) of all moves down that are not straight down."""
+    slopes = [0.0]
+    for here, there in pairwise(vertices):
+        if (here[:2] != there[:2]).any():
+            slopes.append(float(here[2] - there[2]) / move_length(here, there))
+    return max(slopes)
+
+
+def cut_over(runs: Iterable[Run], places: Floats, step_mm: float) -> tuple[Floats, float]:
+    """How low (J,) the tool gets over each of these places of a contour (J, 2), and the most that
+    it takes away there at a time; points of the run farther than 2 steps from any place count
+    for nothing."""
+    low = np.zeros(len(places))
+    most = 0.0
+    for run in runs:
+        points = run_points(run.vertices, step_mm)
+        for begin in range(0, len(points), 500):
+            some = points[begin : begin + 500]
+            apart = np.hypot(*(some[:, None, :2] - places[None]).transpose(2, 0, 1))
+            for (_, _, z), distances in zip(some.tolist(), apart, strict=True):
+                at = int(distances.argmin())
+                if distances[at] <= 2.0 * step_mm:
+                    most = max(most, low[at] - z)
+                    low[at] = min(low[at], z)
+    return low, most
