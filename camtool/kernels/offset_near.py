@@ -14,6 +14,7 @@ from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF, apart_square
 from camtool.kernels.offset_curves import LENGTH, Floats, distance_to, point_on
+from camtool.kernels.offset_kites import deepest
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -23,6 +24,9 @@ TRIM_ROUNDS = 40
 
 TRIM_STEP_SHARE = 0.02
 """An end that moves on by less than this share of its element is left where it is."""
+
+Near = tuple[Floats, Floats, Floats, Floats]
+"""The curves of a source and the tree over them; the kites of its mitres and their tree."""
 
 PLACES = (0.5, 0.03, 0.97, 0.2, 0.8, 0.35, 0.65)
 """Where on a slice its distance is measured; the middle first, as it settles most of them."""
@@ -73,12 +77,12 @@ def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats:
 
 
 @njit(cache=True)
-def trimmed_ends(elements: Floats, source: Floats, tree: Floats, least: float) -> Floats:
-    """(K, 2) fractions between which each element may be `least` or farther from the source.
+def trimmed_ends(elements: Floats, near: Near, distance: float, spare: float) -> Floats:
+    """(K, 2) fractions between which each element may be far enough from the source.
 
-    The distance from the source changes by no more than the way along an element: where it falls
-    short by s, all is too near for the length s from there. Low is not below high where nothing
-    is left.
+    The distance from the source, and the depth in a kite, change by no more than the way along an
+    element: where it falls short by s, all is too near for the length s from there. Ends stay that
+    are too near by no more than `spare`. Low is not below high where nothing is left.
     """
     ends = np.empty((len(elements), 2))
     for i in range(len(elements)):
@@ -86,8 +90,7 @@ def trimmed_ends(elements: Floats, source: Floats, tree: Floats, least: float) -
         for way in range(2):
             for _ in range(TRIM_ROUNDS):
                 point = point_on(elements, i, low if way == 0 else high)
-                enough = least - (high - low) * elements[i, LENGTH]
-                short = least - least_below(source, tree, point, least, enough)
+                short = _too_near(near, point, distance, spare, (high - low) * elements[i, LENGTH])
                 step = short / elements[i, LENGTH]
                 if step <= TRIM_STEP_SHARE * (high - low):
                     break
@@ -104,21 +107,37 @@ def trimmed_ends(elements: Floats, source: Floats, tree: Floats, least: float) -
 
 
 @njit(cache=True)
-def far_enough(
-    elements: Floats, element: Ints, span: Floats, source: tuple[Floats, Floats], least: float
-) -> Bools:
-    """(S,) true for the slices of which no measured point is nearer to the source than `least`.
+def _too_near(
+    near: Near, point: tuple[float, float], distance: float, spare: float, enough: float
+) -> float:
+    """By how much more than `spare` a point is too near to the source, or too deep in a kite.
 
-    Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]; `source` holds the
-    curves and their tree.
+    0 when it is not; any number above `enough` will do.
     """
-    curves, tree = source
+    curves, tree, kites, kite_tree = near
+    least = distance - spare
+    short = least - least_below(curves, tree, point, least, least - enough)
+    if short > enough:
+        return short
+    return deepest(kites, kite_tree, point, short + spare, enough + spare) - spare
+
+
+@njit(cache=True)
+def far_enough(
+    elements: Floats, element: Ints, span: Floats, near: Near, limits: tuple[float, float]
+) -> Bools:
+    """(S,) true for the slices of which no measured point is too near to the source.
+
+    Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]. `limits` are the
+    distance, and by how much a point may be too near.
+    """
+    distance, spare = limits
     valid = np.ones(len(element), np.bool_)
     for i in range(len(element)):
         for place in PLACES:
             t = span[i, 0] + place * (span[i, 1] - span[i, 0])
             point = point_on(elements, element[i], t)
-            if least_below(curves, tree, point, least, least) < least:
+            if _too_near(near, point, distance, spare, 0.0) > 0.0:
                 valid[i] = False
                 break
     return valid

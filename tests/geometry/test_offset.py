@@ -17,7 +17,7 @@ from camtool.geometry.measure import (
     segment_lengths,
     signed_area,
 )
-from camtool.geometry.offset import OffsetOptions, offset, offset_open, offset_stages
+from camtool.geometry.offset import OffsetOptions, Way, offset, offset_open, shape_stages
 from camtool.geometry.offset.slices import merge_points
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
@@ -337,7 +337,7 @@ def test_open_ends_stay_where_the_normals_point() -> None:
 
 
 def test_stages_can_be_looked_at() -> None:
-    stages = offset_stages(DUMBBELL, 2.0, options=OffsetOptions())
+    stages = shape_stages(Polylines.of([DUMBBELL]), Way(2.0))
     raw = stages.raw
     assert np.count_nonzero(~raw.join) == 12
     assert np.count_nonzero(raw.join) == 4  # its reflex corners
@@ -359,7 +359,7 @@ def test_stages_can_be_looked_at() -> None:
 
 def test_trimming_takes_only_what_is_too_near() -> None:
     p, d = gear(40, 9.0, 10.0), 2.0
-    stages = offset_stages(reverse(p), d, options=OffsetOptions())
+    stages = shape_stages(Polylines.of([reverse(p)]), Way(d))
     before, after = stages.raw.elements, stages.trimmed.elements
     shorter = segment_lengths(before).sum() - segment_lengths(after).sum()
     assert shorter > 0.3 * segment_lengths(before).sum()

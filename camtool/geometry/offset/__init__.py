@@ -34,22 +34,23 @@ The result is exact up to these: each point is at the distance from the source w
 """
 
 from camtool.geometry.offset.options import OffsetOptions
-from camtool.geometry.offset.parallel import offset, offset_open, offset_stages
+from camtool.geometry.offset.parallel import offset, offset_open
 from camtool.geometry.offset.raw import RawOffset, raw_offset
 from camtool.geometry.offset.shape import Stages, offset_shape, shape_stages
 from camtool.geometry.offset.slices import Slices, slice_elements, valid_slices
 from camtool.geometry.offset.stitch import trace_loops
 from camtool.geometry.offset.trim import trim_raw
+from camtool.geometry.offset.way import Way
 
 __all__ = [
     "OffsetOptions",
     "RawOffset",
     "Slices",
     "Stages",
+    "Way",
     "offset",
     "offset_open",
     "offset_shape",
-    "offset_stages",
     "raw_offset",
     "shape_stages",
     "slice_elements",

@@ -18,8 +18,9 @@ CUSP_EPS_RAD = 1e-3
 """A corner this near to a full turn back is capped on both its sides: rounding, or arcs that cross
 again beside the corner, decide which side is the inner one."""
 
-U_TURN_EPS_RAD = 1e-3
-"""A turn at a node this near to a full right turn is taken as a full left one."""
+SHARP_LIMIT = 100.0
+"""A sharp corner may be so many times the distance away from the source, and is cut off there: it
+is one sharper than 1.1°."""
 
 
 @dataclass(frozen=True)

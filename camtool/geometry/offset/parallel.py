@@ -6,61 +6,75 @@ import numpy as np
 
 from camtool.errors import GeometryError
 from camtool.geometry.offset.options import DEFAULT_OPTIONS, OffsetOptions
-from camtool.geometry.offset.shape import Stages, is_nothing, offset_shape, shape_stages
+from camtool.geometry.offset.shape import offset_shape, shape_stages
 from camtool.geometry.offset.stitch import paths_of
+from camtool.geometry.offset.way import Way, is_nothing, limit_of
 from camtool.geometry.polylines import Bools, Ints, Polyline, Polylines
 from camtool.geometry.transform import reverse
 
 
 def offset(
-    p: Polyline, distance_mm: float, *, options: OffsetOptions = DEFAULT_OPTIONS
+    p: Polyline,
+    distance_mm: float,
+    *,
+    joins: str = "round",
+    mitre_limit: float = 2.0,
+    options: OffsetOptions = DEFAULT_OPTIONS,
 ) -> list[Polyline]:
     """The parallel paths at a distance in mm: positive to the left of travel, negative right.
 
     A closed path gives closed paths, an open one what `offset_open` says; each runs the way of
     its source. The list is empty when the path collapses, and has several when it falls apart.
     Of a path that crosses itself, only parts that close on its own side are given. Distances up
-    to POSITION_EPS_MM give the path itself. GeometryError for a distance that is not finite.
+    to POSITION_EPS_MM give the path itself.
+
+    `joins` says what is about outer corners: "round" arcs at the distance; "mitre", tangents that
+    go on until they meet, cut off at `mitre_limit` times the distance from the corner; or
+    "sharp", a mitre of any length (up to SHARP_LIMIT).
+
+    GeometryError for a distance that is not finite, OptionError for joins that do not exist and a
+    mitre limit below 1.
     """
     if not p.closed:
-        return offset_open(p, distance_mm, options=options)
-    if is_nothing(distance_mm):
-        return [p]
-    if distance_mm < 0.0:
-        return [reverse(r) for r in offset(reverse(p), -distance_mm, options=options)]
-    return list(offset_shape(Polylines.of([p]), distance_mm, options=options))
+        return offset_open(p, distance_mm, joins=joins, mitre_limit=mitre_limit, options=options)
+    lines = Polylines.of([p])
+    found = offset_shape(lines, distance_mm, joins=joins, mitre_limit=mitre_limit, options=options)
+    return [p] if found is lines else list(found)
 
 
 def offset_open(
-    p: Polyline, distance_mm: float, *, options: OffsetOptions = DEFAULT_OPTIONS
+    p: Polyline,
+    distance_mm: float,
+    *,
+    joins: str = "round",
+    mitre_limit: float = 2.0,
+    options: OffsetOptions = DEFAULT_OPTIONS,
 ) -> list[Polyline]:
     """What runs parallel on one side of an open path: positive left of travel, negative right.
 
     Points nearer than the distance to any of the path, its ends too, are left out; nothing is put
-    around its ends. A part that closes on itself is a closed path. GeometryError for a closed
-    source or a distance that is not finite.
+    around its ends. A part that closes on itself is a closed path. For `joins` see `offset`.
+    GeometryError for a closed source or a distance that is not finite.
     """
     if p.closed:
         raise GeometryError("a closed path has no ends", mend="use offset()")
+    limit = limit_of(joins, mitre_limit)
     if is_nothing(distance_mm):
         return [p]
+    way = Way(abs(distance_mm), limit, both_sides=True, options=options)
     if distance_mm < 0.0:
-        return [reverse(r) for r in offset_open(reverse(p), -distance_mm, options=options)]
-    around = there_and_back(p)
-    stages = offset_stages(around, distance_mm, options=options, both_sides=True)
+        return [reverse(r) for r in _left_of(reverse(p), way)]
+    return list(_left_of(p, way))
+
+
+def _left_of(p: Polyline, way: Way) -> Polylines:
+    stages = shape_stages(Polylines.of([there_and_back(p)]), way)
     elements, kept = stages.trimmed.elements, stages.kept
     around_end = stages.trimmed.join & (stages.trimmed.source == len(p) - 1)
     ahead = (stages.trimmed.source < len(p)) & ~around_end
     runs = [run for loop in stages.loops for run in _runs(loop, ahead[kept.element[loop]])]
     closed = np.array([is_all for _, is_all in runs], dtype=np.bool_)
-    return list(paths_of([run for run, _ in runs], closed, kept, elements, options))
-
-
-def offset_stages(
-    p: Polyline, distance_mm: float, *, options: OffsetOptions, both_sides: bool = False
-) -> Stages:
-    """All stages of the offset of a closed path to the left, by a distance above 0."""
-    return shape_stages(Polylines.of([p]), distance_mm, options=options, both_sides=both_sides)
+    return paths_of([run for run, _ in runs], closed, kept, elements, way.options)
 
 
 def there_and_back(p: Polyline) -> Polyline:

@@ -1,4 +1,4 @@
-"""Stage 1: every segment shifted to the left, and an arc about every outer corner."""
+"""Stage 1: every segment shifted to the left, and arcs or mitres about the outer corners."""
 
 from __future__ import annotations
 
@@ -6,24 +6,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.frames import Frames, dot, turned
+from camtool.geometry.frames import Frames, turned
+from camtool.geometry.offset.corners import Corners, Mitres, arcs_about
 from camtool.geometry.offset.curves import next_rows
-from camtool.geometry.offset.options import CUSP_EPS_RAD, OffsetOptions
+from camtool.geometry.offset.way import Way
 from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
 
 
 @dataclass(frozen=True, eq=False)
 class RawOffset:
     """`elements`: shifted segments and joins, in the order of travel. `source` (K,): the source
-    segment of each, or the one before its corner; `join` (K,): true for arcs about a corner."""
+    segment of each, or the one before its corner; `join` (K,): true for what is put about a
+    corner. `kites` (J, 10): what mitres cover (camtool.kernels.offset_kites)."""
 
     elements: Segments
     source: Ints
     join: Bools
+    kites: Floats
 
 
-def raw_offset(lines: Polylines, distance_mm: float, options: OffsetOptions) -> RawOffset:
-    """All that lies at `distance_mm` > 0 to the left of closed paths, and much that is nearer.
+def raw_offset(lines: Polylines, way: Way) -> RawOffset:
+    """All of the offset to the left of closed paths, and much that is too near to them.
 
     An arc that bends left with a radius up to the distance has nothing there: every point beyond
     its centre is nearer to another of its points. Inner corners need no join: the elements
@@ -31,57 +34,43 @@ def raw_offset(lines: Polylines, distance_mm: float, options: OffsetOptions) -> 
     """
     segments = Segments.of(lines)
     frames = Frames.of(segments)
-    end_tangent = frames.tangent_at(np.ones(len(segments)))
-    start = segments.start + distance_mm * frames.normal
-    end = segments.end + distance_mm * turned(end_tangent)
-    left_over = 1.0 - distance_mm * frames.curvature
-    keep = (left_over > 0.0) & _longer(start, end, options.node_eps_mm)
-
-    rows = np.arange(len(segments))
-    shifted = Segments.between(start[keep], end[keep], segments.bulge[keep])
-    corner, joins = _joins(frames, frames.tangent[next_rows(lines)], distance_mm, options)
-    source = np.concatenate([rows[keep], corner])
-    join = np.repeat([False, True], [len(shifted), len(joins)])
-    order = np.lexsort([join, source])
-    elements = Segments.between(
-        np.concatenate([shifted.start, joins.start])[order],
-        np.concatenate([shifted.end, joins.end])[order],
-        np.concatenate([shifted.bulge, joins.bulge])[order],
-    )
-    return RawOffset(elements, source[order], join[order])
+    corners = Corners.of(frames, lines)
+    mitred = corners.outer(way)
+    rounded = mitred & way.is_round
+    if way.both_sides:
+        # About the ends of an open path only what is nearer than the distance counts.
+        rounded[[len(segments) // 2 - 1, -1]] = mitred[[len(segments) // 2 - 1, -1]]
+    mitres = Mitres.about(corners, np.flatnonzero(mitred & ~rounded), way)
+    rows, shifted = _shifted(segments, frames, corners, mitres, way)
+    about, arcs = arcs_about(corners, np.flatnonzero(rounded), way)
+    beside = np.column_stack([segments.is_arc, segments.is_arc[next_rows(lines)]])
+    along, across = mitres.lines(corners, beside, way)
+    return _in_order([rows, about, along], [shifted, arcs, across], mitres.kites)
 
 
-def _joins(
-    frames: Frames, tangent: Floats, distance_mm: float, options: OffsetOptions
+def _shifted(
+    segments: Segments, frames: Frames, corners: Corners, mitres: Mitres, way: Way
 ) -> tuple[Ints, Segments]:
-    """Arcs about the outer corners, and the segment before each; two where one is above π.
-
-    Where a path turns straight back, rounding alone says whether it turns left or right. It is
-    then taken to turn right: an arc too much is invalid, or leads nowhere, and goes later.
-    """
-    end_tangent = frames.tangent_at(np.ones(len(tangent)))
-    turn = np.arctan2(dot(turned(end_tangent), tangent), dot(end_tangent, tangent))
-    turn = np.where(turn >= np.pi - CUSP_EPS_RAD, turn - 2.0 * np.pi, turn)
-    parts = np.where(turn < -np.pi, 2, np.where(turn < 0.0, 1, 0))
-    corner = np.repeat(np.arange(len(turn)), parts)
-    second = np.concatenate([[False], corner[1:] == corner[:-1]])
-    sweep = turn[corner] / parts[corner]
-    begin = np.where(second, sweep, 0.0)
-    normal = turned(end_tangent[corner])
-    start = frames.end[corner] + distance_mm * _rotated(normal, begin)
-    last = parts[corner] == second + 1
-    middle = frames.end[corner] + distance_mm * _rotated(normal, sweep)
-    after = frames.end[corner] + distance_mm * turned(tangent[corner])
-    end = np.where(last[:, None], after, middle)
-    long = _longer(start, end, options.node_eps_mm)
-    arcs = Segments.between(start[long], end[long], np.tan(0.25 * sweep[long]))
-    return corner[long], arcs
+    """The segments at the distance, and the row of each; lines go on to the tips of mitres."""
+    start = segments.start + way.distance_mm * frames.normal
+    end = segments.end + way.distance_mm * turned(corners.before)
+    left_over = 1.0 - way.distance_mm * frames.curvature
+    apart = np.hypot(*(end - start).T)
+    rows = np.flatnonzero((left_over > 0.0) & (apart > way.options.node_eps_mm))
+    reach = np.where(segments.is_arc, 0.0, mitres.reach)
+    reach_back = np.where(segments.is_arc, 0.0, mitres.reach[corners.earlier])
+    end += reach[:, None] * corners.before
+    start -= reach_back[:, None] * frames.tangent
+    return rows, Segments.between(start[rows], end[rows], segments.bulge[rows])
 
 
-def _rotated(vectors: Floats, angle: Floats) -> Floats:
-    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    return np.asarray(cosine * vectors + sine * turned(vectors))
-
-
-def _longer(start: Floats, end: Floats, eps: float) -> Bools:
-    return np.asarray(np.hypot(*(end - start).T) > eps)
+def _in_order(sources: list[Ints], parts: list[Segments], kites: Floats) -> RawOffset:
+    """Shifted segments and then joins, by their source."""
+    source = np.concatenate(sources)
+    order = np.argsort(source, kind="stable")
+    elements = Segments.between(
+        np.concatenate([part.start for part in parts])[order],
+        np.concatenate([part.end for part in parts])[order],
+        np.concatenate([part.bulge for part in parts])[order],
+    )
+    return RawOffset(elements, source[order], order >= len(sources[0]), kites)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.geometry.offset.curves import Curves, curve_rows_of
+from camtool.geometry.offset.near import Near
 from camtool.geometry.offset.options import OffsetOptions
+from camtool.geometry.offset.way import Way
 from camtool.geometry.polylines import Bools, Floats, Ints, Segments
 
 SKEW = (0.850650808352040, 0.525731112119133)
@@ -101,16 +103,15 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
     return node, points[first]
 
 
-def valid_slices(
-    slices: Slices, elements: Segments, source: Curves, distance_mm: float, options: OffsetOptions
-) -> Bools:
-    """(S,) true where no measured point is nearer to the source than the distance − eps.
+def valid_slices(slices: Slices, elements: Segments, near: Near, way: Way) -> Bools:
+    """(S,) true where no measured point is too near to the source, or within a mitre.
 
+    Too near is what falls short of the distance, or is deeper in a kite, by `validity_eps_mm`.
     The raw offset changes between valid and invalid only where it meets itself, so that one point
     would do; several guard against slices that are hardly too near anywhere.
     """
     from camtool.kernels.offset_near import far_enough
 
-    least = distance_mm - options.validity_eps_mm
+    limits = (way.distance_mm, way.options.validity_eps_mm)
     curves = curve_rows_of(elements)
-    return far_enough(curves, slices.element, slices.span, (source.rows, source.tree), least)
+    return far_enough(curves, slices.element, slices.span, near.arrays, limits)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from camtool.geometry.measure import point_at
-from camtool.geometry.offset.curves import Curves, curve_rows_of
-from camtool.geometry.offset.options import OffsetOptions
+from camtool.geometry.offset.curves import curve_rows_of
+from camtool.geometry.offset.near import Near
 from camtool.geometry.offset.raw import RawOffset
+from camtool.geometry.offset.way import Way
 from camtool.geometry.polylines import Floats, Segments
 
 TRIM_SPARE = 10.0
@@ -15,22 +16,20 @@ TRIM_SPARE = 10.0
 the last cut are then judged to be invalid."""
 
 
-def trim_raw(
-    raw: RawOffset, source: Curves, distance_mm: float, options: OffsetOptions
-) -> RawOffset:
-    """The raw offset of a source without what is surely too near at both ends of each element.
+def trim_raw(raw: RawOffset, near: Near, way: Way) -> RawOffset:
+    """The raw offset without what is surely too near at both ends of each element.
 
     What goes could never be kept, and what is kept is not cut by it: this only saves cuts, which
     would grow with the square of the number of elements where the distance is large against them.
     """
     from camtool.kernels.offset_near import trimmed_ends
 
-    least = distance_mm - TRIM_SPARE * options.validity_eps_mm
-    ends = trimmed_ends(curve_rows_of(raw.elements), source.rows, source.tree, least)
+    spare = TRIM_SPARE * way.options.validity_eps_mm
+    ends = trimmed_ends(curve_rows_of(raw.elements), near.arrays, way.distance_mm, spare)
     low, high = ends.T
     keep = np.flatnonzero(low < high)
     trimmed = _between(raw.elements[keep], low[keep], high[keep])
-    return RawOffset(trimmed, raw.source[keep], raw.join[keep])
+    return RawOffset(trimmed, raw.source[keep], raw.join[keep], raw.kites)
 
 
 def _between(elements: Segments, low: Floats, high: Floats) -> Segments:
