@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import path_extents, sample
-from camtool.geometry.polylines import Bools, Floats, Polyline, Segments
+from camtool.geometry.polylines import Bools, Floats, Polyline, Polylines, Segments
 from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
 
@@ -41,6 +42,9 @@ PECK_TOP_MM = 0.5
 
 PECK_CLEARANCE_MM = 0.2
 """A drill goes back as a rapid to this height above the last depth, or to half a peck if lower."""
+
+PECK_SHARE = 1e-9
+"""A last peck shorter than this share of the others is none."""
 
 NAMES_SHOWN = 3
 """So many paths are named in a finding; the others are counted."""
@@ -104,14 +108,12 @@ def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
 
 
 def _turns_once(sweep: Floats) -> bool:
-    """Whether arcs that all turn one way make one full turn."""
+    """Whether arcs that all turn one way make one full turn, and not two."""
     one_way = bool((sweep > 0.0).all() or (sweep < 0.0).all())
-    return one_way and abs(abs(float(sweep.sum())) - 2.0 * math.pi) < 0.5 * math.pi
+    return one_way and round(abs(float(sweep.sum())) / (2.0 * math.pi)) == 1
 
 
 def _box(path: Polyline) -> list[list[float]]:
-    from camtool.geometry.polylines import Polylines
-
     box: list[list[float]] = path_extents(Polylines.of([path]))[0].tolist()
     return box
 
@@ -141,7 +143,7 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
     if not depth_mm > 0.0:
         raise ValueError(f"a hole {depth_mm} mm deep")
     whole = depth_mm if peck_mm is None else peck_mm
-    count = math.ceil(depth_mm / whole * (1.0 - np.finfo(float).eps))
+    count = max(1, math.ceil(depth_mm / whole - PECK_SHARE))
     return [depth_mm * (step + 1) / count for step in range(count)]
 
 
@@ -152,7 +154,7 @@ def _run(hole: Hole, setting: Setting) -> Run:
     depths = peck_depths(-setting.levels_mm[-1], operation.peck_mm)
     above = min(PECK_CLEARANCE_MM, 0.5 * depths[0])
     heights, feeds = [-depths[0]], []
-    for last, depth in zip(depths, depths[1:], strict=False):
+    for last, depth in pairwise(depths):
         heights += [top, above - last, -depth]
         feeds += [RAPID, RAPID, feed]
     vertices = np.array([(*hole.at_mm, z, 0.0) for z in heights])

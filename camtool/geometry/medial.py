@@ -1,0 +1,165 @@
+"""The medial axis of a region with the radii of its discs, exact with lines and arcs.
+
+Each point of the boundary has one largest disc that touches it from within. Its middle lies on
+the medial axis, and runs along it without a jump when the point runs along the boundary: round a
+region the whole axis is passed, each of its branches from both sides. So nothing needs to be
+approximated or pruned: the axis is traced by the boundary itself.
+
+    boundary ──samples──▶ discs ──where the partner changes: bisection──▶ stretches
+             ──halved until chords are within the tolerance──▶ Trace
+
+A stretch is what one element sees of one partner. A sample that one element has of another shows
+that other a place where the first must be seen; so stretches that fall between the first samples
+are found from their other side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from camtool.geometry.boundary import Boundary
+from camtool.geometry.polylines import Bools, Floats, Ints, Polylines
+
+FIRST_SAMPLES = 9
+"""Places on each element at which the discs are looked for first."""
+
+HALVINGS = 60
+"""So often the stretch in which the partner changes is halved: then no number lies between."""
+
+MOST_ROUNDS = 40
+"""Samples are halved, and looked for from the other side, no more often than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Discs (N rows) along the boundary, by element and place on it: `element` (N,), `t` (N,) in
+    0 … 1, the middles `x`, `y` and radii `rho` mm, the `partner` element that each touches
+    besides and the place `u` there. The curve between three neighbouring rows of one element and
+    one partner leaves their chords by a part of the tolerance only (x, y and rho together)."""
+
+    element: Ints
+    t: Floats
+    x: Floats
+    y: Floats
+    rho: Floats
+    partner: Ints
+    u: Floats
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def rows(self, chosen: Ints | Bools) -> Trace:
+        """The chosen rows."""
+        return Trace(*(getattr(self, each.name)[chosen] for each in fields(self)))
+
+    @property
+    def discs(self) -> Floats:
+        """(N, 3) x, y, rho."""
+        return np.column_stack([self.x, self.y, self.rho])
+
+
+def concatenated(traces: list[Trace]) -> Trace:
+    """The rows of all, one trace after the other."""
+    return Trace(
+        *(
+            np.concatenate([getattr(trace, each.name) for trace in traces])
+            for each in fields(Trace)
+        )
+    )
+
+
+def discs_at(boundary: Boundary, element: Ints, t: Floats) -> Trace:
+    """The largest disc that touches each of these places."""
+    from camtool.kernels.discs import largest_discs
+
+    result, partner = np.empty((len(t), 4)), np.empty(len(t), dtype=np.int64)
+    largest_discs(boundary.table, boundary.links, boundary.boxes, element, t, result, partner)
+    return Trace(element, t, result[:, 0], result[:, 1], result[:, 2], partner, result[:, 3])
+
+
+def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, Trace]:
+    """The trace of a region: closed paths, outer ones CCW, holes CW, that do not cross."""
+    boundary = Boundary.of(region)
+    element = np.repeat(np.arange(len(boundary)), FIRST_SAMPLES)
+    t = np.tile(np.linspace(0.0, 1.0, FIRST_SAMPLES), len(boundary))
+    trace = discs_at(boundary, element, t)
+    open_gaps = _gaps(trace)
+    for _ in range(MOST_ROUNDS):
+        trace, open_gaps = _refined(boundary, trace, open_gaps, tolerance_mm)
+        if not open_gaps.any():
+            seen = _seen_from_partners(boundary, trace)
+            if len(seen) == 0:
+                break
+            trace, open_gaps = _inserted(trace, seen, np.ones(len(seen), dtype=np.bool_))
+    return boundary, trace
+
+
+def _gaps(trace: Trace) -> Bools:
+    """(N,) true where the next row belongs to the same element."""
+    return np.append(trace.element[1:] == trace.element[:-1], False)
+
+
+def _inserted(trace: Trace, more: Trace, is_open: Bools) -> tuple[Trace, Bools]:
+    """The trace with more rows, and its gaps that are open: those beside the new rows that
+    `is_open` names, but for gaps in which no number lies."""
+    both = concatenated([trace, more])
+    order = np.lexsort((both.t, both.element))
+    both = both.rows(order)
+    opens = np.append(np.zeros(len(trace), dtype=np.bool_), is_open)[order]
+    beside = opens | np.append(opens[1:], False)
+    width = np.append(np.diff(both.t), 0.0)
+    return both, beside & _gaps(both) & (width > np.finfo(np.float64).eps)
+
+
+def _refined(
+    boundary: Boundary, trace: Trace, open_gaps: Bools, tolerance_mm: float
+) -> tuple[Trace, Bools]:
+    """All open gaps once: halved, and open still where the curve left the chord; cut where the
+    partner changes."""
+    at = np.flatnonzero(open_gaps)
+    changes = trace.partner[at] != trace.partner[at + 1]
+    low, high = _events(boundary, trace, at[changes])
+    middle = 0.5 * (trace.t[at] + trace.t[at + 1])
+    inner = ~changes & (middle > trace.t[at]) & (middle < trace.t[at + 1])
+    begin = at[inner]
+    halves = discs_at(boundary, trace.element[begin], middle[inner])
+    bent = off_chord(halves.discs, trace.discs[begin], trace.discs[begin + 1]) > tolerance_mm
+    bent |= halves.partner != trace.partner[begin]
+    more = concatenated([halves, low, high])
+    return _inserted(trace, more, np.append(bent, np.ones(2 * len(low), dtype=np.bool_)))
+
+
+def _events(boundary: Boundary, trace: Trace, at: Ints) -> tuple[Trace, Trace]:
+    """Where the partner of row `at` ceases to be one: the last disc with it, and the next."""
+    element, partner = trace.element[at], trace.partner[at]
+    low, high = trace.t[at].copy(), trace.t[at + 1].copy()
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        same = discs_at(boundary, element, middle).partner == partner
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return discs_at(boundary, element, low), discs_at(boundary, element, high)
+
+
+def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
+    """(N,) how far points (N, 3) lie from the chords between begin and end (N, 3): the distance
+    in the plane and the difference of radii, added."""
+    chord, arm = end - begin, points - begin
+    square = (chord**2).sum(axis=1)
+    part = np.clip((arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    off = arm - part[:, None] * chord
+    return np.asarray(np.hypot(off[:, 0], off[:, 1]) + np.abs(off[:, 2]))
+
+
+def _seen_from_partners(boundary: Boundary, trace: Trace) -> Trace:
+    """Discs at the touching points on partners that show no such partner next to that place."""
+    others = trace.partner != trace.element
+    element, t, partner = trace.partner[others], trace.u[others], trace.element[others]
+    # Numbers that sort as element and place do; places lie in 0 … 1.
+    key, wanted = 2.0 * trace.element + trace.t, 2.0 * element + t
+    after = np.clip(np.searchsorted(key, wanted), 1, len(trace) - 1)
+    hidden = (trace.partner[after] != partner) & (trace.partner[after - 1] != partner)
+    fresh = (key[after] != wanted) & (key[after - 1] != wanted)
+    found = discs_at(boundary, element[hidden & fresh], t[hidden & fresh])
+    return found.rows(found.partner == partner[hidden & fresh])

@@ -1,0 +1,232 @@
+"""The largest disc in a region that touches its boundary at a given point.
+
+A boundary element starts at A with the unit tangent T and the inner normal N (T turned by +90°),
+and turns by `sweep` along its `length`; its curvature is κ = sweep / length. One of no length is
+a reflex corner: there the normal turns while the point stays. The function
+
+    g(p) = N·(p − A) − κ/2 |p − A|²
+
+is 0 on the element's line or circle, positive on its inner side, and its gradient m has the
+length 1 there. A disc that touches the boundary at p with the inner normal n, and whose middle is
+p + ρ n, touches that line or circle too when
+
+    ρ = g(p) / (1 − n·m(p)),          and a point q when   ρ = |q − p|² / (2 n·(q − p)).
+
+Exact: the least of these over all elements whose touching point is theirs is the radius. Blocks
+of elements are left out by their true distance only: a disc of radius ρ ends 2ρ from p.
+
+Neighbours: two elements that join smoothly are never touched by one disc of the region (their
+circles touch each other already, one within the other or on two sides of their tangent), so a
+smooth neighbour is left out, and with it the quotient 0/0. A neighbour behind a reflex corner
+counts only where p is clearly on its inner side.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+AX, AY, TX, TY, LENGTH, SWEEP, BX, BY, UX, UY = range(10)
+"""Columns of an element: its start, tangent there, length, sweep, end, and tangent there."""
+
+SMOOTH, CONVEX, REFLEX = 0, 1, 2
+"""How an element is joined to the one before it."""
+
+BLOCK = 16
+"""Elements that are left out together."""
+
+TOUCH_MM = 1e-9
+"""Nearer than this a neighbour behind a reflex corner is not seen, and touching points may be
+off the ends of a neighbour behind a convex corner."""
+
+
+@njit(cache=True)
+def largest_discs(
+    table: Floats, links: Ints, boxes: Floats, row: Ints, t: Floats, result: Floats, partner: Ints
+) -> None:
+    """Fill `result` (N, 4) with x, y of the middle, radius, and the place (0 … 1) on the element
+    that the disc touches besides, and `partner` (N,) with that element.
+
+    `table` (E, 10) as the columns say; `links` (E, 3): the element before and behind, and the
+    joint to the one before; `boxes` (⌈E/BLOCK⌉, 4). The discs touch element `row` (N,) at the
+    part `t` (N,) of its length or of its turn. One that touches only its own arc, in whose centre
+    it lies, has itself as partner.
+    """
+    for k in range(len(row)):
+        own = row[k]
+        x, y, nx, ny = frame(table, own, t[k])
+        corner = _at_convex_corner(links, own, t[k])
+        if corner >= 0:
+            result[k, 0], result[k, 1], result[k, 2] = x, y, 0.0
+            result[k, 3], partner[k] = 1.0 - t[k], corner
+            continue
+        radius, best = _largest(table, links, boxes, own, (x, y, nx, ny))
+        cx, cy = x + radius * nx, y + radius * ny
+        result[k, 0], result[k, 1], result[k, 2] = cx, cy, radius
+        result[k, 3], partner[k] = _place(table, best, cx, cy), best
+
+
+@njit(cache=True)
+def frame(table: Floats, own: int, t: float) -> tuple[float, float, float, float]:
+    """The point x, y of an element at the part t of it, and its inner normal there."""
+    tx, ty, length = table[own, TX], table[own, TY], table[own, LENGTH]
+    turned = table[own, SWEEP] * t
+    sine, cosine = math.sin(turned), math.cos(turned)
+    nx, ny = -ty * cosine - tx * sine, tx * cosine - ty * sine
+    if t == 1.0:
+        return table[own, BX], table[own, BY], nx, ny
+    chord = length * t
+    half = 0.5 * turned
+    if half != 0.0:
+        chord *= math.sin(half) / half
+    hc, hs = math.cos(half), math.sin(half)
+    x = table[own, AX] + chord * (tx * hc - ty * hs)
+    y = table[own, AY] + chord * (ty * hc + tx * hs)
+    return x, y, nx, ny
+
+
+@njit(cache=True)
+def _at_convex_corner(links: Ints, own: int, t: float) -> int:
+    """The other element of the convex corner at which the point lies, −1 elsewhere."""
+    if t == 0.0 and links[own, 2] == CONVEX:
+        return int(links[own, 0])
+    if t == 1.0 and links[links[own, 1], 2] == CONVEX:
+        return int(links[own, 1])
+    return -1
+
+
+@njit(cache=True)
+def _largest(
+    table: Floats,
+    links: Ints,
+    boxes: Floats,
+    own: int,
+    at: tuple[float, float, float, float],
+) -> tuple[float, int]:
+    """Radius and partner of the largest disc at a point with its normal."""
+    x, y = at[0], at[1]
+    radius, best = np.inf, own
+    if table[own, LENGTH] > 0.0 and table[own, SWEEP] > 0.0:
+        radius = table[own, LENGTH] / table[own, SWEEP]
+    home = own // BLOCK
+    for turn in range(len(boxes)):
+        block = (home + turn) % len(boxes)
+        dx = max(boxes[block, 0] - x, 0.0, x - boxes[block, 2])
+        dy = max(boxes[block, 1] - y, 0.0, y - boxes[block, 3])
+        if math.hypot(dx, dy) > 2.0 * radius:
+            continue
+        for other in range(block * BLOCK, min((block + 1) * BLOCK, len(table))):
+            if other == own:
+                continue
+            found = _limit(table, links, own, other, at, radius)
+            if found < radius:
+                radius, best = found, other
+    return radius, best
+
+
+@njit(cache=True)
+def _limit(
+    table: Floats,
+    links: Ints,
+    own: int,
+    other: int,
+    at: tuple[float, float, float, float],
+    radius: float,
+) -> float:
+    """The radius to which another element limits the disc; inf where it does not, or not below
+    `radius`."""
+    x, y, nx, ny = at
+    wx, wy = x - table[other, AX], y - table[other, AY]
+    before, behind = links[own, 0] == other, links[own, 1] == other
+    found = np.inf
+    # Its corner, or the smooth joint at its start, as a point; not one of our own ends.
+    corner = table[other, LENGTH] == 0.0
+    ahead = -(nx * wx + ny * wy)
+    if (corner or links[other, 2] == SMOOTH) and not (behind or (before and corner)) and ahead > 0:
+        found = 0.5 * (wx * wx + wy * wy) / ahead
+    if corner:
+        return found
+    if (before and links[own, 2] == SMOOTH) or (behind and links[other, 2] == SMOOTH):
+        return np.inf
+    if table[own, LENGTH] == 0.0 and (before or behind):
+        return np.inf
+    curve = _touching(table, other, at, min(radius, found), _least(table, links, own, other))
+    return min(found, curve)
+
+
+@njit(cache=True)
+def _least(table: Floats, links: Ints, own: int, other: int) -> float:
+    """How far on the inner side of `other` a point must be: above 0 behind a reflex corner, and
+    −1 for a neighbour behind a convex corner, where rounding may take the point outside."""
+    before, behind = links[own, 0], links[own, 1]
+    if (before == other and links[own, 2] == CONVEX) or (
+        behind == other and links[other, 2] == CONVEX
+    ):
+        return -1.0
+    if table[before, LENGTH] == 0.0 and links[before, 0] == other:
+        return TOUCH_MM
+    if table[behind, LENGTH] == 0.0 and links[behind, 1] == other:
+        return TOUCH_MM
+    return 0.0
+
+
+@njit(cache=True)
+def _touching(
+    table: Floats,
+    other: int,
+    at: tuple[float, float, float, float],
+    radius: float,
+    least: float,
+) -> float:
+    """The radius at which the disc touches the line or arc `other` within it; inf if it is not
+    below `radius` or touches beyond the ends."""
+    x, y, nx, ny = at
+    tx, ty = table[other, TX], table[other, TY]
+    kappa = table[other, SWEEP] / table[other, LENGTH]
+    wx, wy = x - table[other, AX], y - table[other, AY]
+    g = wy * tx - wx * ty - 0.5 * kappa * (wx * wx + wy * wy)
+    slack = 0.0
+    if least < 0.0:
+        g, slack = max(g, 0.0), TOUCH_MM
+    elif g <= least:
+        return np.inf
+    mx, my = -ty - kappa * wx, tx - kappa * wy
+    # 1 − n·m without cancellation: |n − m|²/2 + (1 − |m|²)/2, and |m|² = 1 − 2κg.
+    ex, ey = nx - mx, ny - my
+    below = 0.5 * (ex * ex + ey * ey) + kappa * g
+    if below <= 0.0 or g >= radius * below:
+        return np.inf
+    found = g / below
+    cx, cy = x + found * nx, y + found * ny
+    after = (cx - table[other, AX]) * tx + (cy - table[other, AY]) * ty
+    still = (cx - table[other, BX]) * table[other, UX] + (cy - table[other, BY]) * table[other, UY]
+    return found if after >= -slack and still <= slack else np.inf
+
+
+@njit(cache=True)
+def _place(table: Floats, other: int, cx: float, cy: float) -> float:
+    """At which part of an element a disc with this middle touches it."""
+    wx, wy = cx - table[other, AX], cy - table[other, AY]
+    tx, ty, length, sweep = (
+        table[other, TX],
+        table[other, TY],
+        table[other, LENGTH],
+        table[other, SWEEP],
+    )
+    if length > 0.0 and sweep == 0.0:
+        part = (wx * tx + wy * ty) / length
+    else:
+        along, across = wx * tx + wy * ty, wy * tx - wx * ty
+        if length == 0.0:  # the direction from the corner to the middle, off the first normal
+            turned = math.atan2(-along, across)
+        else:  # and that from the centre to the foot, off the one to the start
+            kappa = sweep / length
+            turned = math.atan2(kappa * along, 1.0 - kappa * across)
+        part = turned / sweep
+    return float(min(max(part, 0.0), 1.0))

@@ -1,0 +1,222 @@
+"""Carving with a V bit: the wider a place, the deeper the tip, so that both walls are cut at once.
+
+    closed paths ──nesting──▶ regions ──medial trace──▶ discs ──bands of radii──▶ grooves, walls
+                 ──graph──▶ walks ──depth by radius──▶ runs, one Fixed item per region
+
+With the half angle α of the bit and the radius r of its flat tip, a disc of radius ρ is cut at the
+surface when the tip is as deep as
+
+    depth = (ρ − r) / tan α.
+
+At convex corners ρ falls to 0 and the tip comes up to the surface, in the corner itself (a flat
+tip stops where it no longer fits). Where the depth of the operation or the width of the bit does
+not allow more, walls are cut at that depth, and the floor between them is left and reported: a
+pocket with a flat tool clears it.
+
+What is cut is right to `CARVE_TOLERANCE_MM`: all vertices lie on the medial axis or on the
+parallel curve, exact to rounding; lines and arcs between them leave the axis, sideways and in
+radius together, by no more than the tolerance; twigs that would reach no farther are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from camtool.errors import OptionError
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.medial import Trace, medial_trace
+from camtool.geometry.nest import nesting
+from camtool.geometry.polylines import Floats, Polyline, Polylines
+from camtool.geometry.regions import regions
+from camtool.planning.carve_graph import graph_of, walks, without_twigs
+from camtool.planning.carve_pieces import Band, floor_area, grooves, walls, with_level
+from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
+from camtool.planning.job import Operation
+
+CARVE_TOLERANCE_MM = 5e-4
+"""A carved wall may be off its line by this much: half a micrometre."""
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A V bit: the tangent of its half angle, the radius of its flat tip, mm, and the largest
+    radius that it cuts at the surface, mm (inf: not known)."""
+
+    slope: float
+    tip_mm: float
+    widest_mm: float
+
+    @classmethod
+    def of(cls, operation: Operation) -> Cone:
+        """The V bit of an operation; OptionError when its tool is none."""
+        tool = operation.tool
+        where = f"operation {operation.name!r}, key tool"
+        if tool.kind != "v" or tool.tip_angle_rad is None:
+            raise OptionError(
+                "carving needs a V bit",
+                where=where,
+                mend='use a tool with kind = "v" and a tip_angle',
+            )
+        if not 0.0 < tool.tip_angle_rad < math.pi:
+            degrees = math.degrees(tool.tip_angle_rad)
+            raise OptionError(
+                f"a tip angle of {degrees:g} degrees is no cone",
+                where=where,
+                mend="give the full angle of the tip, above 0 and below 180 degrees",
+            )
+        widest = tool.radius_mm or math.inf
+        if tool.tip_diameter_mm >= 2.0 * widest:
+            raise OptionError(
+                f"a tip of {tool.tip_diameter_mm:g} mm is no smaller than the tool",
+                where=where,
+                mend="give a smaller tip_diameter",
+            )
+        return cls(math.tan(0.5 * tool.tip_angle_rad), 0.5 * tool.tip_diameter_mm, widest)
+
+    def radius_at(self, depth_mm: float) -> float:
+        """Radius of what is cut at the surface with the tip so deep."""
+        return min(self.tip_mm + depth_mm * self.slope, self.widest_mm)
+
+    def depth_of(self, rho: Floats) -> Floats:
+        """How deep the tip goes to cut these radii at the surface."""
+        return np.maximum(rho - self.tip_mm, 0.0) / self.slope
+
+
+@dataclass(frozen=True, eq=False)
+class _Region:
+    """A region to carve: its paths, its name, and the index of its outer path in the drawing."""
+
+    lines: Polylines
+    name: str
+    source: int
+
+
+def vcarve(chosen: Chosen, setting: Setting) -> Work:
+    """One Fixed item for each region: what an even-odd reading of the closed paths fills.
+
+    OptionError for an open path and for a tool that is no V bit.
+    """
+    cone = Cone.of(setting.operation)
+    _refuse_open(chosen, setting.operation)
+    items: list[Fixed] = []
+    findings: list[Finding] = []
+    for region in _regions(chosen):
+        item, noticed = _carved(region, setting, cone)
+        items.extend(item)
+        findings.extend(noticed)
+    return Work(tuple(items), tuple(findings))
+
+
+def _refuse_open(chosen: Chosen, operation: Operation) -> None:
+    if not chosen.lines.closed.all():
+        name = chosen.names[int(np.argmin(chosen.lines.closed))]
+        raise OptionError(
+            f"{name} is open and has no inside to carve",
+            where=f"operation {operation.name!r}, key kind",
+            mend='close it, or take it with an operation of kind = "engrave"',
+        )
+
+
+def _regions(chosen: Chosen) -> Iterator[_Region]:
+    outer = np.flatnonzero(nesting(chosen.lines).depth % 2 == 0)
+    for row, lines in zip(outer.tolist(), regions(chosen.lines), strict=True):
+        yield _Region(lines, chosen.names[row], int(chosen.source[row]))
+
+
+def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed], list[Finding]]:
+    """The item of one region, none if the tip fits nowhere, and what was noticed."""
+    boundary, trace = medial_trace(region.lines, CARVE_TOLERANCE_MM)
+    limits = [cone.tip_mm, *(cone.radius_at(-level) for level in setting.levels_mm)]
+    for limit in sorted(set(limits)):
+        trace = with_level(boundary, trace, limit)
+    paths: list[Floats] = []
+    floor: list[Floats] = []
+    for low, high in pairwise(limits):
+        if high > low:
+            band = Band(low, high, CARVE_TOLERANCE_MM)
+            floor = walls(boundary, trace, high)
+            paths += _walks(trace, floor, band)
+    findings = [*_too_narrow(region, trace, cone), *_limited(region, trace, floor, limits[-1])]
+    runs = tuple(_run(path, setting, cone, region.name) for path in paths)
+    outline = region.lines[0]
+    item = Fixed(runs, setting, region.name, region.source, outline)
+    return [item] if runs else [], findings
+
+
+def _walks(trace: Trace, floor: list[Floats], band: Band) -> list[Floats]:
+    """What is walked in one band: the grooves, the walls, and the middle of a round region."""
+    graph = without_twigs(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
+    paths = walks(graph)
+    x, y, rho = trace.discs[int(np.argmax(trace.rho))].tolist()
+    if not band.low_mm < rho <= band.high_mm:
+        return paths
+    points = np.concatenate([np.empty((0, 4)), *paths])
+    apart = np.hypot(points[:, 0] - x, points[:, 1] - y) + rho - points[:, 2]
+    if (apart <= band.tolerance_mm).any():
+        return paths
+    return [*paths, np.array([[x, y, rho, 0.0]])]
+
+
+def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
+    """The run along a path (n, 4) of x, y, rho, bulge.
+
+    On a slope the tip goes down and up no faster than in a plunge.
+    """
+    z = -cone.depth_of(path[:, 2])
+    vertices = np.column_stack([path[:, :2], z, path[:, 3]])
+    lengths, heights = _lengths(path), np.abs(np.diff(z))
+    slope = np.hypot(lengths, heights)
+    feeds = setting.feeds
+    steep = feeds.plunge_mm_min * slope / np.where(heights > 0.0, heights, np.inf)
+    limit = np.where(heights > 0.0, steep, np.inf)
+    return Run(vertices, np.minimum(feeds.cut_mm_min, limit), feeds.plunge_mm_min, name)
+
+
+def _lengths(path: Floats) -> Floats:
+    """(n−1,) lengths in the plane of the lines and arcs of a path."""
+    chord = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    bulge = path[:-1, 3]
+    safe = np.where(bulge != 0.0, bulge, 1.0)
+    stretch = np.where(bulge != 0.0, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
+    return np.asarray(chord * stretch)
+
+
+def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
+    widest = float(trace.rho.max())
+    if widest <= cone.tip_mm:
+        yield Finding(
+            Code.CONTOUR_TOO_SMALL,
+            Severity.WARNING,
+            f"a flat tip of {2.0 * cone.tip_mm:g} mm does not fit into this contour, which is"
+            f" {2.0 * widest:.4g} mm wide: it is not carved",
+            where=_at(region.name, region.lines[0]),
+            measured=2.0 * widest,
+            limit=2.0 * cone.tip_mm,
+            unit="mm",
+        )
+
+
+def _limited(
+    region: _Region, trace: Trace, floor: list[Floats], limit_mm: float
+) -> Iterator[Finding]:
+    if floor:
+        row = int(np.argmax(trace.rho))
+        area = floor_area(floor)
+        yield Finding(
+            Code.DEPTH_LIMITED,
+            Severity.WARNING,
+            f"a floor of {area:.6g} mm² is left: up to {2.0 * trace.rho[row]:.4g} mm wide, bit and"
+            f" depth allow {2.0 * limit_mm:.4g} mm; clear it with a pocket and a flat tool",
+            where=f"{region.name} at X {trace.x[row]:.4f} Y {trace.y[row]:.4f}",
+            measured=area,
+            unit="mm2",
+        )
+
+
+def _at(name: str, path: Polyline) -> str:
+    return f"{name} at X {path.start[0]:.4f} Y {path.start[1]:.4f}"
