@@ -53,6 +53,11 @@ def points_to_segments(points: Floats, segments: Segments) -> Floats:
     return _distance(points[:, None, :], _Rows.of(segments))
 
 
+def point_to_segment(points: Floats, segments: Segments) -> Floats:
+    """(K,) distance in mm of each point (K, 2) to the line or arc of the same row."""
+    return _distance(points, _Rows.of(segments))
+
+
 def nearest(points: Floats, segments: Segments, *, chunk: int = POINTS_AT_A_TIME) -> Nearest:
     """The nearest segment to each point (P, 2); quick when neighbours in the list are near.
 

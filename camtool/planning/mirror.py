@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.distance import nearest
+from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
-from camtool.geometry.polylines import Floats, Ints, Segments
+from camtool.geometry.polylines import Floats, Ints
 from camtool.planning.residual import Residual
 from camtool.planning.turns import Parts, Turns
 
@@ -109,17 +109,20 @@ class Division:
 
 def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
     """(A, 2, 2) mm: how far each part comes from the path when X is driven towards −, + and Y
-    towards −, +: the points of the part, moved by the residual errors, to the nearest line or arc
-    of the whole path."""
-    count = len(parts)
+    towards −, +: the points of the part, moved by the residual errors, to the part and to the
+    ones before and after it. (The path may pass nearer elsewhere, where it is as fine as the
+    errors.)"""
+    count, segments = len(parts), parts.segments
     rows = np.repeat(np.arange(count), SAMPLES)
-    points = point_at(parts.segments, rows, np.tile(np.linspace(0.0, 1.0, SAMPLES), count))
-    path = Segments.of(parts.path)
+    points = point_at(segments, rows, np.tile(np.linspace(0.0, 1.0, SAMPLES), count))
+    near = [rows, rows - 1, rows + 1]
+    near = [row % count if parts.path.closed else row.clip(0, count - 1) for row in near]
     errors = np.zeros((count, 2, 2))
     for i, x in enumerate((residual[0].minus_mm, residual[0].plus_mm)):
         for j, y in enumerate((residual[1].minus_mm, residual[1].plus_mm)):
             if x or y:
-                apart = nearest(points + np.array([x, y]), path).distance
+                moved = points + np.array([x, y])
+                apart = np.min([point_to_segment(moved, segments[row]) for row in near], axis=0)
                 errors[:, i, j] = apart.reshape(count, SAMPLES).max(axis=1)
     return errors
 

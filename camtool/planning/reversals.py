@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import Ints, Polyline
+from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import reverse
 from camtool.machine.model import Machine
 from camtool.planning.approach import flat, least_turn_mm
@@ -119,6 +119,9 @@ def _runs_of(
     runs = 1 if closed or contour.reversible else levels
     counts.before.add(runs, count * levels - at_start, error_mm)
     reason = _stays_whole(contour.setting.operation)
+    if not count and (closed or reason):
+        counts.after.add(runs, 0, error_mm)
+        return [contour]
     if not reason:
         pieces = division.pieces()
         counts.after.add(len(pieces) * levels, 0, max(piece.error_mm for piece in pieces))
@@ -126,8 +129,7 @@ def _runs_of(
             _part(contour, parts.stretch(piece.first, piece.last), piece.backward)
             for piece in pieces
         ]
-    if count:
-        counts.whole.setdefault(reason, []).append(contour.name)
+    counts.whole.setdefault(reason, []).append(contour.name)
     if closed and contour.setting.operation.start == "nearest":
         contour, at_start = _begun_at_turns(contour, parts, turns)
     counts.after.add(runs, count * levels - at_start, error_mm)

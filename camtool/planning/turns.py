@@ -141,7 +141,8 @@ def turns_of(values: Floats, closed: bool, least_mm: float) -> Turns:
     # A closed way is begun at its highest value, which is a turn if there are any.
     begin = int(values[:-1].argmax()) if closed else 0
     way = np.append(np.roll(values[:-1], -begin), values[begin]) if closed else values
-    knots = _knots(way.tolist(), least_mm)
+    values_mm = way.tolist()
+    knots = _knots(values_mm, least_mm)
     if not knots:
         return no_turns(count)
     if closed:
@@ -149,7 +150,7 @@ def turns_of(values: Floats, closed: bool, least_mm: float) -> Turns:
     sense = np.zeros(count, dtype=np.int64)
     for one, other in pairwise(knots):
         sense[one:other] = 1 if way[other] > way[one] else -1
-    flats = [_flat(way.tolist(), knot, closed, least_mm) for knot in knots]
+    flats = [_flat(values_mm, knot, closed, least_mm) for knot in knots]
     for low, high in flats:
         sense[np.arange(low, high) % count] = 0
     turning = np.array(flats[1:] if closed else flats[1:-1], dtype=np.int64).reshape(-1, 2)
