@@ -93,7 +93,7 @@ def _operation(
 def _unknown(name: str, kind: str) -> tuple[str, str]:
     """What is wrong with a key that a kind of operation does not know, and the mend."""
     known = [key for key in OPERATION if kind in OPERATION[key].kinds]
-    return f"is no key of the kind {kind}", f"it has: {', '.join(known)}, tool"
+    return f"means nothing to the kind {kind}", f"it has: {', '.join(known)}, tool"
 
 
 def _refuse_tool(operation: Operation, own: Table) -> None:

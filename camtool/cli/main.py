@@ -16,6 +16,7 @@ import click
 from camtool import __version__
 from camtool.cli.check import check
 from camtool.cli.convert import convert
+from camtool.cli.job import job
 from camtool.cli.post import post
 from camtool.cli.preview import preview
 from camtool.cli.targets import targets
@@ -38,13 +39,14 @@ def cli() -> None:
     camtool verify  logo.pic --target pic-mmh   judge any program of a machine
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
+    camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
 
     Lengths take units: 0.2mm, 1/8in, 200um; bare numbers are mm. Every command has --help.
     """
 
 
-for _command in (post, verify, convert, preview, check, targets):
+for _command in (post, verify, convert, preview, check, job, targets):
     cli.add_command(_command)
 
 
