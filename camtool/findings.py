@@ -55,6 +55,7 @@ class Code(IntEnum):
     MARKS_NOT_CUT = 215
     NOT_DRILLED = 216
     HOLE_SIZE = 217
+    TOOL_NOT_SAID = 218
 
     BLOCK_TOO_LONG = 301
     FEED_ROUNDED = 302

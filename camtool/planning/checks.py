@@ -1,26 +1,54 @@
-"""Checks of a whole toolpath before anything is written."""
+"""Checks of a whole toolpath before anything is written: travel, stock, rapids, tools, feeds.
+
+Everything that is cut lies below the stock top, z < 0. The stock, where the job knows one, ends at
+its sides and at its thickness; beside it is air, so leads and overrun may go there, and so may
+rapids. What earlier cuts have cleared is that of `camtool.toolpath.cleared`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
 from camtool.machine.model import Machine
-from camtool.planning.job import Job
+from camtool.planning.job import Job, Stock, Tool
+from camtool.toolpath.cleared import STOCK_TOP_MM, Reach, rapids_through_stock
 from camtool.toolpath.extents import toolpath_extents
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
+
+FEED_TOLERANCE = 1e-6
+"""A feed may exceed its limit by this part of it: by rounding alone."""
+
+MOST_LISTED = 10
+"""So many rapids are listed; the last one says how many more there are."""
+
+AXES = "XYZ"
 
 
 def checked(toolpath: Toolpath, job: Job, machine: Machine) -> tuple[Finding, ...]:
-    """What is wrong with a toolpath: axes out of travel."""
-    return tuple(out_of_travel(toolpath, machine))
+    """What no program may do, and what looks like a mistake; () when all is well.
+
+    Errors: an axis beyond its travel, a cut deeper than the stock, a rapid through what is not
+    cleared, a feed that the machine cannot make (on slopes: along Z), an operation whose tool the
+    program cannot ask for. A warning: something is cut wholly beside the stock.
+    """
+    return (
+        *out_of_travel(toolpath, machine),
+        *_out_of_stock(toolpath, job),
+        *_tools_not_said(job),
+        *_rapids_in_stock(toolpath, job),
+        *_feeds_above_limits(toolpath, machine),
+    )
 
 
 def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
     """Axes on which the toolpath, part zero included, spans more than they can travel."""
     for name, axis, (low, high) in zip(
-        "XYZ", machine.axes, toolpath_extents(toolpath).tolist(), strict=True
+        AXES, machine.axes, toolpath_extents(toolpath).tolist(), strict=True
     ):
         span = high - low
         if axis.travel_mm is None or span <= axis.travel_mm + POSITION_EPS_MM:
@@ -35,3 +63,173 @@ def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
             limit=axis.travel_mm,
             unit="mm",
         )
+
+
+def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
+    """Cuts deeper than the stock is thick, and what is cut wholly beside it."""
+    stock = job.stock
+    cuts = _cuts(toolpath)
+    if stock is None or not cuts.any():
+        return
+    rows = np.flatnonzero(cuts)
+    low = np.minimum(toolpath.starts[rows, 2], toolpath.end[rows, 2])
+    deepest = int(rows[low.argmin()])
+    depth = STOCK_TOP_MM - float(low.min())
+    if depth > stock.thickness_mm + POSITION_EPS_MM:
+        yield Finding(
+            Code.OUT_OF_STOCK,
+            Severity.ERROR,
+            f"the tool cuts {depth:.4g} mm deep into a stock of {stock.thickness_mm:g} mm",
+            where=_place(toolpath, deepest),
+            measured=depth,
+            limit=stock.thickness_mm,
+            unit="mm",
+        )
+    _, sweeps = _radii(toolpath, job)
+    beside = _beside(toolpath, stock, sweeps)
+    stay = np.cumsum((toolpath.kind == Kind.RAPID) & (toolpath.end[:, 2] >= STOCK_TOP_MM))
+    within = np.unique(stay[cuts & ~beside])
+    outside = cuts & ~np.isin(stay, within)
+    if outside.any():
+        row, count = int(outside.argmax()), len(np.unique(stay[outside]))
+        x, y = toolpath.end[row, :2].tolist()
+        yield Finding(
+            Code.OUT_OF_STOCK,
+            Severity.WARNING,
+            f"{count} cuts lie wholly beside the stock: check its corner, its size and the origin",
+            where=f"{_place(toolpath, row)} near ({x:.3f}, {y:.3f}) mm",
+            measured=float(count),
+            unit="cuts",
+        )
+
+
+def _cuts(toolpath: Toolpath) -> Bools:
+    """(N,) true for moves at a feed that reach below the stock top."""
+    low = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
+    return np.asarray(toolpath.is_feed & (low < STOCK_TOP_MM - POSITION_EPS_MM))
+
+
+def _beside(toolpath: Toolpath, stock: Stock, radius: Floats) -> Bools:
+    """(N,) true where the tool, of `radius` (N,) mm, stays beside the stock: by the boxes of the
+    moves, of arcs by those of their circles."""
+    begin, end = toolpath.starts[:, :2], toolpath.end[:, :2]
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
+    arm = np.hypot(*(begin - toolpath.centre).T)[:, None]
+    arc = toolpath.is_arc[:, None]
+    low = np.where(arc, toolpath.centre - arm, low) - radius[:, None]
+    high = np.where(arc, toolpath.centre + arm, high) + radius[:, None]
+    corner = np.array(stock.corner_mm)
+    far = (high <= corner) | (low >= corner + np.array(stock.size_mm))
+    return np.asarray(far.any(axis=1))
+
+
+def _tools_not_said(job: Job) -> Iterator[Finding]:
+    """Operations whose tool is another than the one before, with no number to ask for it."""
+    for before, operation in pairwise(job.operations):
+        one, other = before.tool, operation.tool
+        if _shape(one) == _shape(other) or other.number not in (None, one.number):
+            continue
+        number = "no number" if other.number is None else f"the same number {other.number}"
+        yield Finding(
+            Code.TOOL_NOT_SAID,
+            Severity.ERROR,
+            f"it has another tool than the operation before and {number}, so the program cannot"
+            " ask for it: number the tools, or write a program for each",
+            where=f"operation {operation.name!r}" if operation.name else operation.kind,
+        )
+
+
+def _shape(tool: Tool) -> tuple[object, ...]:
+    return tool.kind, tool.diameter_mm, tool.tip_angle_rad, tool.tip_diameter_mm
+
+
+def _radii(toolpath: Toolpath, job: Job) -> tuple[Floats, Floats]:
+    """(N,), (N,) mm: of what the tool of each row clears at the depth of its tip, and of what it
+    needs free. Where it is not known which tool is in, the least and the most of all."""
+    tools = [operation.tool for operation in job.operations]
+    every = np.array([(_cleared_mm(tool), tool.radius_mm) for tool in tools])
+    cuts = np.full(len(toolpath), every[:, 0].min())
+    sweeps = np.full(len(toolpath), every[:, 1].max())
+    numbered = {tool.number: tool for tool in tools if tool.number is not None}
+    changes = np.flatnonzero(toolpath.kind == Kind.TOOL_CHANGE).tolist()
+    for begin, end in pairwise([*changes, len(toolpath)]):
+        tool = numbered.get(int(toolpath.value[begin]))
+        if tool is not None:
+            cuts[begin:end], sweeps[begin:end] = _cleared_mm(tool), tool.radius_mm
+    return cuts, sweeps
+
+
+def _cleared_mm(tool: Tool) -> float:
+    """Only a flat tool is as wide at its tip as above; of others the tip alone counts."""
+    return tool.radius_mm if tool.kind == "flat" else 0.5 * tool.tip_diameter_mm
+
+
+def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
+    """Rapids below the stock top outside what is cleared."""
+    cuts, sweeps = _radii(toolpath, job)
+    found = rapids_through_stock(toolpath, Reach(cuts, sweeps, _solid(job.stock)))
+    more = len(found) - MOST_LISTED
+    for number, one in enumerate(found[:MOST_LISTED], 1):
+        depth = STOCK_TOP_MM - one.z_mm
+        rest = f"; and {more} more rapids" if more > 0 and number == MOST_LISTED else ""
+        x, y = one.at_mm
+        yield Finding(
+            Code.RAPID_IN_STOCK,
+            Severity.ERROR,
+            f"a rapid runs through the stock, {depth:.4g} mm below its top{rest}",
+            where=f"{_place(toolpath, one.row)} near ({x:.3f}, {y:.3f}) mm",
+            measured=one.z_mm,
+            limit=STOCK_TOP_MM,
+            unit="mm",
+        )
+
+
+def _solid(stock: Stock | None) -> tuple[float, float, float, float] | None:
+    if stock is None:
+        return None
+    (x, y), (width, height) = stock.corner_mm, stock.size_mm
+    return x, y, x + width, y + height
+
+
+def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
+    """The fastest move along X and Y, and along Z, where the machine is not so fast.
+
+    Of a feed the part |dz| / way goes along Z, and the rest of the triangle across.
+    """
+    across, along = _ways(toolpath)
+    way = np.hypot(across, along)
+    moves = toolpath.is_feed & (way > 0.0)
+    feed = np.where(moves, toolpath.feed, 0.0) / np.where(moves, way, 1.0)
+    for what, part, limit in (
+        ("in X and Y", across, machine.max_feed_mm_min),
+        ("along Z", along, machine.max_plunge_mm_min),
+    ):
+        speed = feed * part
+        if len(speed) == 0 or speed.max() <= limit * (1.0 + FEED_TOLERANCE):
+            continue
+        row = int(speed.argmax())
+        yield Finding(
+            Code.FEED_ABOVE_LIMIT,
+            Severity.ERROR,
+            f"the tool moves at {speed[row]:.4g} mm/min {what}, {limit:.4g} is the highest of"
+            f" {machine.target.name}: lower the feed" + (", or slope less" if across[row] else ""),
+            where=_place(toolpath, row),
+            measured=float(speed[row]),
+            limit=limit,
+            unit="mm_min",
+        )
+
+
+def _ways(toolpath: Toolpath) -> tuple[Floats, Floats]:
+    """(N,), (N,) mm: how far each row goes in XY, along its arc, and in Z."""
+    step = toolpath.end - toolpath.starts if len(toolpath) else np.zeros((0, 3))
+    spoke = toolpath.starts[:, :2] - toolpath.centre
+    arc = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
+    across = np.where(toolpath.is_arc, arc, np.hypot(step[:, 0], step[:, 1]))
+    return across, np.abs(step[:, 2])
+
+
+def _place(toolpath: Toolpath, row: int) -> str:
+    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
+    source = toolpath.text(row)
+    return f"move {row} ({source})" if source else f"move {row}"

@@ -1,0 +1,158 @@
+"""What no program may do: travel, stock, rapids, tools, feeds."""
+
+import math
+
+import pytest
+
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.planning.checks import checked
+from camtool.planning.job import Job, Operation, Stock, Tool, job_of
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind
+from tests.oracles.path_machine import path_machine
+
+STOCK = Stock((0.0, 0.0), (10.0, 10.0), 2.0)
+
+
+def found(
+    path: ToolpathBuilder, job: Job | None = None, machine: Machine | None = None
+) -> list[Finding]:
+    return list(checked(path.finish(), job or job_of(), machine or path_machine()))
+
+
+def codes(path: ToolpathBuilder, job: Job | None = None, *settings: str) -> list[Code]:
+    return [finding.code for finding in found(path, job, path_machine(*settings))]
+
+
+def down(x: float, y: float, z: float = -1.0) -> ToolpathBuilder:
+    return ToolpathBuilder().rapid(z=5).rapid(x, y).line(z=z, feed=10)
+
+
+def square(path: ToolpathBuilder, x: float, y: float) -> ToolpathBuilder:
+    path.rapid(z=5).rapid(x, y).line(z=-1, feed=10)
+    path.line(x + 1, y, feed=10).line(x + 1, y + 1, feed=10).line(x, y, feed=10)
+    return path.rapid(z=5)
+
+
+def test_a_sound_toolpath_has_no_findings() -> None:
+    path = square(ToolpathBuilder(), 1, 1)
+    assert found(path, job_of(stock=STOCK, tool_diameter_mm=1.0)) == []
+    assert found(ToolpathBuilder(), job_of(stock=STOCK)) == []
+
+
+def test_travel_counts_part_zero_and_the_bulge_of_arcs() -> None:
+    path = ToolpathBuilder().rapid(4, 0).arc(4, 2, centre=(4, 1), ccw=True, feed=10)
+    assert codes(path, None, "axes.x.travel_mm=5.0") == []
+    (finding,) = found(path, None, path_machine("axes.x.travel_mm=4.9"))
+    assert (finding.code, finding.measured, finding.limit) == (Code.OUT_OF_TRAVEL, 5.0, 4.9)
+
+
+def test_cuts_end_at_the_bottom_of_the_stock() -> None:
+    job = job_of(stock=STOCK)
+    assert codes(down(1, 1, -2.0).line(2, 1, feed=10), job) == []
+    path = down(1, 1, -2.0).line(2, 1, -2.01, feed=10)
+    (finding,) = found(path, job)
+    assert finding.code == Code.OUT_OF_STOCK
+    assert finding.severity == Severity.ERROR
+    assert finding.measured == pytest.approx(2.01)
+    assert finding.where == "move 3"
+    assert codes(path) == []
+
+
+def test_leads_may_begin_in_the_air_but_no_cut_lies_there_alone() -> None:
+    job = job_of(stock=STOCK, tool_diameter_mm=1.0)
+    assert codes(down(-3, 5).line(5, 5, feed=10), job) == []
+    path = square(square(square(ToolpathBuilder(), 1, 1), 12, 1), 1, -2)
+    (finding,) = found(path, job)
+    assert (finding.code, finding.severity) == (Code.OUT_OF_STOCK, Severity.WARNING)
+    assert finding.message.startswith("2 cuts lie wholly beside")
+    assert "near (12.000, 1.000)" in finding.where
+    assert codes(square(ToolpathBuilder(), 10.4, 1), job) == []  # half a tool still cuts
+    assert codes(square(ToolpathBuilder(), 10.6, 1), job) == [Code.OUT_OF_STOCK]
+
+
+def test_arcs_reach_into_the_stock_by_their_bulge() -> None:
+    job = job_of(stock=STOCK)
+    path = down(10.5, 4).arc(10.5, 6, centre=(10.5, 5), ccw=False, feed=10)
+    assert codes(path, job) == []
+
+
+def test_rapids_below_the_top_need_room_for_the_tool() -> None:
+    slot = down(1, 1).line(5, 1, feed=10)
+    job = job_of(tool_diameter_mm=1.0)
+    assert codes(slot.rapid(1, 1).rapid(z=-0.5), job) == []
+    slot.source = "CUT/LINE 1"
+    slot.rapid(1, 2)
+    (finding,) = found(slot, job)
+    assert (finding.code, finding.severity) == (Code.RAPID_IN_STOCK, Severity.ERROR)
+    assert finding.where.startswith("move 6 (CUT/LINE 1) near (")
+    assert finding.message == "a rapid runs through the stock, 0.5 mm below its top"
+
+
+def test_a_v_bit_clears_but_its_tip() -> None:
+    path = down(1, 1).line(5, 1, feed=10).rapid(1, 1)
+    bit = {"tool_diameter_mm": 3.0, "tool_kind": "v", "tool_tip_angle_rad": 1.0}
+    assert codes(path, job_of(tool_diameter_mm=3.0)) == []
+    assert codes(path, job_of(**bit)) == [Code.RAPID_IN_STOCK]
+
+
+def test_many_rapids_are_counted() -> None:
+    path = down(1, 1).line(1, 50, feed=10)
+    for y in range(25):
+        path.rapid(30, 2 * y + 1).rapid(1, 2 * y + 1)
+    listed = found(path, job_of(tool_diameter_mm=1.0))
+    assert len(listed) == 10
+    assert listed[-1].message.endswith("; and 40 more rapids")
+    assert "more" not in listed[0].message
+
+
+def two(number: int | None) -> Job:
+    one = Operation(name="coarse", tool=Tool(4.0, number=1))
+    return Job(operations=(one, Operation(name="fine", tool=Tool(1.0, number=number))))
+
+
+def test_rapids_are_those_of_the_tool_that_is_in() -> None:
+    path = ToolpathBuilder().event(Kind.TOOL_CHANGE, 2).rapid(1, 1).line(z=-1, feed=10)
+    path.line(5, 1, feed=10).rapid(1, 1).rapid(z=5)
+    assert codes(path, two(2)) == []
+    path.event(Kind.TOOL_CHANGE, 1).rapid(1, 1).rapid(z=-1)
+    assert codes(path, two(2)) == [Code.RAPID_IN_STOCK]
+
+
+def test_a_tool_without_a_number_of_its_own_cannot_be_asked_for() -> None:
+    assert codes(ToolpathBuilder(), two(2)) == []
+    for number in (None, 1):
+        (finding,) = found(ToolpathBuilder(), two(number))
+        assert (finding.code, finding.where) == (Code.TOOL_NOT_SAID, "operation 'fine'")
+    same = Operation(tool=Tool(1.0, name="a"))
+    assert codes(ToolpathBuilder(), Job(operations=(same, Operation(tool=Tool(1.0))))) == []
+
+
+LIMITS = ("limits.max_feed_mm_min=100", "axes.z.max_rate_mm_min=10")
+
+
+def test_feeds_keep_to_the_machine() -> None:
+    path = ToolpathBuilder().line(10, 0, feed=100)
+    assert codes(path, None, *LIMITS) == []
+    (finding,) = found(path.line(0, 0, feed=101), None, path_machine(*LIMITS))
+    assert (finding.code, finding.where) == (Code.FEED_ABOVE_LIMIT, "move 1")
+    assert (finding.measured, finding.limit) == (101.0, 100.0)
+    assert codes(path) == []
+
+
+def test_slopes_keep_to_what_z_can() -> None:
+    steep = ToolpathBuilder().line(3, 0, -0.4, feed=75)  # 4 : 30, along Z 9.9 mm/min
+    assert codes(steep, None, *LIMITS) == []
+    (finding,) = found(steep.line(6, 0, -0.9, feed=75), None, path_machine(*LIMITS))
+    assert finding.measured == pytest.approx(75.0 * 0.5 / math.hypot(3.0, 0.5))
+    assert "or slope less" in finding.message
+    assert codes(ToolpathBuilder().line(z=-1, feed=11), None, *LIMITS) == [Code.FEED_ABOVE_LIMIT]
+
+
+def test_a_helix_is_as_long_as_it_is() -> None:
+    turn = ToolpathBuilder((1.0, 0.0, 0.0))
+    turn.arc(1, 0, -0.6, centre=(0, 0), ccw=True, feed=100)  # 6.28 round: 9.5 along Z
+    assert codes(turn, None, *LIMITS) == []
+    turn.arc(1, 0, -1.4, centre=(0, 0), ccw=True, feed=100)  # 12.6 along Z
+    assert codes(turn, None, *LIMITS) == [Code.FEED_ABOVE_LIMIT]
