@@ -39,30 +39,36 @@ MOST_MEETINGS = 6
 
 
 @njit(cache=True)
-def pairs_of(boxes: Floats, others: Floats, tree: Floats, own: bool) -> tuple[Ints, Ints]:
-    """Rows (J,), (J,) of `boxes` and of `others`, over which `tree` stands, that touch.
+def pairs_of(
+    boxes: Floats, tree: Floats, others: Floats, other_tree: Floats, own: bool
+) -> tuple[Ints, Ints]:
+    """Rows (J,), (J,) of `boxes` and of `others` that touch; a tree stands over each.
 
-    `own` says that both are the same: then each pair comes once, the lesser row first.
+    `own` says that both are the same: then each pair comes once, the lesser row first. Nodes of
+    both trees are looked at in pairs, so that what two large boxes tell is told once.
     """
     room = 4 * len(boxes) + 16
     one, other = np.empty(room, np.int64), np.empty(room, np.int64)
-    leaves, count = len(tree) // 2, 0
-    stack = np.empty(DEPTH, np.int64)
-    for i in range(len(boxes)):
-        height, stack[0] = 1, 1
-        while height > 0:
-            height -= 1
-            node = stack[height]
-            if not touch(boxes, i, tree, node):
-                continue
-            if node < leaves:
-                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
-                height += 2
-                continue
-            low = (node - leaves) * LEAF
-            first = max(low, i + 1) if own else low
-            for j in range(first, min(low + LEAF, len(others))):
-                if touch(boxes, i, others, j):
+    leaves, other_leaves, count = len(tree) // 2, len(other_tree) // 2, 0
+    left, right = np.empty(4 * DEPTH, np.int64), np.empty(4 * DEPTH, np.int64)
+    height, left[0], right[0] = 1, 1, 1
+    while height > 0:
+        height -= 1
+        a, b = left[height], right[height]
+        if not touch(tree, a, other_tree, b):
+            continue
+        if a < leaves or b < other_leaves:
+            # The children of each, or itself when it is a leaf.
+            for child in range(2 * a, 2 * a + 2) if a < leaves else range(a, a + 1):
+                for far in range(2 * b, 2 * b + 2) if b < other_leaves else range(b, b + 1):
+                    if not own or child <= far:
+                        left[height], right[height] = child, far
+                        height += 1
+            continue
+        low, far_low = (a - leaves) * LEAF, (b - other_leaves) * LEAF
+        for i in range(low, min(low + LEAF, len(boxes))):
+            for j in range(far_low, min(far_low + LEAF, len(others))):
+                if (not own or i < j) and touch(boxes, i, others, j):
                     if count == len(one):
                         one, other = np.append(one, one), np.append(other, other)
                     one[count], other[count] = i, j

@@ -28,6 +28,9 @@ TRIM_STEP_SHARE = 0.02
 Near = tuple[Floats, Floats, Floats, Floats]
 """The curves of a source and the tree over them; the kites of its mitres and their tree."""
 
+GATHERED = 32
+"""Room for the curves that can be too near to an element; where there are more, all are asked."""
+
 PLACES = (0.5, 0.03, 0.97, 0.2, 0.8, 0.35, 0.65)
 """Where on a slice its distance is measured; the middle first, as it settles most of them."""
 
@@ -77,21 +80,83 @@ def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats:
 
 
 @njit(cache=True)
-def trimmed_ends(elements: Floats, near: Near, distance: float, spare: float) -> Floats:
+def gathered(
+    curves: Floats, tree: Floats, point: tuple[float, float], reach: float, rows: Ints
+) -> int:
+    """How many curves are nearer to a point than `reach`; they are written into `rows`.
+
+    −1 when there are more than it has room for.
+    """
+    x, y = point
+    leaves, count = len(tree) // 2, 0
+    stack = np.empty(DEPTH, np.int64)
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        if apart_square(tree, node, x, y) >= reach * reach:
+            continue
+        if node < leaves:
+            stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+            height += 2
+            continue
+        low = (node - leaves) * LEAF
+        for row in range(low, min(low + LEAF, len(curves))):
+            if distance_to(curves, row, x, y) < reach:
+                if count == len(rows):
+                    return -1
+                rows[count] = row
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _too_near(
+    near: Near,
+    some: tuple[Ints, int],
+    point: tuple[float, float],
+    limits: tuple[float, float],
+    enough: float,
+) -> float:
+    """By how much more than `spare` a point is too near to the source, or too deep in a kite.
+
+    0 when it is not; any number above `enough` will do. `some` are the rows of the curves that
+    can be nearer than the distance, and how many: −1 for all. `limits`: the distance and `spare`.
+    """
+    curves, tree, kites, kite_tree = near
+    rows, count = some
+    distance, spare = limits
+    least = distance - spare
+    if count < 0:
+        short = least - least_below(curves, tree, point, least, least - enough)
+    else:
+        short = 0.0
+        for k in range(count):
+            short = max(short, least - distance_to(curves, rows[k], point[0], point[1]))
+    if short > enough or len(kites) == 0:
+        return short
+    return deepest(kites, kite_tree, point, short + spare, enough + spare) - spare
+
+
+@njit(cache=True)
+def trimmed_ends(elements: Floats, near: Near, limits: tuple[float, float]) -> Floats:
     """(K, 2) fractions between which each element may be far enough from the source.
 
     The distance from the source, and the depth in a kite, change by no more than the way along an
-    element: where it falls short by s, all is too near for the length s from there. Ends stay that
-    are too near by no more than `spare`. Low is not below high where nothing is left.
+    element: where it falls short by s, all is too near for the length s from there. `limits` are
+    the distance, and by how much the ends that stay may be too near. Low is not below high where
+    nothing is left.
     """
     ends = np.empty((len(elements), 2))
+    rows = np.empty(GATHERED, np.int64)
     for i in range(len(elements)):
-        low, high = 0.0, 1.0
+        low, high, length = 0.0, 1.0, elements[i, LENGTH]
+        reach = limits[0] + 0.5 * length
+        some = (rows, gathered(near[0], near[1], point_on(elements, i, 0.5), reach, rows))
         for way in range(2):
             for _ in range(TRIM_ROUNDS):
                 point = point_on(elements, i, low if way == 0 else high)
-                short = _too_near(near, point, distance, spare, (high - low) * elements[i, LENGTH])
-                step = short / elements[i, LENGTH]
+                step = _too_near(near, some, point, limits, (high - low) * length) / length
                 if step <= TRIM_STEP_SHARE * (high - low):
                     break
                 if way == 0:
@@ -107,22 +172,6 @@ def trimmed_ends(elements: Floats, near: Near, distance: float, spare: float) ->
 
 
 @njit(cache=True)
-def _too_near(
-    near: Near, point: tuple[float, float], distance: float, spare: float, enough: float
-) -> float:
-    """By how much more than `spare` a point is too near to the source, or too deep in a kite.
-
-    0 when it is not; any number above `enough` will do.
-    """
-    curves, tree, kites, kite_tree = near
-    least = distance - spare
-    short = least - least_below(curves, tree, point, least, least - enough)
-    if short > enough:
-        return short
-    return deepest(kites, kite_tree, point, short + spare, enough + spare) - spare
-
-
-@njit(cache=True)
 def far_enough(
     elements: Floats, element: Ints, span: Floats, near: Near, limits: tuple[float, float]
 ) -> Bools:
@@ -131,13 +180,18 @@ def far_enough(
     Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]. `limits` are the
     distance, and by how much a point may be too near.
     """
-    distance, spare = limits
     valid = np.ones(len(element), np.bool_)
+    rows = np.empty(GATHERED, np.int64)
     for i in range(len(element)):
-        for place in PLACES:
-            t = span[i, 0] + place * (span[i, 1] - span[i, 0])
-            point = point_on(elements, element[i], t)
-            if _too_near(near, point, distance, spare, 0.0) > 0.0:
+        t0, part = span[i, 0], span[i, 1] - span[i, 0]
+        some = (rows, -1)
+        for k in range(len(PLACES)):
+            point = point_on(elements, element[i], t0 + PLACES[k] * part)
+            if _too_near(near, some, point, limits, 0.0) > 0.0:
                 valid[i] = False
                 break
+            if k == 0:
+                # No other curve is too near to any point of the slice.
+                reach = limits[0] + 0.5 * part * elements[element[i], LENGTH]
+                some = (rows, gathered(near[0], near[1], point, reach, rows))
     return valid

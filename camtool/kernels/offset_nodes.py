@@ -81,6 +81,29 @@ def grouped(keys: Ints, count: int) -> tuple[Ints, Ints]:
 
 
 @njit(cache=True)
+def in_order(keys: Ints, t: Floats, count: int) -> Ints:
+    """Rows (R,) by their key below `count`, then by t (R,), then as they come (a shell sort)."""
+    rows, begins = grouped(keys, count)
+    for key in range(count):
+        some = rows[begins[key] : begins[key + 1]]
+        gap = len(some) // 2
+        while gap > 0:
+            for i in range(gap, len(some)):
+                row, j = some[i], i
+                while j >= gap and _after(t, some[j - gap], row):
+                    some[j] = some[j - gap]
+                    j -= gap
+                some[j] = row
+            gap //= 2
+    return rows
+
+
+@njit(cache=True)
+def _after(t: Floats, one: int, other: int) -> bool:
+    return bool(t[one] > t[other] or (t[one] == t[other] and one > other))
+
+
+@njit(cache=True)
 def doubles_left(
     elements: Floats, element: Ints, middle_t: Floats, ends: tuple[Ints, Ints, int], eps: float
 ) -> Bools:

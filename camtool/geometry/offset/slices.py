@@ -59,13 +59,13 @@ def slice_elements(elements: Segments, others: Segments | None, options: OffsetO
 
     eps = options.node_eps_mm
     own = Curves.of(elements, margin_mm=eps)
-    pairs = pairs_of(own.boxes, own.boxes, own.tree, True)
+    pairs = pairs_of(own.boxes, own.tree, own.boxes, own.tree, True)
     one, other, at = meetings_of(own.rows, own.rows, *pairs, eps)
     rows = [one, other]
     found = [at[:, [TA, X, Y]], at[:, [TB, X, Y]]]
     if others is not None:
         cutting = Curves.of(others, margin_mm=eps)
-        pairs = pairs_of(own.boxes, cutting.boxes, cutting.tree, False)
+        pairs = pairs_of(own.boxes, own.tree, cutting.boxes, cutting.tree, False)
         one, _, at = meetings_of(own.rows, cutting.rows, *pairs, eps)
         rows.append(one)
         found.append(at[:, [TA, X, Y]])
@@ -74,7 +74,7 @@ def slice_elements(elements: Segments, others: Segments | None, options: OffsetO
 
 def _cut(elements: Segments, rows: Ints, found: Floats, options: OffsetOptions) -> Slices:
     """The elements cut at `found` (J, 3), the fraction and the place on the element rows[j]."""
-    from camtool.kernels.offset_nodes import grouped
+    from camtool.kernels.offset_nodes import in_order
 
     count = len(elements)
     every = np.arange(count)
@@ -83,8 +83,7 @@ def _cut(elements: Segments, rows: Ints, found: Floats, options: OffsetOptions) 
     t = np.concatenate([np.zeros(count), np.ones(count), found[:, 0]])
     points = np.concatenate([elements.start, elements.end, found[:, 1:]])
     node, nodes = merge_points(points, 2.0 * options.node_eps_mm)
-    order = np.argsort(t, kind="stable")
-    order = order[grouped(element[order], count)[0]]
+    order = in_order(element, t, count)
     element, t, node = element[order], t[order], node[order]
     cut = (element[1:] == element[:-1]) & (node[1:] != node[:-1])
     before, after = np.flatnonzero(cut), np.flatnonzero(cut) + 1
@@ -99,7 +98,7 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
     from camtool.kernels.offset_nodes import merged
 
     skew = points @ np.array(SKEW)
-    node, first = merged(points, skew, np.argsort(skew, kind="stable"), eps_mm)
+    node, first = merged(points, skew, np.argsort(skew), eps_mm)
     return node, points[first]
 
 

@@ -25,7 +25,7 @@ def trim_raw(raw: RawOffset, near: Near, way: Way) -> RawOffset:
     from camtool.kernels.offset_near import trimmed_ends
 
     spare = TRIM_SPARE * way.options.validity_eps_mm
-    ends = trimmed_ends(curve_rows_of(raw.elements), near.arrays, way.distance_mm, spare)
+    ends = trimmed_ends(curve_rows_of(raw.elements), near.arrays, (way.distance_mm, spare))
     low, high = ends.T
     keep = np.flatnonzero(low < high)
     trimmed = _between(raw.elements[keep], low[keep], high[keep])
