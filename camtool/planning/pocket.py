@@ -141,8 +141,9 @@ def _check(chosen: Chosen, operation: Operation) -> None:
         )
     if not chosen.lines.closed.all():
         row = int(np.argmin(chosen.lines.closed))
+        place = at_place(chosen.names[row], chosen.lines[row].start.tolist())
         raise OptionError(
-            f"a pocket of the open path {at_place(chosen.names[row], chosen.lines[row].start.tolist())}",
+            f"a pocket of the open path {place}",
             where=where,
             mend="close it (perhaps --gap), or take it out by layer or colour",
         )

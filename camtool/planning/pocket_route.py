@@ -102,6 +102,9 @@ def route(start: Floats, end: Floats, rails: Rails) -> Floats | None:
 
 def _outside(start: Floats, end: Floats, rails: Rails) -> list[tuple[float, float]]:
     """The parts (from, to) of the straight line that are outside of the region, in order."""
+    room = points_to_segments(start[None, :], rails.segments).min()
+    if np.hypot(*(end - start)) <= room + ON_LINE_MM:
+        return []
     line = Segments.between(start[None, :], end[None, :], np.zeros(1))
     found = crossings(line, rails.segments, position_eps_mm=ON_LINE_MM)
     marks = np.unique(np.concatenate([[0.0, 1.0], found.ta]))

@@ -19,6 +19,7 @@ from camtool.geometry.distance import nearest
 from camtool.geometry.frames import Frames
 from camtool.geometry.measure import extents, point_at, segment_lengths, signed_areas
 from camtool.geometry.offset import offset_shape
+from camtool.geometry.offset.curves import Curves
 from camtool.geometry.offset.slices import merge_points
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
@@ -108,7 +109,7 @@ def _apart(lines: Polylines, other: Polylines) -> list[Polyline]:
     parts = np.array(PROBES)
     probes = (low[:, None] + (high - low)[:, None] * parts).ravel()
     points = point_at(segments, np.repeat(row, len(parts)), probes)
-    distance = nearest(points, Segments.of(other)).distance.reshape(-1, len(parts))
+    distance = _distances(points, Segments.of(other)).reshape(-1, len(parts))
     together = np.asarray((distance <= TOGETHER_MM).all(axis=1))
     lengths = segment_lengths(segments)
     found: list[Polyline] = []
@@ -125,11 +126,11 @@ def _apart(lines: Polylines, other: Polylines) -> list[Polyline]:
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
-    near = nearest(points, segments)
-    on = near.distance <= TOGETHER_MM
-    row = near.segment[on]
+    points = points[_distances(points, segments) <= TOGETHER_MM]
+    points = _elsewhere(points, segments.start)
+    row = nearest(points, segments).segment if len(points) else np.empty(0, dtype=np.int64)
     frames = Frames.of(segments)[row]
-    along = frames.along(points[on])
+    along = frames.along(points)
     within = (along > TOGETHER_MM) & (along < frames.length - TOGETHER_MM)
     row, part = row[within], (along / frames.length)[within]
     rows = np.concatenate([np.arange(len(segments)), row])
@@ -139,6 +140,20 @@ def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     last = np.concatenate([rows[1:] != rows[:-1], [True]])
     high = np.where(last, 1.0, np.concatenate([low[1:], [1.0]]))
     return rows, low, high
+
+
+def _distances(points: Floats, segments: Segments) -> Floats:
+    """(P,) distance of each point (P, 2) from the nearest segment."""
+    from camtool.kernels.offset_near import nearest_distances
+
+    curves = Curves.of(segments)
+    return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)
+
+
+def _elsewhere(points: Floats, others: Floats) -> Floats:
+    """The points (P, 2) that are at none of the others (N, 2)."""
+    node, _ = merge_points(np.concatenate([points, others]), TOGETHER_MM)
+    return points[~np.isin(node[: len(points)], node[len(points) :])]
 
 
 def _stretches(along: Along, begin: Floats, wanted: Bools) -> list[Polyline]:

@@ -13,10 +13,16 @@ import shapely
 
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.items import Run
-from tests.oracles.offset import GRID_MM, chords, dense, distance, inside, near_region
+from tests.oracles.offset import GRID_MM, chords, dense, distance, inside, near_region, pieces
 
 CHORD_RAD = 0.05
-"""Sweep of the chords that stand for arcs."""
+"""Sweep of the chords that stand for the edges of discs, at first."""
+
+FINE_CHORD_RAD = 0.015
+"""The same where coarse chords find something wrong: then these decide."""
+
+SAG = 2e-5
+"""How far the chords that stand for arcs of a drawing are from them, over its size."""
 
 
 def at_depth(runs: Sequence[Run], z: float) -> list[Polyline]:
@@ -35,24 +41,27 @@ def at_depth(runs: Sequence[Run], z: float) -> list[Polyline]:
 
 def area_of(region: Polylines) -> shapely.Geometry:
     """What an odd number of the closed paths enclose."""
+    size = float(np.ptp(region.vertices[:, :2], axis=0).max())
     area = shapely.Polygon()
     for path in region:
-        ring = shapely.make_valid(shapely.Polygon(chords(path, CHORD_RAD)))
+        radii = [arc.radius for _, _, arc in pieces(path) if arc is not None]
+        most_rad = math.sqrt(8.0 * SAG * size / max(radii, default=size))
+        ring = shapely.make_valid(shapely.Polygon(chords(path, min(most_rad, 0.1))))
         area = shapely.symmetric_difference(area, ring, grid_size=GRID_MM)
     return area
 
 
-def swept(paths: Sequence[Polyline], radius_mm: float) -> shapely.Geometry:
+def swept(paths: Sequence[Polyline], radius_mm: float, most_rad: float) -> shapely.Geometry:
     """What a disc covers on its way along the paths."""
-    parts = [near_region(path, radius_mm, CHORD_RAD) for path in paths]
+    parts = [near_region(path, radius_mm, most_rad) for path in paths]
     return shapely.union_all(parts, grid_size=GRID_MM)
 
 
-def opened(area: shapely.Geometry, radius_mm: float) -> shapely.Geometry:
+def opened(area: shapely.Geometry, radius_mm: float, most_rad: float) -> shapely.Geometry:
     """What discs cover that lie wholly in an area."""
-    near = swept(_boundary(area), radius_mm)
+    near = swept(_boundary(area), radius_mm, most_rad)
     middle = shapely.difference(area, near, grid_size=GRID_MM)
-    around = swept(_boundary(middle), radius_mm)
+    around = swept(_boundary(middle), radius_mm, most_rad)
     return shapely.union(middle, around, grid_size=GRID_MM)
 
 
@@ -77,16 +86,20 @@ def complaints(
     runs: Sequence[Run], region: Polylines, radius_mm: float, z: float, *, share: float = 1e-3
 ) -> list[str]:
     """What is wrong with runs that shall clear a region down to z with a tool of this radius."""
-    paths = at_depth(runs, z)
-    wanted = opened(area_of(region), radius_mm)
-    got = swept(paths, radius_mm)
-    found = []
-    missed = shapely.difference(wanted, got, grid_size=GRID_MM).area
-    if missed > share * wanted.area:
-        found.append(f"{missed} of {wanted.area} mm² left over")
-    beyond = shapely.difference(got, wanted, grid_size=GRID_MM).area
-    if beyond > share * wanted.area:
-        found.append(f"{beyond} mm² cut beyond {wanted.area} mm²")
+    paths, area = at_depth(runs, z), area_of(region)
+    found: list[str] = []
+    for most_rad in (CHORD_RAD, FINE_CHORD_RAD):
+        found = []
+        wanted = opened(area, radius_mm, most_rad)
+        got = swept(paths, radius_mm, most_rad)
+        missed = shapely.difference(wanted, got, grid_size=GRID_MM).area
+        if missed > share * wanted.area:
+            found.append(f"{missed} of {wanted.area} mm² left over")
+        beyond = shapely.difference(got, wanted, grid_size=GRID_MM).area
+        if beyond > share * wanted.area:
+            found.append(f"{beyond} mm² cut beyond {wanted.area} mm²")
+        if not found:
+            break
     return found + gouges(runs, region, radius_mm)
 
 
