@@ -28,6 +28,10 @@ FIRST_SAMPLES = 9
 HALVINGS = 60
 """So often the stretch in which the partner changes is halved: then no number lies between."""
 
+STILL_MM = 1e-7
+"""Where discs at both ends and in the middle of a gap are nearer than this, nothing is looked for:
+at the common centre of several arcs any of them may seem to be the partner."""
+
 MOST_ROUNDS = 40
 """Samples are halved, and looked for from the other side, no more often than this."""
 
@@ -119,16 +123,24 @@ def _refined(
     """All open gaps once: halved, and open still where the curve left the chord; cut where the
     partner changes."""
     at = np.flatnonzero(open_gaps)
-    changes = trace.partner[at] != trace.partner[at + 1]
-    low, high = _events(boundary, trace, at[changes])
     middle = 0.5 * (trace.t[at] + trace.t[at + 1])
+    halves = discs_at(boundary, trace.element[at], middle)
+    begin, end = trace.discs[at], trace.discs[at + 1]
+    still = np.maximum(_apart(begin, end), _apart(begin, halves.discs)) <= STILL_MM
+    changes = ~still & (trace.partner[at] != trace.partner[at + 1])
+    bent = off_chord(halves.discs, begin, end) > tolerance_mm
+    bent |= halves.partner != trace.partner[at]
     inner = ~changes & (middle > trace.t[at]) & (middle < trace.t[at + 1])
-    begin = at[inner]
-    halves = discs_at(boundary, trace.element[begin], middle[inner])
-    bent = off_chord(halves.discs, trace.discs[begin], trace.discs[begin + 1]) > tolerance_mm
-    bent |= halves.partner != trace.partner[begin]
-    more = concatenated([halves, low, high])
-    return _inserted(trace, more, np.append(bent, np.ones(2 * len(low), dtype=np.bool_)))
+    low, high = _events(boundary, trace, at[changes])
+    more = concatenated([halves.rows(inner), low, high])
+    is_open = np.append((bent & ~still)[inner], np.ones(2 * len(low), dtype=np.bool_))
+    return _inserted(trace, more, is_open)
+
+
+def _apart(discs: Floats, others: Floats) -> Floats:
+    """(N,) how far discs (N, 3) are from others, in the plane and in radius."""
+    off = discs - others
+    return np.asarray(np.hypot(off[:, 0], off[:, 1]) + np.abs(off[:, 2]))
 
 
 def _events(boundary: Boundary, trace: Trace, at: Ints) -> tuple[Trace, Trace]:
@@ -148,8 +160,7 @@ def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
     chord, arm = end - begin, points - begin
     square = (chord**2).sum(axis=1)
     part = np.clip((arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-    off = arm - part[:, None] * chord
-    return np.asarray(np.hypot(off[:, 0], off[:, 1]) + np.abs(off[:, 2]))
+    return _apart(arm, part[:, None] * chord)
 
 
 def _seen_from_partners(boundary: Boundary, trace: Trace) -> Trace:

@@ -2,9 +2,10 @@
 
     pieces ──ends that meet──▶ graph ──twigs off──▶ graph ──as few walks as there can be──▶ walks
 
-A connected graph in which 2k places have an odd number of ends is walked in k walks, never twice
-along a piece (in one when k is 0): it is joined by k jumps to one closed walk, that is found piece
-by piece (Hierholzer), and cut where the tool would jump. Jumps join near places.
+A connected graph in which 2k places have an odd number of ends is walked in k walks (in one when
+k is 0): it is joined by k jumps between near places to one closed walk, that is found piece by
+piece (Hierholzer), and cut where the tool would jump. Short pieces between two such places are
+walked twice instead, into a corner and back, which saves a jump each.
 """
 
 from __future__ import annotations
@@ -110,19 +111,44 @@ def _pieces_at(graph: Graph) -> list[list[int]]:
     return at_place
 
 
-def walks(graph: Graph) -> list[Floats]:
+def walks(graph: Graph, again_mm: float) -> list[Floats]:
     """All pieces, joined to as few walks (n, 4) of x, y, rho, bulge as possible.
 
-    A walk begins at that of its ends where the disc is smaller.
+    Pieces up to `again_mm` long may be walked twice. A walk begins at that of its ends where the
+    disc is smaller.
     """
-    jumps = _jumps(graph)
-    ends = np.concatenate([graph.ends, jumps])
+    graph = _doubled(graph, again_mm)
+    ends = np.concatenate([graph.ends, _jumps(graph)])
     result = []
     for circuit in _circuits(ends, len(graph.places)):
         for rows in _cut(circuit, len(graph.pieces)):
             walk = _joined([_turned(graph.pieces[row], back) for row, back in rows])
             result.append(_turned(walk, walk[-1, 2] < walk[0, 2]))
     return result
+
+
+def _doubled(graph: Graph, again_mm: float) -> Graph:
+    """The graph with a second one of each short piece between two places with an odd number of
+    ends; the shortest first, each place once."""
+    odd = np.bincount(graph.ends.ravel(), minlength=len(graph.places)) % 2 == 1
+    lengths = [float(lengths_of(piece).sum()) for piece in graph.pieces]
+    again = []
+    for row in sorted(range(len(lengths)), key=lambda row: (lengths[row], row)):
+        a, b = graph.ends[row].tolist()
+        if lengths[row] <= again_mm and a != b and odd[a] and odd[b]:
+            odd[[a, b]] = False
+            again.append(row)
+    pieces = [*graph.pieces, *(graph.pieces[row] for row in again)]
+    return Graph(pieces, np.concatenate([graph.ends, graph.ends[again]]), graph.places)
+
+
+def lengths_of(path: Floats) -> Floats:
+    """(n−1,) lengths in the plane of the lines and arcs of a path (n, 4)."""
+    chord = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    bulge = path[:-1, 3]
+    safe = np.where(bulge != 0.0, bulge, 1.0)
+    stretch = np.where(bulge != 0.0, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
+    return np.asarray(chord * stretch)
 
 
 def _jumps(graph: Graph) -> Ints:

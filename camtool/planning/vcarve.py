@@ -29,11 +29,12 @@ import numpy as np
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
+from camtool.geometry.distance import points_to_segments
 from camtool.geometry.medial import Trace, medial_trace
 from camtool.geometry.nest import nesting
-from camtool.geometry.polylines import Floats, Polyline, Polylines
+from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
 from camtool.geometry.regions import regions
-from camtool.planning.carve_graph import graph_of, walks, without_twigs
+from camtool.planning.carve_graph import graph_of, lengths_of, walks, without_twigs
 from camtool.planning.carve_pieces import Band, floor_area, grooves, walls, with_level
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
@@ -134,13 +135,15 @@ def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed],
     limits = [cone.tip_mm, *(cone.radius_at(-level) for level in setting.levels_mm)]
     for limit in sorted(set(limits)):
         trace = with_level(boundary, trace, limit)
+    # Walking a piece twice takes no longer than coming down from safe z does.
+    again = setting.safe_z_mm * setting.feeds.cut_mm_min / setting.feeds.plunge_mm_min
     paths: list[Floats] = []
     floor: list[Floats] = []
     for low, high in pairwise(limits):
         if high > low:
             band = Band(low, high, CARVE_TOLERANCE_MM)
             floor = walls(boundary, trace, high)
-            paths += _walks(trace, floor, band)
+            paths += _walks(trace, floor, band, again)
     findings = [*_too_narrow(region, trace, cone), *_limited(region, trace, floor, limits[-1])]
     runs = tuple(_run(path, setting, cone, region.name) for path in paths)
     outline = region.lines[0]
@@ -148,18 +151,23 @@ def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed],
     return [item] if runs else [], findings
 
 
-def _walks(trace: Trace, floor: list[Floats], band: Band) -> list[Floats]:
+def _walks(trace: Trace, floor: list[Floats], band: Band, again_mm: float) -> list[Floats]:
     """What is walked in one band: the grooves, the walls, and the middle of a round region."""
     graph = without_twigs(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
-    paths = walks(graph)
-    x, y, rho = trace.discs[int(np.argmax(trace.rho))].tolist()
-    if not band.low_mm < rho <= band.high_mm:
-        return paths
-    points = np.concatenate([np.empty((0, 4)), *paths])
-    apart = np.hypot(points[:, 0] - x, points[:, 1] - y) + rho - points[:, 2]
-    if (apart <= band.tolerance_mm).any():
-        return paths
-    return [*paths, np.array([[x, y, rho, 0.0]])]
+    middle = trace.discs[int(np.argmax(trace.rho))]
+    is_cut = band.low_mm < middle[2] <= band.high_mm
+    lonely = is_cut and _passed_by(graph.pieces, middle[:2]) > band.tolerance_mm
+    return [*walks(graph, again_mm), *([np.append(middle, 0.0)[None, :]] if lonely else [])]
+
+
+def _passed_by(pieces: list[Floats], point: Floats) -> float:
+    """How far in the plane pieces pass by a point, mm; inf if there are none."""
+    rows = [np.column_stack([piece[:-1], piece[1:, :2]]) for piece in pieces]
+    if not rows:
+        return math.inf
+    ends = np.concatenate(rows)
+    segments = Segments.between(ends[:, :2], ends[:, 4:], ends[:, 3])
+    return float(points_to_segments(point[None, :], segments).min())
 
 
 def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
@@ -169,21 +177,12 @@ def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
     """
     z = -cone.depth_of(path[:, 2])
     vertices = np.column_stack([path[:, :2], z, path[:, 3]])
-    lengths, heights = _lengths(path), np.abs(np.diff(z))
-    slope = np.hypot(lengths, heights)
+    heights = np.abs(np.diff(z))
+    slope = np.hypot(lengths_of(path), heights)
     feeds = setting.feeds
     steep = feeds.plunge_mm_min * slope / np.where(heights > 0.0, heights, np.inf)
     limit = np.where(heights > 0.0, steep, np.inf)
     return Run(vertices, np.minimum(feeds.cut_mm_min, limit), feeds.plunge_mm_min, name)
-
-
-def _lengths(path: Floats) -> Floats:
-    """(n−1,) lengths in the plane of the lines and arcs of a path."""
-    chord = np.hypot(*np.diff(path[:, :2], axis=0).T)
-    bulge = path[:-1, 3]
-    safe = np.where(bulge != 0.0, bulge, 1.0)
-    stretch = np.where(bulge != 0.0, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
-    return np.asarray(chord * stretch)
 
 
 def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
