@@ -17,8 +17,9 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, nearest
 from camtool.geometry.measure import extents, path_extents, point_at, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Ints, Polyline, Polylines, Segments
 from camtool.geometry.transform import reverse
+from camtool.planning.arcs import joints
 from camtool.planning.items import Chosen, Contour, Setting, Work
 from camtool.planning.places import at_place, tool_name
 
@@ -37,6 +38,8 @@ class _Line:
     path: Polyline
     left: bool
     of: tuple[int, ...]
+    plain: Polyline | None = None
+    """The line without its reliefs, when it has any."""
 
 
 @dataclass(eq=False)
@@ -206,7 +209,7 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
             )
             for corner in done.left.tolist()
         )
-    return replace(line, path=path)
+    return replace(line, path=path, plain=line.path)
 
 
 def _beside(line: _Line, chosen: Chosen, setting: Setting) -> Contour:
@@ -219,7 +222,24 @@ def _beside(line: _Line, chosen: Chosen, setting: Setting) -> Contour:
     else:
         turn = line.left == (wanted == "climb")
     path, left = (reverse(line.path), not line.left) if turn else (line.path, line.left)
-    return Contour(path, setting, chosen.names[k], int(chosen.source[k]), material_left=left)
+    return Contour(
+        path,
+        setting,
+        chosen.names[k],
+        int(chosen.source[k]),
+        starts=_starts(path, line.plain),
+        material_left=left,
+    )
+
+
+def _starts(path: Polyline, plain: Polyline | None) -> Ints:
+    """The vertices at which a path with reliefs may begin: not at the tip of one."""
+    if plain is None:
+        return np.empty(0, dtype=np.int64)
+    own = {tuple(place) for place in plain.vertices[:, :2].tolist()}
+    joint = joints(path)
+    places = enumerate(path.vertices[:, :2].tolist())
+    return np.array([k for k, place in places if joint[k] and tuple(place) in own], dtype=np.int64)
 
 
 def _on_line(chosen: Chosen, k: int, setting: Setting) -> Contour:

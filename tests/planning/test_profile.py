@@ -277,6 +277,10 @@ def test_reliefs_reach_into_the_corners(kind: str) -> None:
     corners = np.array([[0.0, 0.0], [4, 0], [4, 3], [0, 3]])
     away = nearest(corners, Segments.of(found.lines)).distance
     assert away == pytest.approx(R, abs=1e-6)
+    (item,) = found.items
+    starts = item.path.vertices[item.starts, :2]
+    assert len(starts) == 8  # each corner on the way to its relief, and on the way back
+    assert nearest(starts, Segments.of(_box(R, R, 4 - R, 3 - R))).distance.max() < 1e-9
 
 
 def test_a_corner_without_room_for_a_relief_is_told() -> None:
