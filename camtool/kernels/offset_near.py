@@ -184,14 +184,14 @@ def far_enough(
     rows = np.empty(GATHERED, np.int64)
     for i in range(len(element)):
         t0, part = span[i, 0], span[i, 1] - span[i, 0]
-        some = (rows, -1)
+        count = -1
         for k in range(len(PLACES)):
             point = point_on(elements, element[i], t0 + PLACES[k] * part)
-            if _too_near(near, some, point, limits, 0.0) > 0.0:
+            if _too_near(near, (rows, count), point, limits, 0.0) > 0.0:
                 valid[i] = False
                 break
             if k == 0:
                 # No other curve is too near to any point of the slice.
                 reach = limits[0] + 0.5 * part * elements[element[i], LENGTH]
-                some = (rows, gathered(near[0], near[1], point, reach, rows))
+                count = gathered(near[0], near[1], point, reach, rows)
     return valid

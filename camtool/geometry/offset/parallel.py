@@ -61,7 +61,7 @@ def offset_open(
     limit = limit_of(joins, mitre_limit)
     if is_nothing(distance_mm):
         return [p]
-    way = Way(abs(distance_mm), limit, both_sides=True, options=options)
+    way = Way(abs(float(distance_mm)), limit, both_sides=True, options=options)
     if distance_mm < 0.0:
         return [reverse(r) for r in _left_of(reverse(p), way)]
     return list(_left_of(p, way))

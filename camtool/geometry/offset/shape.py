@@ -60,7 +60,7 @@ def offset_shape(
         raise GeometryError("an open path has no inside", where=where, mend=mend)
     if is_nothing(distance_mm) or len(lines) == 0:
         return lines
-    way = Way(abs(distance_mm), limit, options=options)
+    way = Way(abs(float(distance_mm)), limit, options=options)
     if distance_mm < 0.0:
         return lines_reversed(_left_of(lines_reversed(lines), way))
     return _left_of(lines, way)
