@@ -1,8 +1,9 @@
 """A job file to fill in: what `camtool job new` writes from the layers of a drawing.
 
 One operation for each layer, or for each colour when there is one layer: drilled where it holds
-small circles and points alone, engraved where every path is open, else a profile. What is larger
-comes later, so that parts are cut free last. Every other key stands there as a comment, with its default or an example.
+small circles and points alone, engraved where every path is open or its name says so, else a
+profile. What is larger comes later, so that parts are cut free last. Every other key stands there
+as a comment, with an example.
 """
 
 from __future__ import annotations

@@ -79,17 +79,19 @@ class Tools:
         number = keys.given.get("number")
         if number is None or number.value not in self.table:
             return keys
-        return keys.over(self._of_table(number.value))
+        return keys.over(self._of_table(number.value, needed="diameter" not in keys.given))
 
-    def _of_table(self, number: int) -> Table:
-        """The keys of a tool of the tool table."""
+    def _of_table(self, number: int, *, needed: bool = True) -> Table:
+        """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
         tool = self.table[number]
-        where = f"line {tool.line}"
-        given = {"number": Given(number, where, self.table_file)}
-        if tool.diameter is not None:
-            text = f"{tool.diameter!r}{self.units}"
-            given["diameter"] = Given(text, where, self.table_file)
-        return Table(given, where, self.table_file)
+        table = Table({}, f"line {tool.line}", self.table_file)
+        if tool.diameter is None and needed:
+            raise table.refused(f"tool {number} has no diameter", "give it a D")
+        values = {"number": number, "diameter": f"{tool.diameter!r}{self.units}"}
+        if tool.diameter is None:
+            del values["diameter"]
+        given = {name: Given(value, table.where, table.file) for name, value in values.items()}
+        return replace(table, given=given)
 
 
 def with_table(tools: Tools, path: Path) -> Tools:

@@ -8,7 +8,32 @@ from typing import TYPE_CHECKING
 from camtool.errors import OptionError
 
 if TYPE_CHECKING:
-    from camtool.planning.job import Operation, Placement
+    from camtool.planning.job import Entry, Operation, Placement, Tool
+
+
+def refuse_tool(tool: Tool) -> None:
+    """Refuse a tip that is no cone, or as wide as its tool."""
+    angle = tool.tip_angle_rad
+    if angle is not None and not 0.0 < angle < math.pi:
+        raise OptionError(
+            f"tip angle {math.degrees(angle):g}° is not between 0 and 180°",
+            mend="give the full angle of the cone, such as 60deg",
+        )
+    if 0.0 < tool.diameter_mm <= tool.tip_diameter_mm:
+        raise OptionError(
+            f"the tip of {tool.tip_diameter_mm:g} mm is as wide as the tool",
+            where="key tip_diameter",
+            mend="give a smaller tip, or a wider tool",
+        )
+
+
+def refuse_entry(entry: Entry) -> None:
+    """Refuse a slope that is none."""
+    if not entry.angle_rad < 0.5 * math.pi:
+        raise OptionError(
+            f"ramp angle {math.degrees(entry.angle_rad):g}° is not below 90°",
+            mend="give a smaller angle, or plunge",
+        )
 
 
 def refuse_operation(operation: Operation) -> None:
@@ -19,6 +44,12 @@ def refuse_operation(operation: Operation) -> None:
             f"the last pass of {last:g} mm is deeper than the whole cut of {depth:g} mm",
             where=f"{_named(operation)}key last_pass",
             mend="give a smaller last pass, or a larger depth",
+        )
+    if operation.entry.kind == "helix" and operation.kind != "pocket":
+        raise OptionError(
+            f"a helix goes into pockets, not into what the kind {operation.kind} cuts",
+            where=f"{_named(operation)}key entry",
+            mend='use "ramp" or "plunge"',
         )
 
 

@@ -13,7 +13,12 @@ from typing import Any
 
 from camtool.errors import OptionError
 from camtool.patterns import matches
-from camtool.planning.contradictions import refuse_operation, refuse_placement
+from camtool.planning.contradictions import (
+    refuse_entry,
+    refuse_operation,
+    refuse_placement,
+    refuse_tool,
+)
 from camtool.planning.ranges import above_zero, all_above_zero, at_least_zero, finite, one_of
 
 KINDS = ("profile", "pocket", "engrave", "drill", "vcarve")
@@ -71,6 +76,7 @@ class Tool:
         at_least_zero("tool diameter", self.diameter_mm, "mm")
         at_least_zero("tip diameter", self.tip_diameter_mm, "mm")
         one_of("kind of tool", self.kind, TOOL_KINDS)
+        refuse_tool(self)
 
     @property
     def radius_mm(self) -> float:
@@ -91,6 +97,7 @@ class Entry:
         one_of("entry", self.kind, ENTRIES)
         above_zero("ramp angle", self.angle_rad, "rad")
         above_zero("helix radius", self.radius_mm, "mm")
+        refuse_entry(self)
 
 
 @dataclass(frozen=True)
