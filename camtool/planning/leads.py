@@ -30,9 +30,8 @@ from camtool.planning.items import Contour
 from camtool.planning.job import Lead
 from camtool.planning.places import at_place
 
-LEAD_SLACK_MM = 1e-4
-"""A lead may come nearer to wanted material than the tool's radius by this much: a tenth of a
-micrometre."""
+LEAD_SLACK_MM = 1e-5
+"""A lead may come nearer to wanted material than the tool's radius by this much."""
 
 QUARTER = math.tan(math.pi / 8.0)
 """The bulge of a quarter of a circle."""
@@ -191,7 +190,8 @@ def left_of(path: Polyline, points: Floats) -> Floats:
                 continue
             into = behind[vertex - 1] if vertex > 0 else np.zeros(2)
             out = ahead[vertex] if vertex < len(segments) else np.zeros(2)
-            across = float(np.cross(into + out, arm))
+            way = into + out
+            across = float(way[0] * arm[1] - way[1] * arm[0])
             at_end = vertex in (0, len(segments))
             left[j] = across if at_end else math.copysign(found.distance[j], across)
     return left

@@ -27,7 +27,7 @@ import numpy as np
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
 from camtool.planning.along import Along
 from camtool.planning.items import Contour
 from camtool.planning.job import Operation
@@ -183,40 +183,43 @@ def _fitted(along: Along, model: Tab, foot: float, share: tuple[int, int]) -> Ta
     size = along.total_mm / count
     low, high = which * size, (which + 1) * size
     corners = along.reach[: len(along.turns)][np.abs(along.turns) > TAB_CORNER_RAD]
-    fallback = None
-    for step in range(2 * PLACES_PER_SIDE):
-        # The middle, then in turn to both sides of it.
-        side = (step + 1) // 2 * (1 if step % 2 else -1)
-        centre = low + size * (0.5 + 0.5 * side / PLACES_PER_SIDE)
+    # The middle, then in turn to both sides of it.
+    steps = np.arange(2 * PLACES_PER_SIDE)
+    offs = (steps + 1) // 2 * np.where(steps % 2 == 1, 1.0, -1.0) / PLACES_PER_SIDE
+    centres = low + size * (0.5 + 0.5 * offs)
+    away = np.abs(centres[:, None] - corners).min(axis=1, initial=math.inf)
+    clear = away >= 0.5 * model.end + foot
+    for centre in [*centres[clear].tolist(), *centres.tolist()]:
         half = _half(along, centre, model.end, min(centre - low, high - centre) - foot)
         if half is None:
             continue
         tab = Tab(centre - half, centre + half, model.top_mm, model.fall)
-        if not _stays(along, tab):
-            continue
-        if not ((corners > tab.begin - foot) & (corners < tab.end + foot)).any():
+        if _stays(along, tab):
             return tab
-        fallback = fallback or tab
-    return fallback
+    return None
 
 
 def _half(along: Along, centre: float, chord: float, room: float) -> float | None:
     """Half the length about a place whose ends are so far apart; None beyond the room there is."""
 
-    def short(halves: Floats) -> Bools:
+    def lacks(halves: Floats) -> Floats:
         ends = along.at(centre + halves) - along.at(centre - halves)
-        return np.asarray(np.hypot(ends[:, 0], ends[:, 1]) < chord - TAB_SLACK_MM)
+        return np.asarray(chord - np.hypot(ends[:, 0], ends[:, 1]))
 
-    tries = np.linspace(0.5 * chord, max(room, 0.5 * chord), PLACES_PER_SIDE)
-    enough = np.flatnonzero(~short(tries))
-    if 0.5 * chord > room or len(enough) == 0:
+    half = 0.5 * chord
+    if half > room + TAB_SLACK_MM:
         return None
-    high = float(tries[enough[0]])
-    low = float(tries[max(enough[0] - 1, 0)])
-    for _ in range(WIDTH_ROUNDS if high > low else 0):
+    if lacks(np.array([half]))[0] <= TAB_SLACK_MM:  # along a line
+        return half
+    tries = np.linspace(half, room, PLACES_PER_SIDE)
+    enough = np.flatnonzero(lacks(tries) <= 0.0)
+    if len(enough) == 0:
+        return None
+    low, high = tries[enough[0] - 1], tries[enough[0]]
+    for _ in range(WIDTH_ROUNDS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if short(np.array([middle]))[0] else (low, middle)
-    return high
+        low, high = (middle, high) if lacks(middle[None])[0] > 0.0 else (low, middle)
+    return float(high)
 
 
 def _stays(along: Along, tab: Tab) -> bool:

@@ -72,3 +72,24 @@ def cut_over(runs: Iterable[Run], places: Floats, step_mm: float) -> tuple[Float
                     most = max(most, low[at] - z)
                     low[at] = min(low[at], z)
     return low, most
+
+
+def most_at_a_time(vertices: Floats, total_mm: float, cells: int) -> float:
+    """The most that a run round a closed path of this length takes away anywhere at a time.
+
+    The run only goes forwards: how far it has come tells where on the path it is.
+    """
+    low = np.zeros(cells)
+    most = came = 0.0
+    for here, there in pairwise(vertices):
+        if (here[:2] == there[:2]).all():
+            continue
+        size = move_length(here, there)
+        first = math.ceil(came / total_mm * cells)
+        for cell in range(first, math.ceil((came + size) / total_mm * cells)):
+            share = (cell / cells * total_mm - came) / size
+            z = float(here[2] + share * (there[2] - here[2]))
+            most = max(most, low[cell % cells] - z)
+            low[cell % cells] = min(low[cell % cells], z)
+        came += size
+    return most
