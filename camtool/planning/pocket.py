@@ -34,11 +34,8 @@ from camtool.planning.pocket_parts import parts_of
 from camtool.planning.pocket_rings import Steps, ring_cells, ring_ways
 from camtool.planning.pocket_route import Rails
 from camtool.planning.pocket_slots import SLOT_TOLERANCE, slot_ways
-from camtool.planning.reach import unreached
+from camtool.planning.uncut import unreached_findings
 from camtool.planning.zigzag import Scan, zigzag_ways
-
-MOST_NAMED = 3
-"""How many places that stay uncut a message names; the others it counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +50,11 @@ class Pocket:
 
 @dataclass(frozen=True, eq=False)
 class Cleared:
-    """The runs that clear a region, in order, and what did not fit of their entries."""
+    """The runs that clear a region, in order; and what did not fit of their entries, with the
+    first run for which that is so."""
 
     runs: list[Run]
-    changed: list[str]
+    changed: dict[str, Run]
 
 
 def pocket(chosen: Chosen, setting: Setting) -> Work:
@@ -77,10 +75,10 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
             continue
         outline = each.region[0]
         items.append(Fixed(tuple(cleared.runs), setting, each.name, each.source, outline))
-        findings += [_changed(each, change, cleared.runs[0]) for change in cleared.changed]
+        findings += [_changed(each, *change) for change in cleared.changed.items()]
         findings += [_slot(each, slot, setting.operation) for slot in slots]
-        hair = 2.0 * SLOT_TOLERANCE * radius if slots else 0.0
-        findings += _uncut(each, wanted, radius - hair, setting.operation)
+        hair_mm = 2.0 * SLOT_TOLERANCE * setting.operation.tool.diameter_mm if slots else 0.0
+        findings += unreached_findings(wanted, setting, hair_mm=hair_mm)
     return Work(tuple(items), tuple(findings))
 
 
@@ -98,20 +96,33 @@ def pockets(chosen: Chosen) -> list[Pocket]:
 
 def _cleared(wanted: Polylines, slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
     """The runs of one region: each connected region of the tool's middle, then the slots."""
-    runs: list[Run] = []
-    changed: dict[str, None] = {}
+    groups: list[list[Run]] = []
+    changed: dict[str, Run] = {}
     tool_region = offset_shape(wanted, setting.operation.tool.radius_mm)
-    for part in parts_of(tool_region) if len(tool_region) else []:
-        whole = Rails(part)
+    for part in parts_of(tool_region):
+        whole, runs = Rails(part), list[Run]()
         for way, middle in _ways(part, setting.operation):
             down = down_for(way, middle, whole, setting)
             runs += lowered(way, down, over_floor(whole), setting, each.name)
-            changed[down.changed] = None
+            changed.setdefault(down.changed, runs[0])
+        groups.append(runs)
     for way in slots:
         down = down_for(way, None, None, setting)
-        runs += lowered(way, down, back_along(way), setting, each.name)
-        changed[down.changed] = None
-    return Cleared(runs, [text for text in changed if text])
+        groups.append(lowered(way, down, back_along(way), setting, each.name))
+        changed.setdefault(down.changed, groups[-1][0])
+    changed.pop("", None)
+    return Cleared(_nearest_next(groups), changed)
+
+
+def _nearest_next(groups: list[list[Run]]) -> list[Run]:
+    """All runs, after those of one connected region those of the one whose begin is nearest."""
+    runs: list[Run] = []
+    left = list(groups)
+    while left:
+        here = runs[-1].vertices[-1, :2] if runs else left[0][0].vertices[0, :2]
+        begins = np.array([group[0].vertices[0, :2] for group in left])
+        runs += left.pop(int(np.hypot(*(begins - here).T).argmin()))
+    return runs
 
 
 def _ways(part: Polylines, operation: Operation) -> Iterator[tuple[Floats, Rails]]:
@@ -124,7 +135,7 @@ def _ways(part: Polylines, operation: Operation) -> Iterator[tuple[Floats, Rails
         for way in zigzag_ways(part, Scan(step, radius, operation.angle_rad, forward)):
             yield way, Rails(part)
         return
-    steps = Steps(step, radius, forward)
+    steps = Steps(step, radius, forward, operation.entry.kind == "helix")
     ways, first = ring_ways(ring_cells(part, steps), steps)
     for way in ways:
         yield way, first.rails
@@ -192,27 +203,3 @@ def _slot(each: Pocket, slot: Floats, operation: Operation) -> Finding:
         measured=operation.tool.diameter_mm,
         unit="mm",
     )
-
-
-def _uncut(each: Pocket, wanted: Polylines, radius: float, op: Operation) -> list[Finding]:
-    """One finding for all places of a region that the tool does not reach; the largest named."""
-    pieces = unreached(wanted, radius)
-    if not pieces:
-        return []
-    total = sum(piece.area_mm2 for piece in pieces)
-    named = ", ".join(
-        f"{piece.area_mm2:.4g} mm² at X {piece.at_mm[0]:.4f} Y {piece.at_mm[1]:.4f}"
-        for piece in pieces[:MOST_NAMED]
-    )
-    more = f" and {len(pieces) - MOST_NAMED} more" if len(pieces) > MOST_NAMED else ""
-    return [
-        Finding(
-            Code.UNREACHED,
-            Severity.WARNING,
-            f"{tool_name(op.tool)} leaves {total:.4g} mm² uncut in {len(pieces)} places:"
-            f" {named}{more}",
-            where=at_place(each.name, pieces[0].at_mm),
-            measured=total,
-            unit="mm2",
-        )
-    ]

@@ -14,10 +14,10 @@ from itertools import pairwise
 import numpy as np
 
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.measure import sample, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline
 from camtool.planning.along import Along
 from camtool.planning.items import Run, Setting
+from camtool.planning.pocket_parts import pole
 from camtool.planning.pocket_route import Rails, route
 from camtool.planning.ramps import feeds_along
 
@@ -29,9 +29,6 @@ HELIX_LEAST = 0.1
 
 RAMP_MOST_LAPS = 20
 """A ramp that would go to and fro on the whole way more often than this becomes a plunge."""
-
-POLE_SHARE = 0.01
-"""How near to the true middle of a region its middle is looked for, over its extent."""
 
 Link = Callable[[Floats, Floats], Floats | None]
 """From a place (2,) to another: (k, 3) over the floor, or None when there is no way."""
@@ -68,22 +65,6 @@ def down_for(way: Floats, middle: Rails | None, whole: Rails | None, setting: Se
     if _laps(way, setting) <= RAMP_MOST_LAPS:
         return Down(ramp=True, changed=changed)
     return Down(changed=f"a plunge instead of a {entry.kind}")
-
-
-def pole(region: Polylines) -> Floats:
-    """(2,) a place of a connected region about as far from its boundary as any."""
-    import shapely
-
-    outer = int(signed_areas(region).argmax())
-    low, high = (
-        region[outer].vertices[:, :2].min(axis=0),
-        region[outer].vertices[:, :2].max(axis=0),
-    )
-    fine = max(POLE_SHARE * float(np.hypot(*(high - low))), POSITION_EPS_MM)
-    rings = [sample(path, fine) for path in region]
-    holes = [ring for row, ring in enumerate(rings) if row != outer and len(ring) > 2]
-    circle = shapely.maximum_inscribed_circle(shapely.Polygon(rings[outer], holes), fine)
-    return np.asarray(shapely.get_coordinates(circle)[0], dtype=np.float64)
 
 
 def lowered(way: Floats, down: Down, link: Link, setting: Setting, name: str) -> list[Run]:

@@ -20,7 +20,7 @@ import numpy as np
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines
 from camtool.planning.clip import outside_parts
-from camtool.planning.pocket_parts import parts_of
+from camtool.planning.pocket_parts import parts_of, pole
 from camtool.planning.pocket_route import Rails, closest
 from camtool.planning.pocket_way import Way
 
@@ -42,11 +42,13 @@ class Cell:
 @dataclass(frozen=True)
 class Steps:
     """Distance of the rings and radius of the tool, mm; whether rings run as they are oriented
-    (the region on their left) or the other way."""
+    (the region on their left) or the other way; whether the first one begins as near as can be
+    to the middle of its region, where a helix goes down."""
 
     step_mm: float
     radius_mm: float
     forward: bool = True
+    from_middle: bool = False
 
 
 def ring_cells(region: Polylines, steps: Steps) -> Cell:
@@ -96,7 +98,9 @@ def ring_ways(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
     way = Way()
     first = None
     for cell, around in _inside_out(root, way):
-        first = first or cell
+        if first is None:
+            first = cell
+            way.begin = pole(cell.rails.region) if steps.from_middle else None
         paths = (*cell.tips, *cell.rails.region)
         way.cut_all(paths, cell.rails, around.rails, steps.forward)
     return way.ways(), first or root

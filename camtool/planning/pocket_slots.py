@@ -50,7 +50,7 @@ def slot_ways(region: Polylines, tool_radius_mm: float) -> list[Floats]:
     for band in bands:
         if not _covered(band, ways, BEYOND * hair * diameter):
             ways.append(_once(band, BEYOND * hair * diameter))
-    return [way.vertices for way in ways]
+    return [_without_specks(way.vertices, BEYOND * hair * diameter) for way in ways]
 
 
 def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
@@ -85,3 +85,9 @@ def _once(band: Polyline, near_mm: float) -> Polyline:
     if _covered(other, [one], near_mm):
         return one
     return Polyline(along.piece(begin, begin + 2.0 * half))
+
+
+def _without_specks(vertices: Floats, speck_mm: float) -> Floats:
+    """An open path (n, 3) without segments as short as a band is wide: they lead across it."""
+    step = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
+    return np.asarray(vertices[np.concatenate([step > speck_mm, [True]])])

@@ -16,6 +16,8 @@ class Way:
     """Collects strokes (k, 3) of x, y, bulge; each is linked to the one before it, at depth."""
 
     def __init__(self) -> None:
+        self.begin: Floats | None = None
+        """Where the tool would best go down (2,), if anywhere."""
         self._parts: list[Floats] = []
         self._done: list[Floats] = []
 
@@ -46,7 +48,7 @@ class Way:
         """
         left = [Along.of(path) for path in paths]
         while left:
-            here = left[0].path.start if self.here is None else self.here
+            here = self._near(left[0].path)
             ways = [_from_nearest(along, here) for along in left]
             pick = min(range(len(left)), key=lambda row: ways[row][0])
             along, begin = left.pop(pick), ways[pick][1]
@@ -57,6 +59,12 @@ class Way:
                 path = along.path if begin == 0.0 else reverse(along.path)
                 self.cut(path.vertices, around)
             around = rails
+
+    def _near(self, path: Polyline) -> Floats:
+        """Where the tool is, or would go down, or else the start of a path."""
+        if self.here is not None:
+            return self.here
+        return path.start if self.begin is None else self.begin
 
     def ways(self) -> list[Floats]:
         """(n, 3) open paths; several only where the tool has to come up."""

@@ -20,13 +20,16 @@ MOST_PLACES = 12
 """So many larger pieces are told one by one, the others together."""
 
 
-def unreached_findings(region: Polylines, setting: Setting) -> list[Finding]:
+def unreached_findings(
+    region: Polylines, setting: Setting, *, hair_mm: float = 0.0
+) -> list[Finding]:
     """What a tool within the region (on the left of its closed paths) cannot touch.
 
-    Feet of corners are not told where the operation makes reliefs.
+    Feet of corners are not told where the operation makes reliefs. Slots narrower than the tool
+    by `hair_mm` count as reached.
     """
     tool = setting.operation.tool
-    pieces = unreached(region, tool.radius_mm)
+    pieces = unreached(region, tool.radius_mm - 0.5 * hair_mm)
     largest_foot = CORNER_SHARE * np.pi * tool.radius_mm**2
     wide = [piece for piece in pieces if piece.area_mm2 > largest_foot]
     feet = [piece for piece in pieces if piece.area_mm2 <= largest_foot]
