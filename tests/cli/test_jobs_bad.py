@@ -144,7 +144,10 @@ FILES = [
     (TOOLS + "[[operations]]\ntool = 'mil'", ["table [[operations]] 1, key tool", "mean 'mill'?"]),
     ("tool = 3", ["key tool", "there is no tool 3", 'tool_table = "tool.tbl"']),
     ("tool = 3\ntool_table = 'tool.tbl'", ["key tool", "there is no tool 3", "has: 1, 2"]),
-    ("tool = 2\ntool_table = 'tool.tbl'", ["tool.tbl", "line 2", "tool 2 has no diameter", "give it a D"]),
+    (
+        "tool = 2\ntool_table = 'tool.tbl'",
+        ["tool.tbl", "line 2", "tool 2 has no diameter", "give it a D"],
+    ),
     ("tool = 1.5", ["key tool", "1.5 is no tool"]),
     ("tool_table = 'none.tbl'", ["none.tbl", "cannot be read"]),
     ("tool_table = 'bad.tbl'", ["bad.tbl", "line 1", "'nonsense'"]),
