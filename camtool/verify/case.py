@@ -18,6 +18,10 @@ COVERAGE_RESOLUTIONS = 1.5
 """... or than so many resolutions of a dialect that is coarser than the steps: vertices are off
 by up to 0.71 of them, and starts that a machine cannot reach by up to 1.41."""
 
+DEPTH_FITS = 2.0
+"""Heights may differ by as much as coverage allows, by so many steps of Z, or by so many fit
+tolerances, where that is more: slopes of machines without slopes are steps that high."""
+
 SAMPLE_MM = 0.01
 """Spacing of the points on decoded and wanted moves that are compared with each other."""
 
@@ -31,10 +35,12 @@ class VerifyOptions:
 
     `interpolator` None: as the machine does. `coverage_mm` None: `COVERAGE_MM`,
     `COVERAGE_STEPS` or `COVERAGE_RESOLUTIONS`. `blocks` None: counted from the decoded toolpath
-    where it was read.
+    where it was read. `tool_diameter_mm`: rapids below the stock top may run where the tool has
+    cleared the way before; None, when nobody knows it: nowhere.
     """
 
     interpolator: Interpolator | None = None
+    tool_diameter_mm: float | None = None
     source: str = ""
     size_bytes: int | None = None
     blocks: int | None = None
@@ -76,3 +82,12 @@ class Case:
         coarse = max(axis.coded_step_mm for axis in axes)
         said = max(axis.resolution_mm or 0.0 for axis in axes)
         return max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * said)
+
+    @property
+    def depth_mm(self) -> float:
+        """How far heights of one side may be from those of the other."""
+        z, fit_mm = self.machine.axes.z, self.machine.defaults.fit_tolerance_mm
+        steps = max(
+            COVERAGE_STEPS * z.coded_step_mm, COVERAGE_RESOLUTIONS * (z.resolution_mm or 0)
+        )
+        return max(self.coverage_mm, steps, DEPTH_FITS * fit_mm)

@@ -66,13 +66,15 @@ UNSEEN = CircleFigures(math.nan, math.nan, math.nan, math.nan)
 
 
 def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
-    """Runs of consecutive cutting arcs about one centre, one way round, that make a full turn.
+    """Runs of consecutive level arcs that cut about one centre, one way round, and make a full
+    turn; of those that lie below each other (passes, or a helix and its last turn) the deepest.
 
     `gap_mm` is how far centres and radii may differ, and how much of the way round may lack (a
     post may leave a rest that a line mends).
     """
     toolpath = cuts.toolpath
-    arcs = np.flatnonzero(toolpath.is_arc & cuts.is_cut)
+    level = toolpath.starts[:, 2] == toolpath.end[:, 2]
+    arcs = np.flatnonzero(toolpath.is_arc & cuts.is_cut & level)
     if len(arcs) == 0:
         return []
     spoke = toolpath.starts[arcs, :2] - toolpath.centre[arcs]
@@ -88,9 +90,26 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
     last = np.concatenate([first[1:], [len(arcs)]]) - 1
     way = np.abs(np.add.reduceat(toolpath.sweeps()[arcs], first)) * radius[first]
     full = np.flatnonzero(way >= 2.0 * np.pi * radius[first] - gap_mm)
+    return _deepest(
+        [
+            _circle(toolpath, arcs[first[run] : last[run] + 1], float(radius[first[run]]))
+            for run in full
+        ],
+        gap_mm,
+    )
+
+
+def _deepest(circles: list[Circle], gap_mm: float) -> list[Circle]:
+    """Of circles one below the other the deepest, of equals all, in their order."""
+    lowest: dict[tuple[object, ...], float] = {}
+    keys = []
+    for circle in circles:
+        numbers = (*circle.centre_mm, circle.radius_mm)
+        key = (circle.ccw, *(round(number / gap_mm) for number in numbers))
+        lowest[key] = min(lowest.get(key, math.inf), circle.z_mm)
+        keys.append(key)
     return [
-        _circle(toolpath, arcs[first[run] : last[run] + 1], float(radius[first[run]]))
-        for run in full
+        circle for circle, key in zip(circles, keys, strict=True) if circle.z_mm == lowest[key]
     ]
 
 

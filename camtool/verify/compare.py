@@ -14,12 +14,13 @@ whatever the first margin was; a good guess only saves time.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from camtool.geometry.measure import segment_boxes
+from camtool.geometry.measure import segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
 from camtool.verify.cuts import CutMoves
 from camtool.verify.runs import group_boxes, ranges
@@ -57,6 +58,7 @@ class SegmentTable:
         self._over = 1.0 / np.where(square > 0.0, square, 1.0)
         self._cx, self._cy = np.ascontiguousarray(segments.centre.T)
         self._radius = segments.radius
+        self._sweep = np.abs(segments.sweep)
         # Normals that point into the wedge from its two edges.
         self._ux, self._uy = np.ascontiguousarray((turn * (start - segments.centre)).T)
         self._vx, self._vy = np.ascontiguousarray((turn * (end - segments.centre)).T)
@@ -72,6 +74,22 @@ class SegmentTable:
         for rows, distances in ((arc, self._to_arcs), (~arc, self._to_lines)):
             found[rows] = distances(points[rows, 0], points[rows, 1], which[rows])
         return found
+
+    def shares(self, points: Floats, which: Ints) -> Floats:
+        """(J,) how far along segment which[j] (0 to 1) its place nearest to point j lies."""
+        x, y = points[:, 0] - self._ax[which], points[:, 1] - self._ay[which]
+        along = (x * self._dx[which] + y * self._dy[which]) * self._over[which]
+        arc = np.flatnonzero(self.is_arc[which])
+        row = which[arc]
+        px, py = points[arc, 0] - self._cx[row], points[arc, 1] - self._cy[row]
+        # u points into the wedge at a right angle to the spoke of the start.
+        sine = self._ux[row] * py - self._uy[row] * px
+        cosine = (self._ax[row] - self._cx[row]) * px + (self._ay[row] - self._cy[row]) * py
+        angle = np.mod(np.arctan2(sine, cosine), 2.0 * np.pi)
+        sweep = self._sweep[row]
+        behind = angle > np.pi + 0.5 * sweep
+        along[arc] = np.where(behind, 0.0, angle / sweep)
+        return np.asarray(np.clip(along, 0.0, 1.0))
 
     def _to_lines(self, x: Floats, y: Floats, which: Ints) -> Floats:
         dx, dy = self._dx[which], self._dy[which]
@@ -99,13 +117,19 @@ class Groups:
     """Points in runs of neighbours: group g is points[offsets[g]:offsets[g+1]], never empty.
 
     `margin` (G,) mm first guess of the distance; `contour` (G,) the only contour to compare with
-    or ANY_CONTOUR; `z` (G, 2) mm: only moves whose heights overlap this are compared.
+    or ANY_CONTOUR; `z` (G, 2) mm: only moves whose heights overlap this are compared. With a
+    `height` (J,) mm of each point, only where the move is within `window_mm` of it at the place
+    nearest to the point (more on slopes, where XY shifts heights). What is farther than `most_mm`
+    counts as not found.
     """
 
     offsets: Ints
     margin: Floats
     contour: Ints
     z: Floats
+    height: Floats | None = None
+    window_mm: float = math.inf
+    most_mm: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +149,9 @@ class Target:
         self.table = SegmentTable(cuts.segments)
         self.boxes = segment_boxes(cuts.segments)
         self._tree: Any = None
+        low, high = cuts.z.T
+        length = segment_lengths(cuts.segments)
+        self._slope = (high - low) / np.where(length > 0.0, length, 1.0)
 
     def own(self, points: Floats, rows: Ints) -> Floats:
         """(J,) mm from points (J, 2) to the moves of their own toolpath rows (J,), which cut."""
@@ -143,18 +170,20 @@ class Target:
         if count == 0 or len(self.boxes) == 0:
             return found
         boxes = group_boxes(points, groups.offsets)
-        everything = self._reach(boxes)
+        everything = min(self._reach(boxes), groups.most_mm)
         margin = np.minimum(np.maximum(groups.margin * MARGIN_SLACK, POSITION_EPS_MM), everything)
         todo = np.arange(count)
         while len(todo):
             pairs = self._candidates(boxes[todo], margin[todo], todo, groups)
-            worst = self._least(points, groups.offsets, todo, pairs, found)
+            worst = self._least(points, groups, todo, pairs, found)
             done = (worst <= margin[todo]) | (margin[todo] >= everything)
             grown = np.where(
                 np.isfinite(worst), worst * MARGIN_SLACK, margin[todo] * MARGIN_GROWTH
             )
             margin[todo] = np.minimum(grown, everything)
             todo = todo[~done]
+        far = found.distance > groups.most_mm
+        found.distance[far], found.segment[far] = np.inf, -1
         return found
 
     def _reach(self, boxes: Floats) -> float:
@@ -181,10 +210,20 @@ class Target:
         order = np.lexsort((move, group))
         return group[order], move[order]
 
+    def _off_height(self, points: Floats, height: Floats, move: Ints, window_mm: float) -> Any:
+        """(J,) where the moves are at another height than the points nearest to them."""
+        begin, end = self.cuts.ends_z[move].T
+        sloping = np.flatnonzero(begin != end)
+        z = begin.copy()
+        share = self.table.shares(points[sloping], move[sloping])
+        z[sloping] += share * (end - begin)[sloping]
+        return np.abs(z - height) > window_mm * (1.0 + self._slope[move])
+
     def _least(
-        self, points: Floats, offsets: Ints, todo: Ints, pairs: tuple[Ints, Ints], found: Found
+        self, points: Floats, groups: Groups, todo: Ints, pairs: tuple[Ints, Ints], found: Found
     ) -> Floats:
         """Fill `found` for the groups `todo`; returns the largest distance in each, mm."""
+        offsets = groups.offsets
         group, move = pairs
         choices = np.bincount(group, minlength=len(todo))
         begin, sizes = offsets[todo], np.diff(offsets)[todo]
@@ -199,14 +238,20 @@ class Target:
             samples = ranges(begin[part], sizes[part])
             many = np.repeat(choices[part], sizes[part])
             pair_move = move[ranges(np.repeat(first[part], sizes[part]), many)]
-            distance = self.table.distances(points[np.repeat(samples, many)], pair_move)
+            pair_point = np.repeat(samples, many)
+            distance = self.table.distances(points[pair_point], pair_move)
+            if groups.height is not None:
+                height = groups.height[pair_point]
+                off = self._off_height(points[pair_point], height, pair_move, groups.window_mm)
+                distance[off] = np.inf
             starts = np.cumsum(many) - many
             least = np.minimum.reduceat(distance, starts)
             # The first of the nearest, so that ties do not depend on the tree.
             hits = np.flatnonzero(distance == np.repeat(least, many))
             sample_of_pair = np.repeat(np.arange(len(samples)), many)[hits]
             chosen = hits[np.flatnonzero(np.diff(sample_of_pair, prepend=-1))]
-            found.distance[samples], found.segment[samples] = least, pair_move[chosen]
+            found.distance[samples] = least
+            found.segment[samples] = np.where(np.isinf(least), -1, pair_move[chosen])
             group_starts = np.cumsum(sizes[part]) - sizes[part]
             worst[part] = np.maximum.reduceat(least, group_starts)
         return worst

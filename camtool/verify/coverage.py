@@ -2,8 +2,9 @@
 
 Decoded moves are sampled and compared with the wanted moves: that gives the error of rounding,
 extra cuts, and for each decoded row the wanted contour that it belongs to. Wanted moves are
-sampled and compared with the decoded ones: that gives what is missing. Only moves at the same
-height are compared (within the coverage tolerance), so a lost pass or a wrong depth shows.
+sampled and compared with the decoded ones: that gives what is missing. Only moves at the height of
+the sample are compared (a slope: at the place nearest to it), so a lost pass or a wrong depth
+shows. How far heights may differ leaves room for slopes that a machine makes in small steps.
 """
 
 from __future__ import annotations
@@ -15,12 +16,11 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
-from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
-from camtool.verify.cuts import Bools, CutMoves, Samples, sample_cuts
+from camtool.verify.compare import Found, Target
+from camtool.verify.cuts import STOCK_TOP_MM, Bools, CutMoves, Samples, sample_cuts
 from camtool.verify.figures import Figure
-from camtool.verify.match import SAMPLES_PER_GROUP, Goal, Match, match_contours, match_rows
+from camtool.verify.match import Goal, Match, match_contours, match_rows, nearest_at_height
 from camtool.verify.places import and_more, at_point, block_name
-from camtool.verify.runs import run_offsets
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,46 +34,33 @@ class Coverage:
 
 def cover(decoded: Target, goal: Goal, spacing_mm: float) -> Coverage:
     """Compare decoded and wanted cutting moves both ways, on samples about `spacing_mm` apart."""
-    cuts, wanted, limit_mm = decoded.cuts, goal.target, goal.limit_mm
+    cuts, wanted, limits = decoded.cuts, goal.target, (goal.limit_mm, goal.depth_mm)
     samples = sample_cuts(cuts, spacing_mm)
-    found, wrong_depth = _nearest(cuts, samples, wanted, limit_mm)
-    extra = tuple(_extra_cuts(cuts, samples, found, wrong_depth, limit_mm))
+    found, wrong_depth = nearest_at_height(samples, None, wanted, limits)
+    extra = tuple(_extra_cuts(cuts, samples, found, wrong_depth, goal))
     belongs = match_contours(cuts, samples, found, goal)
     rounding = Figure()
     real = np.isfinite(found.distance)
     rows = cuts.segments.path[samples.segment]
     rounding.add(found.distance[real], samples.points[real], rows[real])
     back = sample_cuts(wanted.cuts, spacing_mm)
-    found_back, wrong_back = _nearest(wanted.cuts, back, decoded, limit_mm)
-    missing = _missing(wanted.cuts, back, found_back, wrong_back, limit_mm)
+    found_back, wrong_back = nearest_at_height(back, None, decoded, limits)
+    missing = _missing(wanted.cuts, back, found_back, wrong_back, goal)
     match = match_rows(cuts, samples, belongs, found, goal)
     return Coverage(match, rounding, (*missing, *extra))
 
 
-def _nearest(
-    cuts: CutMoves, samples: Samples, target: Target, limit_mm: float
-) -> tuple[Found, Bools]:
-    """Nearest target move at the same height; where there is none (second item true), at any."""
-    offsets = run_offsets(samples.segment, SAMPLES_PER_GROUP)
-    z = cuts.z[samples.segment[offsets[:-1]]] + np.array([-limit_mm, limit_mm])
-    count = len(offsets) - 1
-    margin, contour = np.full(count, limit_mm), np.full(count, ANY_CONTOUR)
-    found = target.nearest(samples.points, Groups(offsets, margin, contour, z))
-    wrong_depth = np.isinf(found.distance)
-    if wrong_depth.any():
-        rest = np.flatnonzero(wrong_depth)
-        parts = run_offsets(samples.segment[rest], SAMPLES_PER_GROUP)
-        any_z = np.tile([-np.inf, np.inf], (len(parts) - 1, 1))
-        groups = Groups(parts, margin[: len(parts) - 1], contour[: len(parts) - 1], any_z)
-        flat = target.nearest(samples.points[rest], groups)
-        found.distance[rest], found.segment[rest] = flat.distance, flat.segment
-    return found, wrong_depth
+def _judged(samples: Samples, cuts: CutMoves, depth_mm: float) -> Bools:
+    """(S,) true for samples that must be found: a slope that is hardly below the stock top may be
+    a flat move upon it, which cuts nothing."""
+    return np.asarray(~cuts.slopes[samples.segment] | (samples.z < STOCK_TOP_MM - depth_mm))
 
 
 def _extra_cuts(
-    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, limit_mm: float
+    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, goal: Goal
 ) -> Iterator[Finding]:
-    bad = wrong_depth | (found.distance > limit_mm)
+    bad = wrong_depth | (found.distance > goal.limit_mm)
+    bad &= _judged(samples, cuts, goal.depth_mm)
     listed = list(_by_contour(cuts, samples, found.distance, bad))
     for number, (_, worst, share) in enumerate(listed):
         row = int(cuts.segments.path[samples.segment[worst]])
@@ -85,7 +72,7 @@ def _extra_cuts(
             f"{share:.0%} of a cut was not wanted: {how}" + and_more(number, len(listed), "cuts"),
             where=f"{block_name(cuts.toolpath, row)} near {at}",
             measured=_finite(found.distance[worst]),
-            limit=limit_mm,
+            limit=goal.limit_mm,
             unit="mm",
         )
         if and_more(number, len(listed), "cuts"):
@@ -93,9 +80,10 @@ def _extra_cuts(
 
 
 def _missing(
-    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, limit_mm: float
+    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, goal: Goal
 ) -> Iterator[Finding]:
-    bad = wrong_depth | (found.distance > limit_mm)
+    bad = wrong_depth | (found.distance > goal.limit_mm)
+    bad &= _judged(samples, cuts, goal.depth_mm)
     listed = list(_by_contour(cuts, samples, found.distance, bad))
     for number, (contour, worst, share) in enumerate(listed):
         row = int(cuts.segments.path[samples.segment[worst]])
@@ -109,7 +97,7 @@ def _missing(
             + and_more(number, len(listed), "contours"),
             where=f"{name} near {at_point(samples.points[worst])}",
             measured=_finite(found.distance[worst]),
-            limit=limit_mm,
+            limit=goal.limit_mm,
             unit="mm",
         )
         if and_more(number, len(listed), "contours"):

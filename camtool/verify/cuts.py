@@ -5,8 +5,9 @@ begins or ends below the stock top, z < 0. Air moves and plunges straight down a
 toolpath that never moves in Z (a bare drawing program, z ≥ 0 all along) holds no such row; when
 nothing better is known, `flat_cuts=True` makes all its feed moves in XY cut.
 
-A contour is a run of consecutive cutting rows. Events and rows that move nowhere do not end it;
-an air move, a plunge or homing does.
+A contour is a stay of the tool in the stock: consecutive cutting rows, with events, rows that move
+nowhere and feeds straight down or up between them (the steps from one pass to the next, the sides
+of tabs). A rapid, an air move or homing ends it.
 """
 
 from __future__ import annotations
@@ -38,14 +39,25 @@ class CutMoves:
     Arcs run about the programmed centre with the radius of their start; above 180° they are two
     segments. `segments.path` (K,) is the toolpath row; row r owns segments
     first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) numbers the contours from 0, −1 where
-    nothing is cut. `z` (K, 2) mm: lowest and highest point of the segment's row.
+    nothing is cut. `ends_z` (K, 2) mm: heights of the segment's start and end, between which it
+    rises or sinks evenly.
     """
 
     toolpath: Toolpath
     segments: Segments
     first: Ints
     contour: Ints
-    z: Floats
+    ends_z: Floats
+
+    @property
+    def z(self) -> Floats:
+        """(K, 2) mm: lowest and highest point of each segment."""
+        return np.sort(self.ends_z, axis=1)
+
+    @property
+    def slopes(self) -> Bools:
+        """(K,) true where a segment rises or sinks."""
+        return np.asarray(self.ends_z[:, 0] != self.ends_z[:, 1])
 
     @property
     def rows(self) -> Ints:
@@ -121,11 +133,20 @@ def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
     first = np.zeros(len(toolpath) + 1, dtype=np.int64)
     first[rows + 1] = parts
     segments = _segments(toolpath, rows, sweep, parts)
-    starts = toolpath.starts
-    low = np.minimum(starts[:, 2], toolpath.end[:, 2])
-    high = np.maximum(starts[:, 2], toolpath.end[:, 2])
-    z = np.column_stack([low, high])[segments.path]
-    return CutMoves(toolpath, segments, np.cumsum(first), _contours(toolpath, cutting), z)
+    contour = _contours(toolpath, cutting)
+    return CutMoves(toolpath, segments, np.cumsum(first), contour, _heights(toolpath, rows, parts))
+
+
+def _heights(toolpath: Toolpath, rows: Ints, parts: Ints) -> Floats:
+    """(K, 2) mm: heights at the ends of the equal parts of each row."""
+    row = np.repeat(rows, parts)
+    part = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
+    begin, end = toolpath.starts[row, 2], toolpath.end[row, 2]
+    of = np.repeat(parts, parts)
+    ends = (
+        begin[:, None] + (end - begin)[:, None] * np.column_stack([part, part + 1]) / of[:, None]
+    )
+    return np.asarray(np.where((begin == end)[:, None], begin[:, None], ends))
 
 
 def _segments(toolpath: Toolpath, rows: Ints, sweep: Floats, parts: Ints) -> Segments:
@@ -151,12 +172,15 @@ def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
 
 
 def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
-    """(N,) contour of each row: a new one begins where anything else moved in between."""
+    """(N,) contour of each row: a new one begins where the tool left the stock in between."""
     starts = toolpath.starts
     rise = np.abs(toolpath.end[:, 2] - starts[:, 2]) if len(toolpath) else np.empty(0)
-    moves = toolpath.is_motion & ((moved_lengths(toolpath) > POSITION_EPS_MM) | (rise > 0.0))
+    flat = moved_lengths(toolpath) > POSITION_EPS_MM
+    moves = toolpath.is_motion & (flat | (rise > 0.0))
     homes = (toolpath.kind == Kind.HOME_XY) | (toolpath.kind == Kind.HOME_Z)
-    breaks = np.cumsum((moves | homes) & ~cutting)
+    low = np.minimum(starts[:, 2], toolpath.end[:, 2]) < STOCK_TOP_MM - POSITION_EPS_MM
+    sinks = toolpath.is_feed & ~flat & low
+    breaks = np.cumsum((moves | homes) & ~cutting & ~sinks)
     contour = np.full(len(toolpath), -1, dtype=np.int64)
     contour[cutting] = np.unique(breaks[cutting], return_inverse=True)[1]
     return contour
@@ -164,10 +188,12 @@ def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Points (S, 2) mm on the segments `segment` (S,) of some CutMoves, ends included."""
+    """Points (S, 2) mm on the segments `segment` (S,) of some CutMoves, ends included, and their
+    heights `z` (S,) mm."""
 
     points: Floats
     segment: Ints
+    z: Floats
 
 
 def sample_cuts(cuts: CutMoves, spacing_mm: float) -> Samples:
@@ -180,4 +206,8 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float) -> Samples:
     parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), FEWEST_SAMPLES)
     segment = np.repeat(np.arange(len(parts)), parts + 1)
     within = np.arange(len(segment)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
-    return Samples(point_at(cuts.segments, segment, within / parts[segment]), segment)
+    share = within / parts[segment]
+    begin, end = cuts.ends_z[segment].T
+    # On the level exactly: rounding must not make slopes of flat moves.
+    z = np.where(begin == end, begin, begin + share * (end - begin))
+    return Samples(point_at(cuts.segments, segment, share), segment, z)

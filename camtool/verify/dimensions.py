@@ -1,6 +1,8 @@
 """Sizes of the part and of its closed contours, wanted and predicted; and how contours close.
 
-Sizes are those of the tool centre's path: the tool's own radius is nothing that motion changes.
+Of a contour that is cut in several passes the last one counts, without leads and ramps: its loop
+(`camtool.verify.loops`). The part is all loops and open contours together. Sizes are those of the
+tool centre's path: the tool's own radius is nothing that motion changes.
 
     error_percent = (predicted − nominal) / nominal · 100
 
@@ -19,6 +21,8 @@ import numpy as np
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
 from camtool.verify.cuts import CutMoves
+from camtool.verify.loops import NO_LOOP, loops, of_loops
+from camtool.verify.match import Match
 
 
 @dataclass(frozen=True)
@@ -59,43 +63,52 @@ def places_between(start: Floats, row_end: Floats) -> Floats:
 def closure_mm(cuts: CutMoves, slides: RowSlides, gap_mm: float) -> float:
     """Largest distance between the slides' start and end on a closed contour; NaN without one.
 
-    A contour is closed when its programmed ends are within gap_mm.
+    A contour is closed when the programmed ends of its loop are within gap_mm.
     """
-    begin, finish = cuts.contour_ends()
-    closed = cuts.closed(gap_mm)
-    if not closed.any():
+    found = loops(cuts, gap_mm)
+    begin, finish = found[found[:, 0] != NO_LOOP].T
+    if len(begin) == 0:
         return math.nan
-    gap = slides.places[finish[closed] + 1] - slides.places[begin[closed]]
+    gap = slides.places[finish + 1] - slides.places[begin]
     return float(np.hypot(gap[:, 0], gap[:, 1]).max())
 
 
 def sizes(
-    cuts: CutMoves, slides: RowSlides, wanted: CutMoves, contour: Ints, gap_mm: float
+    cuts: CutMoves, slides: RowSlides, wanted: CutMoves, match: Match, gap_mm: float
 ) -> Iterator[Size]:
     """The whole part, then each closed contour of `wanted`, X and Y.
 
-    `contour` (N,) is the wanted contour that each row of `cuts` belongs to; contours that no row
+    `match` says which wanted row and contour each row of `cuts` belongs to; contours that no row
     belongs to are left out (a finding says so).
     """
     if len(cuts.rows) == 0 or len(wanted.rows) == 0:
         return
-    low, high = _predicted(cuts, slides)
-    boxes = segment_boxes(wanted.segments)
+    found = loops(wanted, gap_mm)
+    closed = found[:, 0] != NO_LOOP
+    counts = wanted.is_cut & (of_loops(wanted, found) | ~np.append(closed, False)[wanted.contour])
+    mine = np.flatnonzero(counts[match.row] & (match.row >= 0))
+    if len(mine) == 0:
+        return
+    low, high = _predicted(cuts, slides, mine, match.contour)
+    segments = wanted.segments[np.flatnonzero(counts[wanted.segments.path])]
+    boxes = segment_boxes(segments)
     yield from _pair(
         "part",
         boxes[:, 2:].max(axis=0) - boxes[:, :2].min(axis=0),
-        high[cuts.rows].max(axis=0) - low[cuts.rows].min(axis=0),
+        high[mine].max(axis=0) - low[mine].min(axis=0),
     )
-    nominal = _extents(wanted.contour[wanted.segments.path], boxes[:, :2], boxes[:, 2:], wanted)
-    member = np.flatnonzero(contour >= 0)
-    predicted = _extents(contour[member], low[member], high[member], wanted)
-    for index in np.flatnonzero(wanted.closed(gap_mm) & np.isfinite(predicted[:, 0])):
+    nominal = _extents(wanted.contour[segments.path], boxes[:, :2], boxes[:, 2:], wanted)
+    predicted = _extents(match.contour[mine], low[mine], high[mine], wanted)
+    for index in np.flatnonzero(closed & np.isfinite(predicted[:, 0])):
         yield from _pair(f"contour {index + 1}", nominal[index], predicted[index])
 
 
-def _predicted(cuts: CutMoves, slides: RowSlides) -> tuple[Floats, Floats]:
-    """Extents (N, 2), (N, 2) of the slides in each row, and at the start of each contour."""
-    begin, _ = cuts.contour_ends()
+def _predicted(
+    cuts: CutMoves, slides: RowSlides, mine: Ints, contour: Ints
+) -> tuple[Floats, Floats]:
+    """Extents (N, 2), (N, 2) of the slides in each row, and, of the rows `mine`, where the first
+    of each contour (N,) begins."""
+    begin = mine[np.flatnonzero(np.diff(contour[mine], prepend=-1))]
     low, high = slides.low.copy(), slides.high.copy()
     low[begin] = np.minimum(low[begin], slides.places[begin])
     high[begin] = np.maximum(high[begin], slides.places[begin])

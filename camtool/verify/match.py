@@ -9,18 +9,21 @@ much) is taken row by row: a row belongs where all of its inner samples are near
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
 from camtool.verify.circles import Circle
 from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
-from camtool.verify.cuts import CutMoves, Samples
+from camtool.verify.cuts import Bools, CutMoves, Samples
 from camtool.verify.runs import ranges, run_offsets
 
 MOST_TRIES = 4
 """So many wanted contours are tried for a decoded one."""
+
+LEAST_MM = 1e-6
+"""What is nearer than this at its height is found even when no distance is allowed."""
 
 SAMPLES_PER_GROUP = 64
 """Neighbouring samples that share one search for near moves."""
@@ -30,11 +33,13 @@ SAMPLES_PER_GROUP = 64
 class Match:
     """What each of the N decoded rows belongs to, in the moves that it is compared with.
 
-    `contour` (N,) −1 for rows that do not cut; `only` (N,) that contour when the slides may be
-    compared with it alone, else ANY_CONTOUR; `circle` (N,) index of the full circle that the row
-    follows, −1; `apart_mm` (N,) largest distance of the row's samples.
+    `row` (N,) the wanted row nearest to its middle, −1 for rows that do not cut; `contour` (N,)
+    likewise; `only` (N,) that contour when the slides may be compared with it alone, else
+    ANY_CONTOUR; `circle` (N,) index of the full circle that the row follows, −1; `apart_mm` (N,)
+    largest distance of the row's samples.
     """
 
+    row: Ints
     contour: Ints
     only: Ints
     circle: Ints
@@ -43,17 +48,64 @@ class Match:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """The wanted moves, their full circles, and how far a decoded contour may be from its own."""
+    """The wanted moves, their full circles, how far a decoded contour may be from its own in XY,
+    and how far in height."""
 
     target: Target
     circles: list[Circle]
     limit_mm: float
+    depth_mm: float
 
 
 def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     """Each row belongs to itself: for programs with nothing to compare them with."""
     count = len(cuts.contour)
-    return Match(cuts.contour, cuts.contour, _circle_of_row(circles, count), np.zeros(count))
+    row = np.where(cuts.is_cut, np.arange(count), -1)
+    circle = _circle_of_row(circles, count)
+    return Match(row, cuts.contour, cuts.contour, circle, np.zeros(count))
+
+
+def nearest_at_height(
+    samples: Samples, choice: Ints | None, target: Target, limits_mm: tuple[float, float]
+) -> tuple[Found, Bools]:
+    """The nearest move of the target for each sample at its own height; where none is near there,
+    the nearest at any height, and true (S,) if that one is near.
+
+    `choice` (S,): the contour to compare with, the same all along a segment; None: any.
+    `limits_mm`: how far "near" is in XY, and in height.
+    """
+    limit_mm, depth_mm = limits_mm
+    found, wrong_depth = _nothing(len(samples.points)), np.zeros(len(samples.points), np.bool_)
+    if len(samples.points) == 0:
+        return found, wrong_depth
+    every = np.arange(len(samples.points))
+    for levels in (True, False):
+        rest = every[np.isinf(found.distance)]
+        if len(rest) == 0:
+            break
+        offsets = run_offsets(samples.segment[rest], SAMPLES_PER_GROUP)
+        first, z = rest[offsets[:-1]], samples.z[rest]
+        count = len(first)
+        contour = np.full(count, ANY_CONTOUR) if choice is None else choice[first]
+        groups = Groups(
+            offsets, np.full(count, limit_mm), contour, np.tile([-np.inf, np.inf], (count, 1))
+        )
+        if levels:
+            low = np.minimum.reduceat(z, offsets[:-1]) - depth_mm
+            high = np.maximum.reduceat(z, offsets[:-1]) + depth_mm
+            heights = np.column_stack([low, high])
+            groups = replace(
+                groups, z=heights, height=z, window_mm=depth_mm, most_mm=max(limit_mm, LEAST_MM)
+            )
+        near = target.nearest(samples.points[rest], groups)
+        found.distance[rest], found.segment[rest] = near.distance, near.segment
+        if not levels:
+            wrong_depth[rest] = near.distance <= limit_mm
+    return found, wrong_depth
+
+
+def _nothing(count: int) -> Found:
+    return Found(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
 
 
 def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -> Ints:
@@ -71,7 +123,8 @@ def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -
             break
         which = ranges(begin[open_], np.diff(begin)[open_])
         choice = np.repeat(candidate[open_], np.diff(begin)[open_])
-        near = _nearest_of(samples.points[which], samples.segment[which], choice, wanted)
+        part = Samples(samples.points[which], samples.segment[which], samples.z[which])
+        near, _ = nearest_at_height(part, choice, wanted, (goal.limit_mm, goal.depth_mm))
         starts = np.cumsum(np.diff(begin)[open_]) - np.diff(begin)[open_]
         fits = np.maximum.reduceat(near.distance, starts) <= goal.limit_mm
         fitting = np.repeat(fits, np.diff(begin)[open_])
@@ -101,20 +154,13 @@ def _candidates(mine: Ints, nearest: Ints) -> list[Ints]:
     return tries
 
 
-def _nearest_of(points: Floats, segment: Ints, choice: Ints, wanted: Target) -> Found:
-    """The nearest move of the chosen contours (S,) for points (S, 2) on these segments (S,)."""
-    offsets = run_offsets(segment, SAMPLES_PER_GROUP)
-    count = len(offsets) - 1
-    any_z = np.tile([-np.inf, np.inf], (count, 1))
-    return wanted.nearest(points, Groups(offsets, np.zeros(count), choice[offsets[:-1]], any_z))
-
-
 def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, goal: Goal) -> Match:
     """What each row of `cuts` belongs to, its samples taken together; `belongs` (S,) and `found`
     as `match_contours` leaves them."""
     wanted, count = goal.target, len(cuts.contour)
     rows = cuts.segments.path[samples.segment]
     match = Match(
+        row=np.full(count, -1, dtype=np.int64),
         contour=np.full(count, -1, dtype=np.int64),
         only=np.full(count, ANY_CONTOUR, dtype=np.int64),
         circle=np.full(count, -1, dtype=np.int64),
@@ -129,6 +175,7 @@ def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, go
     circle = _circle_of_row(goal.circles, len(wanted.cuts.contour))[
         wanted.cuts.segments.path[found.segment]
     ]
+    match.row[row] = wanted.cuts.segments.path[found.segment[middle]]
     known = belongs[begin] != ANY_CONTOUR
     match.contour[row] = np.where(known, belongs[begin], nearest[middle])
     match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))

@@ -10,26 +10,33 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
+from camtool.toolpath.cleared import CLEARED_MM, Reach, Through, rapids_through_stock
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verify.case import Case
 from camtool.verify.cuts import CutMoves, rapids_in_stock
+from camtool.verify.holes import holes_of
 from camtool.verify.motion import Tally
 from camtool.verify.places import and_more, at_point, block_name
 
 AXES = "XYZ"
+
+CLEARED_COVERAGES = 2.0
+"""A rapid may stick out of what is cleared by so many tolerances of the coverage: it and the cuts
+beside it are rounded each on its own."""
 
 TRAVEL_EPS_MM = 1e-6
 """A span may exceed the travel by this much, by rounding alone."""
 
 
 def motion_findings(
-    cuts: CutMoves, machine: Machine, tally: Tally, extents: Floats
+    cuts: CutMoves, case: Case, tally: Tally, extents: Floats
 ) -> tuple[Finding, ...]:
     """All findings that need the motion or the machine; `extents` (3, 2) mm of the toolpath."""
-    decoded = cuts.toolpath
+    decoded, machine = cuts.toolpath, case.machine
     return (
         *_endless_arcs(decoded, machine, tally),
         *_out_of_travel(machine, extents),
-        *_rapids_in_stock(decoded),
+        *_rapids_in_stock(decoded, case),
         *_many_reversals(machine, tally),
         *_nothing_moves(cuts),
         *_homing(decoded, machine),
@@ -71,22 +78,36 @@ def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
             )
 
 
-def _rapids_in_stock(decoded: Toolpath) -> Iterator[Finding]:
-    rows = rapids_in_stock(decoded)
-    for number, row in enumerate(rows):
-        more = and_more(number, len(rows), "rapids")
-        depth = float(min(decoded.starts[row, 2], decoded.end[row, 2]))
+def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
+    found = _through_stock(decoded, case)
+    for number, one in enumerate(found):
+        more = and_more(number, len(found), "rapids")
         yield Finding(
-            Code.EXTRA_CUT,
+            Code.RAPID_IN_STOCK,
             Severity.ERROR,
-            f"a rapid runs through the stock, {-depth:.3f} mm below its top{more}",
-            where=f"{block_name(decoded, int(row))}, end {at_point(decoded.end[row])}",
-            measured=depth,
+            f"a rapid runs through the stock, {-one.z_mm:.3f} mm below its top{more}",
+            where=f"{block_name(decoded, one.row)} near {at_point(one.at_mm)}",
+            measured=one.z_mm,
             limit=0.0,
             unit="mm",
         )
         if more:
             return
+
+
+def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
+    """Rapids through what the tool has not cleared; of a tool that nobody knows all rapids below
+    the stock top that move in XY."""
+    diameter = case.options.tool_diameter_mm
+    if diameter is not None:
+        radius = np.full(len(decoded), 0.5 * diameter)
+        tolerance = max(CLEARED_MM, CLEARED_COVERAGES * case.coverage_mm)
+        return rapids_through_stock(decoded, Reach(radius, radius), tolerance)
+    low = np.minimum(decoded.starts[:, 2], decoded.end[:, 2])
+    return [
+        Through(row, float(low[row]), (float(decoded.end[row, 0]), float(decoded.end[row, 1])))
+        for row in rapids_in_stock(decoded).tolist()
+    ]
 
 
 def _many_reversals(machine: Machine, tally: Tally) -> Iterator[Finding]:
@@ -109,7 +130,7 @@ def _nothing_moves(cuts: CutMoves) -> Iterator[Finding]:
     still = np.all(decoded.end == decoded.starts) if len(decoded) else True
     if bool(still) and not decoded.is_arc.any() and not homes.any():
         message = "the program moves nothing"
-    elif len(cuts.rows) == 0:
+    elif len(cuts.rows) == 0 and len(holes_of(decoded)) == 0:
         message = "the program cuts nothing: no feed move goes along below the stock top"
     else:
         return

@@ -92,8 +92,8 @@ class Result:
         )
 
     def _dimensions(self, slides: RowSlides) -> tuple[record.Dimension, ...]:
-        contour = self.coverage.match.contour
-        found = sizes(self.cuts, slides, self.wanted, contour, self.case.coverage_mm)
+        match = self.coverage.match
+        found = sizes(self.cuts, slides, self.wanted, match, self.case.coverage_mm)
         return tuple(
             record.Dimension(
                 name=size.name,

@@ -13,10 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
-from camtool.verify.circles import UNSEEN, Circle, CircleBins, CircleFigures
+from camtool.verify.circles import UNSEEN, CircleBins, CircleFigures
 from camtool.verify.compare import Groups, Target
 from camtool.verify.figures import Figure, LargestError
-from camtool.verify.match import Match
+from camtool.verify.match import Goal, Match
 from camtool.verify.motion import Batch
 from camtool.verify.runs import run_offsets
 from camtool.verify.trace import Trace, TraceBuffer
@@ -31,9 +31,8 @@ class SlidePass:
     def __init__(
         self,
         decoded: Target,
-        wanted: Target,
+        goal: Goal,
         match: Match,
-        circles: list[Circle],
         trace: TraceBuffer,
     ) -> None:
         self.interpolation = Figure()
@@ -48,11 +47,12 @@ class SlidePass:
         """(N, 2) mm: highest X and Y of the slides in each row; −inf where they did not move."""
         self.row_end = np.full((count, 2), np.nan)
         """(N, 2) mm: where the slides stand after each row; NaN where they did not move."""
-        self.circle_figures: list[CircleFigures] = [UNSEEN] * len(circles)
-        self._decoded, self._wanted, self._match = decoded, wanted, match
-        self.circles = circles
+        self.circles = goal.circles
+        self.circle_figures: list[CircleFigures] = [UNSEEN] * len(goal.circles)
+        self._decoded, self._wanted, self._match = decoded, goal.target, match
+        self._heights = _heights(decoded, goal.depth_mm)
         self._bins: dict[int, CircleBins] = {}
-        self._last_row = _last_rows(match.circle, len(circles))
+        self._last_row = _last_rows(match.circle, len(goal.circles))
 
     def add(self, batch: Batch) -> None:
         """The next steps of the program."""
@@ -97,11 +97,19 @@ class SlidePass:
         return np.where(known, total, 0.0)
 
     def _nearest(self, slide: Floats, row: Ints, bound: Floats) -> Floats:
+        """Distances to wanted moves at the row's height, and at any height where none is there."""
+        distance = self._nearest_within(slide, row, bound, self._heights[row])
+        rest = np.flatnonzero(np.isinf(distance))
+        if len(rest):
+            any_z = np.tile([-np.inf, np.inf], (len(rest), 1))
+            distance[rest] = self._nearest_within(slide[rest], row[rest], bound[rest], any_z)
+        return distance
+
+    def _nearest_within(self, slide: Floats, row: Ints, bound: Floats, z: Floats) -> Floats:
         offsets = run_offsets(row, STEPS_PER_GROUP)
-        first = row[offsets[:-1]]
-        any_z = np.tile([-np.inf, np.inf], (len(first), 1))
-        margin = np.maximum.reduceat(bound, offsets[:-1])
-        groups = Groups(offsets, margin, self._match.only[first], any_z)
+        first = offsets[:-1]
+        margin = np.maximum.reduceat(bound, first)
+        groups = Groups(offsets, margin, self._match.only[row[first]], z[first])
         return self._wanted.nearest(slide, groups).distance
 
     def _add_circles(self, cut: Batch) -> None:
@@ -119,6 +127,13 @@ class SlidePass:
         row = int(cut.row[-1])
         for index in [index for index in self._bins if self._last_row[index] < row]:
             self.circle_figures[index] = self._bins.pop(index).figures()
+
+
+def _heights(decoded: Target, depth_mm: float) -> Floats:
+    """(N, 2) mm: between which heights each row is compared."""
+    toolpath = decoded.cuts.toolpath
+    ends = np.column_stack([toolpath.starts[:, 2], toolpath.end[:, 2]])
+    return np.asarray(np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]))
 
 
 def _last_rows(circle: Ints, count: int) -> Ints:

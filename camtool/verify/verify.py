@@ -31,6 +31,7 @@ from camtool.verify.coverage import Coverage, cover
 from camtool.verify.cuts import cut_moves, is_flat
 from camtool.verify.figures import Figure
 from camtool.verify.held import held
+from camtool.verify.holes import hole_findings, holes_of
 from camtool.verify.match import Goal, own_match
 from camtool.verify.motion import Tally, batches
 from camtool.verify.noticed import motion_findings
@@ -85,17 +86,16 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
     if case.wanted is not None:
         wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
     circles = full_circles(wanted.cuts, case.coverage_mm)
-    coverage = _coverage(case, decoded, Goal(wanted, circles, case.coverage_mm))
+    goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
+    coverage = _coverage(case, decoded, goal)
     trace = TraceBuffer(case.decoded, case.spacing_mm, case.options.trace_points)
-    slides = SlidePass(decoded, wanted, coverage.match, circles, trace)
+    slides = SlidePass(decoded, goal, coverage.match, trace)
     tally = Tally()
     for batch in batches(chunks, case.decoded, decoded.cuts.is_cut, tally):
         slides.add(batch)
     slides.finish()
     extents = toolpath_extents(case.decoded)
-    findings = _all_findings(
-        case, coverage, motion_findings(decoded.cuts, case.machine, tally, extents)
-    )
+    findings = _all_findings(case, coverage, motion_findings(decoded.cuts, case, tally, extents))
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, tally)
     return Verification(result.report(extents, findings), trace.trace(), findings)
 
@@ -103,7 +103,14 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
 def _coverage(case: Case, decoded: Target, goal: Goal) -> Coverage:
     if case.wanted is None:
         return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
-    return cover(decoded, goal, case.options.sample_mm)
+    coverage = cover(decoded, goal, case.options.sample_mm)
+    holes = hole_findings(
+        holes_of(decoded.cuts.toolpath),
+        holes_of(goal.target.cuts.toolpath),
+        goal.limit_mm,
+        goal.depth_mm,
+    )
+    return replace(coverage, findings=(*coverage.findings, *holes))
 
 
 def _all_findings(

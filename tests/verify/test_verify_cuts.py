@@ -58,18 +58,18 @@ def test_rapids_through_the_stock_are_found() -> None:
     assert rapids_in_stock(b.finish()).tolist() == [3]
 
 
-def test_contours_end_at_air_moves_plunges_and_homing_but_not_at_events() -> None:
+def test_contours_end_at_air_moves_and_homing_but_not_at_plunges_and_events() -> None:
     b = cut(ToolpathBuilder(), 0, 0).line(1, 0, feed=1)
     b.event(Kind.DWELL, 1.0).line(1, 0, feed=1).line(1, 1, feed=1)  # one contour
-    b.line(z=-0.04, feed=1).line(0, 0, feed=1)  # plunge: a second one
-    b.event(Kind.HOME_Z).line(0, 1, feed=1)  # homing: a third one
-    b.rapid(z=0.2).rapid(0, 0).line(z=-0.1, feed=1).line(0, 1, feed=1)  # a fourth one
+    b.line(z=-0.04, feed=1).line(0, 0, feed=1)  # plunge: another pass
+    b.event(Kind.HOME_Z).line(0, 1, feed=1)  # homing: a second one
+    b.rapid(z=0.2).rapid(0, 0).line(z=-0.1, feed=1).line(0, 1, feed=1)  # a third one
     cuts = cut_moves(b.finish(), flat_cuts=False)
-    assert cuts.contour[cuts.rows].tolist() == [0, 0, 1, 2, 3]
-    assert cuts.contour_count == 4
+    assert cuts.contour[cuts.rows].tolist() == [0, 0, 0, 1, 2]
+    assert cuts.contour_count == 3
     begin, finish = cuts.contour_ends()
-    assert begin.tolist() == [3, 8, 10, 14]
-    assert finish.tolist() == [6, 8, 10, 14]
+    assert begin.tolist() == [3, 10, 14]
+    assert finish.tolist() == [8, 10, 14]
 
 
 def test_closed_contours() -> None:

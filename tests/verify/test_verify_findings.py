@@ -126,7 +126,7 @@ def test_travel_play_homing_and_rapids_in_stock() -> None:
     assert travel.where.startswith("axis X")
     (play,) = [f for f in found.findings if f.code == Code.PLAY_NOT_KNOWN]
     assert play.where == "axis Z"
-    (rapid,) = [f for f in found.findings if f.code == Code.EXTRA_CUT]
+    (rapid,) = [f for f in found.findings if f.code == Code.RAPID_IN_STOCK]
     assert rapid.where.startswith("move 5")
     assert codes(found).count(Code.RETURN_TO_MACHINE_ZERO) == 1
 

@@ -1,0 +1,100 @@
+"""Drilled holes: are all there, as deep as wanted, and no others?
+
+A hole is a place where the tool is fed straight down below the stock top and back, in as many
+pecks as it likes, without any cut in XY before it leaves the place: no contour begins with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verify.cuts import STOCK_TOP_MM, cutting_rows, moved_lengths
+from camtool.verify.places import and_more, at_point, block_name
+
+
+@dataclass(frozen=True, eq=False)
+class Holes:
+    """H holes of `toolpath`: where, (H, 2) mm, the height of their bottoms (H,) mm, and the row
+    (H,) that reached it first."""
+
+    toolpath: Toolpath
+    at: Floats
+    bottom_mm: Floats
+    row: Ints
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+
+def holes_of(toolpath: Toolpath) -> Holes:
+    """The holes that a toolpath drills, in order."""
+    flat = toolpath.is_motion & (moved_lengths(toolpath) > POSITION_EPS_MM)
+    flat |= toolpath.kind == Kind.HOME_XY
+    cutting = cutting_rows(toolpath, flat_cuts=False)
+    # A stay at one place lies between two moves in XY; neither may cut.
+    stay = np.cumsum(flat)
+    movers = np.flatnonzero(flat)
+    cut = np.zeros(len(movers) + 2, dtype=np.bool_)
+    cut[1:-1] = cutting[movers]
+    running = np.cumsum(toolpath.kind == Kind.END) == 0
+    down = toolpath.is_feed & ~flat & (toolpath.end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
+    rows = np.flatnonzero(down & running & ~cut[stay] & ~cut[stay + 1])
+    order = rows[np.lexsort((rows, toolpath.end[rows, 2], stay[rows]))]
+    deepest = order[np.flatnonzero(np.diff(stay[order], prepend=-1))]
+    return Holes(toolpath, toolpath.end[deepest, :2], toolpath.end[deepest, 2], deepest)
+
+
+def hole_findings(
+    decoded: Holes, wanted: Holes, limit_mm: float, depth_mm: float
+) -> tuple[Finding, ...]:
+    """CONTOUR_MISSING for holes that the program does not drill, EXTRA_CUT for others: within
+    `limit_mm` in XY, and `depth_mm` in height."""
+    return (
+        *_unpaired(wanted, decoded, (limit_mm, depth_mm), Code.CONTOUR_MISSING),
+        *_unpaired(decoded, wanted, (limit_mm, depth_mm), Code.EXTRA_CUT),
+    )
+
+
+def _unpaired(
+    holes: Holes, others: Holes, limits_mm: tuple[float, float], code: Code
+) -> Iterator[Finding]:
+    here, paired = _paired(holes, others, limits_mm)
+    alone = np.flatnonzero(~paired).tolist()
+    what = "is not drilled by the program" if code == Code.CONTOUR_MISSING else "was not wanted"
+    for number, hole in enumerate(alone):
+        more = and_more(number, len(alone), "holes")
+        row, depth = int(holes.row[hole]), STOCK_TOP_MM - float(holes.bottom_mm[hole])
+        how = ": there is one of another depth" if here[hole] else ""
+        yield Finding(
+            code,
+            Severity.ERROR,
+            f"a hole {depth:.3f} mm deep {what}{how}{more}",
+            where=f"{block_name(holes.toolpath, row)} at {at_point(holes.at[hole])}",
+            measured=depth,
+            unit="mm",
+        )
+        if more:
+            return
+
+
+def _paired(
+    holes: Holes, others: Holes, limits_mm: tuple[float, float]
+) -> tuple[np.ndarray[tuple[int], np.dtype[np.bool_]], np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+    """(H,), (H,) which holes have another one at their place, and which one as deep too."""
+    import shapely
+
+    here, same = np.zeros(len(holes), dtype=np.bool_), np.zeros(len(holes), dtype=np.bool_)
+    if len(holes) and len(others):
+        tree = shapely.STRtree(shapely.points(others.at))
+        points = shapely.points(holes.at)
+        mine, theirs = tree.query(points, predicate="dwithin", distance=limits_mm[0])
+        here[mine] = True
+        deep = np.abs(holes.bottom_mm[mine] - others.bottom_mm[theirs]) <= limits_mm[1]
+        same[mine[deep]] = True
+    return here, same
