@@ -1,0 +1,154 @@
+"""What the tests of reversals share: shapes, contours, and what a machine makes of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from camtool.geometry.polylines import Polyline
+from camtool.machine.model import Machine
+from camtool.machine.registry import load_target
+from camtool.planning.approach import Approaches
+from camtool.planning.items import Contour, Feeds, Item, Run, Setting
+from camtool.planning.job import Operation
+from camtool.planning.link import Worked, link
+from camtool.toolpath.moves import Toolpath
+from camtool.verify.report import Report
+from camtool.verify.verify import verify
+
+DEPTH_MM = 0.02
+PIC = load_target("pic-mmh")
+
+
+def setting(levels: int = 1, **operation: Any) -> Setting:
+    depths = tuple(-DEPTH_MM * (level + 1) / levels for level in range(levels))
+    return Setting(Operation(**operation), Feeds(0.8, 0.8), depths, 0.2)
+
+
+def contour(
+    path: Polyline, levels: int = 1, left: bool | None = None, **operation: Any
+) -> Contour:
+    return Contour(
+        path,
+        setting(levels, **operation),
+        "test",
+        0,
+        reversible=not path.closed,
+        material_left=left,
+    )
+
+
+def run_of(path: Polyline) -> Run:
+    flat = path.vertices
+    if path.closed:
+        flat = np.concatenate([flat, flat[:1]])
+    vertices = np.insert(flat, 2, -DEPTH_MM, axis=1)
+    vertices[-1, 3] = 0.0
+    return Run(vertices, np.full(len(vertices) - 1, 0.8), 0.8, "test")
+
+
+def toolpath(paths: Sequence[Polyline], machine: Machine, *, approach: bool) -> Toolpath:
+    """The paths cut one after the other, each from its first point."""
+    runs = [run_of(path) for path in paths]
+    come = Approaches(machine) if approach else None
+    return link([Worked(Operation(), runs)], 0.2, come).finish()
+
+
+def judged(
+    paths: Sequence[Polyline], wanted: Sequence[Polyline], machine: Machine, *, approach: bool
+) -> Report:
+    """The paths as the PIC machine cuts them, compared with the wanted ones."""
+    program = PIC.post.write(toolpath(paths, machine, approach=approach), machine)
+    decoded = PIC.post.read(program.data, machine)
+    whole = toolpath(wanted, machine, approach=False)
+    return verify(decoded, machine, wanted=whole).report
+
+
+def cutting_reversals(report: Report) -> int:
+    return report.reversals.cutting.x + report.reversals.cutting.y
+
+
+def paths_of(items: Sequence[Item]) -> list[Polyline]:
+    assert all(isinstance(item, Contour) for item in items)
+    return [item.path for item in items if isinstance(item, Contour)]
+
+
+def with_play(machine: Machine, **changes: float) -> Machine:
+    """The machine with other `backlash_mm` or `compensation_mm` in X and Y (or with an `x_` or
+    `y_` before, in one of them)."""
+    axes = {}
+    for name in ("x", "y"):
+        of_axis = {
+            key.removeprefix(f"{name}_"): value
+            for key, value in changes.items()
+            if not key.startswith(("y_", "x_")) or key.startswith(f"{name}_")
+        }
+        axes[name] = msgspec.structs.replace(getattr(machine.axes, name), **of_axis)
+    return msgspec.structs.replace(machine, axes=msgspec.structs.replace(machine.axes, **axes))
+
+
+def polygon(*points: tuple[float, float]) -> Polyline:
+    return Polyline(np.array([(x, y, 0.0) for x, y in points]), True)
+
+
+def square(side_mm: float = 1.0) -> Polyline:
+    return polygon((0.0, 0.0), (side_mm, 0.0), (side_mm, side_mm), (0.0, side_mm))
+
+
+def circle(radius_mm: float = 0.5, start_rad: float = 0.0) -> Polyline:
+    x, y = radius_mm * math.cos(start_rad), radius_mm * math.sin(start_rad)
+    return Polyline(np.array([[x, y, 1.0], [-x, -y, 1.0]]), True)
+
+
+def star(points: int = 5, radius_mm: float = 0.5) -> Polyline:
+    angle = np.arange(2 * points) * math.pi / points + 0.1
+    radius = np.where(np.arange(2 * points) % 2 == 0, 1.0, 0.4) * radius_mm
+    ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle])
+    return Polyline(ring, True)
+
+
+def gear(teeth: int = 8, radius_mm: float = 0.5) -> Polyline:
+    """Teeth with arcs at their tips and roots."""
+    step = math.pi / teeth
+    angle = (np.arange(2 * teeth)[:, None] * step + np.array([0.2, 0.8]) * step).ravel()
+    tips = np.repeat(np.arange(2 * teeth) % 2 == 0, 2)
+    radius = np.where(tips, 1.0, 0.8) * radius_mm
+    bulge = np.where(np.arange(4 * teeth) % 2 == 0, math.tan(0.6 * step / 4.0), 0.0)
+    return Polyline(np.column_stack([radius * np.cos(angle), radius * np.sin(angle), bulge]), True)
+
+
+def letter_s(height_mm: float = 1.0) -> Polyline:
+    """An S as an outline of arcs and lines, its ends cut off straight."""
+    quarter = math.tan(math.pi / 8.0)
+    outline = [
+        (0.9, 0.8, 0.0),
+        (0.7, 0.8, quarter),
+        (0.5, 1.0, quarter),
+        (0.3, 0.8, quarter),
+        (0.5, 0.6, -quarter),
+        (0.9, 0.2, -quarter),
+        (0.5, -0.2, -quarter),
+        (0.1, 0.2, 0.0),
+        (0.3, 0.2, quarter),
+        (0.5, 0.0, quarter),
+        (0.7, 0.2, quarter),
+        (0.5, 0.4, -quarter),
+        (0.1, 0.8, -quarter),
+        (0.5, 1.2, -quarter),
+    ]
+    return Polyline(np.array(outline) * np.array([height_mm, height_mm, 1.0]) / 1.4, True)
+
+
+def letter_e(height_mm: float = 1.0) -> Polyline:
+    points = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 2), (2.5, 2), (2.5, 3), (1, 3), (1, 4), (3, 4)]
+    scaled = [(x * height_mm / 5.0, y * height_mm / 5.0) for x, y in [*points, (3, 5), (0, 5)]]
+    return polygon(*scaled)
+
+
+def letter_v(height_mm: float = 1.0) -> Polyline:
+    points = [(2, 0), (3, 0), (5, 5), (4, 5), (2.5, 1), (1, 5), (0, 5)]
+    return polygon(*[(x * height_mm / 5.0, y * height_mm / 5.0) for x, y in points])
