@@ -1,0 +1,149 @@
+"""Where the tool comes from, so that no play is left when a cut begins."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camtool.geometry.polylines import Polyline
+from camtool.kernels.play import play_fill, play_limits
+from camtool.machine.model import Machine, PathController, PicMmhController
+from camtool.planning.approach import (
+    APPROACH_MARGIN_MM,
+    Approaches,
+    approach_from,
+    approach_mm,
+)
+from camtool.planning.items import Run
+from camtool.planning.residual import residuals
+from camtool.planning.reversals import reversals_of
+from camtool.simulation.simulate import simulate
+from camtool.verify.cuts import cut_moves
+from tests.planning.reversal_parts import run_of, square, toolpath, with_play
+from tests.strategies import contours, open_contours
+
+
+def line(*points: tuple[float, float]) -> Run:
+    return run_of(Polyline(np.array([(x, y, 0.0) for x, y in points])))
+
+
+MARGIN = APPROACH_MARGIN_MM
+
+
+@pytest.mark.parametrize(
+    ("run", "from_x", "from_y", "why"),
+    [
+        (line((1, 2), (3, 4)), -MARGIN, -MARGIN, "both axes towards +"),
+        (line((1, 2), (0, 4)), MARGIN, -MARGIN, "X towards −"),
+        (line((1, 2), (0, 0)), MARGIN, MARGIN, "both towards −"),
+        (line((1, 2), (1, 0)), -MARGIN, MARGIN, "X stands still: from its better side"),
+        (line((1, 2), (1, 0), (0, 0)), MARGIN, MARGIN, "X moves later, towards −"),
+        (line((1, 2), (2, 0), (0, 0)), -MARGIN, MARGIN, "X moves towards + first"),
+        (run_of(Polyline(np.array([[1, 2, 1.0], [1, 4, 0]]))), -MARGIN, -MARGIN, "an arc"),
+    ],
+)
+def test_both_axes_come_as_they_go_on(
+    machine: Machine, run: Run, from_x: float, from_y: float, why: str
+) -> None:
+    assert approach_from(run, machine) == pytest.approx((1 + from_x, 2 + from_y)), why
+
+
+def test_a_hole_is_always_reached_from_one_side(machine: Machine) -> None:
+    hole = Run(np.array([[1, 2, -1.0, 0], [1, 2, 0.5, 0]]), np.array([5.0]), 5.0, "hole")
+    assert approach_from(hole, machine) == pytest.approx((1 - MARGIN, 2 - MARGIN))
+
+
+def test_the_way_is_what_compensation_leaves_of_the_play(machine: Machine) -> None:
+    bare = with_play(machine, backlash_mm=0.3, compensation_mm=0.1)
+    assert approach_mm(bare.axes.x) == pytest.approx(0.2 + MARGIN)
+    one = with_play(machine, backlash_mm=0.3, compensation_mm=0.0, y_backlash_mm=0.0)
+    assert approach_from(line((1, 2), (3, 4)), one) == pytest.approx((1 - 0.3 - MARGIN, 2))
+    none = with_play(machine, backlash_mm=0.0, compensation_mm=0.0)
+    assert approach_from(line((1, 2), (3, 4)), none) is None
+
+
+def test_an_engaged_axis_comes_straight(machine: Machine) -> None:
+    come = Approaches(machine)
+    assert come(line((0, 0), (1, 1))) == pytest.approx((-MARGIN, -MARGIN))
+    assert come(line((1, 1), (2, 2))) is None  # both go on
+    assert come(line((2, 2), (3, 1))) == pytest.approx((2, 2 + MARGIN))  # Y turns
+    assert come(line((2.9, 0.5), (3, 0))) == pytest.approx((2.9 - MARGIN, 0.5))  # X was beyond
+    assert come(line((3.01, 0), (3.02, -1))) is None
+    # From farther than the play on both axes: the way there takes it up.
+    assert come(line((4, -2), (5, -3))) is None
+    assert come(line((2, 2), (1, 3))) is None
+    # X has come back by less than its play.
+    assert come(line((1 + 0.5 * MARGIN, 3), (2, 4))) == pytest.approx((1 - 0.5 * MARGIN, 3))
+
+
+@given(st.lists(st.one_of(contours(max_points=6), open_contours(max_points=6)), max_size=5))
+def test_the_first_motion_of_a_cut_is_no_reversal(machine: Machine, paths: list[Polyline]) -> None:
+    follower = msgspec.structs.replace(machine, controller=PathController(grid="none"))
+    moves = toolpath(paths, follower, approach=True)
+    cuts = cut_moves(moves, flat_cuts=False).is_cut
+    counted = np.zeros(2, dtype=np.int64)
+    for chunk in simulate(moves, follower):
+        if cuts[chunk.row]:
+            counted += chunk.reversals[:2]
+    wanted = [reversals_of(run_of(path), follower) for path in paths]
+    assert counted.tolist() == np.array(wanted).reshape(-1, 2).sum(axis=0).tolist()
+
+
+@given(contours(max_points=6))
+def test_a_slide_stands_engaged_from_the_first_cut_on(machine: Machine, path: Polyline) -> None:
+    # Whole steps of compensation: 0.14 mm are 1000.
+    loose = with_play(machine, backlash_mm=0.3, compensation_mm=0.14)
+    follower = msgspec.structs.replace(loose, controller=PathController(grid="none"))
+    x, y = path.vertices[0, :2].tolist()
+    # Short enough to drive each axis one way only.
+    path = Polyline(np.array([[x, y, 0.0], [*(0.5 * (path.vertices[1, :2] + (x, y))), 0.0]]))
+    moves = toolpath([square(), path], follower, approach=True)
+    last = int(np.flatnonzero(cut_moves(moves, flat_cuts=False).is_cut)[-1])
+    lag = np.concatenate(
+        [
+            (chunk.slide - chunk.commanded)[:, :2]
+            for chunk in simulate(moves, follower)
+            if chunk.row == last
+        ]
+    )
+    way = np.sign(path.end - path.start)
+    for axis, residual in enumerate(residuals(follower)):
+        error = residual.error_mm(int(way[axis]) or residual.better)
+        assert lag[:, axis] == pytest.approx(error, abs=1e-9)
+
+
+@pytest.mark.parametrize("play", ["preloaded", "centred"])
+@pytest.mark.parametrize("direction", ["+", "-"])
+@pytest.mark.parametrize("compensation_steps", [0, 150, 250])
+def test_residual_errors_are_those_of_the_play_operator(
+    machine: Machine, play: str, direction: str, compensation_steps: int
+) -> None:
+    step = 0.001
+    axis = msgspec.structs.replace(
+        machine.axes.x,
+        coded_step_mm=step,
+        real_step_mm=step,
+        backlash_mm=0.2,
+        compensation_mm=compensation_steps * step,
+    )
+    controller = PicMmhController(start_play=play, start_direction=direction)  # type: ignore[arg-type]
+    changed = msgspec.structs.replace(
+        machine, axes=msgspec.structs.replace(machine.axes, x=axis), controller=controller
+    )
+    residual = residuals(changed)[0]
+    first = 1 if direction == "+" else -1
+    low, high = play_limits(0.2, play, first)
+    way = np.concatenate([np.arange(2000), np.arange(2000, -2000, -1), np.arange(-2000, 0)])
+    out = np.empty(len(way))
+    state = np.array([0.0, first, 0.0, 0.0, 0.0, 0.0])
+    play_fill(way, np.array([step, low, high, compensation_steps]), state, out)
+    error = out - way * step
+    assert error[1900] == pytest.approx(residual.plus_mm, abs=1e-12) or first < 0
+    assert error[5900] == pytest.approx(residual.minus_mm, abs=1e-12)
+    assert error[-1] == pytest.approx(residual.plus_mm, abs=1e-12)
+    smaller = min(abs(residual.plus_mm), abs(residual.minus_mm))
+    assert abs(residual.error_mm(residual.better)) == pytest.approx(smaller)
+    assert residual.matters
