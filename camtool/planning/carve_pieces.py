@@ -27,7 +27,10 @@ samples takes less than the rest."""
 FEWEST_FOR_ARC = 5
 """An arc is laid through three of at least so many samples."""
 
-ROUNDEST_SWEEP_RAD = 2.0
+LEAST_SWEEP_RAD = 1e-4
+"""What turns less is no arc: its centre would lie too far off to be counted with."""
+
+MOST_SWEEP_RAD = 2.0
 """An arc of the axis that turns farther is divided."""
 
 
@@ -153,7 +156,7 @@ def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
     to_begin, to_end = begin[0, :2] - middle, end[0, :2] - middle
     across = to_begin[0] * to_end[1] - to_begin[1] * to_end[0]
     sweep = 2.0 * (np.pi - abs(np.arctan2(across, to_begin @ to_end)))
-    if not 0.0 < sweep <= ROUNDEST_SWEEP_RAD:
+    if not LEAST_SWEEP_RAD <= sweep <= MOST_SWEEP_RAD:
         return None
     bulge = float(np.copysign(np.tan(0.25 * sweep), -across))
     return bulge if _off_arc(inner, begin[0], end[0], bulge) <= tolerance_mm else None
