@@ -71,36 +71,40 @@ def relieved(
     others = (
         walls.segments if keep_out is None else Segments.of(Polylines.of([original, *keep_out]))
     )
-    bends = set(np.flatnonzero(np.abs(along.turns) > RELIEF_TURN_RAD).tolist())
-    rows: list[Floats] = []
+    reliefs: dict[int, list[Floats]] = {}
     left: list[Floats] = []
-    for vertex in range(len(path.vertices)):
-        rows.append(path.vertices[vertex : vertex + 1])
-        if vertex not in bends:
+    for corner, vertex in _stands(along, walls, tool_radius_mm).items():
+        way = _way(along, vertex, walls, corner, kind)
+        if _is_clear(way, walls.segments.start[corner], others, tool_radius_mm):
+            reliefs.setdefault(vertex, []).append(way[1])
+        else:
+            left.append(walls.segments.start[corner])
+    rows: list[Floats] = []
+    for vertex, row in enumerate(path.vertices):
+        for tip in reliefs.get(vertex, []):
+            rows += [np.array([*row[:2], 0.0]), np.array([*tip, 0.0])]
+        rows.append(row)
+    return Relieved(Polyline(np.array(rows), path.closed), np.array(left).reshape(-1, 2))
+
+
+def _stands(along: Along, walls: Along, tool_radius_mm: float) -> dict[int, int]:
+    """The corners (vertices of the walls) that the tool misses, and at which vertex of its path it
+    stands then: the nearest of those that are equally far from both walls of the corner."""
+    found: dict[int, tuple[float, int]] = {}
+    sharp = np.abs(walls.turns) > RELIEF_TURN_RAD
+    for vertex in np.flatnonzero(np.abs(along.turns) > RELIEF_TURN_RAD).tolist():
+        v = along.path.vertices[vertex, :2]
+        distance = points_to_segments(v[None], walls.segments)[0]
+        away = float(distance.min())
+        if away < tool_radius_mm - RELIEF_MATCH_MM:
             continue
-        for corner in _corners_at(path.vertices[vertex, :2], walls, tool_radius_mm):
-            way = _way(along, vertex, walls, corner, kind)
-            if _is_clear(way, walls.segments.start[corner], others, tool_radius_mm):
-                back = np.array([[*way[1], 0.0], path.vertices[vertex]])
-                rows[-1] = np.concatenate([rows[-1], back])
-                rows[-1][-3, 2] = 0.0
-            else:
-                left.append(walls.segments.start[corner])
-    reliefs = Polyline(np.concatenate(rows), path.closed)
-    return Relieved(reliefs, np.array(left).reshape(-1, 2))
-
-
-def _corners_at(v: Floats, walls: Along, tool_radius_mm: float) -> list[int]:
-    """The corners (vertices of the walls) that a tool at V misses and is equally far from both
-    walls of."""
-    distance = points_to_segments(v[None], walls.segments)[0]
-    away = float(distance.min())
-    if away < tool_radius_mm - RELIEF_MATCH_MM:
-        return []
-    near = distance <= away + RELIEF_MATCH_MM
-    both = near & np.roll(near, 1) & (np.abs(walls.turns) > RELIEF_TURN_RAD)
-    reach = np.hypot(*(walls.segments.start - v).T)
-    return np.flatnonzero(both & (reach > away + RELIEF_LEAST_MM)).tolist()
+        near = distance <= away + RELIEF_MATCH_MM
+        reach = np.hypot(*(walls.segments.start - v).T)
+        missed = near & np.roll(near, 1) & sharp & (reach > away + RELIEF_LEAST_MM)
+        for corner in np.flatnonzero(missed).tolist():
+            here = (float(reach[corner]), vertex)
+            found[corner] = min(found.get(corner, here), here)
+    return {corner: vertex for corner, (_, vertex) in found.items()}
 
 
 def _way(along: Along, vertex: int, walls: Along, corner: int, kind: str) -> Floats:
@@ -113,7 +117,9 @@ def _way(along: Along, vertex: int, walls: Along, corner: int, kind: str) -> Flo
         foot = float(arm @ ahead)
         beside = math.sqrt(max(float(arm @ arm) - foot * foot, 0.0))
         if beside <= away + RELIEF_MATCH_MM:
-            back = math.sqrt(max(away * away - beside * beside, 0.0))
+            # A straight wall stays at this distance; one that bends may come nearer.
+            bent = beside < away - RELIEF_MATCH_MM
+            back = math.sqrt(away * away - beside * beside) if bent else 0.0
             return np.array([v, v + (foot - back) * ahead])
     # Beside a bent wall the way along it may not come near enough to the corner.
     return np.array([v, c - arm * (away / math.hypot(*arm))])

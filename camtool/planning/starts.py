@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from camtool.geometry.polylines import POSITION_EPS_MM, Ints, Polyline
@@ -31,7 +33,9 @@ def with_starts(
         return path, any_vertex
     along = Along.of(path)
     if rule == "corner":
-        turns = np.abs(along.turns) > START_CORNER_RAD
+        # Where it turns back at once is the tip of a relief.
+        bend = np.abs(along.turns)
+        turns = (bend > START_CORNER_RAD) & (bend < math.pi - START_CORNER_RAD)
         around = np.abs(along.segments.radius - tool_radius_mm) <= POSITION_EPS_MM
         return path, np.flatnonzero(turns | around)
     length = _middle(along) if isinstance(rule, str) else along.nearest_to(rule)

@@ -1,0 +1,226 @@
+"""Reliefs: the tool's edge reaches the corner of the part, and nothing else is harmed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camtool.errors import OptionError
+from camtool.geometry.polylines import Polyline, Polylines
+from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from camtool.planning.corners import RELIEF_LEAST_MM, relieved
+from tests.oracles.arcs import chain_distances
+
+R = 1.0
+POCKET = Polyline(np.array([[0, 0, 0], [10, 0, 0], [10, 6, 0], [0, 6, 0.0]]), True)
+WITHIN = Polyline(np.array([[1, 1, 0], [9, 1, 0], [9, 5, 0], [1, 5, 0.0]]), True)
+
+
+def _ring(path: Polyline) -> np.ndarray:
+    return np.concatenate([path.vertices, path.vertices[:1]])
+
+
+def _tips(path: Polyline, plain: Polyline) -> list[tuple[float, float]]:
+    """What the path visits and the plain one does not."""
+    own = {tuple(place) for place in plain.vertices[:, :2].tolist()}
+    return [tuple(place) for place in path.vertices[:, :2].tolist() if tuple(place) not in own]
+
+
+def triangle(degrees: float) -> tuple[Polyline, Polyline, np.ndarray]:
+    """A sharp wedge of this angle at (0, 0), the path of the tool in it, and where that turns.
+
+    The third side is cut off by an arc far away, which gives no corner to think of.
+    """
+    angle = math.radians(degrees)
+    size = 60.0
+    far = size * np.array([math.cos(angle), math.sin(angle)])
+    wedge = Polyline(np.array([[0, 0, 0], [size, 0, 0.0], [*far, 0]]), True)
+    reach = R / math.sin(0.5 * angle)
+    turn = reach * np.array([math.cos(0.5 * angle), math.sin(0.5 * angle)])
+    ahead = np.array([math.cos(angle), math.sin(angle)])
+    path = Polyline(
+        np.array([[*(turn + 5.0 * ahead), 0], [*turn, 0], [turn[0] + 5.0, turn[1], 0.0]])
+    )
+    return wedge, path, turn
+
+
+@pytest.mark.parametrize("degrees", [20.0, 60.0, 90.0, 120.0, 170.0])
+@pytest.mark.parametrize("kind", ["dogbone", "overcut"])
+def test_the_edge_reaches_the_corner(degrees: float, kind: str) -> None:
+    wedge, path, turn = triangle(degrees)
+    done = relieved(path, wedge, R, kind)
+    (tip,) = _tips(done.path, path)
+    assert math.hypot(*tip) == pytest.approx(R)
+    half = math.radians(0.5 * degrees)
+    long = R * (1.0 / math.sin(half) - 1.0) if kind == "dogbone" else R / math.tan(half)
+    assert math.dist(tip, turn) == pytest.approx(long)
+    # There and back.
+    assert len(done.path) == len(path) + 2
+    assert done.path.vertices[1].tolist() == done.path.vertices[3].tolist() == [*turn, 0.0]
+    assert len(done.left) == 0
+
+
+def test_a_dogbone_lies_on_the_bisector_and_an_overcut_along_the_longer_wall() -> None:
+    part = relieved(WITHIN, POCKET, R, "dogbone").path
+    off = math.sqrt(0.5)
+    assert sorted(_tips(part, WITHIN)) == [
+        pytest.approx((off, off)),
+        pytest.approx((off, 6 - off)),
+        pytest.approx((10 - off, off)),
+        pytest.approx((10 - off, 6 - off)),
+    ]
+    cut = relieved(WITHIN, POCKET, R, "overcut").path
+    assert sorted(_tips(cut, WITHIN)) == [
+        pytest.approx(place) for place in ((0, 1), (0, 5), (10, 1), (10, 5))
+    ]
+    high = Polyline(POCKET.vertices[:, [1, 0, 2]], True)
+    tall = relieved(Polyline(WITHIN.vertices[:, [1, 0, 2]], True), high, R, "overcut").path
+    assert sorted(_tips(tall, Polyline(WITHIN.vertices[:, [1, 0, 2]], True))) == [
+        pytest.approx(place) for place in ((1, 0), (1, 10), (5, 0), (5, 10))
+    ]
+
+
+def test_walls_as_long_are_overcut_along_x() -> None:
+    square = Polyline(np.array([[0, 0, 0], [6, 0, 0], [6, 6, 0], [0, 6, 0.0]]), True)
+    path = Polyline(np.array([[1, 1, 0], [5, 1, 0], [5, 5, 0], [1, 5, 0.0]]), True)
+    for way in (path, reverse(path)):
+        assert sorted(_tips(relieved(way, square, R, "overcut").path, path)) == [
+            pytest.approx(place) for place in ((0, 1), (0, 5), (6, 1), (6, 5))
+        ]
+
+
+@pytest.mark.parametrize("kind", ["dogbone", "overcut"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        reverse,
+        mirrored,
+        lambda p: rolled(p, 3),
+        lambda p: rotated(p, 0.4),
+        lambda p: scaled(p, 1.0),
+    ],
+)
+def test_reliefs_turn_with_the_part(kind: str, change) -> None:  # type: ignore[no-untyped-def]
+    plain, done = WITHIN, relieved(WITHIN, POCKET, R, kind).path
+    moved_first = relieved(change(plain), change(POCKET), R, kind).path
+    wanted = change(Polyline(np.array([[*tip, 0] for tip in _tips(done, plain)]), True))
+    found = np.array(sorted(_tips(moved_first, change(plain))))
+    assert found == pytest.approx(np.array(sorted(wanted.vertices[:, :2].tolist())), abs=1e-9)
+
+
+def test_the_path_may_run_against_the_walls() -> None:
+    for walls in (POCKET, reverse(POCKET), rolled(POCKET, 2)):
+        assert len(relieved(WITHIN, walls, R, "dogbone").path) == 12
+
+
+def test_rounded_corners_and_outer_ones_get_none() -> None:
+    quarter = math.tan(math.pi / 8.0)
+    small = 0.2
+    rounded = Polyline(
+        np.array([[0, 0, 0], [10 - small, 0, quarter], [10, small, 0], [10, 6, 0], [0, 6, 0.0]]),
+        True,
+    )
+    tips = _tips(relieved(WITHIN, rounded, R, "dogbone").path, WITHIN)
+    assert len(tips) == 3
+    assert not any(x > 9 and y < 1 for x, y in tips)
+    # Around the outside: corners that the tool reaches anyway, with round and with sharp joins.
+    sharp = Polyline(np.array([[-1, -1, 0], [11, -1, 0], [11, 7, 0], [-1, 7, 0.0]]), True)
+    assert relieved(sharp, POCKET, R, "dogbone").path.vertices.tolist() == sharp.vertices.tolist()
+
+
+def test_corners_with_arcs() -> None:
+    """A half disc: the tool turns where line and arc are both r away."""
+    part = Polyline(np.array([[-5, 0, 0], [5, 0, 1.0]]), True)
+    x = math.sqrt(16.0 - 1.0)
+    path = Polyline(
+        np.array([[-x, 1, 0], [x, 1, math.tan(0.25 * (math.pi - 2 * math.asin(0.25)))]]), True
+    )
+    done = relieved(path, part, R, "dogbone").path
+    tips = _tips(done, path)
+    assert len(tips) == 2
+    assert (
+        sorted(math.dist(tip, (math.copysign(5, tip[0]), 0)) for tip in tips)
+        == [pytest.approx(R)] * 2
+    )
+    # The arc that leaves V still does, after the relief.
+    assert np.count_nonzero(done.vertices[:, 2]) == 1
+    assert done.vertices[np.flatnonzero(done.vertices[:, 2])[0], :2] == pytest.approx([x, 1])
+    over = _tips(relieved(path, part, R, "overcut").path, path)
+    assert (
+        sorted(math.dist(tip, (math.copysign(5, tip[0]), 0)) for tip in over)
+        == [pytest.approx(R)] * 2
+    )
+
+
+def test_an_allowance_is_left_in_the_corner_too() -> None:
+    path = Polyline(np.array([[1.2, 1.2, 0], [8.8, 1.2, 0], [8.8, 4.8, 0], [1.2, 4.8, 0.0]]), True)
+    for kind in ("dogbone", "overcut"):
+        tips = _tips(relieved(path, POCKET, R, kind).path, path)
+        assert len(tips) == 4
+        for tip in tips:
+            corner = (10.0 * (tip[0] > 5), 6.0 * (tip[1] > 3))
+            assert math.dist(tip, corner) == pytest.approx(1.2)
+
+
+def test_nothing_is_done_without_walls_radius_or_kind() -> None:
+    assert relieved(WITHIN, POCKET, R, "none").path is WITHIN
+    assert relieved(WITHIN, None, R, "dogbone").path is WITHIN
+    assert relieved(WITHIN, POCKET, 0.0, "dogbone").path is WITHIN
+    with pytest.raises(OptionError):
+        relieved(WITHIN, POCKET, R, "bone")
+
+
+def test_corners_that_are_hardly_missed_get_none() -> None:
+    wedge, path, turn = triangle(179.0)
+    missed = math.hypot(*turn) - R
+    assert 0.0 < missed < RELIEF_LEAST_MM
+    assert relieved(path, wedge, R, "dogbone").path.vertices.tolist() == path.vertices.tolist()
+
+
+def test_a_relief_does_not_cut_into_other_lines() -> None:
+    off = math.sqrt(0.5) - R * math.sqrt(0.5)
+    # A hole of 0.2 mm beyond the corner at (10, 6): the relief reaches over the corner's sides.
+    for gap, left in ((0.0, 1), (0.5, 0)):
+        hole = moved(
+            scaled(Polyline(np.array([[-1, 0, 1.0], [1, 0, 1.0]]), True), 0.1),
+            10.15 + off + gap,
+            5.5,
+        )
+        done = relieved(WITHIN, POCKET, R, "dogbone", Polylines.of([hole, POCKET]))
+        assert len(done.left) == left
+        if left:
+            assert done.left[0].tolist() == [10.0, 6.0]
+        assert len(_tips(done.path, WITHIN)) == 4 - left
+
+
+@given(st.floats(25.0, 150.0), st.floats(25.0, 150.0), st.sampled_from(["dogbone", "overcut"]))
+def test_triangles(first: float, second: float, kind: str) -> None:
+    """Every corner of a pocket of three sides is reached; the path around it is its incircle's."""
+    if first + second > 155.0:
+        return
+    a, b = math.radians(first), math.radians(second)
+    base = 40.0
+    high = base * math.sin(a) * math.sin(b) / math.sin(a + b)
+    corners = np.array([[0, 0], [base, 0], [high / math.tan(a), high]])
+    part = Polyline(np.column_stack([corners, np.zeros(3)]), True)
+    inner = []
+    for k in range(3):
+        to, fro = corners[k - 2] - corners[k], corners[k - 1] - corners[k]
+        to, fro = to / math.hypot(*to), fro / math.hypot(*fro)
+        way = to + fro
+        way /= math.hypot(*way)
+        sine = abs(to[0] * way[1] - to[1] * way[0])
+        inner.append([*(corners[k] + way * R / sine), 0.0])
+    path = Polyline(np.array(inner), True)
+    sides = np.hypot(*(corners - np.roll(corners, 1, axis=0)).T)
+    radius = 2.0 * 0.5 * base * high / sides.sum()
+    if radius < 2.0 * R:
+        return
+    done = relieved(path, part, R, kind)
+    reached = chain_distances(corners, _ring(done.path)) - R
+    assert reached == pytest.approx(np.zeros(3), abs=1e-5)
+    assert len(done.left) == 0
