@@ -21,20 +21,32 @@ def must_precede(items: Sequence[Item]) -> Ints:
     An item goes before the smallest closed Contour that holds it, or any of its runs; nothing
     else does. Contours that cross hold each other not.
     """
-    shapes = [(index, path) for index, item in enumerate(items) for path in _shapes(item)]
-    if not shapes:
+    # The runs that a contour was divided into share its outline: they hold and lie as it does.
+    owners: dict[int, list[int]] = {}
+    paths: dict[int, Polyline] = {}
+    for index, item in enumerate(items):
+        for path in _shapes(item):
+            owners.setdefault(id(path), []).append(index)
+            paths[id(path)] = path
+    if not paths:
         return np.empty((0, 2), dtype=np.int64)
-    owner = np.array([index for index, _ in shapes], dtype=np.int64)
-    parent = nesting(Polylines.of(path for _, path in shapes)).parent
-    held = np.flatnonzero(parent >= 0)
-    pairs = np.column_stack([owner[held], owner[parent[held]]])
-    return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
+    parent = nesting(Polylines.of(paths.values())).parent.tolist()
+    of_shape = list(owners.values())
+    pairs = [
+        (one, other)
+        for held, holder in enumerate(parent)
+        if holder >= 0
+        for one in of_shape[held]
+        for other in of_shape[holder]
+        if one != other
+    ]
+    return np.unique(np.array(pairs, dtype=np.int64).reshape(-1, 2), axis=0)
 
 
 def _shapes(item: Item) -> Iterator[Polyline]:
-    """Paths that say where an item lies; of them only a Contour's own is closed and holds any."""
+    """Paths that say where an item lies; of them only a Contour's is closed and holds any."""
     if isinstance(item, Contour):
-        yield item.path
+        yield item.path if item.outline is None else item.outline
     elif item.outline is not None:
         yield Polyline(item.outline.vertices, closed=False)
     else:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
+from camtool.geometry.transform import scaled
 from camtool.kernels.play import play_fill, play_limits
 from camtool.machine.model import Machine, PathController, PicMmhController
 from camtool.planning.approach import (
@@ -79,9 +80,11 @@ def test_an_engaged_axis_comes_straight(machine: Machine) -> None:
     assert come(line((1 + 0.5 * MARGIN, 3), (2, 4))) == pytest.approx((1 - 0.5 * MARGIN, 3))
 
 
+@settings(max_examples=40)
 @given(st.lists(st.one_of(contours(max_points=6), open_contours(max_points=6)), max_size=5))
 def test_the_first_motion_of_a_cut_is_no_reversal(machine: Machine, paths: list[Polyline]) -> None:
     follower = msgspec.structs.replace(machine, controller=PathController(grid="none"))
+    paths = [scaled(path, 0.05) for path in paths]
     moves = toolpath(paths, follower, approach=True)
     cuts = cut_moves(moves, flat_cuts=False).is_cut
     counted = np.zeros(2, dtype=np.int64)
@@ -97,6 +100,7 @@ def test_a_slide_stands_engaged_from_the_first_cut_on(machine: Machine, path: Po
     # Whole steps of compensation: 0.14 mm are 1000.
     loose = with_play(machine, backlash_mm=0.3, compensation_mm=0.14)
     follower = msgspec.structs.replace(loose, controller=PathController(grid="none"))
+    path = scaled(path, 0.05)
     x, y = path.vertices[0, :2].tolist()
     # Short enough to drive each axis one way only.
     path = Polyline(np.array([[x, y, 0.0], [*(0.5 * (path.vertices[1, :2] + (x, y))), 0.0]]))

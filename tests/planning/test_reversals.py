@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
 from camtool.planning.items import Contour, Fixed, Item
 from camtool.planning.job import Entry, Lead, Tabs
+from camtool.planning.precedence import must_precede
 from camtool.planning.reversals import fewer_reversals, reversals_of
 from tests.oracles.reversals import fewest_runs
 from tests.planning.reversal_parts import (
@@ -337,3 +339,15 @@ def test_what_is_told_counts_passes(machine: Machine) -> None:
     assert "1 runs are cut as 6" in told.message
     assert told.severity == Severity.INFO
     assert math.isclose(float(told.message.split(" µm, not ")[1].split()[0]), 14.9, abs_tol=0.05)
+
+
+def test_what_a_divided_contour_holds_is_cut_before_all_its_runs(machine: Machine) -> None:
+    outer, hole = contour(square(3.0)), contour(moved(circle(), 1.5, 1.5))
+    items, _ = fewer_reversals([outer, hole], machine)
+    runs: dict[int, list[int]] = {id(outer.path): [], id(hole.path): []}
+    for index, item in enumerate(items):
+        assert isinstance(item, Contour)
+        runs[id(item.outline)].append(index)
+    pairs = {tuple(pair) for pair in must_precede(items).tolist()}
+    assert pairs == set(product(runs[id(hole.path)], runs[id(outer.path)]))
+    assert len(pairs) == 8
