@@ -44,6 +44,7 @@ UNITS_OF_TABLES = ("mm", "in")
 
 _LINES = ("profile", "pocket", "engrave")
 _LAYERED = ("profile", "pocket", "engrave", "vcarve")
+_CLEARING = ("profile", "pocket")
 _PROFILE = ("profile",)
 _POCKET = ("pocket",)
 _DRILL = ("drill",)
@@ -118,7 +119,7 @@ OPERATION = {
         "direction", word(DIRECTIONS), "Which way round.", choices=DIRECTIONS, kinds=_LAYERED
     ),
     "allowance": Key(
-        "allowance_mm", plain(length), "Left on the wall.", "LENGTH", kinds=("profile", "pocket")
+        "allowance_mm", plain(length), "Left on the wall.", "LENGTH", kinds=_CLEARING
     ),
     "feed": Key("feed_mm_min", plain(feed), "In mm/min.", "FEED", kinds=KINDS),
     "plunge_feed": Key("plunge_feed_mm_min", plain(feed), "In mm/min.", "FEED", kinds=KINDS),
