@@ -108,8 +108,6 @@ def _offset(shape: Polylines, distance_mm: float, setting: Setting) -> Polylines
     from camtool.geometry.offset import offset_shape
 
     operation = setting.operation
-    if operation.joins == "round":
-        return offset_shape(shape, distance_mm)
     return offset_shape(
         shape, distance_mm, joins=operation.joins, mitre_limit=operation.mitre_limit
     )
