@@ -15,7 +15,7 @@ from camtool.kernels.tour_tree import nearest_owners, nearest_row, switch, tree_
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-NEAR = 10
+NEAR = 7
 """Neighbours of an item of one place: work against length."""
 
 NEAR_EACH = 3

@@ -11,17 +11,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.errors import OptionError
-from camtool.geometry.nest import nesting
-from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Polylines
+from camtool.geometry.polylines import Floats, Ints, Polyline
 from camtool.geometry.transform import reverse, rolled
 from camtool.planning.arcs import joints
 from camtool.planning.items import Contour, Item
 
+if TYPE_CHECKING:
+    from camtool.kernels.tour import Tour
+
 Point = tuple[float, float]
+
+KICKS_EACH = 100
+"""Kicks for each item: work against length."""
+
+MOST_KICKS = 4000
+"""No more kicks than this, however many items: below a second of work."""
+
+SEED = 20_011
+"""Where the pseudo-random places of the kicks begin."""
+
+MOST_PLACES = 8
+"""So many of its ways, evenly spread, say where an item of more lies for its neighbours."""
 
 SHOWN_ITEMS = 5
 """An error message names no more items than this."""
@@ -73,7 +88,7 @@ def chosen_path(items: Sequence[Item], choices: Choices, row: int) -> Polyline:
     TypeError when the row is of an item that is cut as it is.
     """
     index = int(choices.owner[row])
-    item, rank = items[index], row - int(choices.first[index])
+    item, rank = items[index], row - int(np.searchsorted(choices.owner, index))
     if not isinstance(item, Contour):
         raise TypeError(f"{item.name} is cut as it is")
     if item.path.closed:
@@ -100,17 +115,89 @@ def best_order(
     """
     if len(choices) == 0:
         return np.empty(0, dtype=np.int64)
+    from camtool.kernels.tour_rows import best_rows
+    from camtool.kernels.tour_search import kicked, settled
     from camtool.kernels.tour_start import nearest_first
 
+    start = np.array(from_point, dtype=np.float64)
+    goal = np.array((np.nan, np.nan) if to_point is None else to_point, dtype=np.float64)
+    ends, first = np.column_stack([choices.entry, choices.exit]), choices.first
     after_first, after = _followers(before, len(choices))
     waits = np.bincount(after, minlength=len(choices))
-    ends = np.column_stack([choices.entry, choices.exit])
-    rows = nearest_first(
-        ends, choices.first, after_first, after, waits, np.array(from_point, dtype=np.float64)
-    )
+    rows = nearest_first(ends, first, after_first, after, waits, start)
     if len(rows) < len(choices):
         raise _circle(set(range(len(choices))) - set(choices.owner[rows].tolist()))
-    return rows
+    tour = _tour(choices, before, rows, start, goal)
+    settled(tour)
+    kicked(tour, min(KICKS_EACH * len(choices), MOST_KICKS), SEED)
+    while True:
+        order = tour.item[1:-1]
+        tour.row[order] = best_rows(ends, first, order, start, goal)
+        if settled(tour) <= 0.0:
+            return tour.row[order]
+
+
+def _tour(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
+    """The tour of these rows, with all that the search wants to know."""
+    from camtool.kernels.tour import Tour
+    from camtool.kernels.tour_start import neighbours
+
+    count, ways = len(choices), len(choices.owner)
+    turned = _turned(choices)
+    stays = bool(np.isnan(goal).any())
+    goal = start if stays else goal
+    outside = [np.tile(start, 2), np.tile(goal, 2)]
+    ends = np.concatenate([np.column_stack([choices.entry, choices.exit]), outside])
+    near, near_first = neighbours(*_places(choices), count)
+    after_first, after = _followers(before, count)
+    earlier_first, earlier = _followers(np.asarray(before).reshape(-1, 2)[:, ::-1], count)
+    item = np.concatenate([[count], choices.owner[rows], [count + 1]])
+    row = np.empty(count + 2, dtype=np.int64)
+    row[item] = np.concatenate([[ways], rows, [ways + 1]])
+    one_way = (turned == np.arange(ways)) & (choices.entry != choices.exit).any(axis=1)
+    return Tour(
+        ends,
+        np.concatenate([turned, [ways, ways + 1]]),
+        choices.first,
+        near,
+        near_first,
+        after,
+        after_first,
+        earlier,
+        earlier_first,
+        ways + 1 if stays else -1,
+        bool(one_way.any()),
+        item,
+        np.argsort(item),
+        row,
+    )
+
+
+def _turned(choices: Choices) -> Ints:
+    """(S,): of each row the one of its item with entry and exit exchanged, itself when none is."""
+    turned = np.arange(len(choices.owner))
+    rows = np.flatnonzero((choices.entry != choices.exit).any(axis=1))
+    if len(rows) == 0:
+        return turned
+    owner, entry, leave = choices.owner[rows, None], choices.entry[rows], choices.exit[rows]
+    both = np.concatenate([np.hstack([owner, entry, leave]), np.hstack([owner, leave, entry])])
+    _, found, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
+    other = found[group.reshape(-1)[len(rows) :]]
+    turned[rows] = np.where(other < len(rows), rows[np.minimum(other, len(rows) - 1)], rows)
+    return turned
+
+
+def _places(choices: Choices) -> tuple[Floats, Ints]:
+    """Places (N, 2) that stand for the items when neighbours are sought, and their owners (N,)."""
+    first, ways = choices.first, np.diff(choices.first)
+    step = -(-ways // MOST_PLACES)
+    rank = np.arange(len(choices.owner)) - first[choices.owner]
+    rows = np.flatnonzero(rank % step[choices.owner] == 0)
+    alone = rows[(choices.entry[rows] != choices.exit[rows]).any(axis=1)]
+    owner = np.concatenate([choices.owner[rows], choices.owner[alone]])
+    places = np.concatenate([choices.entry[rows], choices.exit[alone]])
+    by_owner = np.argsort(owner, kind="stable")
+    return places[by_owner], owner[by_owner]
 
 
 def travel_mm(
@@ -165,84 +252,3 @@ def _ends(item: Item) -> Floats:
 def _begins(item: Contour) -> Ints:
     """Vertices at which a closed contour may begin."""
     return item.starts if len(item.starts) else np.flatnonzero(joints(item.path))
-
-
-# What follows goes when plan.py asks `best_order`.
-
-
-@dataclass(frozen=True, eq=False)
-class Order:
-    """In order of cutting, for M paths: `path` (M,), its index; `start` (M,), the vertex where it
-    begins; for an open path the last vertex says that it is travelled from its end."""
-
-    path: Ints
-    start: Ints
-
-
-def order(lines: Polylines, from_point: tuple[float, float] = (0.0, 0.0)) -> Order:
-    """The order of cutting for a tool that stands at `from_point` (mm)."""
-    parent = nesting(lines).parent
-    held = np.bincount(parent[parent >= 0], minlength=len(lines))
-    points, owner, vertex = _starts(lines)
-    first = np.searchsorted(owner, np.arange(len(lines) + 1))
-    # Starts that may not be taken now lie infinitely far away.
-    x, y = np.where((held[owner] == 0)[:, None], points, np.inf).T.copy()
-    path = np.empty(len(lines), dtype=np.int64)
-    start = np.empty(len(lines), dtype=np.int64)
-    at = np.array(from_point)
-    for rank in range(len(lines)):
-        row = int(((x - at[0]) ** 2 + (y - at[1]) ** 2).argmin())
-        chosen, holder = int(owner[row]), int(parent[owner[row]])
-        path[rank], start[rank] = chosen, vertex[row]
-        x[first[chosen] : first[chosen + 1]] = np.inf
-        at = _end(lines, chosen, points[row])
-        if holder >= 0:
-            held[holder] -= 1
-            if held[holder] == 0:
-                rows = slice(first[holder], first[holder + 1])
-                x[rows], y[rows] = points[rows].T
-    return Order(path, start)
-
-
-def ordered(lines: Polylines, way: Order) -> list[Polyline]:
-    """The paths in this order, each from its start."""
-    return [
-        _from_start(lines[path], start)
-        for path, start in zip(way.path.tolist(), way.start.tolist(), strict=True)
-    ]
-
-
-def _from_start(path: Polyline, start: int) -> Polyline:
-    if path.closed:
-        return rolled(path, start)
-    return reverse(path) if start else path
-
-
-def _starts(lines: Polylines) -> tuple[Floats, Ints, Ints]:
-    """Points (S, 2) where a path may begin, the path (S,) and the vertex (S,) of each."""
-    may = _may_begin(lines)
-    owner = np.repeat(np.arange(len(lines)), np.diff(lines.offsets))
-    rows = np.flatnonzero(may)
-    return lines.vertices[rows, :2], owner[rows], rows - lines.offsets[owner[rows]]
-
-
-def _may_begin(lines: Polylines) -> Bools:
-    may = np.zeros(len(lines.vertices), dtype=np.bool_)
-    for index in range(len(lines)):
-        low, high = int(lines.offsets[index]), int(lines.offsets[index + 1])
-        if lines.closed[index]:
-            may[low:high] = joints(lines[index])
-        else:
-            may[low] = may[high - 1] = True
-    return may
-
-
-def _end(lines: Polylines, path: int, start: Floats) -> Floats:
-    """Where the tool is when it has followed the path from this start."""
-    if lines.closed[path]:
-        return start
-    low, high = (
-        lines.vertices[lines.offsets[path], :2],
-        lines.vertices[lines.offsets[path + 1] - 1, :2],
-    )
-    return high if (start == low).all() else low
