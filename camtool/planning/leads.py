@@ -22,7 +22,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import nearest, paired_distances, points_to_segments
 from camtool.geometry.frames import Frames, dot
 from camtool.geometry.intersect import crossings
-from camtool.geometry.measure import point_at, segment_boxes, signed_area
+from camtool.geometry.measure import point_at, signed_area
 from camtool.geometry.nest import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
 from camtool.planning.along import Along, backwards
@@ -47,33 +47,36 @@ class Border:
 
     line: Polyline
     free_left: bool | None
-    keep_out: Segments
+    keep_out: Polylines
     reach_mm: float
 
     @classmethod
     def of(cls, contour: Contour, keep_out: Polylines | None) -> Border:
-        """The border of a contour. What an engraved one cuts into is not kept from its leads."""
+        """The border of a contour."""
         line, left = contour.path, contour.material_left
         if contour.outline is not None:
             line = contour.outline
             left = None if left is None else left != runs_back(line, contour.path)
         reach = contour.setting.operation.tool.radius_mm
-        others = Segments.of(Polylines.of([]) if keep_out is None else keep_out)
-        if left is None and len(others):
-            cut = points_to_segments(contour.path.vertices[:, :2], others).min(axis=0) < reach
-            others = others[~np.isin(others.path, others.path[cut])]
+        others = Polylines.of([]) if keep_out is None else keep_out
         return cls(line, None if left is None else not left, others, reach)
 
-    def allows(self, lead: Segments) -> bool:
-        """Whether the tool does no harm along this one line or arc."""
-        return self._is_far(lead) and (self.free_left is None or self._is_beside(lead))
+    def near(self, place: Floats, size_mm: float) -> Segments:
+        """What a lead of this size from a place (2,) of the contour must stay away from.
 
-    def _is_far(self, lead: Segments) -> bool:
-        box, boxes = segment_boxes(lead)[0], segment_boxes(self.keep_out)
-        apart = np.maximum(boxes[:, :2] - box[2:], box[:2] - boxes[:, 2:])
-        rows = np.flatnonzero((apart < self.reach_mm).all(axis=1))
-        distance, _ = paired_distances(lead[np.zeros_like(rows)], self.keep_out[rows])
-        return bool((distance >= self.reach_mm - LEAD_SLACK_MM).all())
+        What an engraved contour itself cuts there is not kept from its leads.
+        """
+        found = segments_near(self.keep_out, place, 2.0 * size_mm + self.reach_mm)
+        if self.free_left is None and len(found):
+            cut = points_to_segments(place[None], found)[0] < self.reach_mm
+            found = found[~np.isin(found.path, found.path[cut])]
+        return found
+
+    def allows(self, lead: Segments, near: Segments) -> bool:
+        """Whether the tool does no harm along this one line or arc."""
+        distance, _ = paired_distances(lead[np.zeros(len(near), dtype=np.int64)], near)
+        far = bool((distance >= self.reach_mm - LEAD_SLACK_MM).all())
+        return far and (self.free_left is None or self._is_beside(lead))
 
     def _is_beside(self, lead: Segments) -> bool:
         """Whether no piece of the lead lies on the side of the contour that is not free."""
@@ -137,6 +140,7 @@ def _longest(
 ) -> tuple[Floats, float]:
     """The lead as a way out from its place at the contour, as long as does no harm; its size."""
     place, ahead = at
+    near = border.near(place, lead.length_mm)
     size = lead.length_mm
     for _ in range(LEAD_HALVINGS + 1 if lead.kind != "none" else 0):
         end, bend = place + size * ahead, 0.0
@@ -144,7 +148,7 @@ def _longest(
             left = np.array([-ahead[1], ahead[0]])
             end, bend = end + math.copysign(size, bulge) * left, bulge
         way = Segments.between(place[None], end[None], np.array([bend]))
-        if size > POSITION_EPS_MM and border.allows(way):
+        if size > POSITION_EPS_MM and border.allows(way, near):
             return np.array([[*place, bend], [*end, 0.0]]), size
         size *= 0.5
     return np.empty((0, 3)), 0.0
@@ -160,6 +164,24 @@ def runs_back(path: Polyline, other: Polyline) -> bool:
     frame = Frames.of(segments[row])
     here = frame.tangent_at(frame.along(point) / frame.length)
     return bool(dot(here, ahead)[0] < 0.0)
+
+
+def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
+    """The segments of paths that may come so near to a place (2,); few others.
+
+    No point of an arc of a half circle at most is farther from its start than π/2 of its chord.
+    """
+    vertices, offsets = lines.vertices, lines.offsets
+    following = np.arange(1, len(vertices) + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    x, y = vertices[:, 0], vertices[:, 1]
+    step = np.abs(x[following] - x) + np.abs(y[following] - y)
+    away = np.maximum(np.abs(x - place[0]), np.abs(y - place[1]))
+    keep = away <= reach_mm + 0.5 * math.pi * step
+    keep[offsets[1:][~lines.closed] - 1] = False
+    path = np.searchsorted(offsets, np.flatnonzero(keep), side="right") - 1
+    ends = vertices[following[keep], :2]
+    return Segments.between(vertices[keep, :2], ends, vertices[keep, 2], path)
 
 
 def left_of(path: Polyline, points: Floats) -> Floats:

@@ -13,13 +13,12 @@ import math
 
 import numpy as np
 
-from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats, Polyline, Polylines
 from camtool.planning.along import Along
 from camtool.planning.items import Contour, Run
 from camtool.planning.leads import Leads, leads_of
-from camtool.planning.places import at_place, key_of
+from camtool.planning.places import at_place
 from camtool.planning.ramps import (
     MOST_LAPS,
     feeds_along,
@@ -41,8 +40,7 @@ def runs_of(
 
     `path` is the contour's path from the chosen start in the chosen direction. On the ways to it
     and out, the tool comes nowhere nearer to the lines of `keep_out` than its radius. A ramp
-    slopes by the entry's angle at most; a helix on a contour is a ramp. OptionError for tabs that
-    cannot be, and for a ramp of 90° or more.
+    slopes by the entry's angle. OptionError for tabs that cannot be.
     """
     along = Along.of(path)
     angle, findings = _slope(contour, along)
@@ -105,12 +103,6 @@ def _slope(contour: Contour, along: Along) -> tuple[float | None, list[Finding]]
     angle = operation.entry.angle_rad
     if operation.entry.kind == "plunge":
         return None, []
-    if not angle < 0.5 * math.pi:
-        raise OptionError(
-            f"a ramp of {math.degrees(angle):.4g} degrees is no ramp",
-            where=key_of(operation, "entry"),
-            mend="give an angle below 90 degrees, or plunge",
-        )
     ramp = -contour.setting.levels_mm[-1] / math.tan(angle)
     if ramp <= MOST_LAPS * along.total_mm:
         return angle, []

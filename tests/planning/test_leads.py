@@ -11,15 +11,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.findings import Code
-from camtool.geometry.polylines import Polyline, Polylines
+from camtool.geometry.distance import points_to_segments
+from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.transform import moved, reverse, rolled
 from camtool.planning.along import Along
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Lead, Operation, Tool
-from camtool.planning.leads import LEAD_HALVINGS, LEAD_SLACK_MM, leads_of, left_of, runs_back
+from camtool.planning.leads import (
+    LEAD_HALVINGS,
+    LEAD_SLACK_MM,
+    leads_of,
+    left_of,
+    runs_back,
+    segments_near,
+)
 from camtool.planning.runs import runs_of
 from tests.oracles.arcs import chain_distances, chain_points
-from tests.strategies import contours, open_contours
+from tests.strategies import contours, open_contours, polylines
 
 ARC, LINE = Lead("arc", 2.0), Lead("line", 2.0)
 SQUARE = Polyline(np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0.0]]), True)
@@ -223,6 +231,25 @@ def test_left_of_beyond_the_ends_of_an_open_path_is_beside_its_tangent() -> None
     assert left_of(OPEN, points) == pytest.approx([0.0, 0.5, -0.5, 0.0, 1.0])
     corner = np.array([[10.5, -0.5], [9.5, 0.5]])
     assert left_of(OPEN, corner) == pytest.approx([-math.sqrt(0.5), 0.5])
+
+
+@given(
+    st.lists(polylines(), min_size=1, max_size=4),
+    st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0)),
+    st.floats(0.1, 10.0),
+)
+def test_no_segment_that_is_near_is_passed_over(
+    paths: list[Polyline], place: tuple[float, float], reach: float
+) -> None:
+    lines = Polylines.of(paths)
+    every = Segments.of(lines)
+    found = segments_near(lines, np.array(place), reach)
+    distance = points_to_segments(np.array([place]), every)[0]
+    near = distance <= reach
+    have = {tuple(row) for row in np.column_stack([found.start, found.bulge, found.path]).tolist()}
+    wanted = np.column_stack([every.start, every.bulge, every.path])[near]
+    assert have >= {tuple(row) for row in wanted.tolist()}
+    assert len(found) <= len(every)
 
 
 @given(st.one_of(contours(), open_contours()), st.integers(0, 11))

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.errors import OptionError
 from camtool.findings import Code
 from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline
@@ -54,7 +53,7 @@ def places(path: Polyline) -> np.ndarray:
 
 
 @pytest.mark.parametrize("reversible", [True, False])
-@pytest.mark.parametrize("entry", [PLUNGE, ramp(3.0), ramp(20.0), Entry("helix", 0.2)])
+@pytest.mark.parametrize("entry", [PLUNGE, ramp(3.0), ramp(20.0)])
 @pytest.mark.parametrize("path", [SQUARE, ROUND, OPEN])
 def test_all_of_the_contour_is_cut_to_the_depth(
     path: Polyline, entry: Entry, reversible: bool
@@ -245,13 +244,6 @@ def test_a_ramp_too_flat_for_a_small_contour_is_a_plunge() -> None:
     assert findings[0].measured is not None
     assert findings[0].measured > (findings[0].limit or math.inf)
     assert (_vertices(runs) == _vertices(cut(small))).all()
-
-
-def test_a_ramp_of_a_right_angle_is_none() -> None:
-    with pytest.raises(OptionError) as caught:
-        runs_of(contour(SQUARE, entry=ramp(90.0)), SQUARE)
-    assert caught.value.where == "operation 'cut', key entry"
-    assert caught.value.mend
 
 
 def test_leads_of_open_contours_are_cut_at_every_depth() -> None:
