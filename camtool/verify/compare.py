@@ -246,10 +246,10 @@ class Target:
                 distance[off] = np.inf
             starts = np.cumsum(many) - many
             least = np.minimum.reduceat(distance, starts)
-            # The first of the nearest, so that ties do not depend on the tree.
-            hits = np.flatnonzero(distance == np.repeat(least, many))
+            # Of all that are as near the last: what is cut again later is what remains.
+            hits = np.flatnonzero(distance <= np.repeat(least, many) + POSITION_EPS_MM)
             sample_of_pair = np.repeat(np.arange(len(samples)), many)[hits]
-            chosen = hits[np.flatnonzero(np.diff(sample_of_pair, prepend=-1))]
+            chosen = hits[np.flatnonzero(np.diff(sample_of_pair, append=len(samples)))]
             found.distance[samples] = least
             found.segment[samples] = np.where(np.isinf(least), -1, pair_move[chosen])
             group_starts = np.cumsum(sizes[part]) - sizes[part]

@@ -1,8 +1,8 @@
 """Sizes of the part and of its closed contours, wanted and predicted; and how contours close.
 
-Of a contour that is cut in several passes the last one counts, without leads and ramps: its loop
-(`camtool.verify.loops`). The part is all loops and open contours together. Sizes are those of the
-tool centre's path: the tool's own radius is nothing that motion changes.
+Of a contour that is cut in several passes the deepest, last one counts, without leads and ramps:
+its loop (`camtool.verify.loops`). The part is all loops and open contours together. Sizes are
+those of the tool centre's path: the tool's own radius is nothing that motion changes.
 
     error_percent = (predicted − nominal) / nominal · 100
 
@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
-from camtool.verify.cuts import CutMoves
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.verify.cuts import Bools, CutMoves
 from camtool.verify.loops import NO_LOOP, loops, of_loops
 from camtool.verify.match import Match
 
@@ -86,7 +86,7 @@ def sizes(
     found = loops(wanted, gap_mm)
     closed = found[:, 0] != NO_LOOP
     counts = wanted.is_cut & (of_loops(wanted, found) | ~np.append(closed, False)[wanted.contour])
-    mine = np.flatnonzero(counts[match.row] & (match.row >= 0))
+    mine = _counting(cuts, match, counts, closed, gap_mm)
     if len(mine) == 0:
         return
     low, high = _predicted(cuts, slides, mine, match.contour)
@@ -99,8 +99,42 @@ def sizes(
     )
     nominal = _extents(wanted.contour[segments.path], boxes[:, :2], boxes[:, 2:], wanted)
     predicted = _extents(match.contour[mine], low[mine], high[mine], wanted)
-    for index in np.flatnonzero(closed & np.isfinite(predicted[:, 0])):
+    final = _final(segments, boxes, wanted, gap_mm)
+    for index in np.flatnonzero(closed & final & np.isfinite(predicted[:, 0])):
         yield from _pair(f"contour {index + 1}", nominal[index], predicted[index])
+
+
+def _final(segments: Segments, boxes: Floats, wanted: CutMoves, gap_mm: float) -> Bools:
+    """(C,) true for contours under which no other one of the same box is cut: the tool may leave
+    the stock between two passes."""
+    contour = wanted.contour[segments.path]
+    least = np.full((wanted.contour_count, 2), np.inf)
+    most = np.full((wanted.contour_count, 2), -np.inf)
+    np.minimum.at(least, contour, boxes[:, :2])
+    np.maximum.at(most, contour, boxes[:, 2:])
+    whole = np.concatenate([least, most], axis=1)
+    lowest = np.full(wanted.contour_count, np.inf)
+    toolpath = wanted.toolpath
+    z = np.minimum(toolpath.starts[segments.path, 2], toolpath.end[segments.path, 2])
+    np.minimum.at(lowest, contour, z)
+    known = np.isfinite(whole[:, 0])
+    keys = np.full((wanted.contour_count, 4), np.iinfo(np.int64).min)
+    keys[known] = np.rint(whole[known] / gap_mm).astype(np.int64)
+    _, same = np.unique(keys, axis=0, return_inverse=True)
+    deepest = np.full(same.max(initial=-1) + 1, np.inf)
+    np.minimum.at(deepest, same.reshape(-1), lowest)
+    return np.asarray(lowest == deepest[same.reshape(-1)])
+
+
+def _counting(cuts: CutMoves, match: Match, counts: Bools, closed: Bools, gap_mm: float) -> Ints:
+    """The rows of `cuts` that make the sizes: of contours (C,) that are `closed` their own loops,
+    where they have any; else the rows that follow a wanted row (W,) which `counts`."""
+    of = match.contour
+    follow = counts[match.row] & (of >= 0)
+    looped = of_loops(cuts, loops(cuts, gap_mm)) & (of >= 0) & np.append(closed, False)[of]
+    with_loop = np.zeros(len(closed) + 1, dtype=np.bool_)
+    with_loop[of[looped]] = True
+    return np.flatnonzero(looped | (follow & ~with_loop[of]))
 
 
 def _predicted(

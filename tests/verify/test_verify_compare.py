@@ -116,7 +116,7 @@ def test_the_search_finds_the_nearest_whatever_the_margin(seed: int, margin: flo
     exact = everything(target, points, np.ones(len(target.contour), dtype=bool))
     assert np.allclose(found.distance, exact, rtol=0, atol=1e-12)
     named = target.cuts.segments[found.segment]
-    assert np.array_equal(distance_each(points, named), found.distance)
+    assert np.allclose(distance_each(points, named), found.distance, rtol=0, atol=1e-9)
 
 
 def test_the_search_can_be_kept_to_a_contour_and_to_a_height() -> None:
