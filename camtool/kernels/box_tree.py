@@ -27,20 +27,22 @@ def tree_of(boxes: Floats) -> Floats:
     while leaves * LEAF < len(boxes):
         leaves *= 2
     tree = np.empty((2 * leaves, 4))
-    tree[:, :2], tree[:, 2:] = np.inf, -np.inf
+    for node in range(2 * leaves):
+        for k in range(2):
+            tree[node, k], tree[node, k + 2] = np.inf, -np.inf
     for row in range(len(boxes)):
-        _widen(tree, leaves + row // LEAF, boxes[row])
+        _widen(tree, leaves + row // LEAF, boxes, row)
     for node in range(leaves - 1, 0, -1):
-        _widen(tree, node, tree[2 * node])
-        _widen(tree, node, tree[2 * node + 1])
+        _widen(tree, node, tree, 2 * node)
+        _widen(tree, node, tree, 2 * node + 1)
     return tree
 
 
 @njit(cache=True)
-def _widen(tree: Floats, node: int, box: Floats) -> None:
+def _widen(tree: Floats, node: int, boxes: Floats, row: int) -> None:
     for k in range(2):
-        tree[node, k] = min(tree[node, k], box[k])
-        tree[node, k + 2] = max(tree[node, k + 2], box[k + 2])
+        tree[node, k] = min(tree[node, k], boxes[row, k])
+        tree[node, k + 2] = max(tree[node, k + 2], boxes[row, k + 2])
 
 
 @njit(cache=True)

@@ -36,7 +36,8 @@ def curve_rows(start: Floats, end: Floats, bulge: Floats) -> Floats:
         # The tangents are the chord turned by ∓ sweep/2, and b = tan(sweep/4).
         grown = 1.0 + b * b
         cosine, sine = (1.0 - b * b) / (grown * chord), 2.0 * b / (grown * chord)
-        rows[i, AX:BX], rows[i, BX:TX] = start[i], end[i]
+        rows[i, AX], rows[i, AY] = start[i, 0], start[i, 1]
+        rows[i, BX], rows[i, BY] = end[i, 0], end[i, 1]
         rows[i, TX], rows[i, TY] = cosine * dx + sine * dy, cosine * dy - sine * dx
         rows[i, UX], rows[i, UY] = cosine * dx - sine * dy, cosine * dy + sine * dx
         rows[i, BEND] = 4.0 * b / (chord * grown)

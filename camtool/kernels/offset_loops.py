@@ -34,7 +34,9 @@ def traced(
     from_node, to_node, count = ends
     leaving, first = grouped(from_node, count)
     unused = np.ones(len(element), np.bool_)
-    seen = np.full(count, -1)
+    seen = np.empty(count, np.int64)
+    for node in range(count):
+        seen[node] = -1
     path, length = np.empty(len(element), np.int64), 0
     rows, begins = np.empty(len(element), np.int64), np.zeros(len(element) + 1, np.int64)
     loops = 0
@@ -50,11 +52,11 @@ def traced(
             if seen[node] >= 0:
                 low = seen[node]
                 begins[loops + 1] = begins[loops] + length - low
-                rows[begins[loops] : begins[loops + 1]] = path[low:length]
-                loops += 1
-                # This node too: what is left of the path ends here and may leave it once more.
                 for k in range(low, length):
+                    rows[begins[loops] + k - low] = path[k]
+                    # This node too: what is left of the path may leave it once more.
                     seen[from_node[path[k]]] = -1
+                loops += 1
                 length = low
                 continue
             ways = leaving[first[node] : first[node + 1]]
@@ -67,7 +69,7 @@ def traced(
             path[length] = chosen
             length += 1
             unused[chosen] = False
-    return rows[: begins[loops]].copy(), begins[: loops + 1].copy()
+    return rows[: begins[loops]], begins[: loops + 1]
 
 
 @njit(cache=True)
@@ -130,17 +132,19 @@ def written(
         for k in range(len(ways)):
             row, last = ways[(first + k) % len(ways)], ways[(first + k - 1) % len(ways)]
             if k == 0 or not _goes_on(element, span, last, row):
-                vertices[count, :2] = nodes[from_node[row]]
+                vertices[count, 0] = nodes[from_node[row], 0]
+                vertices[count, 1] = nodes[from_node[row], 1]
                 begin = span[row, 0]
                 count += 1
             sweep = sweeps[element[row]] * (span[row, 1] - begin)
             vertices[count - 1, 2] = math.tan(0.25 * sweep)
         if not closed[run]:
-            vertices[count, :2] = nodes[to_node[ways[-1]]]
+            vertices[count, 0] = nodes[to_node[ways[-1]], 0]
+            vertices[count, 1] = nodes[to_node[ways[-1]], 1]
             vertices[count, 2] = 0.0
             count += 1
         offsets[run + 1] = low + _cleaned(vertices[low:count], closed[run], eps)
-    return vertices[: offsets[-1]].copy(), offsets
+    return vertices[: offsets[-1]], offsets
 
 
 @njit(cache=True)
@@ -165,11 +169,12 @@ def _cleaned(vertices: Floats, closed: bool, eps: float) -> int:
     Each shrinks to its middle; the ends of an open path stay. 0 when nothing is left.
     """
     count = left = len(vertices)
-    after, before = np.arange(1, count + 1), np.arange(-1, count - 1)
+    after, before = np.empty(count, np.int64), np.empty(count, np.int64)
+    stack, height = np.empty(3 * count, np.int64), count
+    for row in range(count):
+        after[row], before[row], stack[row] = row + 1, row - 1, count - 1 - row
     after[-1], before[0] = (0, count - 1) if closed else (-1, -1)
     there = np.ones(count, np.bool_)
-    stack, height = np.empty(3 * count, np.int64), count
-    stack[:count] = np.arange(count - 1, -1, -1)
     while height > 0:
         height -= 1
         row = stack[height]
@@ -181,7 +186,10 @@ def _cleaned(vertices: Floats, closed: bool, eps: float) -> int:
         # The first and the last vertex of an open path have none before and none after them.
         if after[following] >= 0:
             part = 0.5 if earlier >= 0 else 0.0
-            vertices[following, :2] += (1.0 - part) * (vertices[row, :2] - vertices[following, :2])
+            for k in range(2):
+                vertices[following, k] += (1.0 - part) * (
+                    vertices[row, k] - vertices[following, k]
+                )
         there[row] = False
         left -= 1
         before[following] = earlier
@@ -194,7 +202,8 @@ def _cleaned(vertices: Floats, closed: bool, eps: float) -> int:
     place = 0
     for row in range(count):
         if there[row]:
-            vertices[place] = vertices[row]
+            for k in range(3):
+                vertices[place, k] = vertices[row, k]
             place += 1
     return left
 

@@ -8,6 +8,7 @@ curves and of the range of both, and not within 2 eps of one that counted before
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,7 @@ from camtool.kernels.offset_curves import (
 )
 
 Ints = npt.NDArray[np.int64]
+Numbers = npt.NDArray[Any]
 
 X, Y, TA, TB = range(4)
 """The columns of a meeting: its place, and the fractions of both curves there."""
@@ -39,16 +41,13 @@ MOST_MEETINGS = 6
 
 
 @njit(cache=True)
-def pairs_of(
-    boxes: Floats, tree: Floats, others: Floats, other_tree: Floats, own: bool
-) -> tuple[Ints, Ints]:
-    """Rows (J,), (J,) of `boxes` and of `others` that touch; a tree stands over each.
+def pairs_of(boxes: Floats, tree: Floats, others: Floats, other_tree: Floats, own: bool) -> Ints:
+    """(J, 2) rows of `boxes` and of `others` that touch; a tree stands over each.
 
     `own` says that both are the same: then each pair comes once, the lesser row first. Nodes of
     both trees are looked at in pairs, so that what two large boxes tell is told once.
     """
-    room = 4 * len(boxes) + 16
-    one, other = np.empty(room, np.int64), np.empty(room, np.int64)
+    pairs = np.empty((4 * len(boxes) + 16, 2), np.int64)
     leaves, other_leaves, count = len(tree) // 2, len(other_tree) // 2, 0
     left, right = np.empty(4 * DEPTH, np.int64), np.empty(4 * DEPTH, np.int64)
     height, left[0], right[0] = 1, 1, 1
@@ -69,31 +68,38 @@ def pairs_of(
         for i in range(low, min(low + LEAF, len(boxes))):
             for j in range(far_low, min(far_low + LEAF, len(others))):
                 if (not own or i < j) and touch(boxes, i, others, j):
-                    if count == len(one):
-                        one, other = np.append(one, one), np.append(other, other)
-                    one[count], other[count] = i, j
+                    if count == len(pairs):
+                        pairs = _grown(pairs, np.empty((2 * count, 2), np.int64))
+                    pairs[count, 0], pairs[count, 1] = i, j
                     count += 1
-    return one[:count].copy(), other[:count].copy()
+    return pairs[:count]
 
 
 @njit(cache=True)
-def meetings_of(
-    a: Floats, b: Floats, one: Ints, other: Ints, eps: float
-) -> tuple[Ints, Ints, Floats]:
-    """The rows of a and b (J,), (J,) and the meetings (J, 4) of the pairs one[k], other[k]."""
-    room = len(one) + MOST_MEETINGS + 16
-    row_a, row_b = np.empty(room, np.int64), np.empty(room, np.int64)
-    found = np.empty((room, 4))
+def _grown(rows: Numbers, room: Numbers) -> Numbers:
+    """`room` with these rows at its beginning."""
+    for i in range(len(rows)):
+        for k in range(rows.shape[1]):
+            room[i, k] = rows[i, k]
+    return room
+
+
+@njit(cache=True)
+def meetings_of(a: Floats, b: Floats, pairs: Ints, eps: float) -> tuple[Ints, Floats]:
+    """The rows (J, 2) of a and b, and the meetings (J, 4), of the pairs (P, 2) of rows."""
+    room = len(pairs) + MOST_MEETINGS + 16
+    rows, found = np.empty((room, 2), np.int64), np.empty((room, 4))
     count = 0
-    for k in range(len(one)):
-        if count + MOST_MEETINGS > len(row_a):
-            row_a, row_b = np.append(row_a, row_a), np.append(row_b, row_b)
-            found = np.concatenate((found, found))
-        more = _meet(a, b, one[k], other[k], (eps, found[count : count + MOST_MEETINGS]))
+    for k in range(len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if count + MOST_MEETINGS > len(rows):
+            rows = _grown(rows, np.empty((2 * len(rows), 2), np.int64))
+            found = _grown(found, np.empty((2 * len(found), 4)))
+        more = _meet(a, b, i, j, (eps, found[count : count + MOST_MEETINGS]))
         for m in range(count, count + more):
-            row_a[m], row_b[m] = one[k], other[k]
+            rows[m, 0], rows[m, 1] = i, j
         count += more
-    return row_a[:count].copy(), row_b[:count].copy(), found[:count].copy()
+    return rows[:count], found[:count]
 
 
 @njit(cache=True)

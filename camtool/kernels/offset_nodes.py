@@ -29,7 +29,9 @@ def merged(points: Floats, skew: Floats, order: Ints, eps: float) -> tuple[Ints,
     Points within `eps` of each other share a node, and so do chains of them. `order` sorts the
     points by `skew` (P,), which differs between two points by no more than their distance.
     """
-    group = np.arange(len(points))
+    group = np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        group[i] = i
     for i in range(len(order)):
         one, hits = order[i], 0
         for j in range(i + 1, len(order)):
@@ -41,26 +43,24 @@ def merged(points: Floats, skew: Floats, order: Ints, eps: float) -> tuple[Ints,
                 hits += 1
                 low, high = _root(group, one), _root(group, other)
                 group[max(low, high)] = min(low, high)
-    first = np.empty(len(points), np.int64)
+    first, node = np.empty(len(points), np.int64), np.empty(len(points), np.int64)
     count = 0
     for i in range(len(points)):
         root = _root(group, i)
         if root == i:
-            first[count] = i
-            group[i] = -1 - count
+            first[count], node[i] = i, count
             count += 1
         else:
             # Every root is less than its members, and has its number already.
-            group[i] = group[root]
-    return -1 - group, first[:count].copy()
+            node[i] = node[root]
+    return node, first[:count]
 
 
 @njit(cache=True)
 def _root(group: Ints, i: int) -> int:
-    """The least member of the group of i; roots that are numbered already are below 0."""
-    while group[i] >= 0 and group[i] != i:
-        if group[group[i]] >= 0:
-            group[i] = group[group[i]]
+    """The least member of the group of i."""
+    while group[i] != i:
+        group[i] = group[group[i]]
         i = group[i]
     return i
 
@@ -73,10 +73,14 @@ def grouped(keys: Ints, count: int) -> tuple[Ints, Ints]:
         begins[key + 1] += 1
     for key in range(count):
         begins[key + 1] += begins[key]
-    place, rows = begins[:-1].copy(), np.empty(len(keys), np.int64)
+    rows = np.empty(len(keys), np.int64)
+    # Each begin moves on to its end, which is where the next one begins.
     for row in range(len(keys)):
-        rows[place[keys[row]]] = row
-        place[keys[row]] += 1
+        rows[begins[keys[row]]] = row
+        begins[keys[row]] += 1
+    for key in range(count, 0, -1):
+        begins[key] = begins[key - 1]
+    begins[0] = 0
     return rows, begins
 
 
@@ -114,7 +118,10 @@ def doubles_left(
     """
     from_node, to_node, count = ends
     keep = np.ones(len(element), np.bool_)
-    rows, begins = grouped(np.minimum(from_node, to_node), count)
+    near = np.empty(len(element), np.int64)
+    for row in range(len(element)):
+        near[row] = min(from_node[row], to_node[row])
+    rows, begins = grouped(near, count)
     for node in range(count):
         for k in range(begins[node], begins[node + 1]):
             row = rows[k]
@@ -138,7 +145,10 @@ def leading_on(from_node: Ints, to_node: Ints, count: int) -> Bools:
     keep = np.ones(len(from_node), np.bool_)
     leaving, first_leaving = grouped(from_node, count)
     arriving, first_arriving = grouped(to_node, count)
-    leave, arrive = np.diff(first_leaving), np.diff(first_arriving)
+    leave, arrive = np.empty(count, np.int64), np.empty(count, np.int64)
+    for node in range(count):
+        leave[node] = first_leaving[node + 1] - first_leaving[node]
+        arrive[node] = first_arriving[node + 1] - first_arriving[node]
     stack = np.empty(2 * len(from_node) + count, np.int64)
     height = 0
     for node in range(count):

@@ -43,8 +43,9 @@ def meets_itself(lines: Polylines, eps_mm: float) -> bool:
 
     segments = Segments.of(lines)
     curves = Curves.of(segments, margin_mm=eps_mm)
-    one, other = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
-    one, other, at = meetings_of(curves.rows, curves.rows, one, other, eps_mm)
+    pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
+    met, at = meetings_of(curves.rows, curves.rows, pairs, eps_mm)
+    one, other = met.T
     following = next_rows(lines)
     a_first = (following[one] == other) & (at[:, TA] == 1.0) & (at[:, TB] == 0.0)
     b_first = (following[other] == one) & (at[:, TA] == 0.0) & (at[:, TB] == 1.0)

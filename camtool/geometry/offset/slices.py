@@ -60,14 +60,14 @@ def slice_elements(elements: Segments, others: Segments | None, options: OffsetO
     eps = options.node_eps_mm
     own = Curves.of(elements, margin_mm=eps)
     pairs = pairs_of(own.boxes, own.tree, own.boxes, own.tree, True)
-    one, other, at = meetings_of(own.rows, own.rows, *pairs, eps)
-    rows = [one, other]
+    met, at = meetings_of(own.rows, own.rows, pairs, eps)
+    rows = [met[:, 0], met[:, 1]]
     found = [at[:, [TA, X, Y]], at[:, [TB, X, Y]]]
     if others is not None:
         cutting = Curves.of(others, margin_mm=eps)
         pairs = pairs_of(own.boxes, own.tree, cutting.boxes, cutting.tree, False)
-        one, _, at = meetings_of(own.rows, cutting.rows, *pairs, eps)
-        rows.append(one)
+        met, at = meetings_of(own.rows, cutting.rows, pairs, eps)
+        rows.append(met[:, 0])
         found.append(at[:, [TA, X, Y]])
     return _cut(elements, np.concatenate(rows), np.concatenate(found), options)
 
