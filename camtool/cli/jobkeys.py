@@ -116,7 +116,7 @@ OPERATION = {
         kinds=_PROFILE,
     ),
     "direction": Key(
-        "direction", word(DIRECTIONS), "Which way round.", choices=DIRECTIONS, kinds=_LAYERED
+        "direction", word(DIRECTIONS), "Which way round.", choices=DIRECTIONS, kinds=_CLEARING
     ),
     "allowance": Key(
         "allowance_mm", plain(length), "Left on the wall.", "LENGTH", kinds=_CLEARING
