@@ -8,7 +8,7 @@ where it starts is its own loop. There-and-back is none: a loop holds an area.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -87,21 +87,14 @@ class _Way:
         return best
 
 
-def _returns(places: Floats, gap_mm: float) -> list[tuple[int, int]]:
+def _returns(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
     """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it."""
-    cells = np.floor(places / gap_mm).astype(np.int64).tolist()
-    points = places.tolist()
-    seen: dict[tuple[int, int], int] = {}
-    pairs = []
-    for index, (x, y) in enumerate(cells):
-        near = [
-            other
-            for dx in (-1, 0, 1)
-            for dy in (-1, 0, 1)
-            if (other := seen.get((x + dx, y + dy), -1)) >= 0
-            and math.dist(points[other], points[index]) <= gap_mm
-        ]
-        if near:
-            pairs.append((max(near), index))
-        seen[x, y] = index
-    return pairs
+    import shapely
+
+    points = shapely.points(places)
+    later, earlier = shapely.STRtree(points).query(points, predicate="dwithin", distance=gap_mm)
+    before = earlier < later
+    later, earlier = later[before], earlier[before]
+    order = np.lexsort((earlier, later))
+    last = order[np.flatnonzero(np.diff(later[order], append=len(places)))]
+    yield from zip(earlier[last].tolist(), later[last].tolist(), strict=True)

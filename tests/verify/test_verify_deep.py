@@ -235,9 +235,9 @@ def test_a_pocket_of_50000_moves_and_a_carving_take_seconds() -> None:
     import time
 
     for wanted in (large_pocket(50_000), large_carving(20_000)):
-        began = time.perf_counter()
+        began = time.process_time()
         assert errors(judged(wanted, wanted, tool=2.0)) == []
-        assert time.perf_counter() - began < 15.0
+        assert time.process_time() - began < 10.0
 
 
 def large_pocket(moves: int) -> Toolpath:
