@@ -8,8 +8,9 @@ axis in one direction only, so that the play stays taken up. Here every contour 
 
 Each turn of an axis must be divided somewhere on its stretch; one place may serve both axes (the
 corner of a square). Only the ends of stretches need to be tried. Of all divisions the one with
-the smallest greatest error is taken, then with the fewest runs, then with the smallest error over
-its length: two passes of dynamic programming along the path.
+the smallest greatest error is taken; then with the fewest runs; then that which drives the axes
+in one direction throughout, as far as it can, so that the error is the same all over the part;
+then with the smallest error over its length: two passes of dynamic programming along the path.
 """
 
 from __future__ import annotations
@@ -36,13 +37,14 @@ a quarter of a circle the greatest distance is then found within 0.5 %."""
 @dataclass(frozen=True)
 class Piece:
     """From place `first` to place `last` of the parts (beyond their number on a closed path), cut
-    from its end to its start when `backward`; its greatest predicted error, mm, and the errors of
-    its parts times their lengths, mm²."""
+    from its end to its start when `backward`; its greatest predicted error, mm; how far off it is
+    for the axes driven in their worse direction, mm; its parts' errors times lengths, mm²."""
 
     first: int
     last: int
     backward: bool
     error_mm: float
+    spread_mm: float
     weight_mm2: float
 
 
@@ -77,34 +79,30 @@ class Division:
             return _cheapest(self, 0)[1]
         turns = [(t.first, t.last) for t in self.turns if len(t)]
         if not turns:
-            return [self.piece(0, len(self.parts))]
+            return _cheapest(self, 0)[1]
         first, last = (np.concatenate(column) for column in zip(*turns, strict=True))
         shortest = int((last - first).argmin())
         begins = _places(self, int(first[shortest]), int(last[shortest]))
         return min((_cheapest(self, begin) for begin in begins), key=lambda each: each[0])[1]
 
-    def piece(self, first: int, last: int) -> Piece:
-        """The piece between two places between which no axis turns round, cut the better way."""
-        forward, rank = self._piece(first, last, 1)
-        if not self.either_way:
-            return forward
-        backward, other = self._piece(first, last, -1)
-        return backward if other < rank else forward
+    def ways(self, first: int, last: int) -> list[Piece]:
+        """The piece between two places between which no axis turns round, in each way in which
+        it may be cut."""
+        ways = (1, -1) if self.either_way else (1,)
+        return [self._piece(first, last, way) for way in ways]
 
-    def _piece(self, first: int, last: int, way: int) -> tuple[Piece, tuple[int, int, int]]:
-        """The piece cut forward (1) or backward (−1), and what speaks against it: its error, the
-        same over its length, and how many axes it drives in their worse direction."""
+    def _piece(self, first: int, last: int, way: int) -> Piece:
         index = np.arange(first, last) % len(self.parts)
-        columns, worse = [], 0
+        columns, spread_mm = [], 0.0
         for turns, residual in zip(self.turns, self.residual, strict=True):
-            sense = way * int(np.sign(turns.sense[index].sum()))
-            worse += sense == -residual.better
             # An axis that stands still came in its better direction.
-            columns.append(int((sense or residual.better) > 0))
+            sense = way * int(np.sign(turns.sense[index].sum())) or residual.better
+            columns.append(int(sense > 0))
+            if sense != residual.better:
+                spread_mm += abs(residual.plus_mm - residual.minus_mm)
         errors = self.errors[index, columns[0], columns[1]]
-        error_mm, weight = float(errors.max()), float(errors @ self.lengths[index])
-        rank = round(error_mm / ALIKE_MM), round(weight / ALIKE_MM), worse
-        return Piece(first, last, way < 0, error_mm, weight), rank
+        weight = float(errors @ self.lengths[index])
+        return Piece(first, last, way < 0, float(errors.max()), spread_mm, weight)
 
 
 def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
@@ -140,25 +138,26 @@ def drawn_error_mm(division: Division) -> float:
     return float(division.errors[rows, columns[0], columns[1]].max())
 
 
-Cost = tuple[int, int, float]
+Cost = tuple[int, float, float]
+"""Pieces, their spread, and their errors over their lengths, summed up."""
 
 
-def _cheapest(division: Division, begin: int) -> tuple[Cost, list[Piece]]:
-    """The best division of the way from place `begin` once around, or to the end; its cost:
-    greatest error in ALIKE_MM, pieces, error over length."""
-    count = len(division.parts)
-    places = _places(division, begin, begin + count)
+def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[Piece]]:
+    """The best division of the way from place `begin` once around, or to the end, with its
+    greatest error in ALIKE_MM and its cost."""
+    places = _places(division, begin, begin + len(division.parts))
     pieces = list(_possible(division, places))
     greatest = [0.0] + [np.inf] * (len(places) - 1)
     for i, j, piece in pieces:
         greatest[j] = min(greatest[j], max(greatest[i], piece.error_mm))
-    best: list[tuple[int, float]] = [(0, 0.0)] + [(len(places), np.inf)] * (len(places) - 1)
+    best: list[Cost] = [(0, 0.0, 0.0)] + [(len(places), 0.0, 0.0)] * (len(places) - 1)
     came: list[tuple[int, Piece] | None] = [None] * len(places)
     for i, j, piece in pieces:
-        cost = best[i][0] + 1, best[i][1] + piece.weight_mm2
+        count, spread, weight = best[i]
+        cost = count + 1, spread + piece.spread_mm, weight + piece.weight_mm2
         if piece.error_mm <= greatest[-1] + ALIKE_MM and cost < best[j]:
             best[j], came[j] = cost, (i, piece)
-    return (round(greatest[-1] / ALIKE_MM), *best[-1]), _traced(came)
+    return (round(greatest[-1] / ALIKE_MM), best[-1]), _traced(came)
 
 
 def _traced(came: Sequence[tuple[int, Piece] | None]) -> list[Piece]:
@@ -171,14 +170,15 @@ def _traced(came: Sequence[tuple[int, Piece] | None]) -> list[Piece]:
 
 
 def _possible(division: Division, places: list[int]) -> Iterator[tuple[int, int, Piece]]:
-    """Pieces from place i to place j of `places`, in the order of i: each ends before, or on, the
-    first turn that lies ahead as a whole."""
+    """Pieces from place i to place j of `places` in all ways, in the order of i: each ends before,
+    or on, the first turn that lies ahead as a whole."""
     reach = _reaches(division, np.array(places, dtype=np.int64))
     for i, first in enumerate(places):
         for j in range(i + 1, len(places)):
             if places[j] > reach[i]:
                 break
-            yield i, j, division.piece(first, places[j])
+            for piece in division.ways(first, places[j]):
+                yield i, j, piece
 
 
 def _reaches(division: Division, places: Ints) -> Floats:
