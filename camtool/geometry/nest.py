@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.distance import nearest
 from camtool.geometry.measure import path_extents, point_at, signed_areas
+from camtool.geometry.offset.curves import Curves
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Bools,
@@ -21,9 +21,6 @@ from camtool.geometry.polylines import (
     Polylines,
     Segments,
 )
-
-PAIRS_AT_A_TIME = 1 << 20
-"""How many pairs of a point and a segment `inside` holds at a time: it bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +55,8 @@ def nesting(lines: Polylines) -> Nesting:
         inner = np.flatnonzero(_box_in(boxes, boxes[j]) & (waiting | ~lines.closed))
         if len(inner) == 0 or is_double[j]:
             continue
-        rows = np.concatenate([np.arange(first_point[i], first_point[i + 1]) for i in inner])
         ring = segments[first_segment[j] : first_segment[j + 1]]
-        held, on_line = _held(points[rows], owner[rows], inner, ring)
+        held, on_line = _held(points, first_point, inner, ring)
         is_double[on_line] = True
         parent[held] = j
         depth[held] += 1
@@ -69,32 +65,10 @@ def nesting(lines: Polylines) -> Nesting:
 
 def inside(points: Floats, ring: Segments) -> Bools:
     """(P,) true for the points (P, 2) within a closed path; on the line either may come out."""
-    result = np.zeros(len(points), dtype=np.bool_)
-    step = max(1, PAIRS_AT_A_TIME // max(1, len(ring)))
-    for begin in range(0, len(points), step):
-        result[begin : begin + step] = _inside(points[begin : begin + step, None, :], ring)
-    return result
+    from camtool.kernels.inside import insides
 
-
-def _inside(points: Floats, ring: Segments) -> Bools:
-    chord = ring.end - ring.start
-    x, y = points[..., 0] - ring.start[:, 0], points[..., 1] - ring.start[:, 1]
-    side = chord[:, 0] * y - chord[:, 1] * x
-    upward = ring.end[:, 1] > ring.start[:, 1]
-    spans = (ring.start[:, 1] > points[..., 1]) != (ring.end[:, 1] > points[..., 1])
-    # A ray to the right meets an upward chord that has the point on its left, and so on.
-    crosses = spans & np.where(upward, side > 0.0, side < 0.0)
-    level = chord[:, 1] == 0.0
-    hair = np.where(level, np.sign(chord[:, 0]), -np.sign(chord[:, 1]))
-    on_left = np.where(side == 0.0, hair, side) > 0.0
-    # A positive bulge lies to the right of its chord. Within the circle its power is negative.
-    from_end = points - ring.end
-    power = 4.0 * ring.bulge * (x * from_end[..., 0] + y * from_end[..., 1])
-    power -= 2.0 * (1.0 - ring.bulge**2) * side
-    in_circle = np.sign(ring.bulge) * power < 0.0
-    beside_chord = in_circle & (on_left == (ring.bulge < 0.0))
-    odd = np.logical_xor.reduce(crosses ^ beside_chord, axis=1)
-    return np.asarray(odd)
+    curves = Curves.of(ring)
+    return insides(np.ascontiguousarray(points, dtype=np.float64), curves.rows, ring.bulge, curves.tree)
 
 
 def _witnesses(lines: Polylines, segments: Segments) -> tuple[Floats, Ints]:
@@ -114,12 +88,11 @@ def _box_in(boxes: Floats, box: Floats) -> Bools:
     return np.asarray((low & high).all(axis=1))
 
 
-def _held(points: Floats, owner: Ints, inner: Ints, ring: Segments) -> tuple[Ints, Ints]:
+def _held(points: Floats, first_point: Ints, inner: Ints, ring: Segments) -> tuple[Ints, Ints]:
     """Which paths of `inner` have all their points in the ring, and which have all on its line."""
-    on_line = nearest(points, ring).distance <= POSITION_EPS_MM
-    is_in = inside(points, ring)
-    place = np.searchsorted(inner, owner)
-    out, truly_in = np.zeros(len(inner), dtype=np.int64), np.zeros(len(inner), dtype=np.int64)
-    np.add.at(out, place, ~is_in & ~on_line)
-    np.add.at(truly_in, place, is_in & ~on_line)
-    return inner[(out == 0) & (truly_in > 0)], inner[(out == 0) & (truly_in == 0)]
+    from camtool.kernels.inside import HELD, ON_LINE, holds
+
+    curves = Curves.of(ring)
+    arrays = (curves.rows, ring.bulge, curves.tree)
+    said = holds(points, first_point, arrays, inner, POSITION_EPS_MM)
+    return inner[said == HELD], inner[said == ON_LINE]
