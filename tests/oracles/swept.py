@@ -13,7 +13,16 @@ import shapely
 
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.items import Run
-from tests.oracles.offset import GRID_MM, chords, dense, distance, inside, near_region, pieces
+from tests.oracles.offset import (
+    GRID_MM,
+    Floats,
+    chords,
+    dense,
+    distance,
+    inside,
+    near_region,
+    pieces,
+)
 
 CHORD_RAD = 0.05
 """Sweep of the chords that stand for the edges of discs, at first."""
@@ -32,11 +41,16 @@ def at_depth(runs: Sequence[Run], z: float) -> list[Polyline]:
         level = np.abs(run.vertices[:, 2] - z) < 1e-9
         edges = np.flatnonzero(np.diff(np.concatenate([[0], level.astype(int), [0]])))
         for low, high in zip(edges[::2], edges[1::2], strict=True):
-            rows = run.vertices[low:high, [0, 1, 3]]
-            moved = np.concatenate([[True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > 1e-6])
-            if moved.sum() > 1:
-                found.append(Polyline(rows[moved]))
+            rows = _moving(run.vertices[low:high, [0, 1, 3]])
+            if len(rows) > 1:
+                found.append(Polyline(rows))
     return found
+
+
+def _moving(rows: Floats) -> Floats:
+    """Vertices (k, 3) without those from where nothing moves in XY."""
+    step = np.hypot(*np.diff(rows[:, :2], axis=0).T)
+    return rows[np.concatenate([step > 1e-6, [True]])]
 
 
 def area_of(region: Polylines) -> shapely.Geometry:
@@ -44,11 +58,22 @@ def area_of(region: Polylines) -> shapely.Geometry:
     size = float(np.ptp(region.vertices[:, :2], axis=0).max())
     area = shapely.Polygon()
     for path in region:
-        radii = [arc.radius for _, _, arc in pieces(path) if arc is not None]
-        most_rad = math.sqrt(8.0 * SAG * size / max(radii, default=size))
-        ring = shapely.make_valid(shapely.Polygon(chords(path, min(most_rad, 0.1))))
+        ring = shapely.make_valid(shapely.Polygon(_chords(path, SAG * size)))
         area = shapely.symmetric_difference(area, ring, grid_size=GRID_MM)
     return area
+
+
+def _chords(path: Polyline, sag_mm: float) -> Floats:
+    """The points of a closed path, with chords no farther than that from their arcs."""
+    points = []
+    for start, _, arc in pieces(path):
+        if arc is None:
+            points.append(start[None, :])
+            continue
+        most_rad = min(math.sqrt(8.0 * sag_mm / arc.radius), 0.5)
+        count = max(2, math.ceil(abs(arc.sweep) / most_rad))
+        points.append(arc.at(np.arange(count) / count))
+    return np.concatenate(points)
 
 
 def swept(paths: Sequence[Polyline], radius_mm: float, most_rad: float) -> shapely.Geometry:
@@ -107,9 +132,7 @@ def gouges(runs: Sequence[Run], region: Polylines, radius_mm: float) -> list[str
     """How far the tool is nearer to the boundary of the region than its radius, anywhere."""
     found = []
     for run in runs:
-        rows = run.vertices[:, [0, 1, 3]]
-        moved = np.concatenate([[True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > 1e-6])
-        rows = rows[moved]
+        rows = _moving(run.vertices[:, [0, 1, 3]])
         points = dense(Polyline(rows), 9) if len(rows) > 1 else rows[:, :2]
         apart = np.min([distance(points, path) for path in region], axis=0)
         if apart.min() < radius_mm - 1e-5:

@@ -1,0 +1,147 @@
+"""What a round tool cannot reach: areas and places by hand, and against regions of chords."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camtool.errors import GeometryError
+from camtool.geometry.measure import signed_areas
+from camtool.geometry.polylines import Polyline, Polylines
+from camtool.geometry.transform import mirrored, reverse, rotated, scaled
+from camtool.planning.reach import opened, unreached
+from tests.oracles import swept
+from tests.oracles.contours import (
+    CIRCLE,
+    DUMBBELL,
+    ELL,
+    FILLETED,
+    NOTCH,
+    RANDOM,
+    SQUARE,
+    closed,
+    comb,
+    star,
+)
+from tests.oracles.contours import (
+    opened as open_path,
+)
+from tests.planning.pocket_cases import LETTER_B, region_of, shapes
+
+FOOT = 1.0 - 0.25 * math.pi
+"""Area at the foot of a square corner that a disc of radius 1 leaves."""
+
+
+def total(paths: list[Polyline], radius: float, **options: float) -> float:
+    return sum(piece.area_mm2 for piece in unreached(region_of(paths), radius, **options))
+
+
+def test_feet_of_square_corners() -> None:
+    pieces = unreached(region_of([SQUARE]), 2.0)
+    assert [piece.area_mm2 for piece in pieces] == pytest.approx([4.0 * FOOT] * 4)
+    corners = sorted((round(x, 9), round(y, 9)) for x, y in (piece.at_mm for piece in pieces))
+    assert corners == [(0.0, 0.0), (0.0, 10.0), (10.0, 0.0), (10.0, 10.0)]
+
+
+@pytest.mark.parametrize(
+    ("path", "radius", "areas"),
+    [
+        (CIRCLE, 9.9, []),
+        (FILLETED, 2.0, []),
+        (ELL, 1.0, [FOOT] * 5),
+        # A half disc stands on one side: two thin feet more.
+        (NOTCH, 1.0, [FOOT] * 4 + [0.047267] * 2),
+        # The neck 2 mm wide and 10 mm long, less what discs reach into it from both sides.
+        (DUMBBELL, 1.5, [18.95229352] + [2.25 * FOOT] * 8),
+        # The teeth 1 mm wide stay, less what the disc reaches into them, and two free corners.
+        (comb(3), 0.8, [6.1136245] * 2 + [5.88016572] + [0.64 * FOOT] * 2),
+        (SQUARE, 8.0, [100.0]),
+    ],
+    ids=["circle", "filleted", "ell", "notch", "neck", "comb", "too large"],
+)
+def test_areas(path: Polyline, radius: float, areas: list[float]) -> None:
+    found = [piece.area_mm2 for piece in unreached(region_of([path]), radius)]
+    assert len(found) == len(areas)
+    assert found == sorted(found, reverse=True)
+    exact = signed_areas(region_of([path])).sum()
+    exact -= signed_areas(opened(region_of([path]), radius)).sum()
+    assert sum(found) == pytest.approx(exact, abs=1e-9)
+    assert found == pytest.approx(areas, abs=1e-6)
+
+
+def test_a_band_narrower_than_the_tool_is_one_piece_with_a_hole() -> None:
+    (piece,) = unreached(region_of([CIRCLE, scaled(CIRCLE, 0.7)]), 2.0)
+    assert piece.area_mm2 == pytest.approx(math.pi * (100.0 - 49.0))
+    assert len(piece.outline) == 2
+
+
+def test_the_outside_of_a_part_is_a_region_too() -> None:
+    hole_of_all = Polylines.of([reverse(ELL)])
+    (piece,) = unreached(hole_of_all, 1.5)
+    assert piece.area_mm2 == pytest.approx(2.25 * FOOT)
+    assert piece.at_mm == pytest.approx((4.0, 4.0))
+
+
+def test_blunt_corners_are_left_out_unless_asked_for() -> None:
+    many = [star(30, 9.0, 10.0)]
+    blunt = [closed(*[(10 * math.cos(a), 10 * math.sin(a)) for a in np.arange(0, 6.2, 0.1)])]
+    assert len(unreached(region_of(many), 0.5)) == 30
+    assert unreached(region_of(blunt), 1.0) == []
+    assert len(unreached(region_of(blunt), 1.0, least_foot=0.0)) >= 60
+
+
+def test_nothing_is_out_of_reach_of_a_point() -> None:
+    assert unreached(region_of([SQUARE]), 0.0) == []
+
+
+def test_open_paths_have_no_inside() -> None:
+    with pytest.raises(GeometryError, match="open"):
+        unreached(Polylines.of([open_path((0, 0), (1, 0), (1, 1))]), 0.1)
+
+
+@settings(max_examples=40)
+@given(paths=shapes(), radius=st.floats(0.03, 3.0))
+def test_pieces_are_the_region_less_the_opened_one(paths: list[Polyline], radius: float) -> None:
+    region = region_of(paths)
+    exact = float(signed_areas(region).sum() - signed_areas(opened(region, radius)).sum())
+    pieces = unreached(region, radius, least_foot=0.0)
+    # Feet of corners that hardly turn are thinner than the error of two offsets.
+    slack = 1e-5 * (len(region.vertices) * radius + 1.0)
+    assert sum(piece.area_mm2 for piece in pieces) == pytest.approx(exact, abs=slack)
+
+
+@settings(max_examples=8)
+@given(paths=shapes(), radius=st.floats(0.2, 2.0))
+def test_pieces_are_where_chords_say(paths: list[Polyline], radius: float) -> None:
+    region = region_of(paths)
+    area = swept.area_of(region)
+    left = shapely.difference(area, swept.opened(area, radius, swept.FINE_CHORD_RAD))
+    pieces = unreached(region, radius, least_foot=0.0)
+    ours = shapely.union_all([swept.area_of(piece.outline) for piece in pieces])
+    apart = shapely.symmetric_difference(left, ours).area
+    assert apart <= 1e-3 * area.area
+
+
+@pytest.mark.parametrize("kind", RANDOM)
+def test_turned_mirrored_and_scaled(kind: str) -> None:
+    rng = np.random.default_rng(4)
+    made = [made for made in (RANDOM[kind](rng) for _ in range(12)) if made is not None]
+    assert made
+    for path, size in made:
+        radius = 0.07 * size
+        area = total([path], radius)
+        assert total([rotated(path, 1.0)], radius) == pytest.approx(area, abs=1e-6 * size**2)
+        assert total([mirrored(path)], radius) == pytest.approx(area, abs=1e-6 * size**2)
+        larger = total([scaled(path, 3.0)], 3.0 * radius)
+        assert larger == pytest.approx(9.0 * area, abs=1e-5 * size**2)
+
+
+def test_a_letter() -> None:
+    pieces = unreached(region_of(LETTER_B), 0.9)
+    assert all(piece.area_mm2 < 0.9 for piece in pieces)
+    assert 4 <= len(pieces) <= 12
