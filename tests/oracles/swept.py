@@ -78,8 +78,26 @@ def _chords(path: Polyline, sag_mm: float) -> Floats:
 
 def swept(paths: Sequence[Polyline], radius_mm: float, most_rad: float) -> shapely.Geometry:
     """What a disc covers on its way along the paths."""
-    parts = [near_region(path, radius_mm, most_rad) for path in paths]
+    parts = [near_region(_divided(path, most_rad), radius_mm, most_rad) for path in paths]
     return shapely.union_all(parts, grid_size=GRID_MM)
+
+
+def _divided(path: Polyline, most_rad: float) -> Polyline:
+    """The path with its large arcs divided, so that chords of a sweep are near to them too."""
+    size = float(np.ptp(path.vertices[:, :2], axis=0).max())
+    rows: list[Floats] = []
+    for start, _, arc in pieces(path):
+        count = 1
+        if arc is not None and abs(arc.sweep) > 1e-6:
+            fine_rad = math.sqrt(8.0 * SAG * size / arc.radius)
+            count = 1 if fine_rad > most_rad else math.ceil(abs(arc.sweep) / fine_rad)
+        part = np.arange(count) / count
+        points = start[None, :] if arc is None or count == 1 else arc.at(part)
+        bulge = 0.0 if arc is None else math.tan(0.25 * arc.sweep / count)
+        rows += [np.array([*point, bulge]) for point in points]
+    if not path.closed:
+        rows.append(path.vertices[-1])
+    return Polyline(np.array(rows), path.closed)
 
 
 def opened(area: shapely.Geometry, radius_mm: float, most_rad: float) -> shapely.Geometry:
