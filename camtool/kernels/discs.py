@@ -48,16 +48,23 @@ off the ends of a neighbour behind a convex corner."""
 
 @njit(cache=True)
 def largest_discs(
-    table: Floats, links: Ints, boxes: Floats, row: Ints, t: Floats, result: Floats, partner: Ints
+    boundary: tuple[Floats, Ints, Floats],
+    row: Ints,
+    t: Floats,
+    guess: Ints,
+    result: Floats,
+    partner: Ints,
 ) -> None:
     """Fill `result` (N, 4) with x, y of the middle, radius, and the place (0 … 1) on the element
     that the disc touches besides, and `partner` (N,) with that element.
 
-    `table` (E, 10) as the columns say; `links` (E, 3): the element before and behind, and the
-    joint to the one before; `boxes` (⌈E/BLOCK⌉, 4). The discs touch element `row` (N,) at the
-    part `t` (N,) of its length or of its turn. One that touches only its own arc, in whose centre
-    it lies, has itself as partner.
+    `boundary` is the table (E, 10) as the columns say; links (E, 3): the element before and
+    behind, and the joint to the one before; boxes (⌈E/BLOCK⌉, 4). The discs touch element `row`
+    (N,) at the part `t` (N,) of its length or of its turn. `guess` (N, 2): elements that may be
+    the partner, looked at first. A disc that touches only its own arc, in whose centre it lies,
+    has itself as partner.
     """
+    table, links, _ = boundary
     for k in range(len(row)):
         own = row[k]
         x, y, nx, ny = frame(table, own, t[k])
@@ -66,7 +73,7 @@ def largest_discs(
             result[k, 0], result[k, 1], result[k, 2] = x, y, 0.0
             result[k, 3], partner[k] = 1.0 - t[k], corner
             continue
-        radius, best = _largest(table, links, boxes, own, (x, y, nx, ny))
+        radius, best = _largest(boundary, own, guess[k], (x, y, nx, ny))
         cx, cy = x + radius * nx, y + radius * ny
         result[k, 0], result[k, 1], result[k, 2] = cx, cy, radius
         result[k, 3], partner[k] = _place(table, best, cx, cy), best
@@ -103,17 +110,22 @@ def _at_convex_corner(links: Ints, own: int, t: float) -> int:
 
 @njit(cache=True)
 def _largest(
-    table: Floats,
-    links: Ints,
-    boxes: Floats,
+    boundary: tuple[Floats, Ints, Floats],
     own: int,
+    guess: Ints,
     at: tuple[float, float, float, float],
 ) -> tuple[float, int]:
     """Radius and partner of the largest disc at a point with its normal."""
+    table, links, boxes = boundary
     x, y = at[0], at[1]
     radius, best = np.inf, own
     if table[own, LENGTH] > 0.0 and table[own, SWEEP] > 0.0:
         radius = table[own, LENGTH] / table[own, SWEEP]
+    for other in guess:
+        if other != own:
+            found = _limit(table, links, own, other, at, radius)
+            if found < radius:
+                radius, best = found, other
     home = own // BLOCK
     for turn in range(len(boxes)):
         block = (home + turn) % len(boxes)

@@ -31,23 +31,19 @@ class Graph:
 
 
 def graph_of(pieces: list[Floats]) -> Graph:
-    """The graph of pieces (n, 4) of x, y, rho, bulge; those that lead nowhere are left out."""
+    """The graph of pieces (n, 4) of x, y, rho, bulge; those that go nowhere are left out."""
+    pieces = [piece for piece in pieces if _extent(piece) > MEET_MM]
     if not pieces:
         return Graph([], np.empty((0, 2), dtype=np.int64), np.empty((0, 3)))
     discs = np.concatenate([piece[[0, -1], :3] for piece in pieces])
     place = _met(discs)
-    ends = place.reshape(-1, 2)
-    kept = [
-        row
-        for row, (a, b) in enumerate(ends.tolist())
-        if a != b or len(pieces[row]) > 2 or _extent(pieces[row]) > MEET_MM
-    ]
     first = np.unique(place, return_index=True)[1]
-    return Graph([pieces[row] for row in kept], ends[kept], discs[first])
+    return Graph(pieces, place.reshape(-1, 2), discs[first])
 
 
 def _extent(piece: Floats) -> float:
-    return float(np.ptp(piece[:, :2], axis=0).max())
+    """How far the piece leaves its start, by its points; above 0 for a full turn."""
+    return float(np.hypot(*(piece[1:, :2] - piece[0, :2]).T).max())
 
 
 def _met(points: Floats) -> Ints:
@@ -229,7 +225,7 @@ def _turned(piece: Floats, back: bool) -> Floats:
     if not back:
         return piece
     turned = piece[::-1].copy()
-    turned[:-1, 3] = -piece[-2::-1, 3]
+    turned[:-1, 3] = 0.0 - piece[-2::-1, 3]
     turned[-1, 3] = 0.0
     return turned
 

@@ -51,12 +51,14 @@ def with_level(boundary: Boundary, trace: Trace, level_mm: float) -> Trace:
     above = np.sign(trace.rho - level_mm)
     same = trace.element[1:] == trace.element[:-1]
     at = np.flatnonzero(same & (above[1:] * above[:-1] < 0.0))
+    guess = np.column_stack([trace.partner[at], trace.partner[at + 1]])
     low, high = trace.t[at].copy(), trace.t[at + 1].copy()
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        is_low = np.sign(discs_at(boundary, trace.element[at], middle).rho - level_mm) == above[at]
+        rho = discs_at(boundary, trace.element[at], middle, guess).rho
+        is_low = np.sign(rho - level_mm) == above[at]
         low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
-    found = discs_at(boundary, trace.element[at], low)
+    found = discs_at(boundary, trace.element[at], low, guess)
     both = concatenated([trace, _with_radius(found, np.full(len(at), level_mm))])
     return both.rows(np.lexsort((both.t, both.element)))
 

@@ -144,7 +144,7 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
         raise ValueError(f"a hole {depth_mm} mm deep")
     whole = depth_mm if peck_mm is None else peck_mm
     count = max(1, math.ceil(depth_mm / whole - PECK_SHARE))
-    return [depth_mm * (step + 1) / count for step in range(count)]
+    return [depth_mm * ((step + 1) / count) for step in range(count)]
 
 
 def _run(hole: Hole, setting: Setting) -> Run:

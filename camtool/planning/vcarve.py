@@ -23,13 +23,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
+from camtool.geometry.boxes import touching_boxes
+from camtool.geometry.crossings import MOST_PAIRS
 from camtool.geometry.distance import points_to_segments
+from camtool.geometry.intersect import meetings
+from camtool.geometry.measure import segment_boxes
 from camtool.geometry.medial import Trace, medial_trace
 from camtool.geometry.nest import nesting
 from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
@@ -38,6 +42,9 @@ from camtool.planning.carve_graph import graph_of, lengths_of, walks, without_tw
 from camtool.planning.carve_pieces import Band, floor_area, grooves, walls, with_level
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
+
+CROSSINGS_SHOWN = 3
+"""So many places where paths cross are named."""
 
 CARVE_TOLERANCE_MM = 5e-4
 """A carved wall may be off its line by this much: half a micrometre."""
@@ -56,27 +63,13 @@ class Cone:
     def of(cls, operation: Operation) -> Cone:
         """The V bit of an operation; OptionError when its tool is none."""
         tool = operation.tool
-        where = f"operation {operation.name!r}, key tool"
         if tool.kind != "v" or tool.tip_angle_rad is None:
             raise OptionError(
                 "carving needs a V bit",
-                where=where,
+                where=f"operation {operation.name!r}, key tool",
                 mend='use a tool with kind = "v" and a tip_angle',
             )
-        if not 0.0 < tool.tip_angle_rad < math.pi:
-            degrees = math.degrees(tool.tip_angle_rad)
-            raise OptionError(
-                f"a tip angle of {degrees:g} degrees is no cone",
-                where=where,
-                mend="give the full angle of the tip, above 0 and below 180 degrees",
-            )
         widest = tool.radius_mm or math.inf
-        if tool.tip_diameter_mm >= 2.0 * widest:
-            raise OptionError(
-                f"a tip of {tool.tip_diameter_mm:g} mm is no smaller than the tool",
-                where=where,
-                mend="give a smaller tip_diameter",
-            )
         return cls(math.tan(0.5 * tool.tip_angle_rad), 0.5 * tool.tip_diameter_mm, widest)
 
     def radius_at(self, depth_mm: float) -> float:
@@ -100,10 +93,14 @@ class _Region:
 def vcarve(chosen: Chosen, setting: Setting) -> Work:
     """One Fixed item for each region: what an even-odd reading of the closed paths fills.
 
+    Where paths cross nobody knows what is filled: a finding of severity error, and no items.
     OptionError for an open path and for a tool that is no V bit.
     """
     cone = Cone.of(setting.operation)
     _refuse_open(chosen, setting.operation)
+    crossing = list(islice(_crossings(chosen), CROSSINGS_SHOWN))
+    if crossing:
+        return Work((), tuple(crossing))
     items: list[Fixed] = []
     findings: list[Finding] = []
     for region in _regions(chosen):
@@ -120,6 +117,28 @@ def _refuse_open(chosen: Chosen, operation: Operation) -> None:
             f"{name} is open and has no inside to carve",
             where=f"operation {operation.name!r}, key kind",
             mend='close it, or take it with an operation of kind = "engrave"',
+        )
+
+
+def _crossings(chosen: Chosen) -> Iterator[Finding]:
+    """The places where paths cross themselves or each other."""
+    segments = Segments.of(chosen.lines)
+    rows, nothing = np.arange(len(segments)), np.zeros(len(segments), dtype=np.int64)
+    every = np.ones(len(segments), dtype=np.bool_)
+    boxes = segment_boxes(segments)
+    one, other = touching_boxes(boxes, nothing, rows, every, most=MOST_PAIRS)
+    if len(one) == 0:
+        return
+    meets, crosses = meetings(segments, one, other)
+    for row in np.flatnonzero(crosses).tolist():
+        a, b = (chosen.names[segments.path[i[row]]] for i in (meets.row_a, meets.row_b))
+        x, y = meets.point[row]
+        yield Finding(
+            Code.SELF_CROSSING,
+            Severity.ERROR,
+            f"{a} crosses {'itself' if a == b else b}: what is inside cannot be told; mend the"
+            " drawing, or carve without it",
+            where=f"{a} at X {x:.4f} Y {y:.4f}",
         )
 
 
@@ -175,7 +194,7 @@ def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
 
     On a slope the tip goes down and up no faster than in a plunge.
     """
-    z = -cone.depth_of(path[:, 2])
+    z = 0.0 - cone.depth_of(path[:, 2])
     vertices = np.column_stack([path[:, :2], z, path[:, 3]])
     heights = np.abs(np.diff(z))
     slope = np.hypot(lengths_of(path), heights)

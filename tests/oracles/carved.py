@@ -54,7 +54,9 @@ def swept(runs: Iterable[Run], slope: float, tip_mm: float, step_mm: float) -> s
     for run in runs:
         points = dense(run, step_mm)
         radius = np.where(points[:, 2] <= 0.0, tip_mm - points[:, 2] * slope, 0.0)
-        discs = shapely.buffer(shapely.points(points[:, :2]), np.maximum(radius, 1e-9), 32)
+        discs = shapely.buffer(
+            shapely.points(points[:, :2]), np.maximum(radius, 1e-9), quad_segs=32
+        )
         if len(discs) == 1:
             parts.append(discs[0])
             continue
