@@ -53,6 +53,11 @@ def read_job_file(path: Path) -> Said:
         values = read_table(path)
     except MachineError as error:
         raise OptionError(error.message, file=error.file, mend=error.mend) from error
+    return said_of(values, path)
+
+
+def said_of(values: dict[str, Any], path: Path) -> Said:
+    """The tables of a job as TOML gives them; `path` names the file."""
     file = str(path)
     top = table_of(values, AT_THE_TOP, "", file)
     defaults = top.only(OF_OPERATIONS)

@@ -62,7 +62,7 @@ class Tools:
 
     def _numbered(self, number: int, given: Given) -> tuple[str, Table]:
         for name, keys in self.named.items():
-            if "number" in keys.given and keys.given["number"].value == number:
+            if _number_of(keys) == number:
                 return name, self._completed(keys)
         if number in self.table:
             return self.table[number].remark, self._of_table(number)
@@ -76,10 +76,10 @@ class Tools:
 
     def _completed(self, keys: Table) -> Table:
         """A named tool of a number may leave its diameter to the tool table."""
-        number = keys.given.get("number")
-        if number is None or number.value not in self.table:
+        number = _number_of(keys)
+        if number is None or number not in self.table:
             return keys
-        return keys.over(self._of_table(number.value, needed="diameter" not in keys.given))
+        return keys.over(self._of_table(number, needed="diameter" not in keys.given))
 
     def _of_table(self, number: int, *, needed: bool = True) -> Table:
         """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
@@ -107,18 +107,24 @@ def with_table(tools: Tools, path: Path) -> Tools:
 
 def refuse_bad_tools(named: Mapping[str, Table]) -> None:
     """Refuse what is no tool, used or not, and two tools of one number."""
-    seen: dict[object, str] = {}
+    seen: dict[int, str] = {}
     for name, keys in named.items():
         _tool(name, keys, "")
-        number = keys.given.get("number")
+        number = _number_of(keys)
         if number is None:
             continue
-        if number.value in seen:
-            raise number.refused(
-                f"tool {number.value} is {seen[number.value]!r} already",
-                "give each tool a number of its own",
+        if number in seen:
+            raise keys.given["number"].refused(
+                f"tool {number} is {seen[number]!r} already", "give each tool a number of its own"
             )
-        seen[number.value] = name
+        seen[number] = name
+
+
+def _number_of(keys: Table) -> int | None:
+    """The number of a tool of the file, if it has one."""
+    given = keys.given.get("number")
+    number: int | None = None if given is None else TOOL["number"].read(given)
+    return number
 
 
 def _tool(name: str, keys: Table, kind: str) -> Tool:
