@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.cli.drawing import DrawingFlags
 from camtool.cli.jobbuild import build_job
 from camtool.cli.jobfile import AT_THE_TOP, OF_OPERATIONS, Said, said_of
-from camtool.cli.jobkeys import PLACE, STOCK, TOOL
+from camtool.cli.jobflags import JobFlags
+from camtool.cli.jobkeys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, WHOLE
 from camtool.cli.jobvalues import ENTRY, LEAD, TABS
 from camtool.errors import OptionError
 from camtool.planning.job import ENTRIES, KINDS, LEADS, Job
@@ -329,3 +331,16 @@ def test_whatever_a_file_holds_it_is_a_job_or_one_line(file: dict[str, Any]) -> 
     except OptionError as error:
         made = str(error)
     assert isinstance(made, Job) or (made.startswith("job.toml: ") and "\n" not in made)
+
+
+_flags = sorted({*WHOLE, *PLACE, "tool", *TOOL_KEYS, *(n for n in OPERATION if OPERATION[n].help)})
+
+
+@given(st.sampled_from([n for n in _flags if not n.startswith("tool_table")]), st.text(max_size=8))
+def test_whatever_a_flag_says_it_is_a_job_or_one_line(name: str, text: str) -> None:
+    flag = "--tool-angle" if name == "tool_tip_angle" else f"--{name.replace('_', '-')}"
+    try:
+        made: object = JobFlags(None, (), {name: text}).job(DrawingFlags((), (), (), (), {}))
+    except OptionError as error:
+        made = str(error)
+    assert isinstance(made, Job) or made.startswith((flag, "vcarve"))
