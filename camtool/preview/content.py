@@ -124,9 +124,9 @@ def _window(
 
 def _bare_starts(strokes: Strokes | None) -> Floats:
     """(S, 2) starts of contours where no plunge is marked."""
-    if strokes is None or not strokes.feeds:
+    if strokes is None:
         return np.empty((0, 2))
-    starts = np.array([chain.points[0] for chain in strokes.feeds])
+    starts = strokes.starts
     if not len(strokes.plunges):
         return starts
     marked = {tuple(place) for place in _grid(strokes.plunges)}
@@ -180,7 +180,7 @@ def _toolpath_entries(content: Content) -> list[Entry]:
     if trace is not None:
         return entries
     if strokes.ramps:
-        entries.append(Entry(legend.line_swatch(*legend.RAMP_SWATCH), "ramp"))
+        entries.append(Entry(legend.line_swatch(*legend.RAMP_SWATCH), "slope"))
     if strokes.rapids:
         entries.append(Entry(legend.line_swatch(*legend.RAPID_SWATCH), "rapid"))
     if len(strokes.plunges):

@@ -118,9 +118,11 @@ def _lines(content: Content, view: View) -> list[str]:
         if strokes.rapids and trace is None:
             layers.append(marks.rapids(strokes.rapids, view))
         base = FEED_PEN if trace is None else 0.6 * FEED_PEN
-        width = marks.pen(view, base, strokes.feeds)
-        if strokes.feeds:
-            layers.append(marks.feeds(strokes.feeds, view, width, pale=trace is not None))
+        cuts = (*strokes.feeds, *strokes.ramps)
+        width = marks.pen(view, base, cuts)
+        level = strokes.feeds if trace is None else cuts
+        if level:
+            layers.append(marks.feeds(level, view, width, pale=trace is not None))
         if strokes.ramps and trace is None:
             layers.append(marks.ramps(strokes.ramps, view, width))
     if trace is not None:

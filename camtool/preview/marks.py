@@ -114,7 +114,7 @@ def feeds(chains: Sequence[Chain], view: View, width: float, *, pale: bool) -> s
 
 
 def ramps(chains: Sequence[Chain], view: View, width: float) -> str:
-    """Moves that sink while they travel, in the colour of plunges."""
+    """Moves that sink or climb while they travel, in the colour of plunges."""
     line = {**_line(view, width), "stroke": PLUNGE}
     return element("g", {"id": "ramps", **line}, element("path", {"d": path_data(chains)}))
 

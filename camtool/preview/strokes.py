@@ -19,6 +19,7 @@ from camtool.preview.svg import MM_DECIMALS, PathData
 from camtool.toolpath.moves import Kind, Toolpath
 
 Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
 LONGEST_ARC_RAD = 1.5 * math.pi
 """An arc of more is written as two."""
@@ -60,13 +61,16 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """A toolpath from above: `feeds`, `ramps` (sinking while moving) and `rapids` as chains,
-    `plunges` (P, 2) mm each place once, `begin` (2,) mm where the tool stands at first."""
+    """A toolpath from above: `feeds` (level), `ramps` (sinking or climbing on their way) and
+    `rapids` as chains; `plunges` (P, 2) mm, where the tool goes straight down that did not come
+    there at a feed, `starts` (S, 2) mm, where feeds in XY begin, each place once; `begin` (2,) mm
+    where the tool stands at first. What is cut at several depths is drawn once."""
 
     feeds: tuple[Chain, ...]
     ramps: tuple[Chain, ...]
     rapids: tuple[Chain, ...]
     plunges: Floats
+    starts: Floats
     begin: Floats
 
 
@@ -75,32 +79,61 @@ def strokes_of(toolpath: Toolpath) -> Strokes:
     starts, ends = toolpath.starts, toolpath.end
     step = ends - starts
     across = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
-    sinks = (toolpath.kind == Kind.LINE) & (step[:, 2] < -POSITION_EPS_MM)
-    feeds = toolpath.is_feed & ~sinks & (across | toolpath.is_arc)
+    cuts = toolpath.is_feed & (across | toolpath.is_arc)
+    slopes = cuts & (np.abs(step[:, 2]) > POSITION_EPS_MM)
     rapid = (toolpath.kind == Kind.RAPID) & across
-    plunges = ends[sinks & ~across, :2]
-    _, first = np.unique(plunges, axis=0, return_index=True)
+    # Steps straight down within a cut, as from one pass to the next, are no plunges to look at.
+    goes_on = _after(toolpath, cuts, cuts | rapid | (toolpath.kind == Kind.RAPID))
+    down = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
     return Strokes(
-        feeds=_chains(toolpath, feeds),
-        ramps=_chains(toolpath, sinks & across),
+        feeds=_chains(toolpath, cuts & ~slopes),
+        ramps=_chains(toolpath, slopes),
         rapids=_once(starts[rapid, :2], ends[rapid, :2]),
-        plunges=plunges[np.sort(first)],
+        plunges=_places(ends[down & ~goes_on, :2]),
+        starts=_places(starts[cuts & ~goes_on, :2]),
         begin=toolpath.start[:2],
     )
 
 
-def _chains(toolpath: Toolpath, chosen: npt.NDArray[np.bool_]) -> tuple[Chain, ...]:
-    """Runs of the chosen rows, each run once (passes at several depths look the same)."""
+def _after(toolpath: Toolpath, cuts: Bools, counts: Bools) -> Bools:
+    """(N,) true where the last row that `counts` before a row is one of the `cuts`."""
+    rows = np.arange(len(toolpath))
+    latest = np.maximum.accumulate(np.where(counts, rows, -1))
+    before = np.concatenate([[-1], latest])[: len(rows)]
+    return np.asarray((before >= 0) & cuts[before]) if len(rows) else cuts
+
+
+def _places(points: Floats) -> Floats:
+    """Each place once, in their order."""
+    _, first = np.unique(points, axis=0, return_index=True)
+    return points[np.sort(first)]
+
+
+def _chains(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
+    """Runs of the chosen rows, each way once: passes at several depths, and back along a line,
+    look the same. Nothing that moves in XY lies between the rows of a run."""
     rows = np.flatnonzero(chosen)
     if not len(rows):
         return ()
-    starts, sweeps = toolpath.starts, toolpath.sweeps()
-    found: dict[bytes, Chain] = {}
-    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
-        points = np.concatenate([starts[run[:1], :2], toolpath.end[run, :2]])
-        chain = Chain(points, toolpath.centre[run], sweeps[run])
-        found.setdefault(points.tobytes() + chain.sweep.tobytes(), chain)
-    return tuple(found.values())
+    starts, ends, sweeps = toolpath.starts[:, :2], toolpath.end[:, :2], toolpath.sweeps()
+    rows = rows[_first_times(starts[rows], ends[rows], sweeps[rows])]
+    moves = toolpath.is_motion & ((starts != ends).any(axis=1) | toolpath.is_arc)
+    count = np.cumsum(moves | (toolpath.kind == Kind.RAPID))
+    runs = np.split(rows, np.flatnonzero(np.diff(count[rows]) > 1) + 1)
+    return tuple(
+        Chain(np.concatenate([starts[run[:1]], ends[run]]), toolpath.centre[run], sweeps[run])
+        for run in runs
+    )
+
+
+def _first_times(begin: Floats, end: Floats, sweep: Floats) -> npt.NDArray[np.int64]:
+    """Which of J moves are the first on their way, there or back, ascending."""
+    back = (begin[:, 0] > end[:, 0]) | ((begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1]))
+    low, high = np.where(back[:, None], end, begin), np.where(back[:, None], begin, end)
+    full = (begin == end).all(axis=1)
+    turn = np.where(full, np.abs(sweep), np.where(back, -sweep, sweep))
+    _, first = np.unique(np.column_stack([low, high, turn]), axis=0, return_index=True)
+    return np.sort(first)
 
 
 def _once(begin: Floats, end: Floats) -> tuple[Chain, ...]:

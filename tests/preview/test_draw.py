@@ -178,7 +178,7 @@ def test_each_layer_is_a_group_and_only_what_is_there_is_drawn(
             },
         ),
         ("line", {"drawing", "open end", "part zero"}),
-        ("ramp", {"feed", "ramp", "start", "part zero"}),
+        ("ramp", {"feed", "slope", "start", "part zero"}),
         ("far", {"drawing, layer far"}),
     ],
 )

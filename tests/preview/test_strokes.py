@@ -138,7 +138,7 @@ def test_moves_are_sorted_by_how_they_are_drawn() -> None:
         .line(z=-0.1, feed=5.0)  # plunge
         .line(2.0, 0.0, feed=10.0)
         .arc(2.0, 2.0, centre=(2.0, 1.0), ccw=True, feed=10.0)
-        .line(z=-0.2, feed=5.0)  # plunge
+        .line(z=-0.2, feed=5.0)  # down to the next pass
         .line(3.0, 2.0, -0.3, feed=5.0)  # ramp
         .line(z=1.0, feed=5.0)  # rises: neither
         .rapid(1.0, 0.0)
@@ -149,7 +149,8 @@ def test_moves_are_sorted_by_how_they_are_drawn() -> None:
     strokes = strokes_of(path)
     assert [len(chain.sweep) for chain in strokes.feeds] == [2]
     assert [chain.points.tolist() for chain in strokes.ramps] == [[[2.0, 2.0], [3.0, 2.0]]]
-    assert strokes.plunges.tolist() == [[1.0, 0.0], [2.0, 2.0]]
+    assert strokes.plunges.tolist() == [[1.0, 0.0]]
+    assert strokes.starts.tolist() == [[1.0, 0.0]]
     # There and back is drawn once.
     assert [chain.points.tolist() for chain in strokes.rapids] == [
         [[0.0, 0.0], [1.0, 0.0]],
@@ -171,3 +172,55 @@ def test_headings_are_those_of_travel() -> None:
         pytest.approx(math.pi),
     )
     assert toolpath_arc(-math.pi, first=math.pi).at(0, 0.5)[1] == pytest.approx(0.0)
+
+
+def test_passes_of_one_stay_are_drawn_once() -> None:
+    builder = ToolpathBuilder().rapid(z=1.0).rapid(1.0, 0.0)
+    for level in (-1.0, -2.0, -3.0):
+        builder.line(z=level, feed=5.0).line(2.0, 0.0, feed=5.0)
+        builder.arc(2.0, 2.0, centre=(2.0, 1.0), ccw=True, feed=5.0).line(1.0, 0.0, feed=5.0)
+    strokes = strokes_of(builder.rapid(z=1.0).finish())
+    assert [len(chain.sweep) for chain in strokes.feeds] == [3]
+    assert strokes.plunges.tolist() == [[1.0, 0.0]]
+
+
+def test_there_and_back_is_drawn_once() -> None:
+    builder = ToolpathBuilder().rapid(z=1.0).rapid(2.0, 0.0)
+    for level in (-1.0, -2.0):
+        builder.line(z=level, feed=5.0).line(3.0, 0.0, feed=5.0)
+        builder.arc(5.0, 0.0, centre=(4.0, 0.0), ccw=True, feed=5.0).line(z=level - 0.5, feed=5.0)
+        builder.arc(3.0, 0.0, centre=(4.0, 0.0), ccw=False, feed=5.0).line(2.0, 0.0, feed=5.0)
+    strokes = strokes_of(builder.finish())
+    assert [chain.sweep.tolist() for chain in strokes.feeds] == [[0.0, pytest.approx(math.pi)]]
+    other = ToolpathBuilder().arc(2.0, 0.0, centre=(1.0, 0.0), ccw=True, feed=5.0)
+    other.arc(0.0, 0.0, centre=(1.0, 0.0), ccw=True, feed=5.0)  # the other half
+    assert [len(chain.sweep) for chain in strokes_of(other.finish()).feeds] == [2]
+
+
+def test_slopes_and_helices_are_no_level_cuts() -> None:
+    builder = ToolpathBuilder().rapid(z=1.0).rapid(1.0, 0.0).line(z=0.0, feed=5.0)
+    builder.arc(1.0, 0.0, -1.0, centre=(0.0, 0.0), ccw=True, feed=5.0)
+    builder.arc(1.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=5.0).line(2.0, 0.0, -0.5, feed=5.0)
+    strokes = strokes_of(builder.finish())
+    assert [chain.sweep.tolist() for chain in strokes.feeds] == [[pytest.approx(FULL)]]
+    assert [len(chain.sweep) for chain in strokes.ramps] == [1, 1]
+    assert strokes.starts.tolist() == [[1.0, 0.0]]
+
+
+def test_small_steps_of_a_slope_are_neither_plunges_nor_starts() -> None:
+    builder = ToolpathBuilder().rapid(z=1.0).rapid(1.0, 0.0).line(z=0.0, feed=5.0)
+    for number in range(1, 50):
+        builder.line(1.0 + 0.1 * number, 0.0, feed=5.0).line(z=-0.01 * number, feed=5.0)
+    strokes = strokes_of(builder.finish())
+    assert strokes.plunges.tolist() == strokes.starts.tolist() == [[1.0, 0.0]]
+    assert [len(chain.sweep) for chain in strokes.feeds] == [49]
+
+
+def test_drilled_holes_are_plunges() -> None:
+    builder = ToolpathBuilder().rapid(z=1.0)
+    for x in (1.0, 2.0):
+        builder.rapid(x, 0.0).line(z=-1.0, feed=5.0).rapid(z=1.0).rapid(z=-0.9)
+        builder.line(z=-2.0, feed=5.0).rapid(z=1.0)
+    strokes = strokes_of(builder.finish())
+    assert strokes.plunges.tolist() == [[1.0, 0.0], [2.0, 0.0]]
+    assert (strokes.feeds, strokes.ramps, len(strokes.starts)) == ((), (), 0)
