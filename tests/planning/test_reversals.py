@@ -19,12 +19,14 @@ from camtool.geometry.polylines import Polyline, Segments
 from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
+from camtool.pipeline import post_drawing
 from camtool.planning.items import Contour, Fixed, Item
-from camtool.planning.job import Entry, Lead, Tabs
+from camtool.planning.job import Entry, Lead, Tabs, job_of
 from camtool.planning.precedence import must_precede
 from camtool.planning.reversals import fewer_reversals, reversals_of
 from tests.oracles.reversals import fewest_runs
 from tests.planning.reversal_parts import (
+    PIC,
     circle,
     contour,
     cutting_reversals,
@@ -351,3 +353,22 @@ def test_what_a_divided_contour_holds_is_cut_before_all_its_runs(machine: Machin
     pairs = {tuple(pair) for pair in must_precede(items).tolist()}
     assert pairs == set(product(runs[id(hole.path)], runs[id(outer.path)]))
     assert len(pairs) == 8
+
+
+def test_a_letter_from_drawing_to_report() -> None:
+    posted = post_drawing(
+        read_drawing(LOGO.with_name("letter.svg")),
+        job_of(origin="lower-left", minimise="reversals"),
+        PIC,
+    )
+    assert posted.verification is not None
+    report = posted.verification.report
+    assert report.contours == 10
+    assert cutting_reversals(report) == 0
+    assert report.before is not None
+    assert report.before.reversals_cutting == 11
+    assert report.before.total_max_um == pytest.approx(14.84, abs=0.3)
+    assert report.error_um.total.max == pytest.approx(9.5, abs=0.3)
+    assert "10 reversals while cutting become 0" in str(
+        next(each for each in posted.findings if each.code == Code.REVERSALS_IN_AIR)
+    )
