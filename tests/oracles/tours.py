@@ -66,33 +66,34 @@ def best_ways(choices: Choices, order: Sequence[int], start: Point, goal: Point 
     return min(length(choices, rows, start, goal) for rows in itertools.product(*ways))
 
 
-def least_length(points: np.ndarray, rounds: int = 400) -> float:
+def least_length(points: np.ndarray, aim: float, rounds: int = 400) -> float:
     """A length that no closed tour of the points (N, 2) can be under.
 
     A tour is a tree of all points but the first and two edges of the first, with two edges at
     each point; a shortest such tree is no longer (Held and Karp 1970). Weights on the points,
     which cost a tour twice their sum, make it longer where it has more than two edges. They are
-    found by subgradient steps; whatever they are, the bound holds.
+    found by subgradient steps towards `aim`, halved when they lead nowhere; whatever they are,
+    the bound holds.
     """
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-    weight, best = np.zeros(len(points)), 0.0
-    step, past = 0.0, np.zeros(len(points))
-    for k in range(rounds):
-        cost = apart + weight[:, None] + weight[None]
-        total, degree = _one_tree(cost)
+    weight, best, stride, idle = np.zeros(len(points)), 0.0, 2.0, 0
+    past = np.zeros(len(points))
+    for _ in range(rounds):
+        total, degree = _one_tree(apart + weight[:, None] + weight[None])
         total -= 2.0 * float(weight.sum())
+        idle = 0 if total > best else idle + 1
         best = max(best, total)
-        if k == 0:
-            step = 0.5 * total / len(points)
+        if idle == IDLE_ROUNDS:
+            stride, idle = 0.5 * stride, 0
         slope = degree - 2.0
         if not slope.any():
             break
-        weight += step * (0.7 * slope + 0.3 * past)
-        past, step = slope, step * STEP_SHRINKS
+        past = 0.7 * slope + 0.3 * past
+        weight += stride * max(aim - total, 0.0) / float(slope @ slope) * past
     return best
 
 
-STEP_SHRINKS = 0.985
+IDLE_ROUNDS = 20
 
 
 def _one_tree(cost: np.ndarray) -> tuple[float, np.ndarray]:

@@ -65,7 +65,7 @@ def test_places_against_what_no_tour_can_be_under(name: str) -> None:
     places = PLACES[name]()
     choices = Choices(np.arange(len(places)), places, places)
     found = travel_mm(choices, best_order(choices, NONE))
-    bound = tours.least_length(np.concatenate([np.zeros((1, 2)), places]), rounds=1500)
+    bound = tours.least_length(np.concatenate([np.zeros((1, 2)), places]), found, 1500)
     assert bound - 1e-6 <= found <= MOST_EXCESS * bound
 
 
