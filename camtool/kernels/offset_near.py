@@ -182,16 +182,21 @@ def far_enough(
     """
     valid = np.ones(len(element), np.bool_)
     rows = np.empty(GATHERED, np.int64)
+    last, whole = -1, -1
     for i in range(len(element)):
-        t0, part = span[i, 0], span[i, 1] - span[i, 0]
-        count = -1
+        row, t0, part = element[i], span[i, 0], span[i, 1] - span[i, 0]
+        length = elements[row, LENGTH]
+        if row != last:
+            # No other curve is too near to any point of the element.
+            middle, reach = point_on(elements, row, 0.5), limits[0] + 0.5 * length
+            last, whole = row, gathered(near[0], near[1], middle, reach, rows)
+        count = whole
         for k in range(len(PLACES)):
-            point = point_on(elements, element[i], t0 + PLACES[k] * part)
+            point = point_on(elements, row, t0 + PLACES[k] * part)
             if _too_near(near, (rows, count), point, limits, 0.0) > 0.0:
                 valid[i] = False
                 break
-            if k == 0:
-                # No other curve is too near to any point of the slice.
-                reach = limits[0] + 0.5 * part * elements[element[i], LENGTH]
+            if k == 0 and whole < 0:
+                reach = limits[0] + 0.5 * part * length
                 count = gathered(near[0], near[1], point, reach, rows)
     return valid
