@@ -34,7 +34,7 @@ RELIEF_MATCH_MM = 1e-5
 """The tool stands at a corner when its distances from both walls differ by no more than this."""
 
 RELIEF_TURN_RAD = 1e-2
-"""Where the contour or the tool's path turns by no more than this, there is no corner."""
+"""Where the tool's path turns by no more than this, it stands at no corner."""
 
 RELIEF_SLACK_MM = 1e-4
 """A relief may come nearer to other wanted lines than the tool's radius by this much."""
@@ -91,7 +91,6 @@ def _stands(along: Along, walls: Along, tool_radius_mm: float) -> dict[int, int]
     """The corners (vertices of the walls) that the tool misses, and at which vertex of its path it
     stands then: the nearest of those that are equally far from both walls of the corner."""
     found: dict[int, tuple[float, int]] = {}
-    sharp = np.abs(walls.turns) > RELIEF_TURN_RAD
     for vertex in np.flatnonzero(np.abs(along.turns) > RELIEF_TURN_RAD).tolist():
         v = along.path.vertices[vertex, :2]
         distance = points_to_segments(v[None], walls.segments)[0]
@@ -100,7 +99,7 @@ def _stands(along: Along, walls: Along, tool_radius_mm: float) -> dict[int, int]
             continue
         near = distance <= away + RELIEF_MATCH_MM
         reach = np.hypot(*(walls.segments.start - v).T)
-        missed = near & np.roll(near, 1) & sharp & (reach > away + RELIEF_LEAST_MM)
+        missed = near & np.roll(near, 1) & (reach > away + RELIEF_LEAST_MM)
         for corner in np.flatnonzero(missed).tolist():
             here = (float(reach[corner]), vertex)
             found[corner] = min(found.get(corner, here), here)

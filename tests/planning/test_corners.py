@@ -132,6 +132,15 @@ def test_rounded_corners_and_outer_ones_get_none() -> None:
     assert relieved(sharp, POCKET, R, "dogbone").path.vertices.tolist() == sharp.vertices.tolist()
 
 
+def test_a_joint_that_is_smooth_is_no_corner() -> None:
+    """A line goes on as an arc so shallow that the tool is as far from both."""
+    shallow = Polyline(
+        np.array([[0, 0, 0], [10, 0, math.tan(0.25 * 1e-5)], [20, 5e-5, 0], [10, 20, 0.0]]), True
+    )
+    path = Polyline(np.array([[5, 1, 0], [11, 1, 0], [12, 3, 0.0]]))
+    assert len(relieved(path, shallow, R, "dogbone").path) == len(path)
+
+
 def test_corners_with_arcs() -> None:
     """A half disc: the tool turns where line and arc are both r away."""
     part = Polyline(np.array([[-5, 0, 0], [5, 0, 1.0]]), True)
@@ -146,6 +155,9 @@ def test_corners_with_arcs() -> None:
         sorted(math.dist(tip, (math.copysign(5, tip[0]), 0)) for tip in tips)
         == [pytest.approx(R)] * 2
     )
+    for tip in tips:
+        at = np.flatnonzero((done.path.vertices[:, :2] == tip).all(axis=1))[0]
+        assert done.path.vertices[at - 1, :2] == pytest.approx([math.copysign(x, tip[0]), 1])
     # The arc that leaves V still does, after the relief.
     assert np.count_nonzero(done.vertices[:, 2]) == 1
     assert done.vertices[np.flatnonzero(done.vertices[:, 2])[0], :2] == pytest.approx([x, 1])

@@ -117,6 +117,15 @@ def test_a_lead_does_not_jump_through_a_thin_wall() -> None:
     assert crossed.findings[0].measured == 1.0
 
 
+def test_a_lead_does_not_cross_a_finger_of_its_own_contour() -> None:
+    """Its ends and its middle are free; between them it runs through the finger."""
+    part = [[4, 0], [4, 2], [5, 2], [5, -2], [5.3, -2], [5.3, 3], [0, 3], [0, 0]]
+    comb = Polyline(np.column_stack([np.array(part, dtype=np.float64), np.zeros(8)]), True)
+    made = leads(comb, True, radius=0.0, lead_in=Lead(), lead_out=Lead("line", 3.0))
+    assert [each.measured for each in made.findings] == [0.75]
+    assert made.away[1, :2] == pytest.approx([4.75, 0.0])
+
+
 def test_an_engraved_line_may_lie_in_what_is_kept() -> None:
     """What the contour itself cuts is not kept from its leads; other lines are."""
     assert leads(OPEN, None, [OPEN]).findings == ()
@@ -282,5 +291,6 @@ def test_leads_are_flat_and_belong_to_the_run() -> None:
     assert findings == []
     vertices = runs[0].vertices
     assert vertices[0].tolist() == pytest.approx([3, -2, -1.0, -math.tan(math.pi / 8)])
+    assert vertices[-2].tolist() == pytest.approx([6, 0, -1.0, -math.tan(math.pi / 8)])
     assert vertices[-1].tolist() == pytest.approx([8, -2, -1.0, 0.0])
     assert (vertices[:, 2] == -1.0).all()

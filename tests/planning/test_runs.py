@@ -154,6 +154,9 @@ def test_open_contours_go_to_and_fro_or_begin_again() -> None:
     again = cut(OPEN)
     assert [tuple(each.vertices[0, :3]) for each in again] == [(0, 0, z) for z in (-0.4, -0.8, -1)]
     assert all((each.vertices[-1, :2] == [0.0, 7.0]).all() for each in again)
+    # A ramp of a later pass begins on what the pass before has left.
+    sloping = cut(OPEN, entry=ramp(5.0))
+    assert [float(each.vertices[0, 2]) for each in sloping] == [0.0, -0.4, -0.8]
 
 
 def test_slopes_are_slow_enough_for_the_plunge_feed() -> None:

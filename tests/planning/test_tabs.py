@@ -18,7 +18,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import reverse, rolled
 from camtool.planning.along import Along
 from camtool.planning.items import Contour, Feeds, Setting
-from camtool.planning.job import Entry, Operation, Tabs, Tool
+from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.runs import runs_of
 from camtool.planning.tabs import raised, tabs_of
 from tests.oracles.runs import run_points, steepest
@@ -86,6 +86,17 @@ def test_no_other_part_of_the_path_cuts_the_bridge(path: Polyline) -> None:
         assert free >= 0.5 * WIDTH - 2.0 * STEP
 
 
+def test_leads_of_open_contours_move_no_tab() -> None:
+    tabs = Tabs(count=3, width_mm=WIDTH, height_mm=0.5)
+    plain = tops(OPEN, contour(OPEN, tabs))
+    lead = Lead("line", 3.0)
+    led, _ = runs_of(contour(OPEN, tabs, lead_in=lead), OPEN)
+    high = led[-1].vertices[led[-1].vertices[:, 2] == BOTTOM + 0.5]
+    for piece in plain:
+        for place in (piece[1], piece[-2]):
+            assert np.hypot(*(high[:, :2] - place[:2]).T).min() <= 2.0 * STEP
+
+
 def test_only_passes_below_the_top_are_raised() -> None:
     tabs = Tabs(count=2, width_mm=WIDTH, height_mm=0.5)
     runs, _ = runs_of(contour(SQUARE, tabs, levels=(-1.0, -1.4, -1.5, -1.8, -2.0)), SQUARE)
@@ -98,11 +109,14 @@ def test_sides_are_straight_or_slope_as_the_entry_does() -> None:
     for entry, ramped, slope in (
         (Entry(), True, 1.0),
         (Entry("ramp", math.radians(20.0)), True, math.tan(math.radians(20.0))),
-        (Entry("ramp", math.radians(60.0)), True, math.tan(math.radians(60.0))),
+        (Entry("ramp", math.radians(60.0)), True, 1.0),
     ):
         tabs = Tabs(count=2, width_mm=WIDTH, height_mm=0.5, ramped=ramped)
         runs, _ = runs_of(contour(SQUARE, tabs, entry=entry), SQUARE)
-        assert steepest(runs[0].vertices) == pytest.approx(slope if slope > 1.5 else min(slope, 1))
+        # The tool goes up only at tabs; down nowhere more steeply than there, or than the entry.
+        up = steepest(runs[0].vertices * [1.0, 1.0, -1.0, 1.0])
+        assert up == pytest.approx(slope)
+        assert steepest(runs[0].vertices) <= max(slope, math.tan(entry.angle_rad)) * (1 + 1e-6)
         straight = [
             (a, b)
             for a, b in pairwise(runs[0].vertices.tolist())
