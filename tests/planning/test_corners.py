@@ -60,7 +60,7 @@ def test_the_edge_reaches_the_corner(degrees: float, kind: str) -> None:
     assert math.dist(tip, turn) == pytest.approx(long)
     # There and back.
     assert len(done.path) == len(path) + 2
-    assert done.path.vertices[1].tolist() == done.path.vertices[3].tolist() == [*turn, 0.0]
+    assert done.vertices[1].tolist() == done.path.vertices[3].tolist() == [*turn, 0.0]
     assert len(done.left) == 0
 
 
@@ -156,8 +156,8 @@ def test_corners_with_arcs() -> None:
         == [pytest.approx(R)] * 2
     )
     for tip in tips:
-        at = np.flatnonzero((done.path.vertices[:, :2] == tip).all(axis=1))[0]
-        assert done.path.vertices[at - 1, :2] == pytest.approx([math.copysign(x, tip[0]), 1])
+        at = np.flatnonzero((done.vertices[:, :2] == tip).all(axis=1))[0]
+        assert done.vertices[at - 1, :2] == pytest.approx([math.copysign(x, tip[0]), 1])
     # The arc that leaves V still does, after the relief.
     assert np.count_nonzero(done.vertices[:, 2]) == 1
     assert done.vertices[np.flatnonzero(done.vertices[:, 2])[0], :2] == pytest.approx([x, 1])
