@@ -44,8 +44,13 @@ LEAST_FOOT = 1e-3
 """Pieces smaller than this part of the tool's disc are left out: the foot of a square corner is
 0.068 of it, that of a corner of 156 degrees is just so large."""
 
-PROBES = (0.3, 0.5, 0.7)
-"""Where a stretch between two vertices is measured."""
+PROBES = (0.0, 0.3, 0.5, 0.7, 1.0)
+"""Where a stretch between two vertices is measured; its ends say nothing on whether it runs
+together with something, only on how far it leads."""
+
+
+AT_A_TIME = 32
+"""How many neighbouring points are looked up at a time: few, because they lie near each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +81,7 @@ def unreached(
     reached = opened(region, tool_radius_mm)
     least = least_foot * np.pi * tool_radius_mm**2
     found = []
-    for piece in regions(_without(region, reached)):
+    for piece in regions(_without(region, reached, least)):
         area = float(signed_areas(piece).sum())
         if area >= least:
             found.append(Unreached(area, _far_place(piece, reached), piece))
@@ -93,42 +98,86 @@ def _far_place(piece: Polylines, reached: Polylines) -> tuple[float, float]:
     return x, y
 
 
-def _without(region: Polylines, reached: Polylines) -> Polylines:
-    """The closed paths around what is in the region and not in `reached`, a part of it."""
+def _without(region: Polylines, reached: Polylines, least_mm2: float) -> Polylines:
+    """The closed paths around what is in the region and not in `reached`, a part of it.
+
+    Pieces that are surely smaller than `least_mm2` may be left out.
+    """
     if len(reached) == 0:
         return region
-    stretches = [*_apart(region, reached), *map(reverse, _apart(reached, region))]
+    inner = _apart(reached, region, region.vertices[:, :2], least_mm2)
+    # Where the one parts from the other, so does the other from the one.
+    ends = np.array([[path.start, path.end] for path in inner]).reshape(-1, 2)
+    stretches = [*_apart(region, reached, ends, least_mm2), *map(reverse, inner)]
     whole = [path for path in stretches if path.closed]
     return Polylines.of([*whole, *_closed([path for path in stretches if not path.closed])])
 
 
-def _apart(lines: Polylines, other: Polylines) -> list[Polyline]:
-    """The stretches of closed paths that do not run together with others: closed where whole."""
+def _apart(lines: Polylines, other: Polylines, marks: Floats, least_mm2: float) -> list[Polyline]:
+    """The stretches of closed paths that do not run together with others: closed where whole.
+
+    They begin and end at vertices, and at those of the `marks` (P, 2) that are on a path. One
+    that leads h away, and is l long, goes round no more than 2 l h: if that is less than
+    `least_mm2` it is left out, and so are the many at the blunt corners of a fine polygon.
+    """
     segments = Segments.of(lines)
-    row, low, high = _split(segments, other.vertices[:, :2])
+    row, low, high = _split(segments, marks)
     parts = np.array(PROBES)
     probes = (low[:, None] + (high - low)[:, None] * parts).ravel()
     points = point_at(segments, np.repeat(row, len(parts)), probes)
-    distance = _distances(points, Segments.of(other)).reshape(-1, len(parts))
-    together = np.asarray((distance <= TOGETHER_MM).all(axis=1))
-    lengths = segment_lengths(segments)
+    away = _distances(points, Segments.of(other)).reshape(-1, len(parts))
+    wanted = np.asarray((away[:, 1:-1] > TOGETHER_MM).any(axis=1))
+    lengths = segment_lengths(segments)[row] * (high - low)
+    first = np.searchsorted(segments.path[row], np.arange(len(lines) + 1))
     found: list[Polyline] = []
-    for index, path in enumerate(lines):
-        mine = np.flatnonzero(segments.path[row] == index)
-        if together[mine].all():
-            continue
-        along = Along.of(path)
-        first = int(row[mine[0]])
-        begin = along.reach[row[mine] - first] + low[mine] * lengths[row[mine]]
-        found += _stretches(along, begin, ~together[mine])
+    for index in np.unique(segments.path[row[wanted]]).tolist():
+        mine = slice(int(first[index]), int(first[index + 1]))
+        made = _Parts(lengths[mine], away[mine].max(axis=1), wanted[mine])
+        found += made.stretches(lines[index], least_mm2)
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """The parts of a closed path in order: how long and how far from others each is (K,), mm, and
+    which of them are wanted."""
+
+    length: Floats
+    away: Floats
+    wanted: Bools
+
+    def stretches(self, path: Polyline, least_mm2: float) -> list[Polyline]:
+        """The runs of wanted parts, but those that surely go round less than `least_mm2`."""
+        if self.wanted.all():
+            return [path]
+        turn = int(np.argmin(self.wanted))
+        length, away, wanted = (
+            np.roll(column, -turn) for column in (self.length, self.away, self.wanted)
+        )
+        begin = np.concatenate([[0.0], np.cumsum(length)]) + self.length[:turn].sum()
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], wanted.astype(np.int64), [0]])))
+        first, last = edges[::2], edges[1::2]
+        # The path begins with a part that is not wanted, so that every other stretch is wanted.
+        farthest = np.maximum.reduceat(np.append(away, 0.0), edges)[::2]
+        large = 2.0 * (begin[last] - begin[first]) * farthest >= least_mm2
+        along = Along.of(path)
+        found = []
+        for low, high in zip(begin[first[large]], begin[last[large]], strict=True):
+            vertices = along.piece(float(low), float(high))
+            if np.hypot(*np.diff(vertices[:, :2], axis=0).T).min() > POSITION_EPS_MM:
+                found.append(Polyline(vertices))
+        return found
 
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
     points = points[_distances(points, segments) <= TOGETHER_MM]
     points = _elsewhere(points, segments.start)
-    row = nearest(points, segments).segment if len(points) else np.empty(0, dtype=np.int64)
+    row = (
+        nearest(points, segments, chunk=AT_A_TIME).segment
+        if len(points)
+        else np.empty(0, dtype=np.int64)
+    )
     frames = Frames.of(segments)[row]
     along = frames.along(points)
     within = (along > TOGETHER_MM) & (along < frames.length - TOGETHER_MM)
@@ -154,23 +203,6 @@ def _elsewhere(points: Floats, others: Floats) -> Floats:
     """The points (P, 2) that are at none of the others (N, 2)."""
     node, _ = merge_points(np.concatenate([points, others]), TOGETHER_MM)
     return points[~np.isin(node[: len(points)], node[len(points) :])]
-
-
-def _stretches(along: Along, begin: Floats, wanted: Bools) -> list[Polyline]:
-    """The runs of wanted parts of a closed path, whose parts begin at these lengths."""
-    if wanted.all():
-        return [along.path]
-    turn = int(np.argmin(wanted))
-    wanted, begin = np.roll(wanted, -turn), np.roll(begin, -turn)
-    begin = np.where(np.arange(len(begin)) < len(begin) - turn, begin, begin + along.total_mm)
-    ends = np.concatenate([begin, [begin[0] + along.total_mm]])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], wanted.astype(np.int64), [0]])))
-    found = []
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        vertices = along.piece(float(ends[first]), float(ends[last]))
-        if np.hypot(*np.diff(vertices[:, :2], axis=0).T).min() > POSITION_EPS_MM:
-            found.append(Polyline(vertices))
-    return found
 
 
 def _closed(stretches: list[Polyline]) -> list[Polyline]:
