@@ -60,7 +60,7 @@ def test_the_edge_reaches_the_corner(degrees: float, kind: str) -> None:
     assert math.dist(tip, turn) == pytest.approx(long)
     # There and back.
     assert len(done.path) == len(path) + 2
-    assert done.vertices[1].tolist() == done.path.vertices[3].tolist() == [*turn, 0.0]
+    assert done.path.vertices[1].tolist() == done.path.vertices[3].tolist() == [*turn, 0.0]
     assert len(done.left) == 0
 
 
