@@ -214,3 +214,19 @@ def test_check_refuses_what_post_would(camtool: Run, tmp_path: Path, samples: Pa
     assert b"operation 1 'a', key layers: no layer matches 'NONE'; it has CUT, ENGRAVE" in (
         done.stderr
     )
+
+
+def test_layers_are_read_as_far_as_operations_need_them(
+    camtool: Run, tmp_path: Path, samples: Path
+) -> None:
+    for head, taken in (
+        ("", ["23 closed paths, 9 open", "9 closed paths, 5 open"]),
+        ("layers = ['CUT']", ["14 closed paths, 4 open", "9 closed paths, 5 open"]),
+        ("colours = ['blue']", ["14 closed paths, 4 open", "9 closed paths, 5 open"]),
+    ):
+        rest = "name = 'b'\nlayers = ['ENG*']\n"
+        text = f"[[operations]]\nname = 'a'\n{head}\n[[operations]]\n{rest}"
+        (tmp_path / "job.toml").write_text(text)
+        done = camtool("job", "check", "job.toml", "--against", samples / "logo.dxf")
+        rows = done.stdout.decode().splitlines()[2::2]
+        assert [row.strip() for row in rows] == [f"{each}, 0 points" for each in taken]

@@ -344,3 +344,9 @@ def test_whatever_a_flag_says_it_is_a_job_or_one_line(name: str, text: str) -> N
     except OptionError as error:
         made = str(error)
     assert isinstance(made, Job) or made.startswith((flag, "vcarve"))
+
+
+def test_what_a_flag_hides_must_be_right_too(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "job.toml").write_text("[[operations]]\ndepth = -1\n")
+    words = ["job.toml", "table [[operations]] 1, key depth", "not above 0"]
+    _refused(camtool, tmp_path, ["--job", "job.toml", "--depth", "1"], words)
