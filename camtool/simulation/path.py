@@ -10,7 +10,7 @@ acceleration, no look-ahead. What it does with a row of the toolpath:
 2. The commanded position runs along the line or arc; see `camtool.simulation.path_samples` for
    where it is sampled. Between samples nothing is rounded: steps are counted, not taken.
 3. A move takes way / feed, a rapid way / `Machine.rapid_mm_min`, and no straight move is faster
-   than the highest rate of each axis. Compensation takes no time.
+   than the highest rate of each axis, no helix than that of Z. Compensation takes no time.
 4. Play, compensation and scale act on the commanded position as on that of any other controller.
    An axis has reversed when it came back by half a coded step: less is not seen by a motor.
 
@@ -211,7 +211,8 @@ def _durations(path: Toolpath, machine: Machine) -> Floats:
     for index, axis in enumerate(machine.axes):
         if axis.max_rate_mm_min is not None:
             least = 60.0 * way[:, index] / axis.max_rate_mm_min
-            seconds = np.where(path.is_arc, seconds, np.maximum(seconds, least))
+            turns = path.is_arc & (index < 2)  # but a helix rises evenly
+            seconds = np.where(turns, seconds, np.maximum(seconds, least))
     return np.where(path.kind == Kind.DWELL, path.value, seconds)
 
 

@@ -46,7 +46,8 @@ def jobs(draw: st.DrawFn) -> Toolpath:
             scale = draw(st.integers(1, 20)) * 0.02
             centre = (x - a * scale, y - c * scale)
             end = (centre[0] + p * scale, centre[1] + q * scale) if (p, q) != (a, c) else (x, y)
-            b.arc(*end, centre=centre, ccw=draw(st.booleans()), feed=60.0)
+            z = draw(st.none() | cell)
+            b.arc(*end, z, centre=centre, ccw=draw(st.booleans()), feed=60.0)
         elif kind == "rapid":
             b.rapid(draw(cell), draw(cell), draw(cell))
         else:
@@ -225,6 +226,14 @@ def test_a_real_step_scales_the_slides() -> None:
 
 def seconds(toolpath: Toolpath, *settings: str) -> list[float]:
     return [c.duration_s for c in simulate(toolpath, path_machine(*settings))]
+
+
+def test_a_helix_takes_its_length_and_is_no_faster_than_z() -> None:
+    helix = ToolpathBuilder((1.0, 0.0, 0.0)).arc(1, 0, -3.0, centre=(0, 0), ccw=True, feed=60.0)
+    (found,) = seconds(helix.finish())
+    assert found == pytest.approx(math.hypot(2.0 * math.pi, 3.0))
+    (slow,) = seconds(helix.finish(), "axes.z.max_rate_mm_min=10")
+    assert slow == pytest.approx(18.0)
 
 
 def test_time_is_way_over_feed() -> None:
