@@ -28,11 +28,11 @@ FIRST_SAMPLES = 9
 HALVINGS = 32
 """So often the gap in which the partner changes is halved: to 1e-10 of an element or less."""
 
-STILL_MM = 1e-7
+STILL_MM = 1e-6
 """Where discs at both ends and in the middle of a gap are nearer than this, nothing is looked for:
 at the common centre of several arcs any of them may seem to be the partner."""
 
-MOST_ROUNDS = 40
+MOST_ROUNDS = 200
 """Samples are halved, and looked for from the other side, no more often than this."""
 
 

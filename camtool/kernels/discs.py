@@ -32,6 +32,9 @@ from numba import njit
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+Place = tuple[float, float, float, float, float, float]
+"""A point x, y, its inner normal, and the point as seen from the nearer end of its element."""
+
 AX, AY, TX, TY, LENGTH, SWEEP, BX, BY, UX, UY = range(10)
 """Columns of an element: its start, tangent there, length, sweep, end, and tangent there."""
 
@@ -73,7 +76,12 @@ def largest_discs(
             result[k, 0], result[k, 1], result[k, 2] = x, y, 0.0
             result[k, 3], partner[k] = 1.0 - t[k], corner
             continue
-        radius, best = _largest(boundary, own, guess[k], (x, y, nx, ny))
+        if t[k] < 0.5:
+            sx, sy = _from_corner(table[own, TX], table[own, TY], table[own], t[k])
+        else:
+            sx, sy = _from_corner(-table[own, UX], -table[own, UY], table[own], t[k] - 1.0)
+        at = (x, y, nx, ny, sx, sy)
+        radius, best = _largest(boundary, own, guess[k], at, t[k] < 0.5)
         cx, cy = x + radius * nx, y + radius * ny
         result[k, 0], result[k, 1], result[k, 2] = cx, cy, radius
         result[k, 3], partner[k] = _place(table, best, cx, cy), best
@@ -99,6 +107,18 @@ def frame(table: Floats, own: int, t: float) -> tuple[float, float, float, float
 
 
 @njit(cache=True)
+def _from_corner(tx: float, ty: float, element: Floats, t: float) -> tuple[float, float]:
+    """A point of an element as seen from its start (t > 0), or from its end (t < 0, and t_x, t_y
+    the direction back from there): without the rounding of far coordinates."""
+    half = 0.5 * element[SWEEP] * t
+    chord = element[LENGTH] * abs(t)
+    if half != 0.0:
+        chord *= math.sin(half) / half
+    cosine, sine = math.cos(half), math.sin(half)
+    return chord * (tx * cosine - ty * sine), chord * (ty * cosine + tx * sine)
+
+
+@njit(cache=True)
 def _at_convex_corner(links: Ints, own: int, t: float) -> int:
     """The other element of the convex corner at which the point lies, −1 elsewhere."""
     if t == 0.0 and links[own, 2] == CONVEX:
@@ -113,7 +133,8 @@ def _largest(
     boundary: tuple[Floats, Ints, Floats],
     own: int,
     guess: Ints,
-    at: tuple[float, float, float, float],
+    at: Place,
+    at_start: bool,
 ) -> tuple[float, int]:
     """Radius and partner of the largest disc at a point with its normal."""
     table, links, boxes = boundary
@@ -123,7 +144,7 @@ def _largest(
         radius = table[own, LENGTH] / table[own, SWEEP]
     for other in guess:
         if other != own:
-            found = _limit(table, links, own, other, at, radius)
+            found = _limit((table, links), (own, other), at, radius, at_start)
             if found < radius:
                 radius, best = found, other
     home = own // BLOCK
@@ -136,7 +157,7 @@ def _largest(
         for other in range(block * BLOCK, min((block + 1) * BLOCK, len(table))):
             if other == own:
                 continue
-            found = _limit(table, links, own, other, at, radius)
+            found = _limit((table, links), (own, other), at, radius, at_start)
             if found < radius:
                 radius, best = found, other
     return radius, best
@@ -144,22 +165,18 @@ def _largest(
 
 @njit(cache=True)
 def _limit(
-    table: Floats,
-    links: Ints,
-    own: int,
-    other: int,
-    at: tuple[float, float, float, float],
-    radius: float,
+    boundary: tuple[Floats, Ints], pair: tuple[int, int], at: Place, radius: float, at_start: bool
 ) -> float:
     """The radius to which another element limits the disc; inf where it does not, or not below
     `radius`."""
-    x, y, nx, ny = at
-    wx, wy = x - table[other, AX], y - table[other, AY]
+    table, links = boundary
+    own, other = pair
+    wx, wy = at[0] - table[other, AX], at[1] - table[other, AY]
     before, behind = links[own, 0] == other, links[own, 1] == other
     found = np.inf
     # Its corner, or the smooth joint at its start, as a point; not one of our own ends.
     corner = table[other, LENGTH] == 0.0
-    ahead = -(nx * wx + ny * wy)
+    ahead = -(at[2] * wx + at[3] * wy)
     if (corner or links[other, 2] == SMOOTH) and not (behind or (before and corner)) and ahead > 0:
         found = 0.5 * (wx * wx + wy * wy) / ahead
     if corner:
@@ -168,40 +185,44 @@ def _limit(
         return np.inf
     if table[own, LENGTH] == 0.0 and (before or behind):
         return np.inf
-    curve = _touching(table, other, at, min(radius, found), _least(table, links, own, other))
-    return min(found, curve)
+    tx, ty = table[other, TX], table[other, TY]
+    # A neighbour behind a convex corner is seen from that corner.
+    if before and at_start and links[own, 2] == CONVEX:
+        sight = (table[other, UX], table[other, UY], at[4], at[5])
+        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0))
+    if behind and not at_start and links[other, 2] == CONVEX:
+        sight = (tx, ty, at[4], at[5])
+        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0))
+    least = _least(table, links, own, other)
+    return min(found, _touching(table[other], (tx, ty, wx, wy), at, min(radius, found), least))
 
 
 @njit(cache=True)
 def _least(table: Floats, links: Ints, own: int, other: int) -> float:
-    """How far on the inner side of `other` a point must be: above 0 behind a reflex corner, and
-    −1 for a neighbour behind a convex corner, where rounding may take the point outside."""
+    """How far on the inner side of `other` a point must be: above 0 behind a reflex corner."""
     before, behind = links[own, 0], links[own, 1]
-    if (before == other and links[own, 2] == CONVEX) or (
-        behind == other and links[other, 2] == CONVEX
-    ):
-        return -1.0
-    if table[before, LENGTH] == 0.0 and links[before, 0] == other:
-        return TOUCH_MM
-    if table[behind, LENGTH] == 0.0 and links[behind, 1] == other:
-        return TOUCH_MM
-    return 0.0
+    over = (table[before, LENGTH] == 0.0 and links[before, 0] == other) or (
+        table[behind, LENGTH] == 0.0 and links[behind, 1] == other
+    )
+    return TOUCH_MM if over else 0.0
 
 
 @njit(cache=True)
 def _touching(
-    table: Floats,
-    other: int,
-    at: tuple[float, float, float, float],
+    element: Floats,
+    sight: tuple[float, float, float, float],
+    at: Place,
     radius: float,
     least: float,
 ) -> float:
-    """The radius at which the disc touches the line or arc `other` within it; inf if it is not
-    below `radius` or touches beyond the ends."""
-    x, y, nx, ny = at
-    tx, ty = table[other, TX], table[other, TY]
-    kappa = table[other, SWEEP] / table[other, LENGTH]
-    wx, wy = x - table[other, AX], y - table[other, AY]
+    """The radius at which the disc touches the line or arc `element` within it; inf if it is not
+    below `radius` or touches beyond the ends.
+
+    `sight`: the tangent at a point of the element, and how the disc's place is seen from there.
+    With `least` below 0 that is a shared corner, and rounding may not hide the element.
+    """
+    tx, ty, wx, wy = sight
+    kappa = element[SWEEP] / element[LENGTH]
     g = wy * tx - wx * ty - 0.5 * kappa * (wx * wx + wy * wy)
     slack = 0.0
     if least < 0.0:
@@ -210,14 +231,14 @@ def _touching(
         return np.inf
     mx, my = -ty - kappa * wx, tx - kappa * wy
     # 1 − n·m without cancellation: |n − m|²/2 + (1 − |m|²)/2, and |m|² = 1 − 2κg.
-    ex, ey = nx - mx, ny - my
+    ex, ey = at[2] - mx, at[3] - my
     below = 0.5 * (ex * ex + ey * ey) + kappa * g
     if below <= 0.0 or g >= radius * below:
         return np.inf
     found = g / below
-    cx, cy = x + found * nx, y + found * ny
-    after = (cx - table[other, AX]) * tx + (cy - table[other, AY]) * ty
-    still = (cx - table[other, BX]) * table[other, UX] + (cy - table[other, BY]) * table[other, UY]
+    cx, cy = at[0] + found * at[2], at[1] + found * at[3]
+    after = (cx - element[AX]) * element[TX] + (cy - element[AY]) * element[TY]
+    still = (cx - element[BX]) * element[UX] + (cy - element[BY]) * element[UY]
     return found if after >= -slack and still <= slack else np.inf
 
 

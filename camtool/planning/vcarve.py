@@ -36,7 +36,7 @@ from camtool.geometry.intersect import meetings
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.medial import Trace, medial_trace
 from camtool.geometry.nest import nesting
-from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
+from camtool.geometry.polylines import Floats, Polylines, Segments
 from camtool.geometry.regions import regions
 from camtool.planning.carve_graph import graph_of, lengths_of, walks, without_twigs
 from camtool.planning.carve_pieces import Band, floor_area, grooves, walls, with_level
@@ -132,13 +132,13 @@ def _crossings(chosen: Chosen) -> Iterator[Finding]:
     meets, crosses = meetings(segments, one, other)
     for row in np.flatnonzero(crosses).tolist():
         a, b = (chosen.names[segments.path[i[row]]] for i in (meets.row_a, meets.row_b))
-        x, y = meets.point[row]
+        x, y = meets.point[row].tolist()
         yield Finding(
             Code.SELF_CROSSING,
             Severity.ERROR,
             f"{a} crosses {'itself' if a == b else b}: what is inside cannot be told; mend the"
             " drawing, or carve without it",
-            where=f"{a} at X {x:.4f} Y {y:.4f}",
+            where=_at(a, x, y),
         )
 
 
@@ -205,17 +205,33 @@ def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
 
 
 def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
-    widest = float(trace.rho.max())
-    if widest <= cone.tip_mm:
+    """What a flat tip cannot enter: all of the region, or its corners and narrow places."""
+    from camtool.planning.reach import unreached
+
+    tip, widest = 2.0 * cone.tip_mm, 2.0 * float(trace.rho.max())
+    if widest <= tip:
         yield Finding(
             Code.CONTOUR_TOO_SMALL,
             Severity.WARNING,
-            f"a flat tip of {2.0 * cone.tip_mm:g} mm does not fit into this contour, which is"
-            f" {2.0 * widest:.4g} mm wide: it is not carved",
-            where=_at(region.name, region.lines[0]),
-            measured=2.0 * widest,
-            limit=2.0 * cone.tip_mm,
+            f"a flat tip of {tip:g} mm does not fit into this contour, which is {widest:.4g} mm"
+            " wide: it is not carved",
+            where=_at(region.name, *region.lines[0].start.tolist()),
+            measured=widest,
+            limit=tip,
             unit="mm",
+        )
+        return
+    pieces = unreached(region.lines, cone.tip_mm)
+    if pieces:
+        area = sum(piece.area_mm2 for piece in pieces)
+        yield Finding(
+            Code.UNREACHED,
+            Severity.WARNING,
+            f"a flat tip of {tip:g} mm leaves {len(pieces)} corners or narrow places uncut,"
+            f" {area:.4g} mm² in all: use a bit with a smaller tip",
+            where=_at(region.name, *pieces[0].at_mm),
+            measured=area,
+            unit="mm2",
         )
 
 
@@ -230,11 +246,11 @@ def _limited(
             Severity.WARNING,
             f"a floor of {area:.6g} mm² is left: up to {2.0 * trace.rho[row]:.4g} mm wide, bit and"
             f" depth allow {2.0 * limit_mm:.4g} mm; clear it with a pocket and a flat tool",
-            where=f"{region.name} at X {trace.x[row]:.4f} Y {trace.y[row]:.4f}",
+            where=_at(region.name, float(trace.x[row]), float(trace.y[row])),
             measured=area,
             unit="mm2",
         )
 
 
-def _at(name: str, path: Polyline) -> str:
-    return f"{name} at X {path.start[0]:.4f} Y {path.start[1]:.4f}"
+def _at(name: str, x: float, y: float) -> str:
+    return f"{name} at X {x:.4f} Y {y:.4f}"

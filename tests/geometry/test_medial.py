@@ -148,3 +148,19 @@ def test_arcs_about_one_centre_are_no_endless_work() -> None:
     assert len(trace) < 20_000
     assert trace.rho.max() == pytest.approx(8.0, abs=1e-9)
     assert math.hypot(*trace.discs[int(np.argmax(trace.rho)), :2]) <= 1e-6
+
+
+@pytest.mark.parametrize("turn", [2e-5, 1e-4, 1e-2])
+def test_corners_that_hardly_turn_are_seen_without_noise(turn: float) -> None:
+    low = -5.0 * math.tan(0.5 * turn)
+    bent = shapes.closed((50, 40), (55, 40 + low), (60, 40), (60, 48), (50, 48))
+    region = region_of(bent)
+    boundary, trace = medial_trace(region, TOLERANCE_MM)
+    check_touching(region, trace)
+    assert len(trace) < 1000
+    # On the bisector of the corner the radius grows with the distance from it.
+    beside = np.full(3, 0)
+    inner = discs_at(boundary, beside, 1.0 - np.array([1e-6, 3e-6, 1e-5]) * turn)
+    way = np.hypot(inner.x - 55.0, inner.y - 40.0 - low)
+    assert inner.rho == pytest.approx(way * math.cos(0.5 * turn), rel=1e-6)
+    assert inner.partner.tolist() == [1, 1, 1]

@@ -219,11 +219,12 @@ def test_a_flat_tip_leaves_corners_and_stays_out_of_narrow_places() -> None:
     setting = setting_of(tip_diameter_mm=1.0)
     thin = shapes.closed((30, 0), (39, 0), (39, 0.9), (30, 0.9))
     work = vcarve(chosen_of([shapes.SQUARE, thin]), setting)
-    assert [f.code for f in work.findings] == [Code.CONTOUR_TOO_SMALL]
-    assert work.findings[0].measured == pytest.approx(0.9)
+    assert [f.code for f in work.findings] == [Code.UNREACHED, Code.CONTOUR_TOO_SMALL]
+    corners = 4.0 * 0.25 * (1.0 - 0.25 * math.pi)
+    assert work.findings[0].measured == pytest.approx(corners, rel=1e-6)
+    assert work.findings[1].measured == pytest.approx(0.9)
     assert len(work.items) == 1
     assert gouge(work, [shapes.SQUARE], setting) <= CARVE_TOLERANCE_MM
-    corners = 4.0 * 0.25 * (1.0 - 0.25 * math.pi)
     assert uncut(work, [shapes.SQUARE], setting).area == pytest.approx(corners, abs=0.01)
 
 
