@@ -17,7 +17,15 @@ from camtool.geometry.measure import (
     segment_lengths,
     signed_area,
 )
-from camtool.geometry.offset import OffsetOptions, Way, offset, offset_open, shape_stages
+from camtool.geometry.offset import (
+    OffsetOptions,
+    Way,
+    offset,
+    offset_open,
+    offset_shape,
+    shape_stages,
+    stage_drawings,
+)
 from camtool.geometry.offset.slices import merge_points
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
@@ -355,6 +363,18 @@ def test_stages_can_be_looked_at() -> None:
             at = slices.t0 + t * (slices.t1 - slices.t0)
             points = point_at(stages.trimmed.elements, slices.element, at)
             assert ((distance(points, DUMBBELL) > 2.0 - 1e-9) == valid).all()
+
+
+def test_each_stage_is_a_drawing() -> None:
+    lines = Polylines.of([reverse(DUMBBELL), reverse(moved(SLOT, 0, 30))])
+    drawings = stage_drawings(lines, Way(1.0, 1.2))
+    assert list(drawings) == ["raw", "trimmed", "slices", "kept", "loops"]
+    for name, drawing in drawings.items():
+        assert drawing.layers[:2] == ("source", "source")
+        assert len(set(drawing.layers)) == (3 if name in ("raw", "slices") else 2)
+    loops = drawings["loops"].paths.select([2, 3])
+    wanted = offset_shape(lines, 1.0, joins="mitre", mitre_limit=1.2)
+    assert np.array_equal(loops.vertices, wanted.vertices)
 
 
 def test_trimming_takes_only_what_is_too_near() -> None:
