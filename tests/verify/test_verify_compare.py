@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Segments
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verify.compare import ANY_CONTOUR, Groups, Target, distance_each
+from camtool.verify.compare import ANY_CONTOUR, Groups, SegmentTable, Target, distance_each
 from camtool.verify.cuts import cut_moves
 from camtool.verify.runs import run_offsets
 from tests.oracles.dense_moves import circle, cut, dense_distance, points_of, square
@@ -49,6 +50,18 @@ def test_distance_is_that_of_dense_points(start, way, bulge, point) -> None:
     dense = dense_distance(np.array(point), cloud_of(segments))
     assert found <= dense + 1e-9
     assert found >= dense - 0.5 * length / DENSE - 1e-9
+
+
+@given(pair, pair.filter(lambda d: math.hypot(*d) > 0.01), st.floats(-1, 1), pair)
+def test_the_share_is_that_of_the_nearest_place(start, way, bulge, point) -> None:
+    bulge = bulge if abs(bulge) > 1e-3 else 0.0
+    segments, _ = arc_or_line(start, way, bulge)
+    table, points, which = SegmentTable(segments), np.array([point]), np.zeros(1, dtype=np.int64)
+    share = table.shares(points, which)
+    assert 0.0 <= share[0] <= 1.0
+    place = point_at(segments, which, share)
+    found = float(table.distances(points, which)[0])
+    assert math.dist(place[0], point) == pytest.approx(found, abs=1e-7)
 
 
 @pytest.mark.parametrize("bulge", [0.0, 0.3, -0.3, 1.0, -1.0, 1e-4])
