@@ -83,7 +83,7 @@ def strokes_of(toolpath: Toolpath) -> Strokes:
     slopes = cuts & (np.abs(step[:, 2]) > POSITION_EPS_MM)
     rapid = (toolpath.kind == Kind.RAPID) & across
     # Steps straight down within a cut, as from one pass to the next, are no plunges to look at.
-    goes_on = _after(toolpath, cuts, cuts | rapid | (toolpath.kind == Kind.RAPID))
+    goes_on = _after(toolpath, cuts, cuts | (toolpath.kind == Kind.RAPID))
     down = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
     return Strokes(
         feeds=_chains(toolpath, cuts & ~slopes),

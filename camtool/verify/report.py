@@ -105,7 +105,8 @@ class TimeSplit(msgspec.Struct, frozen=True):
 
 
 class Dimension(msgspec.Struct, frozen=True):
-    """A size of the tool centre's path; error_percent > 0 when it comes out too large."""
+    """A size of the tool centre's path; error_percent > 0 when it comes out too large. Of a
+    contour in several passes the deepest and last one counts, without leads and ramps."""
 
     name: str
     nominal_mm: float
@@ -114,7 +115,9 @@ class Dimension(msgspec.Struct, frozen=True):
 
 
 class CircleReport(msgspec.Struct, frozen=True):
-    """A full circle: G, F max and F min as ISO 230-4 defines them; D is the mean of r − R."""
+    """A full circle: G, F max and F min as ISO 230-4 defines them; D is the mean of r − R. A
+    circle in several passes, or at the end of a helix, is reported once: its deepest level turn.
+    """
 
     centre_mm: tuple[float, float]
     radius_mm: float
