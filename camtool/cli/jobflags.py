@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from camtool.cli.gather import decorate, gather
 from camtool.cli.jobgiven import Given, Key, Table
 from camtool.cli.jobkeys import OPERATION, PLACE, TOOL_KEYS, TOOL_NAME, WHOLE
 from camtool.cli.sections import option
+from camtool.errors import OptionError
 
 if TYPE_CHECKING:
     from camtool.planning.job import Job
@@ -51,6 +53,16 @@ class JobFlags:
         if drawing.layers and len(job.operations) == 1:
             return replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
         return job
+
+    @contextmanager
+    def blamed(self) -> Iterator[None]:
+        """Errors of planning that name an operation name its file too."""
+        try:
+            yield
+        except OptionError as error:
+            if not error.file and str(error.where).startswith("operation"):
+                error.file = self.file
+            raise
 
     def _table(self, keys: Mapping[str, Key | None]) -> Table:
         return Table(

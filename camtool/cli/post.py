@@ -68,7 +68,8 @@ def post(
     say_first_run(quiet=quiet)
     wanted = job.job(drawing)
     read = drawing.read(source, target.machine, wanted)
-    posted = post_drawing(read, wanted, target, check=not no_verify)
+    with job.blamed():
+        posted = post_drawing(read, wanted, target, check=not no_verify)
     return finish(
         posted,
         asked,

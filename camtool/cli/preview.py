@@ -90,7 +90,8 @@ def _scene(
     wanted = job.job(drawing)
     read = drawing.read(source, target.machine, wanted)
     if not simulate:
-        toolpath = plan(read, wanted, target.machine)
+        with job.blamed():
+            toolpath = plan(read, wanted, target.machine)
         return picture(
             title=title,
             drawing=read,
@@ -98,7 +99,8 @@ def _scene(
             toolpath=toolpath,
             machine=target.machine,
         )
-    posted = post_drawing(read, wanted, target)
+    with job.blamed():
+        posted = post_drawing(read, wanted, target)
     return picture(
         title=title,
         drawing=read,

@@ -72,14 +72,15 @@ def verify(
     data = read_bytes(program)
     wanted = job.job(drawing)
     read = drawing.read(against, target.machine, wanted) if against else None
-    decoded, verification = verify_program(
-        data,
-        target,
-        source=shown(program),
-        drawing=read,
-        job=wanted,
-        interpolator=cast("Interpolator | None", interpolator),
-    )
+    with job.blamed():
+        decoded, verification = verify_program(
+            data,
+            target,
+            source=shown(program),
+            drawing=read,
+            job=wanted,
+            interpolator=cast("Interpolator | None", interpolator),
+        )
     files: dict[str, bytes] = {}
     if preview is not None:
         from camtool.preview.render import render

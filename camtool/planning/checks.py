@@ -16,6 +16,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Stock, Tool
+from camtool.planning.places import operation_name
 from camtool.toolpath.cleared import STOCK_TOP_MM, Reach, rapids_through_stock
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Kind, Toolpath
@@ -135,7 +136,7 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
             Severity.ERROR,
             f"it has another tool than the operation before and {number}, so the program cannot"
             " ask for it: number the tools, or write a program for each",
-            where=f"operation {operation.name!r}" if operation.name else operation.kind,
+            where=operation_name(operation),
         )
 
 

@@ -20,6 +20,7 @@ from camtool.geometry.measure import path_extents, sample
 from camtool.geometry.polylines import Bools, Floats, Polyline, Polylines, Segments
 from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
+from camtool.planning.places import operation_name
 
 ROUND_SHARE = 1e-3
 """A closed path is a circle when its points are off the mean radius by no more than this share
@@ -231,7 +232,7 @@ def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
             Code.NOTHING_DRAWN,
             Severity.ERROR,
             "there is no hole to drill: no single point, and no circle that is small enough",
-            where=f"operation {operation.name!r}",
+            where=operation_name(operation),
         )
 
 

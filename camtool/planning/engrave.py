@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from camtool.errors import OptionError
 from camtool.planning.items import Chosen, Contour, Setting, Work
+from camtool.planning.places import key_of
 
 
 def engrave(chosen: Chosen, setting: Setting) -> Work:
@@ -20,7 +21,7 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
     if operation.direction != "drawn":
         raise OptionError(
             f"engraving on the line is neither {operation.direction} nor the other way",
-            where=f"operation {operation.name!r}, key direction",
+            where=key_of(operation, "direction"),
             mend='leave it out, or write "drawn"',
         )
     return Work(

@@ -11,6 +11,7 @@ from camtool.machine.model import Machine
 from camtool.planning.arcs import cuts
 from camtool.planning.items import Feeds, Run
 from camtool.planning.job import Job, Operation, Tool
+from camtool.planning.places import key_of
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
@@ -58,6 +59,7 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
             raise OptionError(
                 f"{name} {feed:g} mm/min is above {highest:.4g} mm/min, the highest of"
                 f" {machine.target.name}",
+                where=key_of(operation, name.replace(" ", "_")),
                 mend=f"use {flag} {_sayable(highest, machine):g} or less",
             )
     return Feeds(cut, plunge)

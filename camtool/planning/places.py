@@ -20,4 +20,9 @@ def tool_name(tool: Tool) -> str:
 
 def key_of(operation: Operation, key: str) -> str:
     """Where a setting of an operation stands in its job."""
-    return f"operation {operation.name or operation.kind!r}, key {key}"
+    return f"{operation_name(operation)}, key {key}"
+
+
+def operation_name(operation: Operation) -> str:
+    """An operation by its name, or by its kind when it has none."""
+    return f"operation {operation.name or operation.kind!r}"

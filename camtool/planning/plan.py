@@ -15,6 +15,7 @@ from pathlib import PurePath
 
 import numpy as np
 
+from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polylines
@@ -25,6 +26,7 @@ from camtool.planning.job import Job, Operation
 from camtool.planning.levels import levels
 from camtool.planning.link import Approach, Worked, depth_of, feeds_of, link, safe_z_of
 from camtool.planning.place import place
+from camtool.planning.places import operation_name
 from camtool.toolpath.moves import Toolpath
 
 Point = tuple[float, float]
@@ -84,13 +86,15 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
 
 
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
-    """The operation with the machine's numbers where it is silent; OptionError when too fast."""
-    return Setting(
-        operation,
-        feeds_of(operation, machine),
-        levels(depth_of(operation, machine), operation.step_down_mm, operation.last_pass_mm),
-        safe_z_of(job, machine),
-    )
+    """The operation with the machine's numbers where it is silent; OptionError when too fast,
+    and for passes that cannot be."""
+    depth = depth_of(operation, machine)
+    try:
+        passes = levels(depth, operation.step_down_mm, operation.last_pass_mm)
+    except OptionError as error:
+        error.where = f"{operation_name(operation)}, {error.where}"
+        raise
+    return Setting(operation, feeds_of(operation, machine), passes, safe_z_of(job, machine))
 
 
 def work_of(chosen: Chosen, setting: Setting) -> Work:
@@ -145,8 +149,8 @@ def _step(placed: Drawing, job: Job, setting: Setting, machine: Machine, here: P
     for row in rows.tolist():
         item = items[int(choices.owner[row])]
         if isinstance(item, Contour):
-            made, noticed = runs_of(item, chosen_path(items, choices, row), _around(keep_out))
-            findings += noticed
+            made, said = runs_of(item, chosen_path(items, choices, row), _around(keep_out))
+            findings += said
             runs += made
         else:
             runs += item.runs
@@ -160,14 +164,14 @@ def _around(keep_out: Polylines) -> Polylines | None:
 
 def _with_starts(item: Item) -> Item:
     """A closed contour with the places where its operation lets it begin."""
-    if not isinstance(item, Contour) or not item.path.closed or len(item.starts):
+    if not isinstance(item, Contour) or not item.path.closed:
         return item
-    rule = item.setting.operation.start
-    if rule == "nearest":
+    operation = item.setting.operation
+    if operation.start == "nearest":
         return item
     from camtool.planning.starts import with_starts
 
-    path, starts = with_starts(item.path, rule)
+    path, starts = with_starts(item.path, operation.start, operation.tool.radius_mm)
     return replace(item, path=path, starts=starts)
 
 

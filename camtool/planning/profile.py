@@ -253,7 +253,7 @@ def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
         Code.OPEN_CONTOUR_ON_LINE,
         Severity.WARNING,
         f"an open contour has no {side}: the tool runs on the line",
-        where=at_place(chosen.names[k], chosen.lines[k].start),
+        where=at_place(chosen.names[k], chosen.lines[k].start.tolist()),
     )
 
 

@@ -42,6 +42,7 @@ from camtool.planning.carve_graph import graph_of, lengths_of, walks, without_tw
 from camtool.planning.carve_pieces import Band, floor_area, grooves, walls, with_level
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
+from camtool.planning.places import key_of
 
 CROSSINGS_SHOWN = 3
 """So many places where paths cross are named."""
@@ -66,7 +67,7 @@ class Cone:
         if tool.kind != "v" or tool.tip_angle_rad is None:
             raise OptionError(
                 "carving needs a V bit",
-                where=f"operation {operation.name!r}, key tool",
+                where=key_of(operation, "tool"),
                 mend='use a tool with kind = "v" and a tip_angle',
             )
         widest = tool.radius_mm or math.inf
@@ -115,7 +116,7 @@ def _refuse_open(chosen: Chosen, operation: Operation) -> None:
         name = chosen.names[int(np.argmin(chosen.lines.closed))]
         raise OptionError(
             f"{name} is open and has no inside to carve",
-            where=f"operation {operation.name!r}, key kind",
+            where=key_of(operation, "kind"),
             mend='close it, or take it with an operation of kind = "engrave"',
         )
 
