@@ -228,6 +228,17 @@ def test_climb_and_conventional_keep_their_direction(machine: Machine) -> None:
     )
 
 
+@pytest.mark.parametrize("name", SHAPES)
+def test_nor_does_the_error_rise_when_they_do(machine: Machine, name: str) -> None:
+    path = moved(SHAPES[name], 1.0, 1.0)
+    item = contour(path, left=True, direction="climb", tool=setting_tool(0.1))
+    pieces = paths_of(fewer_reversals([item], machine)[0])
+    before = judged([path], [path], machine, approach=False)
+    after = judged(pieces, [path], machine, approach=True)
+    assert cutting_reversals(after) == 0
+    assert (after.error_um.total.max or 0.0) <= (before.error_um.total.max or 0.0) + 0.3
+
+
 def setting_tool(diameter_mm: float) -> Any:
     from camtool.planning.job import Tool
 
