@@ -36,7 +36,8 @@ def best_rows(ends: Floats, first: Ints, order: Ints, start: Floats, goal: Float
             for r in cheapest:
                 if cost[r] >= best:
                     break
-                length = cost[r] + math.hypot(ends[row, 0] - ends[r, 2], ends[row, 1] - ends[r, 3])
+                x, y = ends[row, 0] - ends[r, 2], ends[row, 1] - ends[r, 3]
+                length = cost[r] + math.sqrt(x * x + y * y)
                 if length < best:
                     best, came_from[row] = length, r
             cost[row] = best
