@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from camtool.errors import OptionError
 from camtool.findings import Code, Severity
 from camtool.geometry.distance import nearest
 from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.importers.read import read_drawing
 from camtool.planning.items import Chosen, Feeds, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation, Tool
 from camtool.planning.vcarve import CARVE_TOLERANCE_MM, vcarve
@@ -75,15 +77,14 @@ def gouge(work: Work, paths: Sequence[Polyline], setting: Setting) -> float:
     tool = setting.operation.tool
     assert tool.tip_angle_rad is not None
     boundary = Segments.of(Polylines.of(paths))
+    region = area_of(Polylines.of(paths), CHORD_MM).buffer(CHORD_MM)
+    shapely.prepare(region)
     worst = 0.0
     for run in runs_of(work):
         points = dense(run, STEP_MM)
         radius = 0.5 * tool.tip_diameter_mm - points[:, 2] * math.tan(0.5 * tool.tip_angle_rad)
         worst = max(worst, float((radius - nearest(points[:, :2], boundary).distance).max()))
-        inside = shapely.contains_xy(
-            area_of(Polylines.of(paths), CHORD_MM).buffer(1e-3), points[:, :2]
-        )
-        assert inside.all()
+        assert shapely.contains_xy(region, points[:, :2]).all()
     return worst
 
 
@@ -300,3 +301,13 @@ def test_random_contours_are_never_gouged(path: Polyline, depth: float, tip: flo
     if any(f.code is Code.SELF_CROSSING for f in work.findings):
         return
     assert gouge(work, [path], setting) <= CARVE_TOLERANCE_MM
+
+
+def test_the_sample_logo() -> None:
+    drawing = read_drawing(Path(__file__).parents[2] / "samples" / "logo.svg")
+    paths = [path for path in drawing.paths if path.closed]
+    setting = setting_of()
+    work = vcarve(chosen_of(paths), setting)
+    assert not work.findings
+    assert gouge(work, paths, setting) <= CARVE_TOLERANCE_MM
+    assert len(work.items) == 19
