@@ -303,6 +303,7 @@ def test_random_contours_are_never_gouged(path: Polyline, depth: float, tip: flo
     assert gouge(work, [path], setting) <= CARVE_TOLERANCE_MM
 
 
+@pytest.mark.slow
 def test_the_sample_logo() -> None:
     drawing = read_drawing(Path(__file__).parents[2] / "samples" / "logo.svg")
     paths = [path for path in drawing.paths if path.closed]
