@@ -37,6 +37,9 @@ from camtool.planning.pocket_slots import SLOT_TOLERANCE, slot_ways
 from camtool.planning.uncut import unreached_findings
 from camtool.planning.zigzag import Scan, zigzag_ways
 
+MOST_WAYS = 10_000
+"""More steps than this across a pocket are taken as a mistake."""
+
 
 @dataclass(frozen=True, eq=False)
 class Pocket:
@@ -63,6 +66,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
     OptionError for an open path, for paths that cross, and for a tool that cuts no width.
     """
     _check(chosen, setting.operation)
+    _check_step(chosen, setting.operation)
     items: list[Fixed] = []
     findings: list[Finding] = []
     for each in pockets(chosen):
@@ -169,6 +173,18 @@ def _check(chosen: Chosen, operation: Operation) -> None:
             f" {at_place(chosen.names[other], met.point[first].tolist())}",
             where=where,
             mend="unite or part them in the drawing: what is inside is not clear",
+        )
+
+
+def _check_step(chosen: Chosen, operation: Operation) -> None:
+    """OptionError for a step-over that would take for ever."""
+    step = operation.step_over * operation.tool.diameter_mm
+    size = float(np.ptp(extents(chosen.lines), axis=1).max()) if len(chosen.lines) else 0.0
+    if size > MOST_WAYS * step:
+        raise OptionError(
+            f"steps of {step:g} mm go more than {MOST_WAYS} times into {size:g} mm",
+            where=f"operation {operation.name or operation.kind!r}, key step_over",
+            mend="give a larger step-over, or a larger tool",
         )
 
 

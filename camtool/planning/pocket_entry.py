@@ -27,6 +27,9 @@ HELIX_MOST = 0.5
 HELIX_LEAST = 0.1
 """The smallest radius of a helix that is worth it, over the tool's radius."""
 
+HELIX_MOST_TURNS = 200
+"""A helix of more turns than this at one level is not made."""
+
 RAMP_MOST_LAPS = 20
 """A ramp that would go to and fro on the whole way more often than this becomes a plunge."""
 
@@ -57,12 +60,13 @@ def down_for(way: Floats, middle: Rails | None, whole: Rails | None, setting: Se
         centre = pole(middle.region)
         room = float(points_to_segments(centre[None, :], whole.segments).min())
         fits = min(wanted, room)
-        if fits >= min(HELIX_LEAST * radius, wanted):
+        turns = _descent(setting) / (2.0 * math.pi * max(fits, POSITION_EPS_MM))
+        if fits >= min(HELIX_LEAST * radius, wanted) and turns <= HELIX_MOST_TURNS:
             smaller = entry.radius_mm is not None and fits < wanted
             changed = f"a helix of {fits:.4g} mm instead of {wanted:g} mm" if smaller else ""
             return Down(centre, fits, changed=changed)
     changed = "a ramp instead of a helix" if entry.kind == "helix" else ""
-    if _laps(way, setting) <= RAMP_MOST_LAPS:
+    if 0.5 * _descent(setting) <= RAMP_MOST_LAPS * Along.of(Polyline(way)).total_mm:
         return Down(ramp=True, changed=changed)
     return Down(changed=f"a plunge instead of a {entry.kind}")
 
@@ -127,11 +131,10 @@ def _ramp(way: Floats, length: float, heights: tuple[float, float]) -> Floats:
     return np.insert(flat, 2, _sloping(flat, heights), axis=1)
 
 
-def _laps(way: Floats, setting: Setting) -> float:
-    """How often a ramp goes to and fro on the whole way at the deepest step."""
+def _descent(setting: Setting) -> float:
+    """The length of the slope, seen from above, at the deepest step, mm."""
     drop = max(above - level for above, level in pairwise((0.0, *setting.levels_mm)))
-    length = drop / math.tan(setting.operation.entry.angle_rad)
-    return 0.5 * length / Along.of(Polyline(way)).total_mm
+    return drop / math.tan(setting.operation.entry.angle_rad)
 
 
 def _sloping(flat: Floats, heights: tuple[float, float]) -> Floats:

@@ -59,7 +59,7 @@ def test_every_shape(shape: str, diameter_mm: float, step_over: float) -> None:
     assert wrong(SHAPES[shape], diameter_mm, step_over=step_over) == []
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(paths=shapes(), diameter_mm=st.floats(0.3, 2.5), step_over=st.floats(0.2, 1.0))
 def test_random_shapes(paths: list[Polyline], diameter_mm: float, step_over: float) -> None:
     runs = runs_of(work_of(paths, diameter_mm, step_over=step_over))
@@ -235,6 +235,7 @@ def test_a_helix_is_as_large_as_it_may_be() -> None:
         (2.05, Entry("ramp"), None),
         (2.05, Entry("ramp", angle_rad=1e-4), "a plunge instead of a ramp"),
         (2.05, Entry("helix", angle_rad=1e-4), "a plunge instead of a helix"),
+        (8.0, Entry("helix", angle_rad=1e-6), "a plunge instead of a helix"),
     ],
 )
 def test_entries_that_do_not_fit_are_told(width: float, entry: Entry, said: str | None) -> None:
@@ -308,14 +309,15 @@ def test_what_stays_uncut_is_told_in_few_lines() -> None:
         ([SQUARE], 0.0, ["width", "key tool", "diameter"]),
         ([SQUARE, moved(SQUARE, 5.0, 5.0)], 1.0, ["cross", "PATH 0", "PATH 1", "unite"]),
         ([closed((0, 0), (10, 10), (10, 0), (0, 10))], 1.0, ["cross", "PATH 0"]),
+        ([SQUARE], 1.0, ["step", "key step_over", "larger"]),
     ],
-    ids=["open", "no width", "crossing", "eight"],
+    ids=["open", "no width", "crossing", "eight", "steps without end"],
 )
 def test_bad_input_names_path_operation_and_mend(
     paths: list[Polyline], diameter_mm: float, said: list[str]
 ) -> None:
     with pytest.raises(OptionError) as refused:
-        work_of(paths, diameter_mm, name="clear it")
+        work_of(paths, diameter_mm, name="clear it", step_over=1e-9 if "step" in said else 0.4)
     for word in said:
         assert word in str(refused.value)
     assert "operation 'clear it'" in str(refused.value)

@@ -115,7 +115,7 @@ def test_pieces_are_the_region_less_the_opened_one(paths: list[Polyline], radius
     assert sum(piece.area_mm2 for piece in pieces) == pytest.approx(exact, abs=slack)
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(paths=shapes(), radius=st.floats(0.2, 2.0))
 def test_pieces_are_where_chords_say(paths: list[Polyline], radius: float) -> None:
     region = region_of(paths)

@@ -48,7 +48,7 @@ def test_every_shape(shape: str, angle: float, step_over: float) -> None:
     assert wrong(SHAPES[shape], 1.1, step_over, angle) == []
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(
     paths=shapes(),
     diameter_mm=st.floats(0.4, 2.5),
