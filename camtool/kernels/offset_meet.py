@@ -2,7 +2,8 @@
 
 The rules are those of camtool.geometry.intersect, which is the vectorised twin: the four ends and
 the two common points of the whole curves are measured, and count when they are within eps of both
-curves and of the range of both, and not within 2 eps of one that counted before.
+curves and of the range of both, and not within 2 eps of one that counted before; and, which is
+more than there, when the curves part by more than eps on the way from one that counted before.
 """
 
 from __future__ import annotations
@@ -115,9 +116,35 @@ def _meet(a: Floats, b: Floats, i: int, j: int, into: tuple[float, Floats]) -> i
     first, second = _common_points(a, b, i, j)
     for x, y in (first, second):
         # No NaN passes: curves that miss each other by far have no common points.
-        if gap_to(a, i, x, y) <= eps and not _together(a, b, i, j, (x, y, eps)):
+        if gap_to(a, i, x, y) <= eps and not _known(a, b, i, j, (x, y, eps, found, count)):
             count += _taken(a, b, i, j, (x, y, eps, found, count))
     return count
+
+
+@njit(cache=True)
+def _known(
+    a: Floats, b: Floats, i: int, j: int, at: tuple[float, float, float, Floats, int]
+) -> bool:
+    """Whether the curves stay within eps of each other from a common point to all of the shorter
+    one, or to a meeting found before.
+
+    At the angle θ and with curvatures that differ by k they are θ s + k s²/2 apart after s, at
+    most. There rounding alone would place a crossing: where they are tangent at an end, anywhere
+    within the root of its own rounding.
+    """
+    x, y, eps, found, count = at
+    ax, ay = _tangent(a, i, along(a, i, x, y))
+    bx, by = _tangent(b, j, along(b, j, x, y))
+    way = -1.0 if ax * bx + ay * by < 0.0 else 1.0
+    angle, bend = abs(ax * by - ay * bx), abs(a[i, BEND] - way * b[j, BEND])
+    s = min(a[i, LENGTH], b[j, LENGTH])
+    if angle * s + 0.5 * bend * s * s <= eps:
+        return True
+    for k in range(count):
+        s = math.hypot(found[k, X] - x, found[k, Y] - y)
+        if angle * s + 0.5 * bend * s * s <= eps:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -146,21 +173,6 @@ def _fraction(length: float, whole: float, eps: float) -> float:
     if length >= whole - eps:
         return 1.0
     return 0.0 if length <= eps else length / whole
-
-
-@njit(cache=True)
-def _together(a: Floats, b: Floats, i: int, j: int, at: tuple[float, float, float]) -> bool:
-    """Whether the curves stay within eps of each other all along, from a common point.
-
-    There rounding alone would place a crossing; the ends of what they share are found as ends.
-    """
-    x, y, eps = at
-    shorter = min(a[i, LENGTH], b[j, LENGTH])
-    ax, ay = _tangent(a, i, along(a, i, x, y))
-    bx, by = _tangent(b, j, along(b, j, x, y))
-    way = -1.0 if ax * bx + ay * by < 0.0 else 1.0
-    bend = abs(a[i, BEND] - way * b[j, BEND])
-    return bool(abs(ax * by - ay * bx) * shorter + 0.5 * bend * shorter**2 <= eps)
 
 
 @njit(cache=True)

@@ -87,17 +87,19 @@ def test_meetings(seed: int, grid: bool) -> None:
         rows, at = offset_meet.meetings_of(a.rows, curves.rows, pairs, eps)
         got = np.column_stack([rows, at[:, 2:], at[:, :2]])
         want = np.column_stack([wanted.row_a, wanted.row_b, wanted.ta, wanted.tb, wanted.point])
-        # Where curves are tangent, rounding alone may part one meeting into two near ones.
-        assert without_partner(got, want) == []
-        assert without_partner(want, got) == []
+        # Where curves are tangent, what they share up to eps is one meeting here, and may be two
+        # there: they are then up to √(2 eps/k) apart.
+        near = 1e-3 if grid else 1e-6
+        assert without_partner(got, want, near) == []
+        assert without_partner(want, got, near) == []
 
 
-def without_partner(some: np.ndarray, others: np.ndarray) -> list[list[float]]:
-    """Rows of which nothing like them is among the others, to 1e-6 in the place."""
+def without_partner(some: np.ndarray, others: np.ndarray, near: float) -> list[list[float]]:
+    """Rows of which nothing like them is among the others, to `near` in the place."""
     return [
         row.tolist()
         for row in some
-        if not (np.abs(others - row).max(axis=1, initial=0.0) < 1e-6).any()
+        if not (np.abs(others - row).max(axis=1, initial=0.0) < near).any()
     ]
 
 
