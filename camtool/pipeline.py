@@ -66,8 +66,11 @@ def post_drawing(
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return Posted(wanted, program, decoded, None, findings)
+    plain = _plainly(drawing, job, target)
+    # Runs that never turn back are judged by the whole contours that they are parts of.
+    goal = wanted if plain is None else plain.wanted
     verification = _judged(
-        program.data, decoded, target.machine, wanted, plan.placed, source=drawing.file
+        program.data, decoded, target.machine, goal, plan.placed, source=drawing.file
     )
     findings = _merged(findings, verification.findings, without=repeated)
     verification = verification.with_planning(
@@ -75,7 +78,7 @@ def post_drawing(
             rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in plan.steps)),
             rapid_mm=certain(sum(step.rapid_mm for step in plan.steps)),
         ),
-        _before(drawing, job, target),
+        _before(plain),
     )
     return Posted(wanted, program, decoded, verification.with_findings(findings), findings)
 
@@ -97,7 +100,7 @@ def verify_program(
         from camtool.planning.job import Job
         from camtool.planning.plan import planned
 
-        plan = planned(drawing, job or Job(), target.machine)
+        plan = planned(drawing, _plain(job or Job()), target.machine)
         wanted, drawing = plan.toolpath, plan.placed
     return decoded, _judged(
         data, decoded, target.machine, wanted, drawing, source=source, interpolator=interpolator
@@ -138,16 +141,26 @@ def convert_program(
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
 
-def _before(drawing: Drawing, job: Job, target: LoadedTarget) -> Before | None:
-    """The job without what it does against reversals; None when it does nothing."""
+def _plain(job: Job) -> Job:
+    """The job without what it does against reversals."""
+    return replace(job, minimise="rapids", approach=False)
+
+
+def _plainly(drawing: Drawing, job: Job, target: LoadedTarget) -> Posted | None:
+    """The job made without what it does against reversals; None when it does nothing."""
+    plain = _plain(job)
+    return None if plain == job else post_drawing(drawing, plain, target)
+
+
+def _before(plain: Posted | None) -> Before | None:
+    """Its figures, for the report."""
     from camtool.verify.report import Before
 
-    if job.minimise != "reversals" and not job.approach:
+    if plain is None:
         return None
-    made = post_drawing(drawing, replace(job, minimise="rapids", approach=False), target)
-    if made.verification is None or made.failed:
+    if plain.verification is None or plain.failed:
         return Before()
-    report = made.verification.report
+    report = plain.verification.report
     cutting, air = report.reversals.cutting, report.reversals.air
     return Before(cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s)
 

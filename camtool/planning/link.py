@@ -76,10 +76,16 @@ def _sayable(highest_mm_min: float, machine: Machine) -> float:
 
 
 def link(
-    worked: Sequence[Worked], safe_z_mm: float, approach: Approach | None = None
+    worked: Sequence[Worked],
+    safe_z_mm: float,
+    approaches: Callable[[], Approach] | None = None,
 ) -> ToolpathBuilder:
-    """All moves of a program: the tool starts at part zero on the stock and ends above it."""
+    """All moves of a program: the tool starts at part zero on the stock and ends above it.
+
+    `approaches` gives what tells where runs are come to from, a new one after a tool change.
+    """
     builder = ToolpathBuilder().rapid(z=safe_z_mm)
+    approach = approaches() if approaches is not None else None
     tool: Tool | None = None
     speed: float | None = None
     for each in worked:
@@ -89,6 +95,7 @@ def link(
         if _changes(tool, each.operation.tool):
             speed = _spin(builder, speed, None)
             builder.event(Kind.TOOL_CHANGE, float(each.operation.tool.number or 0))
+            approach = approaches() if approaches is not None else None
         tool = each.operation.tool
         speed = _spin(builder, speed, each.operation.spindle_rpm)
         for run in each.runs:

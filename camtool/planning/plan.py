@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import PurePath
 
 import numpy as np
@@ -24,7 +25,7 @@ from camtool.planning.choose import choose
 from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
 from camtool.planning.job import Job, Operation
 from camtool.planning.levels import levels
-from camtool.planning.link import Approach, Worked, depth_of, feeds_of, link, safe_z_of
+from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
 from camtool.planning.place import place
 from camtool.planning.places import operation_name
 from camtool.toolpath.moves import Toolpath
@@ -75,8 +76,12 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
         here = _end(step.runs, here)
         steps.append(step)
     worked = [Worked(step.operation, step.runs) for step in steps]
-    approach = _approach(machine) if job.approach or job.minimise == "reversals" else None
-    toolpath = link(worked, safe_z_of(job, machine), approach).finish()
+    approaches = None
+    if job.approach or job.minimise == "reversals":
+        from camtool.planning.approach import Approaches
+
+        approaches = partial(Approaches, machine)
+    toolpath = link(worked, safe_z_of(job, machine), approaches).finish()
     findings = [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, job, any(step.runs for step in steps))
     findings += checked(toolpath, job, machine)
@@ -181,12 +186,6 @@ def _end(runs: tuple[Run, ...], here: Point) -> Point:
         return here
     x, y = runs[-1].vertices[-1, :2].tolist()
     return x, y
-
-
-def _approach(machine: Machine) -> Approach:
-    from camtool.planning.approach import approach_from
-
-    return lambda run: approach_from(run, machine)
 
 
 def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
