@@ -327,13 +327,11 @@ def test_runs_that_end_where_an_arc_touches_them() -> None:
     # Failed once: an arc about a corner touches the line that it goes on from. Rounding placed a
     # crossing 3e-8 mm before its end for one of two lines that coincide and none for the other,
     # so that they were not the same, and 0.9 mm of the run went missing.
-    u = 0.909521570106383
-    steps = [(-3, 0), (0, 3), (-1, 2), (-2, 1), (-1, 1), (0, 3), (1, 2), (-2, 2), (-1, -2),
-             (-2, 2), (-1, 2), (2, 2), (2, -1)]  # fmt: skip
-    vertices = np.array([(x * u, y * u, 0.0) for x, y in steps])
-    # As they were found, to the last bit.
-    vertices[:2, :2] = [[-2.7285647103191493, 0.0], [0.0, 2.7285647103191493]]
-    vertices[5, 1], p = 2.7285647103191493, Polyline(vertices)
+    u, v, w = 0.909521570106383, 1.819043140212766, 2.7285647103191493
+    p = opened(
+        (-w, 0), (0, w), (-u, v), (-v, u), (-u, u), (0, w), (u, v), (-v, v), (-u, -v),
+        (-v, v), (-u, v), (v, v), (v, -u),
+    )  # fmt: skip
     results = offset(p, 0.967987686057593)
     assert distance_complaints(results, p, 0.967987686057593) == []
     lengths = sorted(length(each) for each in results)
