@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
     from camtool.verify.report import Before
-    from camtool.verify.verify import Verification
+    from camtool.verify.verify import Verification, VerifyOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,6 @@ def post_drawing(
 ) -> Posted:
     """Plan, write, read back, simulate and judge; `check=False` leaves out the last two."""
     from camtool.planning.plan import planned
-    from camtool.verify.report import Planned, certain
 
     plan = planned(drawing, job, target.machine)
     wanted = plan.toolpath
@@ -66,11 +65,18 @@ def post_drawing(
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return Posted(wanted, program, decoded, None, findings)
+    from camtool.verify.report import Planned, certain
+    from camtool.verify.verify import VerifyOptions
+
     plain = _plainly(drawing, job, target)
     # Runs that never turn back are judged by the whole contours that they are parts of.
     goal = wanted if plain is None else plain.wanted
     verification = _judged(
-        program.data, decoded, target.machine, goal, plan.placed, source=drawing.file
+        program.data,
+        decoded,
+        target.machine,
+        (goal, plan.placed),
+        VerifyOptions(source=drawing.file, tool_diameter_mm=_tool_mm(job)),
     )
     findings = _merged(findings, verification.findings, without=repeated)
     verification = verification.with_planning(
@@ -94,17 +100,20 @@ def verify_program(
 ) -> tuple[Toolpath, Verification]:
     """(decoded toolpath, verification) of any program of the target; against `drawing` planned
     with `job` when there is one. ProgramError names file, block and column."""
+    from camtool.planning.job import Job
+    from camtool.verify.verify import VerifyOptions
+
     decoded = _read(data, target, source)
     wanted = None
     if drawing is not None:
-        from camtool.planning.job import Job
         from camtool.planning.plan import planned
 
         plan = planned(drawing, _plain(job or Job()), target.machine)
         wanted, drawing = plan.toolpath, plan.placed
-    return decoded, _judged(
-        data, decoded, target.machine, wanted, drawing, source=source, interpolator=interpolator
+    options = VerifyOptions(
+        interpolator=interpolator, source=source, tool_diameter_mm=_tool_mm(job or Job())
     )
+    return decoded, _judged(data, decoded, target.machine, (wanted, drawing), options)
 
 
 def convert_program(
@@ -123,6 +132,7 @@ def convert_program(
     machines that are slower than the first. ProgramError names file, block and column.
     """
     from camtool.toolpath.carried import at_feed, carried_over
+    from camtool.verify.verify import VerifyOptions
 
     decoded = _read(data, source, file)
     same = source.machine.target.dialect == target.machine.target.dialect
@@ -136,7 +146,8 @@ def convert_program(
     findings = _merged(wanted.findings, program.findings, again.findings)
     if not check:
         return Posted(wanted, program, again, None, findings)
-    judged = _judged(program.data, again, target.machine, wanted, None, source=file)
+    options = VerifyOptions(source=file)
+    judged = _judged(program.data, again, target.machine, (wanted, None), options)
     findings = _merged(findings, judged.findings)
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
@@ -223,20 +234,25 @@ def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, 
     return x, y
 
 
+def _tool_mm(job: Job) -> float | None:
+    """The diameter of the one tool that all operations cut with, mm; None for several or none."""
+    diameters = {operation.tool.diameter_mm for operation in job.operations}
+    return (diameters.pop() or None) if len(diameters) == 1 else None
+
+
 def _judged(
     data: bytes,
     decoded: Toolpath,
     machine: Machine,
-    wanted: Toolpath | None,
-    drawing: Drawing | None,
-    *,
-    source: str,
-    interpolator: Interpolator | None = None,
+    goal: tuple[Toolpath | None, Drawing | None],
+    options: VerifyOptions,
 ) -> Verification:
-    from camtool.verify.verify import VerifyOptions, verify
+    """Simulated and compared with what was wanted, and drawn."""
+    from camtool.verify.verify import verify
 
-    options = VerifyOptions(interpolator=interpolator, source=source, size_bytes=len(data))
-    return verify(decoded, machine, wanted=wanted, drawing=drawing, options=options)
+    wanted, drawing = goal
+    sized = replace(options, size_bytes=len(data))
+    return verify(decoded, machine, wanted=wanted, drawing=drawing, options=sized)
 
 
 def _merged(
