@@ -68,7 +68,9 @@ def inside(points: Floats, ring: Segments) -> Bools:
     from camtool.kernels.inside import insides
 
     curves = Curves.of(ring)
-    return insides(np.ascontiguousarray(points, dtype=np.float64), curves.rows, ring.bulge, curves.tree)
+    return insides(
+        np.ascontiguousarray(points, dtype=np.float64), curves.rows, ring.bulge, curves.tree
+    )
 
 
 def _witnesses(lines: Polylines, segments: Segments) -> tuple[Floats, Ints]:
