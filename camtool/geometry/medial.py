@@ -19,6 +19,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from camtool.errors import GeometryError
 from camtool.geometry.boundary import Boundary
 from camtool.geometry.polylines import Bools, Floats, Ints, Polylines
 
@@ -76,7 +77,8 @@ def concatenated(traces: list[Trace]) -> Trace:
 
 def discs_at(boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = None) -> Trace:
     """The largest disc that touches each of these places; `guess` (N, 2): elements that are
-    likely to be touched besides, which makes it quick."""
+    likely to be touched besides, which makes it quick. GeometryError where nothing ends a disc:
+    paths that lie on each other enclose no region there."""
     from camtool.kernels.discs import largest_discs
 
     result, partner = np.empty((len(t), 4)), np.empty(len(t), dtype=np.int64)
@@ -84,6 +86,14 @@ def discs_at(boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = 
         guess = np.column_stack([element, element])
     columns = (boundary.table, boundary.links, boundary.boxes)
     largest_discs(columns, element, t, guess, result, partner)
+    endless = ~np.isfinite(result).all(axis=1)
+    if endless.any():
+        x, y = boundary.table[element[np.argmax(endless)], :2].tolist()
+        raise GeometryError(
+            "paths lie on each other, so that nothing lies between them",
+            where=f"X {x:.4f} Y {y:.4f}",
+            mend="take one of them out",
+        )
     return Trace(element, t, result[:, 0], result[:, 1], result[:, 2], partner, result[:, 3])
 
 

@@ -8,6 +8,7 @@ of the largest disc allowed runs when it rolls along the boundary.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from camtool.geometry.boundary import Boundary
 from camtool.geometry.measure import signed_area
 from camtool.geometry.medial import HALVINGS, Trace, concatenated, discs_at, off_chord
-from camtool.geometry.polylines import Bools, Floats, Polyline
+from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Polyline
 
 LEVEL_EPS_MM = 1e-9
 """A radius nearer than this to a limit is the limit: rounding, along walls that are parallel."""
@@ -101,7 +102,7 @@ def floor_area(pieces: list[Floats]) -> float:
     for piece in pieces:
         (ax, ay, _, bulge), (bx, by, _, _) = piece.tolist()
         total += 0.5 * (ax * by - ay * bx)
-        if bulge != 0.0:
+        if bulge != 0.0 and math.hypot(bx - ax, by - ay) > POSITION_EPS_MM:
             lens = Polyline(np.array([[ax, ay, bulge], [bx, by, 0.0]]), closed=True)
             total += signed_area(lens)
     return total

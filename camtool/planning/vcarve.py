@@ -27,7 +27,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from camtool.errors import OptionError
+from camtool.errors import GeometryError, OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.crossings import MOST_PAIRS
@@ -105,7 +105,10 @@ def vcarve(chosen: Chosen, setting: Setting) -> Work:
     items: list[Fixed] = []
     findings: list[Finding] = []
     for region in _regions(chosen):
-        item, noticed = _carved(region, setting, cone)
+        try:
+            item, noticed = _carved(region, setting, cone)
+        except GeometryError as error:
+            return Work((), (_no_region(region, error),))
         items.extend(item)
         findings.extend(noticed)
     return Work(tuple(items), tuple(findings))
@@ -141,6 +144,15 @@ def _crossings(chosen: Chosen) -> Iterator[Finding]:
             " drawing, or carve without it",
             where=_at(a, x, y),
         )
+
+
+def _no_region(region: _Region, error: GeometryError) -> Finding:
+    return Finding(
+        Code.SELF_CROSSING,
+        Severity.ERROR,
+        f"{error.message}: what is inside cannot be carved; {error.mend}",
+        where=f"{region.name} at {error.where}",
+    )
 
 
 def _regions(chosen: Chosen) -> Iterator[_Region]:

@@ -312,3 +312,13 @@ def test_the_sample_logo() -> None:
     assert not work.findings
     assert gouge(work, paths, setting) <= CARVE_TOLERANCE_MM
     assert len(work.items) == 19
+
+
+def test_paths_that_share_a_side_enclose_nothing_there_and_are_an_error() -> None:
+    # Failed once: discs beside the shared side had no end, and the search never came to one.
+    inner = Polyline(np.array([[3.0, 3, 0], [4, 3, 0], [4, 4, 0], [3, 4, 0]]), True)
+    outer = Polyline(np.array([[6.0, 6, 0], [3, 6, 0], [3, 3, 0], [6, 3, 0]]), True)
+    work = vcarve(chosen_of([inner, outer]), setting_of(-0.4))
+    assert work.items == ()
+    (finding,) = work.findings
+    assert (finding.code, finding.severity) == (Code.SELF_CROSSING, Severity.ERROR)
