@@ -21,6 +21,10 @@ NEAR = 7
 NEAR_EACH = 3
 """Neighbours of each place of an item of many, at least."""
 
+NEAR_QUARTER = 2
+"""Neighbours in each quarter of the plane round an item's first place: without them the items of
+a cluster, such as the strokes of a letter, would know of no other cluster."""
+
 
 @njit(cache=True)
 def nearest_first(
@@ -64,18 +68,26 @@ def nearest_first(
 def neighbours(points: Floats, owner: Ints, count: int) -> tuple[Ints, Ints]:
     """Neighbours of item i: near[near_first[i] : near_first[i + 1]], by places (N, 2) of items.
 
-    `owner` (N,) ascends. Each place brings its nearest items; what several bring comes once.
+    `owner` (N,) ascends. Each place brings its nearest items, the first one those in each quarter
+    too; what several bring comes once.
     """
     tree = tree_of(points)
     place_first = np.searchsorted(owner, np.arange(count + 1))
     near_first = np.zeros(count + 1, np.int64)
-    near = np.empty(len(points) * NEAR_EACH + count * (NEAR + NEAR_EACH), np.int64)
+    most_of_item = NEAR + NEAR_EACH + 4 * NEAR_QUARTER
+    near = np.empty(len(points) * NEAR_EACH + count * most_of_item, np.int64)
     seen, total = np.full(count, -1), 0
     for i in range(count):
         places = place_first[i + 1] - place_first[i]
         most = max(NEAR_EACH, (NEAR + places - 1) // max(places, 1))
         for place in range(place_first[i], place_first[i + 1]):
             for other in nearest_owners(tree, owner, place, most):
+                if seen[other] != i:
+                    seen[other] = i
+                    near[total] = other
+                    total += 1
+        for quarter in range(4 if places > 0 else 0):
+            for other in nearest_owners(tree, owner, place_first[i], NEAR_QUARTER, quarter):
                 if seen[other] != i:
                     seen[other] = i
                     near[total] = other

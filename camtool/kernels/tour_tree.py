@@ -23,6 +23,9 @@ LEAF = 6
 DEEPEST = 64
 """Nodes that wait while the tree is walked: more than levels of any tree that fits in memory."""
 
+ANYWHERE = -1
+"""No quarter of the plane: all of it."""
+
 
 class Tree(NamedTuple):
     """`points` (N, 2); `rows` (N,) sorted by node; per node `begin`, `size`, `box` (low x, low y,
@@ -111,8 +114,11 @@ def nearest_row(tree: Tree, on: Ints, x: float, y: float) -> int:
 
 
 @njit(cache=True)
-def nearest_owners(tree: Tree, owner: Ints, row: int, most: int) -> Ints:
-    """The owners nearest to a point, but its own: up to `most`, each once, nearest first."""
+def nearest_owners(tree: Tree, owner: Ints, row: int, most: int, quarter: int = ANYWHERE) -> Ints:
+    """The owners nearest to a point, but its own: up to `most`, each once, nearest first.
+
+    `quarter` 0 … 3: only those above and to the right of the point, and so on CCW.
+    """
     x, y = tree.points[row, 0], tree.points[row, 1]
     waiting, top, inner = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
     waiting[0] = 0
@@ -120,7 +126,13 @@ def nearest_owners(tree: Tree, owner: Ints, row: int, most: int) -> Ints:
     while top > 0:
         top -= 1
         node = waiting[top]
-        if _apart(tree, node, x, y) > apart[most - 1]:
+        box = tree.box[node]
+        if _apart(tree, node, x, y) > apart[most - 1] or not (
+            _looks_to(quarter, box[2] - x, box[3] - y)
+            or _looks_to(quarter, box[0] - x, box[3] - y)
+            or _looks_to(quarter, box[0] - x, box[1] - y)
+            or _looks_to(quarter, box[2] - x, box[1] - y)
+        ):
             continue
         if node < inner:
             left_first = _apart(tree, 2 * node + 1, x, y) <= _apart(tree, 2 * node + 2, x, y)
@@ -130,10 +142,24 @@ def nearest_owners(tree: Tree, owner: Ints, row: int, most: int) -> Ints:
             continue
         for k in range(tree.begin[node], tree.begin[node] + tree.size[node]):
             other = tree.rows[k]
-            if owner[other] != owner[row]:
-                dx, dy = tree.points[other, 0] - x, tree.points[other, 1] - y
+            dx, dy = tree.points[other, 0] - x, tree.points[other, 1] - y
+            if owner[other] != owner[row] and _looks_to(quarter, dx, dy):
                 _enter(found, apart, owner[other], dx * dx + dy * dy)
     return found[found >= 0]
+
+
+@njit(cache=True)
+def _looks_to(quarter: int, dx: float, dy: float) -> bool:
+    """Whether a direction lies in a quarter of the plane; each has one of its two edges."""
+    if quarter == 0:
+        return dx > 0.0 and dy >= 0.0
+    if quarter == 1:
+        return dx <= 0.0 and dy > 0.0
+    if quarter == 2:
+        return dx < 0.0 and dy <= 0.0
+    if quarter == 3:
+        return dx >= 0.0 and dy < 0.0
+    return True
 
 
 @njit(cache=True)

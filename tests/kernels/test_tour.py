@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from camtool.kernels.tour import Tour, gain_of_reversal, gain_of_swap, may_swap, reverse, turning
 from camtool.kernels.tour_rows import best_rows
 from camtool.kernels.tour_search import kicked, settled
+from camtool.kernels.tour_start import neighbours
 from camtool.kernels.tour_tree import nearest_owners, nearest_row, switch, tree_of
 from camtool.planning.order import Choices, _tour, travel_mm
 from tests.oracles import tours
@@ -35,18 +38,34 @@ def test_the_nearest_of_those_that_are_on(
     assert found == (min((round(d), k) for d, k in apart)[1] if apart else -1)
 
 
-@given(places(40), st.integers(1, 9), st.integers(1, 6), st.integers(0, 39))
+@given(places(40), st.integers(1, 9), st.integers(1, 6), st.integers(0, 39), st.integers(-1, 3))
 def test_the_nearest_owners(
-    points: list[tuple[int, int]], most: int, owners: int, row: int
+    points: list[tuple[int, int]], most: int, owners: int, row: int, quarter: int
 ) -> None:
     array, row = np.array(points, dtype=float), row % len(points)
     owner = np.arange(len(array)) % owners
     apart: dict[int, int] = {}
     for k in np.flatnonzero(owner != owner[row]).tolist():
+        x, y = (array[k] - array[row]).tolist()
+        angle = math.atan2(y, x) % (2.0 * math.pi)
+        if quarter >= 0 and ((x, y) == (0.0, 0.0) or int(angle // (0.5 * math.pi)) != quarter):
+            continue
         squared = round(float(((array[k] - array[row]) ** 2).sum()))
         apart[int(owner[k])] = min(squared, apart.get(int(owner[k]), squared))
     wanted = sorted(apart, key=lambda each: (apart[each], each))[:most]
-    assert nearest_owners(tree_of(array), owner, row, most).tolist() == wanted
+    assert nearest_owners(tree_of(array), owner, row, most, quarter).tolist() == wanted
+
+
+def test_a_cluster_knows_of_other_clusters() -> None:
+    # Failed once: neighbours were those of the same letter alone, and a page of letters was 13 %
+    # longer than need be.
+    rng = np.random.default_rng(5)
+    centres = np.array([[0.0, 0], [100, 0], [0, 100], [100, 100]])
+    points = (centres[:, None] + rng.uniform(-1, 1, (4, 30, 2))).reshape(-1, 2)
+    near, near_first = neighbours(points, np.arange(120), 120)
+    for cluster in range(4):
+        low, high = near_first[30 * cluster], near_first[30 * (cluster + 1)]
+        assert len(set((near[low:high] // 30).tolist())) >= 3
 
 
 def layout(seed: int, count: int) -> tuple[Choices, np.ndarray, np.ndarray]:

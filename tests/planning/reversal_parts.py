@@ -55,7 +55,7 @@ def toolpath(paths: Sequence[Polyline], machine: Machine, *, approach: bool) -> 
     """The paths cut one after the other, each from its first point."""
     runs = [run_of(path) for path in paths]
     come = Approaches(machine) if approach else None
-    return link([Worked(Operation(), runs)], 0.2, come).finish()
+    return link([Worked(Operation(), runs)], 0.2, lambda: come).finish()
 
 
 def judged(
