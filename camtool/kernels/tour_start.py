@@ -21,7 +21,7 @@ NEAR = 7
 NEAR_EACH = 3
 """Neighbours of each place of an item of many, at least."""
 
-NEAR_QUARTER = 2
+NEAR_QUARTER = 1
 """Neighbours in each quarter of the plane round an item's first place: without them the items of
 a cluster, such as the strokes of a letter, would know of no other cluster."""
 
