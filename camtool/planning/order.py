@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 
-KICKS_EACH = 100
+KICKS_EACH = 20
 """Kicks for each item: work against length."""
+
+LEAST_KICKS = 700
+"""Kicks for few items: it is done at once all the same."""
 
 MOST_KICKS = 4000
 """No more kicks than this, however many items: below a second of work."""
@@ -129,7 +132,8 @@ def best_order(
         raise _circle(set(range(len(choices))) - set(choices.owner[rows].tolist()))
     tour = _tour(choices, before, rows, start, goal)
     settled(tour)
-    kicked(tour, min(KICKS_EACH * len(choices), MOST_KICKS), SEED)
+    kicks = min(max(KICKS_EACH * len(choices), LEAST_KICKS), MOST_KICKS)
+    kicked(tour, kicks, SEED)
     while True:
         order = tour.item[1:-1]
         tour.row[order] = best_rows(ends, first, order, start, goal)
