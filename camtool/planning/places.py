@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from camtool.findings import Finding
 from camtool.planning.job import Operation, Tool
+
+MOST_PLACES = 12
+"""So many places of a kind are told one by one, the others together."""
 
 
 def at_place(name: str, point: Sequence[float]) -> str:
@@ -26,3 +31,19 @@ def key_of(operation: Operation, key: str) -> str:
 def operation_name(operation: Operation) -> str:
     """An operation by its name, or by its kind when it has none."""
     return f"operation {operation.name or operation.kind!r}"
+
+
+def told_together(findings: Sequence[Finding], what: str) -> list[Finding]:
+    """The first `MOST_PLACES` of findings of one kind, and one more that counts the others."""
+    told, rest = list(findings[:MOST_PLACES]), findings[MOST_PLACES:]
+    if rest:
+        told.append(
+            replace(
+                rest[0],
+                message=f"{len(rest)} more {what}",
+                measured=float(len(rest)),
+                limit=None,
+                unit="",
+            )
+        )
+    return told

@@ -21,7 +21,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Ints, Polyline, Polyline
 from camtool.geometry.transform import reverse
 from camtool.planning.arcs import joints
 from camtool.planning.items import Chosen, Contour, Setting, Work
-from camtool.planning.places import at_place, tool_name
+from camtool.planning.places import at_place, told_together, tool_name
 
 GOUGE_TOLERANCE_MM = 1e-4
 """Another contour may be cut into by this much before it is a gouge: a tenth of a micrometre."""
@@ -63,7 +63,8 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     else:
         for k in closed:
             _alone(chosen, k, setting, found)
-        found.findings += _gouges(chosen, setting, found.lines)
+        gouges = list(_gouges(chosen, setting, found.lines))
+        found.findings += told_together(gouges, "places like this")
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
@@ -81,9 +82,9 @@ def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found
         return
     shape = oriented(chosen.lines.select(closed))
     for path in _offset(shape, -_away(setting), setting):
-        of = tuple(closed[k] for k in _sources(path, shape))
-        found.lines.append(_Line(path, True, of))
-        found.findings += _joined(chosen, of, setting)
+        found.lines.append(_Line(path, True, tuple(closed[k] for k in _sources(path, shape))))
+    joined = [each for line in found.lines for each in _joined(chosen, line.of, setting)]
+    found.findings += told_together(joined, "pairs of contours that stay joined")
     reached = {k for line in found.lines for k in line.of}
     for place, k in enumerate(closed):
         if k not in reached and not _is_double(shape, place):

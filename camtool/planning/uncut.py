@@ -9,15 +9,12 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Polylines
 from camtool.planning.items import Setting
-from camtool.planning.places import tool_name
+from camtool.planning.places import MOST_PLACES, tool_name
 from camtool.planning.reach import Unreached, unreached
 
 CORNER_SHARE = 0.25
 """Pieces up to this part of the tool's disc count as feet of corners, and are told together: that
 of a corner of 55 degrees is as large."""
-
-MOST_PLACES = 12
-"""So many larger pieces are told one by one, the others together."""
 
 
 def unreached_findings(

@@ -290,3 +290,15 @@ def test_a_corner_without_room_for_a_relief_is_told() -> None:
     found = contours(drawing_of(paths), job)
     assert set(_codes(found)) <= {Code.NOT_RELIEVED, Code.GOUGE}
     assert Code.NOT_RELIEVED in _codes(found)
+
+
+def test_many_places_of_a_kind_are_counted() -> None:
+    paths = [_circle(2.3 * k, 0, 1) for k in range(30)]
+    for side, named, counted in (("auto", 12, 17), ("outside", 12, 46)):
+        job = job_of(tool_diameter_mm=0.5, side=side)
+        codes = {"auto": Code.UNREACHED, "outside": Code.GOUGE}
+        found = [f for f in contours(drawing_of(paths), job).findings if f.code == codes[side]]
+        found = [f for f in found if f.unit != "mm2"]
+        assert len(found) == named + 1
+        assert found[-1].measured == counted
+        assert str(counted) in found[-1].message
