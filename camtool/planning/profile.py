@@ -171,19 +171,22 @@ def _too_narrow(chosen: Chosen, k: int, ring: Polylines, setting: Setting, found
 
 def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[Finding]:
     """Said of a line that runs round several paths at once: between them nothing is cut."""
-    first = chosen.lines[of[0]]
-    for k in of[1:]:
-        near = approach(first, chosen.lines[k])
-        if near.distance >= 2.0 * _away(setting) - GOUGE_TOLERANCE_MM:
+    room = 2.0 * _away(setting)
+    lines = chosen.lines.select(of)
+    for one, other in sorted(_neighbours(lines, lines, room)):
+        if one >= other:
+            continue
+        near = approach(lines[one], lines[other])
+        if near.distance >= room - GOUGE_TOLERANCE_MM:
             continue
         yield Finding(
             Code.UNREACHED,
             Severity.WARNING,
-            f"{tool_name(setting.operation.tool)} does not fit between {chosen.names[of[0]]} and"
-            f" {chosen.names[k]}, {near.distance:.4g} mm apart: they stay joined there",
-            where=at_place(chosen.names[of[0]], near.point),
+            f"{tool_name(setting.operation.tool)} does not fit between {chosen.names[of[one]]}"
+            f" and {chosen.names[of[other]]}, {near.distance:.4g} mm apart: they stay joined",
+            where=at_place(chosen.names[of[one]], near.point),
             measured=near.distance,
-            limit=2.0 * _away(setting),
+            limit=room,
             unit="mm",
         )
 
