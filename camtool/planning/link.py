@@ -72,7 +72,8 @@ def _above(feed: float, highest: float) -> bool:
 def _sayable(highest_mm_min: float, machine: Machine) -> float:
     """The highest feed not above the highest that the dialect can say."""
     unit = machine.feed.unit_mm_min
-    return highest_mm_min // unit * unit or highest_mm_min
+    units = math.floor(highest_mm_min / unit * (1.0 + FEED_TOLERANCE))
+    return units * unit or highest_mm_min
 
 
 def link(

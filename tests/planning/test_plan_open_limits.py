@@ -30,12 +30,16 @@ def test_without_limits_every_feed_and_every_size_is_taken() -> None:
 
 @pytest.mark.parametrize(
     ("setting", "highest"),
-    [("limits.max_feed_mm_min=250.5", "250"), ("axes.y.max_rate_mm_min=80.2", "80")],
+    [
+        ("limits.max_feed_mm_min=250.5", "250"),
+        ("axes.y.max_rate_mm_min=80.2", "80"),
+        ("limits.max_feed_mm_min=500", "500"),
+    ],
 )
 def test_the_limit_that_is_said_holds_and_the_mend_can_be_said(setting: str, highest: str) -> None:
     machine = path_machine(setting)
     with pytest.raises(OptionError, match=f"above {highest}") as caught:
-        feeds_of(Operation(feed_mm_min=300.0), machine)
+        feeds_of(Operation(feed_mm_min=600.0), machine)
     assert f"--feed {highest} or less" in caught.value.mend
     assert feeds_of(Operation(feed_mm_min=float(highest)), machine).cut_mm_min == float(highest)
 
