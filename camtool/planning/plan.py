@@ -22,9 +22,9 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
 from camtool.planning.choose import choose
+from camtool.planning.contours.levels import levels
 from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
 from camtool.planning.job import Job, Operation
-from camtool.planning.levels import levels
 from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
 from camtool.planning.place import place
 from camtool.planning.places import operation_name
@@ -78,7 +78,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
     worked = [Worked(step.operation, step.runs) for step in steps]
     approaches = None
     if job.approach or job.minimise == "reversals":
-        from camtool.planning.approach import Approaches
+        from camtool.planning.reversing.approach import Approaches
 
         approaches = partial(Approaches, machine)
     toolpath = link(worked, safe_z_of(job, machine), approaches).finish()
@@ -110,7 +110,7 @@ def work_of(chosen: Chosen, setting: Setting) -> Work:
 def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
     """Imported where it is used: carving needs more than engraving."""
     if kind == "pocket":
-        from camtool.planning.pocket import pocket
+        from camtool.planning.pockets.pocket import pocket
 
         return pocket
     if kind == "engrave":
@@ -122,7 +122,7 @@ def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
 
         return drill
     if kind == "vcarve":
-        from camtool.planning.vcarve import vcarve
+        from camtool.planning.carving.vcarve import vcarve
 
         return vcarve
     from camtool.planning.profile import profile
@@ -132,9 +132,9 @@ def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
 
 def _step(placed: Drawing, job: Job, setting: Setting, machine: Machine, here: Point) -> Step:
     """One operation from what it takes to its runs, for a tool that stands at `here`."""
+    from camtool.planning.contours.runs import runs_of
     from camtool.planning.order import best_order, choices_of, chosen_path, drawn, travel_mm
     from camtool.planning.precedence import must_precede
-    from camtool.planning.runs import runs_of
 
     chosen = choose(placed, setting.operation)
     work = work_of(chosen, setting)
@@ -143,7 +143,7 @@ def _step(placed: Drawing, job: Job, setting: Setting, machine: Machine, here: P
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), here, HOME)
     if job.minimise == "reversals":
-        from camtool.planning.reversals import fewer_reversals
+        from camtool.planning.reversing.reversals import fewer_reversals
 
         items, noticed = fewer_reversals(items, machine)
         findings += noticed
@@ -174,7 +174,7 @@ def _with_starts(item: Item) -> Item:
     operation = item.setting.operation
     if operation.start == "nearest":
         return item
-    from camtool.planning.starts import with_starts
+    from camtool.planning.contours.starts import with_starts
 
     path, starts = with_starts(item.path, operation.start, operation.tool.radius_mm)
     return replace(item, path=path, starts=starts)

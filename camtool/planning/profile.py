@@ -193,7 +193,7 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
 
 def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Finding]) -> _Line:
     """The line with reliefs at the sharp inner corners of the paths that it belongs to."""
-    from camtool.planning.corners import relieved
+    from camtool.planning.contours.corners import relieved
 
     tool, path = setting.operation.tool, line.path
     for k in line.of:

@@ -32,7 +32,7 @@ from camtool.geometry.polylines import (
 )
 from camtool.geometry.regions import regions
 from camtool.geometry.transform import reverse
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
 
 TOGETHER_MM = 5e-6
 """Two boundaries nearer than this run together: above the error of two offsets in a row."""

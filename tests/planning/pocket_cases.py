@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.geometry.regions import oriented
 from camtool.geometry.transform import moved, rotated, scaled
+from camtool.planning.contours.levels import levels
 from camtool.planning.items import Chosen, Feeds, Run, Setting, Work
 from camtool.planning.job import Operation, Tool
-from camtool.planning.levels import levels
-from camtool.planning.pocket import pocket
+from camtool.planning.pockets.pocket import pocket
 from tests.oracles.contours import (
     CIRCLE,
     DUMBBELL,

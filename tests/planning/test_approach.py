@@ -12,15 +12,15 @@ from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import scaled
 from camtool.kernels.play import play_fill, play_limits
 from camtool.machine.model import Machine, PathController, PicMmhController
-from camtool.planning.approach import (
+from camtool.planning.items import Run
+from camtool.planning.reversing.approach import (
     APPROACH_MARGIN_MM,
     Approaches,
     approach_from,
     approach_mm,
 )
-from camtool.planning.items import Run
-from camtool.planning.residual import residuals
-from camtool.planning.reversals import reversals_of
+from camtool.planning.reversing.residual import residuals
+from camtool.planning.reversing.reversals import reversals_of
 from camtool.simulation.simulate import simulate
 from camtool.verify.cuts import cut_moves
 from tests.planning.reversal_parts import run_of, square, toolpath, with_play

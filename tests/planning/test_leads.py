@@ -14,10 +14,8 @@ from camtool.findings import Code
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.transform import moved, reverse, rolled
-from camtool.planning.along import Along
-from camtool.planning.items import Contour, Feeds, Setting
-from camtool.planning.job import Lead, Operation, Tool
-from camtool.planning.leads import (
+from camtool.planning.contours.along import Along
+from camtool.planning.contours.leads import (
     LEAD_HALVINGS,
     LEAD_SLACK_MM,
     leads_of,
@@ -25,7 +23,9 @@ from camtool.planning.leads import (
     runs_back,
     segments_near,
 )
-from camtool.planning.runs import runs_of
+from camtool.planning.contours.runs import runs_of
+from camtool.planning.items import Contour, Feeds, Setting
+from camtool.planning.job import Lead, Operation, Tool
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours, open_contours, polylines
 

@@ -19,9 +19,9 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.transform import mirrored, moved, reverse, rotated, scaled
 from camtool.planning.items import Fixed, Run
 from camtool.planning.job import Entry
-from camtool.planning.pocket import pocket
-from camtool.planning.pocket_parts import parts_of
-from camtool.planning.pocket_rings import Cell, Steps, ring_cells
+from camtool.planning.pockets.parts import parts_of
+from camtool.planning.pockets.pocket import pocket
+from camtool.planning.pockets.rings import Cell, Steps, ring_cells
 from tests.oracles import swept
 from tests.oracles.contours import CIRCLE, DUMBBELL, OBLONG, SLOT, SQUARE, closed, comb, star
 from tests.oracles.contours import opened as open_path

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from camtool.geometry.measure import length, point_at, sample
 from camtool.geometry.polylines import Polyline, Segments
 from camtool.geometry.transform import moved, scaled
-from camtool.planning.along import Along
-from camtool.planning.clip import outside_parts, scanned
-from camtool.planning.pocket_route import Rails, closest, route
+from camtool.planning.contours.along import Along
+from camtool.planning.pockets.clip import outside_parts, scanned
+from camtool.planning.pockets.route import Rails, closest, route
 from tests.oracles.contours import CIRCLE, DUMBBELL, ELL, SQUARE
 from tests.oracles.contours import opened as open_path
 from tests.oracles.offset import chords, dense, distance, inside

@@ -23,7 +23,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.items import Contour, Fixed, Item
 from camtool.planning.job import Entry, Lead, Tabs, job_of
 from camtool.planning.precedence import must_precede
-from camtool.planning.reversals import fewer_reversals, reversals_of
+from camtool.planning.reversing.reversals import fewer_reversals, reversals_of
 from tests.oracles.reversals import fewest_runs
 from tests.planning.reversal_parts import (
     PIC,

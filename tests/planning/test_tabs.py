@@ -16,11 +16,11 @@ from camtool.findings import Code
 from camtool.geometry.measure import length
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import reverse, rolled
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
+from camtool.planning.contours.runs import runs_of
+from camtool.planning.contours.tabs import raised, tabs_of
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
-from camtool.planning.runs import runs_of
-from camtool.planning.tabs import raised, tabs_of
 from tests.oracles.runs import run_points, steepest
 from tests.strategies import contours
 

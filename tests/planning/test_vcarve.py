@@ -18,9 +18,9 @@ from camtool.findings import Code, Severity
 from camtool.geometry.distance import nearest
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.importers.read import read_drawing
+from camtool.planning.carving.vcarve import CARVE_TOLERANCE_MM, vcarve
 from camtool.planning.items import Chosen, Feeds, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation, Tool
-from camtool.planning.vcarve import CARVE_TOLERANCE_MM, vcarve
 from tests.oracles import contours as shapes
 from tests.oracles.carved import area_of, dense, swept
 from tests.strategies import contours

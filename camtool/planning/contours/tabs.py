@@ -28,11 +28,11 @@ from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
+from camtool.planning.contours.ramps import Knots
 from camtool.planning.items import Contour
 from camtool.planning.job import Operation
 from camtool.planning.places import at_place, key_of
-from camtool.planning.ramps import Knots
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
 """How steep the sides of ramped tabs are when the tool may plunge."""

@@ -15,11 +15,11 @@ import numpy as np
 
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
+from camtool.planning.contours.ramps import feeds_along
 from camtool.planning.items import Run, Setting
-from camtool.planning.pocket_parts import pole
-from camtool.planning.pocket_route import Rails, route
-from camtool.planning.ramps import feeds_along
+from camtool.planning.pockets.parts import pole
+from camtool.planning.pockets.route import Rails, route
 
 HELIX_MOST = 0.5
 """The largest radius of a helix when none is asked for, over the tool's radius."""

@@ -13,8 +13,8 @@ from camtool.geometry.distance import nearest
 from camtool.geometry.measure import length, sample
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
-from camtool.planning.along import Along
-from camtool.planning.clip import outside_parts
+from camtool.planning.contours.along import Along
+from camtool.planning.pockets.clip import outside_parts
 
 SLOT_TOLERANCE = 1e-3
 """A slot narrower than the tool by up to this part of its diameter counts as wide as the tool."""

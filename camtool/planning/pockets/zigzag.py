@@ -19,10 +19,10 @@ from camtool.geometry.measure import extents, point_at
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Floats, Ints, Polylines, Segments
 from camtool.geometry.transform import rotated
-from camtool.planning.clip import scanned
-from camtool.planning.pocket_parts import parts_of
-from camtool.planning.pocket_route import Rails
-from camtool.planning.pocket_way import Way
+from camtool.planning.pockets.clip import scanned
+from camtool.planning.pockets.parts import parts_of
+from camtool.planning.pockets.route import Rails
+from camtool.planning.pockets.way import Way
 
 MOST_MARGIN = 0.5
 """The most that is left for the ring round the walls, over the tool's radius."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from camtool.geometry.polylines import POSITION_EPS_MM, Ints, Polyline
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
 
 START_SNAP_MM = 1e-3
 """A start nearer than this to a vertex is that vertex: no move shorter than it is made."""

@@ -23,8 +23,8 @@ import numpy as np
 from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import Floats, Ints
-from camtool.planning.residual import Residual
-from camtool.planning.turns import Parts, Turns
+from camtool.planning.reversing.residual import Residual
+from camtool.planning.reversing.turns import Parts, Turns
 
 ALIKE_MM = 1e-4
 """Predicted errors that differ by less are alike: a tenth of a micrometre, below a step."""

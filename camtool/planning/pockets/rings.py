@@ -19,10 +19,10 @@ import numpy as np
 
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines
-from camtool.planning.clip import outside_parts
-from camtool.planning.pocket_parts import parts_of, pole
-from camtool.planning.pocket_route import Rails, closest
-from camtool.planning.pocket_way import Way
+from camtool.planning.pockets.clip import outside_parts
+from camtool.planning.pockets.parts import parts_of, pole
+from camtool.planning.pockets.route import Rails, closest
+from camtool.planning.pockets.way import Way
 
 SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Parts of the step that are tried where it leaves tips: rings alone make a calmer way."""

@@ -16,8 +16,8 @@ import numpy as np
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline
 from camtool.machine.model import Axis, Machine
 from camtool.planning.items import Run
-from camtool.planning.residual import Residual, residuals
-from camtool.planning.turns import parts_of, turns_of
+from camtool.planning.reversing.residual import Residual, residuals
+from camtool.planning.reversing.turns import parts_of, turns_of
 
 APPROACH_MARGIN_MM = 0.05
 """An approach is longer by this much than what compensation leaves of the play: the play is not

@@ -38,8 +38,8 @@ from camtool.geometry.medial import Trace, medial_trace
 from camtool.geometry.nest import nesting
 from camtool.geometry.polylines import Floats, Polylines, Segments
 from camtool.geometry.regions import regions
-from camtool.planning.carve_graph import graph_of, lengths_of, walks, without_twigs
-from camtool.planning.carve_pieces import Band, floor_area, grooves, walls, with_level
+from camtool.planning.carving.graph import graph_of, lengths_of, walks, without_twigs
+from camtool.planning.carving.pieces import Band, floor_area, grooves, walls, with_level
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.places import key_of

@@ -18,7 +18,7 @@ from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import point_at
 from camtool.geometry.nest import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polylines, Segments
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
 
 ON_LINE_MM = 5e-6
 """A place this near to the boundary of a region is still in it."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from camtool.geometry.polylines import Floats, Polyline
 from camtool.geometry.transform import reverse
-from camtool.planning.along import Along
-from camtool.planning.pocket_route import Rails, closest, route, tidy
+from camtool.planning.contours.along import Along
+from camtool.planning.pockets.route import Rails, closest, route, tidy
 
 
 class Way:

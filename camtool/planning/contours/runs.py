@@ -15,11 +15,9 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats, Polyline, Polylines
-from camtool.planning.along import Along
-from camtool.planning.items import Contour, Run
-from camtool.planning.leads import Leads, leads_of
-from camtool.planning.places import at_place
-from camtool.planning.ramps import (
+from camtool.planning.contours.along import Along
+from camtool.planning.contours.leads import Leads, leads_of
+from camtool.planning.contours.ramps import (
     MOST_LAPS,
     feeds_along,
     laps,
@@ -27,7 +25,9 @@ from camtool.planning.ramps import (
     spiral,
     to_and_fro,
 )
-from camtool.planning.tabs import Tab, raised, tabs_of
+from camtool.planning.contours.tabs import Tab, raised, tabs_of
+from camtool.planning.items import Contour, Run
+from camtool.planning.places import at_place
 
 Heights = tuple[float | None, list[Tab]]
 """What decides the height of the tool: the angle of its ramps (None: it plunges), and the tabs."""

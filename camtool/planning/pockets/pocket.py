@@ -29,13 +29,13 @@ from camtool.geometry.regions import oriented
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.places import at_place, tool_name
-from camtool.planning.pocket_entry import back_along, down_for, lowered, over_floor
-from camtool.planning.pocket_parts import parts_of
-from camtool.planning.pocket_rings import Steps, ring_cells, ring_ways
-from camtool.planning.pocket_route import Rails
-from camtool.planning.pocket_slots import SLOT_TOLERANCE, slot_ways
+from camtool.planning.pockets.entry import back_along, down_for, lowered, over_floor
+from camtool.planning.pockets.parts import parts_of
+from camtool.planning.pockets.rings import Steps, ring_cells, ring_ways
+from camtool.planning.pockets.route import Rails
+from camtool.planning.pockets.slots import SLOT_TOLERANCE, slot_ways
+from camtool.planning.pockets.zigzag import Scan, zigzag_ways
 from camtool.planning.uncut import unreached_findings
-from camtool.planning.zigzag import Scan, zigzag_ways
 
 MOST_WAYS = 10_000
 """More steps than this across a pocket are taken as a mistake."""

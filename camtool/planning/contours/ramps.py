@@ -29,7 +29,7 @@ import numpy as np
 
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
 from camtool.planning.items import Feeds
 
 Knots = list[tuple[float, float]]

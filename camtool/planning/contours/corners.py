@@ -24,7 +24,7 @@ from camtool.errors import OptionError
 from camtool.geometry.distance import paired_distances, points_to_segments
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
 from camtool.planning.job import CORNERS
 
 RELIEF_LEAST_MM = 1e-3

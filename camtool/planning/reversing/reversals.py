@@ -3,9 +3,9 @@
 Each change of an axis's direction makes its slide cross the play, costs a compensation, and
 leaves an error where it happens. The PIC thesis saw parts fail above 16 of them (L3052-3057,
 L3207-3211) and saved them by machining in mirror halves (L2816-2841). So each contour is divided
-where an axis turns (`camtool.planning.mirror`), the runs are cut in the directions that leave the
-smaller error, and every run is approached so that its axes are engaged
-(`camtool.planning.approach`): all reversals happen in the air.
+where an axis turns (`mirror`), the runs are cut in the directions that leave the smaller error,
+and every run is approached so that its axes are engaged (`approach`): all reversals happen in the
+air.
 
 A contour stays in one piece where the job asks for what only a whole one can have: leads, tabs,
 a ramp, a start by rule or by hand. Of the others of those, only the start is chosen. What cuts
@@ -23,12 +23,12 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import reverse
 from camtool.machine.model import Machine
-from camtool.planning.approach import flat, least_turn_mm
 from camtool.planning.items import Contour, Fixed, Item, Run
 from camtool.planning.job import Operation
-from camtool.planning.mirror import Division, drawn_error_mm
-from camtool.planning.residual import Residual, residuals
-from camtool.planning.turns import Parts, Turns, no_turns, parts_of, turns_of
+from camtool.planning.reversing.approach import flat, least_turn_mm
+from camtool.planning.reversing.mirror import Division, drawn_error_mm
+from camtool.planning.reversing.residual import Residual, residuals
+from camtool.planning.reversing.turns import Parts, Turns, no_turns, parts_of, turns_of
 
 LEAST_TURN_MM = 1e-6
 """How far back an axis must come for a reversal, where no machine says how fine its steps are."""

@@ -25,7 +25,7 @@ from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import point_at, signed_area
 from camtool.geometry.nest import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
-from camtool.planning.along import Along, backwards
+from camtool.planning.contours.along import Along, backwards
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
 from camtool.planning.places import at_place

@@ -16,7 +16,7 @@ from camtool.geometry.polylines import (
     Polylines,
     Segments,
 )
-from camtool.planning.along import Along
+from camtool.planning.contours.along import Along
 
 
 def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:

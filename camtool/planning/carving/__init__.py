@@ -1,0 +1,1 @@
+"""Carving with a V bit along the medial axis."""

@@ -1,0 +1,1 @@
+"""A contour, its start chosen, as runs: passes, ramps, leads, tabs, starts, reliefs."""

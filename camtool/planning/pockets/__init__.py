@@ -1,0 +1,1 @@
+"""Pockets: rings or a zigzag, linked, entered, with what stays uncut told."""

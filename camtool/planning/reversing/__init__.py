@@ -1,0 +1,1 @@
+"""Fewer reversals while cutting: contours divided into runs, approached in the air."""
