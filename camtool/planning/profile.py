@@ -81,15 +81,9 @@ def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found
     if not closed:
         return
     shape = oriented(chosen.lines.select(closed))
-    for path in _offset(shape, -_away(setting), setting):
-        found.lines.append(_Line(path, True, tuple(closed[k] for k in _sources(path, shape))))
+    _round(chosen, closed, shape, setting, found)
     joined = [each for line in found.lines for each in _joined(chosen, line.of, setting)]
     found.findings += told_together(joined, "pairs of contours that stay joined")
-    reached = {k for line in found.lines for k in line.of}
-    for place, k in enumerate(closed):
-        if k not in reached and not _is_double(shape, place):
-            hole = Polylines.of([reverse(shape[place])])
-            _too_narrow(chosen, k, hole, setting, found)
     free = Polylines.of(reverse(path) for path in shape)
     found.findings += unreached_findings(free, setting)
 
@@ -97,12 +91,32 @@ def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found
 def _alone(chosen: Chosen, k: int, setting: Setting, found: _Found) -> None:
     """Round or within one path, whatever the others are."""
     path = chosen.lines[k]
-    ring = Polylines.of([path if signed_areas(chosen.lines.select([k]))[0] > 0 else reverse(path)])
-    within = setting.operation.side == "inside"
-    lines = _offset(ring, _away(setting) if within else -_away(setting), setting)
-    found.lines += (_Line(line, not within, (k,)) for line in lines)
-    if within and len(lines) == 0:
-        _too_narrow(chosen, k, ring, setting, found)
+    ccw = bool(signed_areas(chosen.lines.select([k]))[0] > 0.0)
+    outside = setting.operation.side == "outside"
+    shape = Polylines.of([path if ccw == outside else reverse(path)])
+    _round(chosen, [k], shape, setting, found)
+
+
+def _round(
+    chosen: Chosen, of: list[int], shape: Polylines, setting: Setting, found: _Found
+) -> None:
+    """Lines round a shape (on the left of its paths, which are these of the chosen ones)."""
+    for path in _offset(shape, -_away(setting), setting):
+        found.lines.append(_Line(path, True, tuple(of[k] for k in _sources(path, shape))))
+    reached = {k for line in found.lines for k in line.of}
+    missing = {place for place, k in enumerate(of) if k not in reached}
+    missing -= {place for place in missing if _is_double(shape, place)}
+    if not missing:
+        return
+    # What is as wide as the tool has room for one that is thinner by a hair.
+    for path in _offset(shape, -max(_away(setting) - SLOT_TOLERANCE_MM, 0.0), setting):
+        along = _sources(path, shape)
+        if missing.issuperset(along):
+            missing.difference_update(along)
+            found.lines.append(_Line(path, True, tuple(of[k] for k in along)))
+            found.findings.append(_as_wide(chosen, of[along[0]], setting))
+    ccw = signed_areas(shape) > 0.0
+    found.findings += (_no_room(chosen, of[k], bool(ccw[k]), setting) for k in sorted(missing))
 
 
 def _offset(shape: Polylines, distance_mm: float, setting: Setting) -> Polylines:
@@ -141,32 +155,32 @@ def _is_double(shape: Polylines, place: int) -> bool:
     return bool((nearest(points, earlier).distance <= POSITION_EPS_MM).all())
 
 
-def _too_narrow(chosen: Chosen, k: int, ring: Polylines, setting: Setting, found: _Found) -> None:
-    """A path (its inside is the left of `ring`) that the tool does not fit into, or just so."""
-    lines = _offset(ring, max(_away(setting) - SLOT_TOLERANCE_MM, 0.0), setting)
-    where = at_place(chosen.names[k], extents(ring).mean(axis=1))
-    called, area = tool_name(setting.operation.tool), abs(float(signed_areas(ring)[0]))
-    if len(lines):
-        found.lines += (_Line(line, False, (k,)) for line in lines)
-        found.findings.append(
-            Finding(
-                Code.SLOT_AS_WIDE,
-                Severity.INFO,
-                f"{called} is as wide as this contour: it runs along its middle",
-                where=where,
-            )
-        )
-        return
-    found.findings.append(
-        Finding(
-            Code.CONTOUR_TOO_SMALL,
-            Severity.WARNING,
-            f"{called} does not fit into this contour of {area:.6g} mm²: it is not cut",
-            where=where,
-            measured=area,
-            unit="mm2",
-        )
+def _as_wide(chosen: Chosen, k: int, setting: Setting) -> Finding:
+    return Finding(
+        Code.SLOT_AS_WIDE,
+        Severity.INFO,
+        f"{tool_name(setting.operation.tool)} is as wide as this contour: it runs in its middle",
+        where=_middle(chosen, k),
     )
+
+
+def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:
+    area = abs(float(signed_areas(chosen.lines.select([k]))[0]))
+    way = "round" if outer else "into"
+    return Finding(
+        Code.CONTOUR_TOO_SMALL,
+        Severity.WARNING,
+        f"{tool_name(setting.operation.tool)} does not fit {way} this contour of {area:.6g} mm²:"
+        " it is not cut",
+        where=_middle(chosen, k),
+        measured=area,
+        unit="mm2",
+    )
+
+
+def _middle(chosen: Chosen, k: int) -> str:
+    """A path and the middle of its box."""
+    return at_place(chosen.names[k], extents(chosen.lines.select([k])).mean(axis=1))
 
 
 def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[Finding]:

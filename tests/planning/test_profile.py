@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
@@ -15,7 +16,7 @@ from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import sample, signed_areas
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import reverse
+from camtool.geometry.transform import moved, reverse, scaled
 from camtool.planning.choose import choose
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Job, job_of
@@ -302,3 +303,37 @@ def test_many_places_of_a_kind_are_counted() -> None:
         assert len(found) == named + 1
         assert found[-1].measured == counted
         assert str(counted) in found[-1].message
+
+
+def test_a_gap_narrower_than_the_tool_is_not_cut_at_all() -> None:
+    # Failed once: the hole was taken on its own, and the tool ran through the island in it.
+    paths = [_circle(0, 0, 3), _circle(0, 0, 2), _circle(0, 0, 1.7)]
+    found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5))
+    assert found.source.tolist() == [0]
+    small = [f for f in found.findings if f.code == Code.CONTOUR_TOO_SMALL]
+    assert [f.where.split(" at ")[0] for f in small] == ["0/PATH 1", "0/PATH 2"]
+    assert "into" in small[0].message
+    assert "round" in small[1].message
+
+
+def test_a_ring_as_wide_as_the_tool_is_cut_along_its_middle() -> None:
+    paths = [_circle(0, 0, 3), _circle(0, 0, 2), _circle(0, 0, 1.5)]
+    found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5))
+    radii = sorted(math.sqrt(area / math.pi) for area in _areas(found))
+    assert radii[-1] == pytest.approx(3.25)
+    assert radii[:-1] == pytest.approx([1.75] * (len(radii) - 1), abs=6e-4)
+    assert len(radii) > 1
+    assert Code.SLOT_AS_WIDE in _codes(found)
+
+
+@settings(max_examples=60)
+@given(st.lists(star_contours(), min_size=2, max_size=5), st.integers(0, 2**32 - 1))
+def test_no_line_comes_nearer_to_any_contour_than_the_tool_is_wide(
+    shapes: list[Polyline], seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    paths = [scaled(moved(p, *rng.uniform(-4, 4, 2)), rng.uniform(0.3, 1.5)) for p in shapes]
+    found = contours(drawing_of(paths), job_of(tool_diameter_mm=2 * R))
+    walls = Segments.of(Polylines.of(paths))
+    for line in found.lines:
+        assert nearest(sample(line, 0.05), walls).distance.min() >= R - 6e-4
