@@ -70,9 +70,12 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
     from camtool.planning.checks import checked
 
     placed = place(drawing, job)
-    here, steps = HOME, []
-    for operation in job.operations:
-        step = _step(placed, job, setting_of(operation, job, machine), machine, here)
+    here: Point = HOME
+    steps: list[Step] = []
+    for rank, operation in enumerate(job.operations, 1):
+        there = HOME if rank == len(job.operations) else None
+        setting = setting_of(operation, job, machine)
+        step = _step(placed, job, setting, machine, (here, there))
         here = _end(step.runs, here)
         steps.append(step)
     worked = [Worked(step.operation, step.runs) for step in steps]
@@ -130,8 +133,15 @@ def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
     return profile
 
 
-def _step(placed: Drawing, job: Job, setting: Setting, machine: Machine, here: Point) -> Step:
-    """One operation from what it takes to its runs, for a tool that stands at `here`."""
+def _step(
+    placed: Drawing,
+    job: Job,
+    setting: Setting,
+    machine: Machine,
+    way: tuple[Point, Point | None],
+) -> Step:
+    """One operation from what it takes to its runs, for a tool that comes from the first point
+    of its `way` and goes to the second (None: stays)."""
     from camtool.planning.contours.runs import runs_of
     from camtool.planning.order import best_order, choices_of, chosen_path, drawn, travel_mm
     from camtool.planning.precedence import must_precede
@@ -141,30 +151,36 @@ def _step(placed: Drawing, job: Job, setting: Setting, machine: Machine, here: P
     items: tuple[Item, ...] = tuple(_with_starts(item) for item in work.items)
     findings = list(work.findings)
     choices = choices_of(items)
-    before = travel_mm(choices, drawn(choices), here, HOME)
+    before = travel_mm(choices, drawn(choices), *way)
     if job.minimise == "reversals":
         from camtool.planning.reversing.reversals import fewer_reversals
 
         items, noticed = fewer_reversals(items, machine)
         findings += noticed
         choices = choices_of(items)
-    rows = best_order(choices, must_precede(items), here, HOME)
-    keep_out = chosen.lines.select(np.flatnonzero(chosen.lines.closed).tolist())
+    rows = best_order(choices, must_precede(items), *way)
+    keep_out = _walls(placed, job, setting.operation)
     runs: list[Run] = []
     for row in rows.tolist():
         item = items[int(choices.owner[row])]
         if isinstance(item, Contour):
-            made, said = runs_of(item, chosen_path(items, choices, row), _around(keep_out))
+            made, said = runs_of(item, chosen_path(items, choices, row), keep_out)
             findings += said
             runs += made
         else:
             runs += item.runs
-    after = travel_mm(choices, rows, here, HOME)
+    after = travel_mm(choices, rows, *way)
     return Step(setting.operation, chosen, work, tuple(runs), tuple(findings), before, after)
 
 
-def _around(keep_out: Polylines) -> Polylines | None:
-    return keep_out if len(keep_out) else None
+def _walls(placed: Drawing, job: Job, operation: Operation) -> Polylines | None:
+    """The closed lines that ways to and from a contour must leave alone: those of the operation
+    itself, and those that any operation makes walls of; None when there are none."""
+    makers = [each for each in job.operations if each.kind in ("profile", "pocket")]
+    names = zip(placed.layers, placed.colours, strict=True)
+    walls = [any(each.takes(*name) for each in (operation, *makers)) for name in names]
+    rows = np.flatnonzero(np.array(walls, dtype=np.bool_) & placed.paths.closed)
+    return placed.paths.select(rows.tolist()) if len(rows) else None
 
 
 def _with_starts(item: Item) -> Item:

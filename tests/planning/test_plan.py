@@ -17,8 +17,8 @@ from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import reverse
 from camtool.machine.model import Machine
-from camtool.planning.job import Job, job_of
-from camtool.planning.plan import plan
+from camtool.planning.job import Job, Lead, Operation, Tool, job_of
+from camtool.planning.plan import plan, planned
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.drawings import drawing_of
 from tests.strategies import contours, open_contours
@@ -197,3 +197,26 @@ def test_single_points_are_named_and_alone_they_are_nothing_to_cut(machine: Mach
     assert [f.code for f in plan(circle, job_of(), machine).findings] == [Code.MARKS_NOT_CUT]
     alone = replace(drawing_of([], []), marks=(point,))
     assert _errors(plan(alone, job_of(), machine)) == [Code.NOTHING_DRAWN]
+
+
+def test_leads_keep_out_of_what_other_operations_leave(machine: Machine) -> None:
+    near = Operation(layers=("B",), tool=Tool(0.2), side="outside")
+    lead = Lead("arc", 0.3)
+    round_it = Operation(
+        layers=("A",), tool=Tool(0.2), side="outside", lead_in=lead, start=(1.5, 3.0)
+    )
+    made = drawing_of([_box(1, 1, 2, 3), _box(1, 3.3, 2, 4)], ["A", "B"])
+    for operations, told in (((round_it,), False), ((round_it, near), True)):
+        codes = [f.code for f in plan(made, Job(operations), machine).findings]
+        assert (Code.LEAD_LEFT_OUT in codes) is told
+
+
+def test_rapids_are_counted_through_all_operations(machine: Machine) -> None:
+    made = drawing_of([_circle(3, 1, 1), _circle(6, 1, 1)], ["A", "B"])
+    one = planned(made, Job((Operation(),)), machine)
+    two = planned(made, Job((Operation(layers=("A",)), Operation(layers=("B",)))), machine)
+    for made_plan in (one, two):
+        toolpath = made_plan.toolpath
+        flat = (toolpath.kind == Kind.RAPID) & (toolpath.starts[:, 2] == toolpath.end[:, 2])
+        way = np.hypot(*(toolpath.end - toolpath.starts)[flat, :2].T).sum()
+        assert way == pytest.approx(sum(s.rapid_mm for s in made_plan.steps))
