@@ -201,40 +201,41 @@ def _single(tour: Tour, item: int, spot: int, lifted: float, best: Step) -> Step
     return Step(gain, low, high, end, 0, item, row)
 
 
-@njit(cache=True)
 def settled(tour: Tour) -> float:
     """How much shorter the tour is when no step gains any more."""
-    items = len(tour.item) - 2
-    queue, log = tour.item[1:-1].copy(), np.empty((LOG, 2), np.int64)
-    return shorten(tour, queue, np.ones(items, np.int64), items, log, -1)[0]
+    return float(kicked(tour, 0, 1))
 
 
 @njit(cache=True)
 def kicked(tour: Tour, kicks: int, seed: int) -> float:
-    """How much shorter the tour is after so many kicks."""
-    items, gained = len(tour.item) - 2, 0.0
-    queue, waits, log = (
-        np.empty(items, np.int64),
-        np.zeros(items, np.int64),
-        np.empty((LOG, 2), np.int64),
-    )
-    for _ in range(kicks if items > 1 else 0):
-        seed = seed * 48271 % 2147483647
-        low = 1 + seed % (items - 1)
-        seed = seed * 48271 % 2147483647
-        high = min(low + seed % KICK_REACH, items - 1)
-        seed = seed * 48271 % 2147483647
-        other = min(high + 1 + seed % KICK_REACH, items)
-        if not may_swap(tour, low, high, other):
-            continue
-        step = Step(gain_of_swap(tour, low, high, other, 0), low, high, other, 0, -1, -1)
-        logged = take(tour, step, log, 0)
-        count = 0
-        for position in _touched(tour, step):
-            count = _wait(tour, queue, waits, 0, count, position)
-        gain, logged = shorten(tour, queue, waits, count, log, logged)
-        if gain + step.gain > LEAST_GAIN_MM:
+    """How much shorter the tour is when no step gains any more, and after so many kicks."""
+    items = len(tour.item) - 2
+    queue, waits = tour.item[1:-1].copy(), np.ones(items, np.int64)
+    log = np.empty((LOG, 2), np.int64)
+    waiting, may_undo, step = items, -1, Step(0.0, 0, -1, -1, 0, -1, -1)
+    gained, kick = 0.0, -1
+    while kick < kicks:
+        gain, logged = shorten(tour, queue, waits, waiting, log, may_undo)
+        if kick < 0 or gain + step.gain > LEAST_GAIN_MM:
             gained += gain + step.gain
         else:
             undo(tour, log, logged)
+        waiting = 0
+        while waiting == 0 and kick < kicks:
+            kick += 1
+            if items < 2 or kick == kicks:
+                return gained
+            seed = seed * 48271 % 2147483647
+            low = 1 + seed % (items - 1)
+            seed = seed * 48271 % 2147483647
+            high = min(low + seed % KICK_REACH, items - 1)
+            seed = seed * 48271 % 2147483647
+            other = min(high + 1 + seed % KICK_REACH, items)
+            if not may_swap(tour, low, high, other):
+                continue
+            gain = gain_of_swap(tour, low, high, other, 0)
+            step = Step(gain, low, high, other, 0, -1, -1)
+            may_undo = take(tour, step, log, 0)
+            for position in _touched(tour, step):
+                waiting = _wait(tour, queue, waits, 0, waiting, position)
     return gained

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from camtool.kernels.tour_tree import nearest_owners, nearest_row, switch, tree_of
+from camtool.kernels.tour_tree import Tree, nearest_owners, nearest_row, switch
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -28,17 +28,24 @@ a cluster, such as the strokes of a letter, would know of no other cluster."""
 
 @njit(cache=True)
 def nearest_first(
-    ends: Floats, first: Ints, after_first: Ints, after: Ints, waits: Ints, start: Floats
+    tree: Tree,
+    ends: Floats,
+    first: Ints,
+    after_first: Ints,
+    after: Ints,
+    waits: Ints,
+    start: Floats,
 ) -> Ints:
     """Rows (M,) in order: from `start` (2,) always to the nearest row that may be taken.
 
-    `ends` (S, 4): entry x, y and exit x, y; item i owns the rows from first[i] to first[i + 1];
-    after[after_first[i] : after_first[i + 1]] may come after item i only, and `waits` (M,) counts
-    for each item what must come before it. Shorter than M when items wait for each other.
+    `tree` is that of the entries, and is used up. `ends` (S, 4): entry x, y and exit x, y; item i
+    owns the rows from first[i] to first[i + 1]; after[after_first[i] : after_first[i + 1]] may
+    come after item i only, and `waits` (M,) counts for each item what must come before it.
+    Shorter than M when items wait for each other.
     """
     count, x, y = len(first) - 1, start[0], start[1]
     rows, owner = np.empty(count, np.int64), np.empty(first[-1], np.int64)
-    tree, on, waiting = tree_of(ends[:, :2]), np.ones(first[-1], np.int64), waits.copy()
+    on, waiting = np.ones(first[-1], np.int64), waits.copy()
     for i in range(count):
         owner[first[i] : first[i + 1]] = i
         if waiting[i] > 0:
@@ -65,17 +72,20 @@ def nearest_first(
 
 
 @njit(cache=True)
-def neighbours(points: Floats, owner: Ints, count: int) -> tuple[Ints, Ints]:
-    """Neighbours of item i: near[near_first[i] : near_first[i + 1]], by places (N, 2) of items.
+def neighbours(tree: Tree, owner: Ints, count: int) -> tuple[Ints, Ints]:
+    """Neighbours of item i: near[near_first[i] : near_first[i + 1]], by a tree of N places.
 
     `owner` (N,) ascends. Each place brings its nearest items, the first one those in each quarter
     too; what several bring comes once.
     """
-    tree = tree_of(points)
-    place_first = np.searchsorted(owner, np.arange(count + 1))
+    place_first = np.zeros(count + 1, np.int64)
+    for item in owner:
+        place_first[item + 1] += 1
+    for item in range(count):
+        place_first[item + 1] += place_first[item]
     near_first = np.zeros(count + 1, np.int64)
     most_of_item = NEAR + NEAR_EACH + 4 * NEAR_QUARTER
-    near = np.empty(len(points) * NEAR_EACH + count * most_of_item, np.int64)
+    near = np.empty(len(owner) * NEAR_EACH + count * most_of_item, np.int64)
     seen, total = np.full(count, -1), 0
     for i in range(count):
         places = place_first[i + 1] - place_first[i]

@@ -40,30 +40,29 @@ class Tree(NamedTuple):
     leaf: Ints
 
 
-@njit(cache=True)
 def tree_of(points: Floats) -> Tree:
-    """The tree of these points, N ≥ 1, all switched on."""
+    """The tree of these points, N ≥ 1, all switched on; the nodes of a level all at once."""
     count, levels = len(points), 0
     while count >> levels > LEAF:
         levels += 1
     nodes = (2 << levels) - 1
-    inner = (1 << levels) - 1
-    rows = np.arange(count)
     begin, size = np.zeros(nodes, np.int64), np.zeros(nodes, np.int64)
-    box, leaf = np.empty((nodes, 4)), np.zeros(count, np.int64)
+    box, rows = np.empty((nodes, 4)), np.arange(count)
     size[0] = count
-    for k in range(nodes):
-        part = rows[begin[k] : begin[k] + size[k]].copy()
-        box[k, 0], box[k, 1] = points[part, 0].min(), points[part, 1].min()
-        box[k, 2], box[k, 3] = points[part, 0].max(), points[part, 1].max()
-        if k >= inner:
-            leaf[part] = k
-            continue
-        axis = 0 if box[k, 2] - box[k, 0] >= box[k, 3] - box[k, 1] else 1
-        rows[begin[k] : begin[k] + size[k]] = part[np.argsort(points[part, axis])]
-        half = size[k] // 2
-        begin[2 * k + 1], size[2 * k + 1] = begin[k], half
-        begin[2 * k + 2], size[2 * k + 2] = begin[k] + half, size[k] - half
+    for level in range(levels + 1):
+        here = np.arange((1 << level) - 1, (2 << level) - 1)
+        node = np.repeat(here, size[here])
+        box[here, :2] = np.minimum.reduceat(points[rows], begin[here])
+        box[here, 2:] = np.maximum.reduceat(points[rows], begin[here])
+        if level < levels:
+            span = box[node, 2:] - box[node, :2]
+            along = np.where(span[:, 0] >= span[:, 1], points[rows, 0], points[rows, 1])
+            rows = rows[np.lexsort((along, node))]
+            half = size[here] // 2
+            begin[2 * here + 1], size[2 * here + 1] = begin[here], half
+            begin[2 * here + 2], size[2 * here + 2] = begin[here] + half, size[here] - half
+    leaf = np.empty(count, np.int64)
+    leaf[rows] = node
     return Tree(points, rows, begin, size, box, size.copy(), leaf)
 
 

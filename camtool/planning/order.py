@@ -121,13 +121,15 @@ def best_order(
     from camtool.kernels.tour_rows import best_rows
     from camtool.kernels.tour_search import kicked, settled
     from camtool.kernels.tour_start import nearest_first
+    from camtool.kernels.tour_tree import tree_of
 
     start = np.array(from_point, dtype=np.float64)
     goal = np.array((np.nan, np.nan) if to_point is None else to_point, dtype=np.float64)
     ends, first = np.column_stack([choices.entry, choices.exit]), choices.first
     after_first, after = _followers(before, len(choices))
     waits = np.bincount(after, minlength=len(choices))
-    rows = nearest_first(ends, first, after_first, after, waits, start)
+    tree = tree_of(choices.entry)
+    rows = nearest_first(tree, ends, first, after_first, after, waits, start)
     if len(rows) < len(choices):
         raise _circle(set(range(len(choices))) - set(choices.owner[rows].tolist()))
     tour = _tour(choices, before, rows, start, goal)
@@ -145,6 +147,7 @@ def _tour(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Float
     """The tour of these rows, with all that the search wants to know."""
     from camtool.kernels.tour import Tour
     from camtool.kernels.tour_start import neighbours
+    from camtool.kernels.tour_tree import tree_of
 
     count, ways = len(choices), len(choices.owner)
     turned = _turned(choices)
@@ -152,7 +155,8 @@ def _tour(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Float
     goal = start if stays else goal
     outside = [np.tile(start, 2), np.tile(goal, 2)]
     ends = np.concatenate([np.column_stack([choices.entry, choices.exit]), outside])
-    near, near_first = neighbours(*_places(choices), count)
+    places, owner = _places(choices)
+    near, near_first = neighbours(tree_of(places), owner, count)
     after_first, after = _followers(before, count)
     earlier_first, earlier = _followers(np.asarray(before).reshape(-1, 2)[:, ::-1], count)
     item = np.concatenate([[count], choices.owner[rows], [count + 1]])

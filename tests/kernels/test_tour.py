@@ -62,7 +62,7 @@ def test_a_cluster_knows_of_other_clusters() -> None:
     rng = np.random.default_rng(5)
     centres = np.array([[0.0, 0], [100, 0], [0, 100], [100, 100]])
     points = (centres[:, None] + rng.uniform(-1, 1, (4, 30, 2))).reshape(-1, 2)
-    near, near_first = neighbours(points, np.arange(120), 120)
+    near, near_first = neighbours(tree_of(points), np.arange(120), 120)
     for cluster in range(4):
         low, high = near_first[30 * cluster], near_first[30 * (cluster + 1)]
         assert len(set((near[low:high] // 30).tolist())) >= 3
