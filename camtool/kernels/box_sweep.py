@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -32,7 +34,7 @@ def touching(
     return one, other
 
 
-@njit(cache=True)
+@inner
 def _touching(
     boxes: Floats, same: Ints, differ: Ints, asked: Bools, most: int, one: Ints, other: Ints
 ) -> int:

@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 
 LEAF = 4
@@ -38,14 +40,14 @@ def tree_of(boxes: Floats) -> Floats:
     return tree
 
 
-@njit(cache=True)
+@inner
 def _widen(tree: Floats, node: int, boxes: Floats, row: int) -> None:
     for k in range(2):
         tree[node, k] = min(tree[node, k], boxes[row, k])
         tree[node, k + 2] = max(tree[node, k + 2], boxes[row, k + 2])
 
 
-@njit(cache=True)
+@inner
 def rows_under(tree: Floats, node: int, count: int) -> tuple[int, int]:
     """The rows low … high − 1 of `count` in all that a node holds."""
     leaves = len(tree) // 2
@@ -57,7 +59,7 @@ def rows_under(tree: Floats, node: int, count: int) -> tuple[int, int]:
     return low, min(low + span, count)
 
 
-@njit(cache=True)
+@inner
 def apart_square(tree: Floats, node: int, x: float, y: float) -> float:
     """Square of the distance of a point from the box of a node."""
     dx = max(tree[node, 0] - x, 0.0, x - tree[node, 2])

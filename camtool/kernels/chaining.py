@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -32,7 +34,7 @@ def near_pairs(cells: Ints, points: Floats, reach: float, most: int) -> tuple[In
     return one, other
 
 
-@njit(cache=True)
+@inner
 def _pairs(cells: Ints, points: Floats, reach: float, most: int, one: Ints, other: Ints) -> int:
     """Counts the pairs, and writes them when there is room for them.
 
@@ -63,7 +65,7 @@ def _pairs(cells: Ints, points: Floats, reach: float, most: int, one: Ints, othe
     return count
 
 
-@njit(cache=True)
+@inner
 def _before(cells: Ints, i: int, group: int, column: int, row: int) -> bool:
     if cells[i, 0] != group:
         return bool(cells[i, 0] < group)
@@ -157,7 +159,7 @@ def walk(mates: Ints, wanted: Bools) -> tuple[Ints, Ints, Bools]:
     return entries[:size], begins[: chains + 1], rings[:chains]
 
 
-@njit(cache=True)
+@inner
 def first_end(mates: Ints, end: int) -> int:
     """The free end at which the chain that enters a path by `end` begins, `end` for a ring."""
     start = end
@@ -219,7 +221,7 @@ def split_loops(
     return made
 
 
-@njit(cache=True)
+@inner
 def _ring_weight(start: int, mates: Ints, weights: Ints) -> Ints:
     """Segments and arcs of a whole ring."""
     total: Ints = weights[start // 2].copy()
@@ -230,7 +232,7 @@ def _ring_weight(start: int, mates: Ints, weights: Ints) -> Ints:
     return total
 
 
-@njit(cache=True)
+@inner
 def _forget(entries: Ints, node: Ints, where: Ints, begin: int) -> None:
     """Takes these entries, the first of which stands at `begin`, out of `where` they stand."""
     for m in range(len(entries)):
@@ -239,6 +241,6 @@ def _forget(entries: Ints, node: Ints, where: Ints, begin: int) -> None:
             where[label] = -1
 
 
-@njit(cache=True)
+@inner
 def _apart(points: Floats, one: int, other: int) -> float:
     return math.hypot(points[one, 0] - points[other, 0], points[one, 1] - points[other, 1])

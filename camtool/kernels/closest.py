@@ -13,6 +13,7 @@ from numba import njit
 
 from camtool.kernels.biarc import distance_to_arc
 from camtool.kernels.box_tree import DEPTH, apart_square, rows_under, tree_of
+from camtool.kernels.inner import inner
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -44,7 +45,7 @@ def closest(
     return best, best_row, best_other
 
 
-@njit(cache=True)
+@inner
 def _from_point(
     x: float,
     y: float,

@@ -35,6 +35,7 @@ import numpy.typing as npt
 from numba import njit
 
 from camtool.kernels.heading import heading, rounded_radius
+from camtool.kernels.inner import inner
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -81,7 +82,7 @@ def dda_arc_start(x: int, y: int, clockwise: bool) -> Ints:
     return np.array([x, y, sx, sy, radius, 0, 0, 1 if x * sx >= 0 else 0], dtype=np.int64)
 
 
-@njit(cache=True)
+@inner
 def _arc_pass(
     grow: int, shrink: int, radius: int, in_grow: int, in_shrink: int
 ) -> tuple[int, int, int, int]:

@@ -39,11 +39,12 @@ import numpy.typing as npt
 from numba import njit
 
 from camtool.kernels.heading import heading
+from camtool.kernels.inner import inner
 
 Ints = npt.NDArray[np.int64]
 
 
-@njit(cache=True)
+@inner
 def _advance(
     x: int, y: int, error: int, sx: int, sy: int, delta_x: int, delta_y: int
 ) -> tuple[int, int, int, int, int, int, int]:

@@ -29,6 +29,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -106,7 +108,7 @@ def frame(table: Floats, own: int, t: float) -> tuple[float, float, float, float
     return x, y, nx, ny
 
 
-@njit(cache=True)
+@inner
 def _from_corner(tx: float, ty: float, element: Floats, t: float) -> tuple[float, float]:
     """A point of an element as seen from its start (t > 0), or from its end (t < 0, and t_x, t_y
     the direction back from there): without the rounding of far coordinates."""
@@ -118,7 +120,7 @@ def _from_corner(tx: float, ty: float, element: Floats, t: float) -> tuple[float
     return chord * (tx * cosine - ty * sine), chord * (ty * cosine + tx * sine)
 
 
-@njit(cache=True)
+@inner
 def _at_convex_corner(links: Ints, own: int, t: float) -> int:
     """The other element of the convex corner at which the point lies, −1 elsewhere."""
     if t == 0.0 and links[own, 2] == CONVEX:
@@ -128,7 +130,7 @@ def _at_convex_corner(links: Ints, own: int, t: float) -> int:
     return -1
 
 
-@njit(cache=True)
+@inner
 def _largest(
     boundary: tuple[Floats, Ints, Floats],
     own: int,
@@ -163,7 +165,7 @@ def _largest(
     return radius, best
 
 
-@njit(cache=True)
+@inner
 def _limit(
     boundary: tuple[Floats, Ints], pair: tuple[int, int], at: Place, radius: float, at_start: bool
 ) -> float:
@@ -197,7 +199,7 @@ def _limit(
     return min(found, _touching(table[other], (tx, ty, wx, wy), at, min(radius, found), least))
 
 
-@njit(cache=True)
+@inner
 def _least(table: Floats, links: Ints, own: int, other: int) -> float:
     """How far on the inner side of `other` a point must be: above 0 behind a reflex corner."""
     before, behind = links[own, 0], links[own, 1]
@@ -207,7 +209,7 @@ def _least(table: Floats, links: Ints, own: int, other: int) -> float:
     return TOUCH_MM if over else 0.0
 
 
-@njit(cache=True)
+@inner
 def _touching(
     element: Floats,
     sight: tuple[float, float, float, float],
@@ -242,7 +244,7 @@ def _touching(
     return found if after >= -slack and still <= slack else np.inf
 
 
-@njit(cache=True)
+@inner
 def _place(table: Floats, other: int, cx: float, cy: float) -> float:
     """At which part of an element a disc with this middle touches it."""
     wx, wy = cx - table[other, AX], cy - table[other, AY]

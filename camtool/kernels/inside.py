@@ -13,6 +13,7 @@ import numpy.typing as npt
 from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF
+from camtool.kernels.inner import inner
 from camtool.kernels.offset_curves import AX, AY, BX, BY, Floats
 from camtool.kernels.offset_near import least_below
 
@@ -35,7 +36,7 @@ def insides(points: Floats, curves: Floats, bulge: Floats, tree: Floats) -> Bool
     return found
 
 
-@njit(cache=True)
+@inner
 def is_inside(curves: Floats, bulge: Floats, tree: Floats, point: tuple[float, float]) -> bool:
     """Whether a closed path holds a point."""
     x, y = point
@@ -57,7 +58,7 @@ def is_inside(curves: Floats, bulge: Floats, tree: Floats, point: tuple[float, f
     return bool(odd)
 
 
-@njit(cache=True)
+@inner
 def _counts(curves: Floats, i: int, bulge: float, x: float, y: float) -> bool:
     """Whether a ray to the right crosses a chord, or else the point lies beside it in its arc."""
     ax, ay, bx, by = curves[i, AX], curves[i, AY], curves[i, BX], curves[i, BY]

@@ -12,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -52,7 +54,7 @@ def nearest_others(
     return nearest, distance
 
 
-@njit(cache=True)
+@inner
 def _first(cells: Ints, column: int, row: int) -> int:
     """The first sorted cell that is not before (column, row)."""
     low, high = 0, len(cells)

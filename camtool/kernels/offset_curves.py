@@ -19,6 +19,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 
 AX, AY, BX, BY, TX, TY, UX, UY, BEND, LENGTH, SWEEP = range(11)
@@ -68,7 +70,7 @@ def curve_boxes(curves: Floats, margin: float) -> Floats:
     return boxes
 
 
-@njit(cache=True)
+@inner
 def gap_to(curves: Floats, i: int, x: float, y: float) -> float:
     """Distance of a point from the whole line or circle of row i."""
     qx, qy = x - curves[i, AX], y - curves[i, AY]
@@ -78,7 +80,7 @@ def gap_to(curves: Floats, i: int, x: float, y: float) -> float:
     return float(abs(power) / (1.0 + math.sqrt(wx * wx + wy * wy)))
 
 
-@njit(cache=True)
+@inner
 def distance_to(curves: Floats, i: int, x: float, y: float) -> float:
     """Distance of a point from row i: from its nearer end beside it (|sweep| ≤ π)."""
     qx, qy = x - curves[i, AX], y - curves[i, AY]

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF, apart_square
+from camtool.kernels.inner import inner
 from camtool.kernels.offset_curves import Floats
 
 CX, CY, N1X, N1Y, N2X, N2Y, MX, MY, DEEP, FAR = range(10)
@@ -42,7 +43,7 @@ def kite_boxes(kites: Floats) -> Floats:
     return boxes
 
 
-@njit(cache=True)
+@inner
 def depth_in(kites: Floats, i: int, x: float, y: float) -> float:
     """How deep a point is in kite i; below 0 outside it."""
     qx, qy = x - kites[i, CX], y - kites[i, CY]

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
 from camtool.kernels.offset_curves import SWEEP, TX, TY, Floats
 from camtool.kernels.offset_nodes import grouped
 
@@ -72,7 +73,7 @@ def traced(
     return rows[: begins[loops]], begins[: loops + 1]
 
 
-@njit(cache=True)
+@inner
 def _leftmost(
     elements: Floats, element: Ints, span: Floats, came: tuple[int, Bools], ways: Ints
 ) -> int:
@@ -98,7 +99,7 @@ def _leftmost(
     return best
 
 
-@njit(cache=True)
+@inner
 def _tangent(elements: Floats, i: int, t: float) -> tuple[float, float]:
     turn = t * elements[i, SWEEP]
     cosine, sine = math.cos(turn), math.sin(turn)
@@ -147,13 +148,13 @@ def written(
     return vertices[: offsets[-1]], offsets
 
 
-@njit(cache=True)
+@inner
 def _goes_on(element: Ints, span: Floats, last: int, row: int) -> bool:
     """Whether a slice goes on along the element of the one before it."""
     return bool(element[last] == element[row] and span[row, 0] >= span[last, 1])
 
 
-@njit(cache=True)
+@inner
 def _first(element: Ints, span: Floats, ways: Ints) -> int:
     """Where a closed run may begin: not within an element."""
     for k in range(len(ways)):
@@ -162,7 +163,7 @@ def _first(element: Ints, span: Floats, ways: Ints) -> int:
     return 0
 
 
-@njit(cache=True)
+@inner
 def _cleaned(vertices: Floats, closed: bool, eps: float) -> int:
     """How many vertices are left, the first ones, when segments up to `eps` have gone.
 
@@ -208,6 +209,6 @@ def _cleaned(vertices: Floats, closed: bool, eps: float) -> int:
     return left
 
 
-@njit(cache=True)
+@inner
 def _length(vertices: Floats, one: int, other: int) -> float:
     return math.hypot(vertices[one, 0] - vertices[other, 0], vertices[one, 1] - vertices[other, 1])

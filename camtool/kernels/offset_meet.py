@@ -16,6 +16,7 @@ import numpy.typing as npt
 from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF, touch
+from camtool.kernels.inner import inner
 from camtool.kernels.offset_curves import (
     AX,
     AY,
@@ -76,7 +77,7 @@ def pairs_of(boxes: Floats, tree: Floats, others: Floats, other_tree: Floats, ow
     return pairs[:count]
 
 
-@njit(cache=True)
+@inner
 def _grown(rows: Numbers, room: Numbers) -> Numbers:
     """`room` with these rows at its beginning."""
     for i in range(len(rows)):
@@ -103,7 +104,7 @@ def meetings_of(a: Floats, b: Floats, pairs: Ints, eps: float) -> tuple[Ints, Fl
     return rows[:count], found[:count]
 
 
-@njit(cache=True)
+@inner
 def _meet(a: Floats, b: Floats, i: int, j: int, into: tuple[float, Floats]) -> int:
     """How many meetings row i of a and row j of b have; they are written into the rows given."""
     eps, found = into
@@ -121,7 +122,7 @@ def _meet(a: Floats, b: Floats, i: int, j: int, into: tuple[float, Floats]) -> i
     return count
 
 
-@njit(cache=True)
+@inner
 def _known(
     a: Floats, b: Floats, i: int, j: int, at: tuple[float, float, float, Floats, int]
 ) -> bool:
@@ -147,7 +148,7 @@ def _known(
     return False
 
 
-@njit(cache=True)
+@inner
 def _taken(
     a: Floats, b: Floats, i: int, j: int, into: tuple[float, float, float, Floats, int]
 ) -> int:
@@ -167,7 +168,7 @@ def _taken(
     return 1
 
 
-@njit(cache=True)
+@inner
 def _fraction(length: float, whole: float, eps: float) -> float:
     """Fraction of the whole length, exactly 0 or 1 within eps of an end."""
     if length >= whole - eps:
@@ -175,7 +176,7 @@ def _fraction(length: float, whole: float, eps: float) -> float:
     return 0.0 if length <= eps else length / whole
 
 
-@njit(cache=True)
+@inner
 def _tangent(curves: Floats, i: int, length: float) -> tuple[float, float]:
     turn = length * curves[i, SWEEP] / curves[i, LENGTH]
     cosine, sine = math.cos(turn), math.sin(turn)

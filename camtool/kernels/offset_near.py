@@ -13,6 +13,7 @@ import numpy.typing as npt
 from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF, apart_square
+from camtool.kernels.inner import inner
 from camtool.kernels.offset_curves import LENGTH, Floats, distance_to, point_on
 from camtool.kernels.offset_kites import deepest
 
@@ -35,7 +36,7 @@ PLACES = (0.5, 0.03, 0.97, 0.2, 0.8, 0.35, 0.65)
 """Where on a slice its distance is measured; the middle first, as it settles most of them."""
 
 
-@njit(cache=True)
+@inner
 def least_below(
     curves: Floats, tree: Floats, point: tuple[float, float], best: float, enough: float
 ) -> float:
@@ -110,7 +111,7 @@ def gathered(
     return count
 
 
-@njit(cache=True)
+@inner
 def _too_near(
     near: Near,
     some: tuple[Ints, int],

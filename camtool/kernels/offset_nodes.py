@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
 from camtool.kernels.offset_curves import Floats, point_on
 
 Ints = npt.NDArray[np.int64]
@@ -56,7 +57,7 @@ def merged(points: Floats, skew: Floats, order: Ints, eps: float) -> tuple[Ints,
     return node, first[:count]
 
 
-@njit(cache=True)
+@inner
 def _root(group: Ints, i: int) -> int:
     """The least member of the group of i."""
     while group[i] != i:
@@ -65,7 +66,7 @@ def _root(group: Ints, i: int) -> int:
     return i
 
 
-@njit(cache=True)
+@inner
 def grouped(keys: Ints, count: int) -> tuple[Ints, Ints]:
     """Rows (R,) by their key below `count`, in their order, and where each key begins."""
     begins = np.zeros(count + 1, np.int64)
@@ -102,7 +103,7 @@ def in_order(keys: Ints, t: Floats, count: int) -> Ints:
     return rows
 
 
-@njit(cache=True)
+@inner
 def _after(t: Floats, one: int, other: int) -> bool:
     return bool(t[one] > t[other] or (t[one] == t[other] and one > other))
 

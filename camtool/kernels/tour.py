@@ -22,6 +22,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -80,7 +82,7 @@ def gap(tour: Tour, one: int, other: int) -> float:
     return math.sqrt(x * x + y * y)
 
 
-@njit(cache=True)
+@inner
 def row_at(tour: Tour, position: int) -> int:
     """The chosen row of the item at a position."""
     return int(tour.row[tour.item[position]])
@@ -164,7 +166,7 @@ def gain_of_swap(tour: Tour, low: int, high: int, other: int, flip: int) -> floa
     return before - gap(tour, left, two) - gap(tour, end_two, one) - gap(tour, end_one, right)
 
 
-@njit(cache=True)
+@inner
 def take(tour: Tour, step: Step, log: Ints, logged: int) -> int:
     """Change the tour, write down how to undo it, and return how much is written."""
     low, high, other = step.low, step.high, step.other
@@ -184,7 +186,7 @@ def take(tour: Tour, step: Step, log: Ints, logged: int) -> int:
     return logged
 
 
-@njit(cache=True)
+@inner
 def _reversed(tour: Tour, low: int, high: int, log: Ints, logged: int) -> int:
     reverse(tour, low, high)
     log[logged, 0], log[logged, 1] = low, high

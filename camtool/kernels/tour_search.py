@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
 from camtool.kernels.tour import (
     Step,
     Tour,
@@ -44,7 +45,7 @@ LOG = 8192
 """So many changes after a kick can be undone; no more are made."""
 
 
-@njit(cache=True)
+@inner
 def shorten(
     tour: Tour, queue: Ints, waits: Ints, count: int, log: Ints, logged: int
 ) -> tuple[float, int]:
@@ -71,7 +72,7 @@ def shorten(
     return gained, logged
 
 
-@njit(cache=True)
+@inner
 def _wait(tour: Tour, queue: Ints, waits: Ints, head: int, count: int, position: int) -> int:
     """Let the item at a position wait, unless it does; how many wait then."""
     item = tour.item[position]
@@ -82,7 +83,7 @@ def _wait(tour: Tour, queue: Ints, waits: Ints, head: int, count: int, position:
     return count + 1
 
 
-@njit(cache=True)
+@inner
 def _touched(tour: Tour, step: Step) -> tuple[int, int, int, int, int, int, int, int]:
     """Positions beside a gap that a step has changed."""
     last = step.high if step.other < 0 else step.other
@@ -91,7 +92,7 @@ def _touched(tour: Tour, step: Step) -> tuple[int, int, int, int, int, int, int,
     return step.low - 1, step.low, middle - 1, middle, last, last + 1, at, at + 1
 
 
-@njit(cache=True)
+@inner
 def best_step(tour: Tour, item: int) -> Step:
     """The step that gains most of those that concern this item; gain 0 when there is none."""
     at, last = tour.place[item], len(tour.item) - 2
@@ -124,7 +125,7 @@ def best_step(tour: Tour, item: int) -> Step:
     return best
 
 
-@njit(cache=True)
+@inner
 def _other_row(tour: Tour, item: int, best: Step) -> Step:
     """The best row of an item where it is."""
     at, row = tour.place[item], tour.row[item]
@@ -137,7 +138,7 @@ def _other_row(tour: Tour, item: int, best: Step) -> Step:
     return best
 
 
-@njit(cache=True)
+@inner
 def _reversal(tour: Tour, low: int, high: int, best: Step) -> Step:
     if low > high:
         return best
@@ -149,7 +150,7 @@ def _reversal(tour: Tour, low: int, high: int, best: Step) -> Step:
     return best
 
 
-@njit(cache=True)
+@inner
 def _part(tour: Tour, at: int, way: int, spot: int, turn: bool, best: Step) -> Step:
     """Parts of two and more items that begin (way 1) or end (way −1) at a position, moved between
     the positions `spot` and `spot` + 1."""
@@ -165,7 +166,7 @@ def _part(tour: Tour, at: int, way: int, spot: int, turn: bool, best: Step) -> S
     return best
 
 
-@njit(cache=True)
+@inner
 def _swap(tour: Tour, low: int, high: int, other: int, flip: int, best: Step) -> Step:
     gain = gain_of_swap(tour, low, high, other, flip)
     if gain > best.gain and may_swap(tour, low, high, other):
@@ -178,7 +179,7 @@ def _swap(tour: Tour, low: int, high: int, other: int, flip: int, best: Step) ->
     return best
 
 
-@njit(cache=True)
+@inner
 def _single(tour: Tour, item: int, spot: int, lifted: float, best: Step) -> Step:
     """One item moved between the positions `spot` and `spot` + 1, cut in the best way there."""
     at = tour.place[item]

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.inner import inner
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -77,7 +79,7 @@ def switch(tree: Tree, row: int, change: int) -> None:
         node = (node - 1) // 2
 
 
-@njit(cache=True)
+@inner
 def _apart(tree: Tree, node: int, x: float, y: float) -> float:
     """Squared distance from a point to a node's box."""
     dx = max(tree.box[node, 0] - x, x - tree.box[node, 2], 0.0)
@@ -147,7 +149,7 @@ def nearest_owners(tree: Tree, owner: Ints, row: int, most: int, quarter: int = 
     return found[found >= 0]
 
 
-@njit(cache=True)
+@inner
 def _looks_to(quarter: int, dx: float, dy: float) -> bool:
     """Whether a direction lies in a quarter of the plane; each has one of its two edges."""
     if quarter == 0:
@@ -161,7 +163,7 @@ def _looks_to(quarter: int, dx: float, dy: float) -> bool:
     return True
 
 
-@njit(cache=True)
+@inner
 def _enter(found: Ints, apart: Floats, owner: int, distance: float) -> None:
     """Put an owner into the sorted list, or move it up when it is there already."""
     at = len(found) - 1

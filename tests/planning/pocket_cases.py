@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 
+from camtool.geometry.distance import path_distance
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.geometry.regions import oriented
 from camtool.geometry.transform import moved, rotated, scaled
@@ -105,3 +107,8 @@ def shapes(draw: st.DrawFn) -> list[Polyline]:
         islands.append(moved(small, 0.6 * math.cos(angle), 0.6 * math.sin(angle)))
     turn = draw(st.floats(0.0, 6.0))
     return [rotated(path, turn) for path in (outer, *islands)]
+
+
+def cross(paths: Sequence[Polyline]) -> bool:
+    """Whether any of the paths meets another one: such pockets are refused."""
+    return any(path_distance(one, other) == 0.0 for one, other in combinations(paths, 2))

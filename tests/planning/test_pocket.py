@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -29,6 +29,7 @@ from tests.oracles.swept import at_depth, complaints, gouges
 from tests.planning.pocket_cases import (
     SHAPES,
     chosen_of,
+    cross,
     region_of,
     runs_of,
     setting_of,
@@ -71,6 +72,7 @@ def test_random_shapes(paths: list[Polyline], diameter_mm: float, step_over: flo
 @settings(max_examples=150)
 @given(paths=shapes(), diameter_mm=st.floats(0.1, 3.0), step_over=st.floats(0.15, 1.0))
 def test_many_random_shapes(paths: list[Polyline], diameter_mm: float, step_over: float) -> None:
+    assume(not cross(paths))
     runs = runs_of(work_of(paths, diameter_mm, step_over=step_over))
     if runs:
         assert complaints(runs, region_of(paths), 0.5 * diameter_mm, -1.0) == []
