@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from camtool.errors import GeometryError
-from camtool.geometry.polylines import Floats, Polyline, Polylines
+from camtool.geometry.polylines import Polyline, Polylines
 
 
 def reverse(p: Polyline) -> Polyline:
@@ -35,12 +35,7 @@ def lines_reversed(lines: Polylines) -> Polylines:
 
 def moved(p: Polyline, dx: float, dy: float) -> Polyline:
     """The path moved by (dx, dy) mm."""
-    return Polyline(_moved(p.vertices, dx, dy), p.closed)
-
-
-def lines_moved(lines: Polylines, dx: float, dy: float) -> Polylines:
-    """All paths moved by (dx, dy) mm."""
-    return Polylines(_moved(lines.vertices, dx, dy), lines.offsets, lines.closed)
+    return Polyline(p.vertices + np.array([dx, dy, 0.0]), p.closed)
 
 
 def rotated(p: Polyline, angle_rad: float) -> Polyline:
@@ -69,7 +64,3 @@ def rolled(p: Polyline, start_index: int) -> Polyline:
     if not p.closed:
         raise GeometryError("an open path can only begin at an end")
     return Polyline(np.roll(p.vertices, -start_index, axis=0), True)
-
-
-def _moved(vertices: Floats, dx: float, dy: float) -> Floats:
-    return np.asarray(vertices + np.array([dx, dy, 0.0]))

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.geometry.transform import lines_moved
 from camtool.preview import legend, marks
 from camtool.preview.colours import DRAWING, FEED_PALE, OUTLINE, TRAVEL
 from camtool.preview.legend import Entry
@@ -77,10 +76,10 @@ def content_of(scene: Scene) -> Content:
     groups: tuple[marks.Group, ...] = ()
     places = Places(NOWHERE, NOWHERE, NOWHERE)
     if scene.drawing is not None:
-        outlines = chains_of(lines_moved(scene.drawing.paths, *scene.drawing_shift_mm))
+        outlines = chains_of(scene.drawing.paths)
         alone = strokes is None and trace is None
         groups = marks.groups_of(scene.drawing, outlines, alone=alone)
-        places = _places(scene.drawing, scene.drawing_shift_mm)
+        places = _places(scene.drawing)
     return Content(
         scene=scene,
         groups=groups,
@@ -93,16 +92,16 @@ def content_of(scene: Scene) -> Content:
     )
 
 
-def _places(drawing: Drawing, shift_mm: tuple[float, float]) -> Places:
-    def moved(points: list[tuple[float, float]]) -> Floats:
-        return np.array(points, dtype=np.float64).reshape(-1, 2) + shift_mm
+def _places(drawing: Drawing) -> Places:
+    def columns(points: list[tuple[float, float]]) -> Floats:
+        return np.array(points, dtype=np.float64).reshape(-1, 2)
 
     doubts = [crossing.at_mm for crossing in drawing.healing.crossings]
     doubts += [branch.at_mm for branch in drawing.healing.branches]
     return Places(
-        gaps=moved([gap.at_mm for gap in drawing.gaps]),
-        points=moved([mark.at_mm for mark in drawing.marks]),
-        doubts=moved(doubts),
+        gaps=columns([gap.at_mm for gap in drawing.gaps]),
+        points=columns([mark.at_mm for mark in drawing.marks]),
+        doubts=columns(doubts),
     )
 
 

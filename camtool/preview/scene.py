@@ -21,7 +21,7 @@ class Scene:
     trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
     wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
     other errors do not count. travel_mm is the size of the table's travel from (0, 0).
-    drawing_shift_mm moves the drawing into the work frame. With a trace the picture is one of the
+    The drawing is in the work frame. With a trace the picture is one of the
     part: rapids and plunges are left out, feeds are pale. ValueError when the trace is incomplete
     or not finite.
     """
@@ -34,7 +34,6 @@ class Scene:
     trace_cutting: Bools | None = None
     travel_mm: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
-    drawing_shift_mm: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm

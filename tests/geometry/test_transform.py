@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
-from camtool.geometry.polylines import Polyline, Polylines
+from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import (
-    lines_moved,
     mirrored,
     moved,
     reverse,
@@ -74,16 +73,3 @@ def test_a_scale_that_is_none_is_refused(factor: float) -> None:
 def test_a_path_scaled_to_a_point_is_refused() -> None:
     with pytest.raises(GeometryError, match="repeated"):
         scaled(Polyline(np.array([[0.0, 0, 0], [1, 0, 0]])), 1e-9)
-
-
-def test_all_lines_are_moved_and_stay_the_same_paths() -> None:
-    paths = Polylines.of(
-        [
-            Polyline(np.array([[0.0, 0, 1], [1, 0, 1]]), closed=True),
-            Polyline(np.array([[5.0, 5, 0], [6, 5, 0]])),
-        ]
-    )
-    other = lines_moved(paths, 1.0, -2.0)
-    assert other.vertices.tolist() == [[1, -2, 1], [2, -2, 1], [6, 3, 0], [7, 3, 0]]
-    assert other.offsets.tolist() == paths.offsets.tolist()
-    assert other.closed.tolist() == [True, False]

@@ -206,7 +206,7 @@ def test_there_are_no_fonts_no_scripts_and_no_links(scene: Scene) -> None:
 
 def test_coordinates_in_the_picture_are_those_of_the_part_in_mm() -> None:
     drawing = drawing_of([circle(2.5, 1.5, 0.5)], ["0"])
-    shifted = Scene("", drawing, drawing_shift_mm=(1.0, -1.0))
+    shifted = Scene("", drawing_of([circle(3.5, 0.5, 0.5)], ["0"]))
     for scene, centre in ((Scene("", drawing), (2.5, 1.5)), (shifted, (3.5, 0.5))):
         layer = named(svg_page.parse(draw(scene)), "drawing")
         arcs = svg_page.paths(layer)[0]
