@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.geometry.offset.slices import merge_points
 from camtool.geometry.polylines import Bools, Floats, Ints
 
 MEET_MM = 1e-4
@@ -36,7 +37,7 @@ def graph_of(pieces: list[Floats]) -> Graph:
     if not pieces:
         return Graph([], np.empty((0, 2), dtype=np.int64), np.empty((0, 3)))
     discs = np.concatenate([piece[[0, -1], :3] for piece in pieces])
-    place = _met(discs)
+    place, _ = merge_points(discs[:, :2], MEET_MM)
     first = np.unique(place, return_index=True)[1]
     return Graph(pieces, place.reshape(-1, 2), discs[first])
 
@@ -44,27 +45,6 @@ def graph_of(pieces: list[Floats]) -> Graph:
 def _extent(piece: Floats) -> float:
     """How far the piece leaves its start, by its points; above 0 for a full turn."""
     return float(np.hypot(*(piece[1:, :2] - piece[0, :2]).T).max())
-
-
-def _met(points: Floats) -> Ints:
-    """(N,) the number of the place of each point, 0 … : points that meet, in chains too, share
-    one."""
-    import shapely
-
-    geometries = shapely.points(points[:, :2])
-    pairs = shapely.STRtree(geometries).query(geometries, predicate="dwithin", distance=MEET_MM)
-    root = list(range(len(points)))
-
-    def top(row: int) -> int:
-        while root[row] != row:
-            root[row] = root[root[row]]
-            row = root[row]
-        return row
-
-    for one, other in pairs.T.tolist():
-        a, b = top(one), top(other)
-        root[max(a, b)] = min(a, b)
-    return np.unique([top(row) for row in range(len(points))], return_inverse=True)[1]
 
 
 def without_twigs(graph: Graph, tolerance_mm: float) -> Graph:
