@@ -87,10 +87,22 @@ def _apart(tree: Tree, node: int, x: float, y: float) -> float:
     return float(dx * dx + dy * dy)
 
 
+@inner
+def _halves_wait(
+    tree: Tree, node: int, point: tuple[float, float], waiting: Ints, top: int
+) -> int:
+    """Let the halves of a node wait, the nearer one on top; how many wait then."""
+    x, y = point
+    left_first = _apart(tree, 2 * node + 1, x, y) <= _apart(tree, 2 * node + 2, x, y)
+    waiting[top] = 2 * node + (2 if left_first else 1)
+    waiting[top + 1] = 2 * node + (1 if left_first else 2)
+    return top + 2
+
+
 @njit(cache=True)
 def nearest_row(tree: Tree, on: Ints, x: float, y: float) -> int:
     """The nearest point that is switched on, `on` (N,) 1 or 0; −1 when none is."""
-    waiting, top, inner = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
+    waiting, top, leaves = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
     waiting[0] = 0
     found, best = -1, np.inf
     while top > 0:
@@ -98,11 +110,8 @@ def nearest_row(tree: Tree, on: Ints, x: float, y: float) -> int:
         node = waiting[top]
         if tree.live[node] == 0 or _apart(tree, node, x, y) > best:
             continue
-        if node < inner:
-            left_first = _apart(tree, 2 * node + 1, x, y) <= _apart(tree, 2 * node + 2, x, y)
-            waiting[top] = 2 * node + (2 if left_first else 1)
-            waiting[top + 1] = 2 * node + (1 if left_first else 2)
-            top += 2
+        if node < leaves:
+            top = _halves_wait(tree, node, (x, y), waiting, top)
             continue
         for k in range(tree.begin[node], tree.begin[node] + tree.size[node]):
             row = tree.rows[k]
@@ -121,7 +130,7 @@ def nearest_owners(tree: Tree, owner: Ints, row: int, most: int, quarter: int = 
     `quarter` 0 … 3: only those above and to the right of the point, and so on CCW.
     """
     x, y = tree.points[row, 0], tree.points[row, 1]
-    waiting, top, inner = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
+    waiting, top, leaves = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
     waiting[0] = 0
     found, apart = np.full(most, -1), np.full(most, np.inf)
     while top > 0:
@@ -135,11 +144,8 @@ def nearest_owners(tree: Tree, owner: Ints, row: int, most: int, quarter: int = 
             or _looks_to(quarter, box[2] - x, box[1] - y)
         ):
             continue
-        if node < inner:
-            left_first = _apart(tree, 2 * node + 1, x, y) <= _apart(tree, 2 * node + 2, x, y)
-            waiting[top] = 2 * node + (2 if left_first else 1)
-            waiting[top + 1] = 2 * node + (1 if left_first else 2)
-            top += 2
+        if node < leaves:
+            top = _halves_wait(tree, node, (x, y), waiting, top)
             continue
         for k in range(tree.begin[node], tree.begin[node] + tree.size[node]):
             other = tree.rows[k]
