@@ -16,8 +16,9 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
+from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.verify.compare import Found, Target
-from camtool.verify.cuts import STOCK_TOP_MM, Bools, CutMoves, Samples, sample_cuts
+from camtool.verify.cuts import Bools, CutMoves, Samples, sample_cuts
 from camtool.verify.figures import Figure
 from camtool.verify.match import Goal, Match, match_contours, match_rows, nearest_at_height
 from camtool.verify.places import and_more, at_point, block_name

@@ -18,12 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.toolpath.moves import Kind, Toolpath
 
 Bools = npt.NDArray[np.bool_]
-
-STOCK_TOP_MM = 0.0
-"""Part zero is the stock top."""
 
 FEWEST_SAMPLES = 4
 """Each line and arc is sampled in at least so many parts: short moves must not slip through."""

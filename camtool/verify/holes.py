@@ -13,8 +13,9 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verify.cuts import STOCK_TOP_MM, cutting_rows, moved_lengths
+from camtool.verify.cuts import cutting_rows, moved_lengths
 from camtool.verify.places import and_more, at_point, block_name
 
 
