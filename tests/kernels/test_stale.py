@@ -29,21 +29,39 @@ def test_nothing_is_thrown_away_while_sources_stay(folder: Path) -> None:
     assert kept(folder) == {".nbi", ".nbc", ".pyc"}
 
 
-def test_a_change_of_any_source_throws_all_compiled_code_away(folder: Path) -> None:
+def test_a_change_throws_away_what_depends_on_it(folder: Path) -> None:
+    (folder / "one.py").write_text("from camtool.kernels.two import b\n")
+    assert _discard_stale(folder) == {"one"}
+    (folder / "__pycache__" / "one.f-3.py311.nbi").write_bytes(b"index")
+    (folder / "__pycache__" / "two.g-3.py311.nbi").write_bytes(b"index")
+    (folder / "__pycache__" / "three.h-3.py311.nbi").write_bytes(b"index")
     source = folder / "two.py"
     before = source.stat()
     source.write_text("b = 3\n")
     os.utime(source, ns=(before.st_atime_ns, before.st_mtime_ns))  # as an installer may leave it
-    assert _discard_stale(folder)
-    assert kept(folder) == {".pyc"}
+    assert _discard_stale(folder) == {"one", "two"}
+    left = {file.name for file in (folder / "__pycache__").glob("*.nbi")}
+    assert left == {"three.h-3.py311.nbi"}
     assert not _discard_stale(folder)
+
+
+def test_what_does_not_depend_on_a_change_stays(folder: Path) -> None:
+    (folder / "two.py").write_text("b = 3\n")
+    assert _discard_stale(folder) == {"two"}
+    assert kept(folder) == {".nbi", ".nbc", ".pyc"}
+
+
+def test_without_a_stamp_everything_is_thrown_away(folder: Path) -> None:
+    (folder / "__pycache__" / "camtool-kernels.digest").write_text("not JSON")
+    assert _discard_stale(folder) == {"one", "two"}
+    assert kept(folder) == {".pyc"}
 
 
 def test_a_source_more_or_less_is_a_change(folder: Path) -> None:
     (folder / "two.py").unlink()
-    assert _discard_stale(folder)
+    assert _discard_stale(folder) == {"two"}
     (folder / "three.py").write_text("c = 3\n")
-    assert _discard_stale(folder)
+    assert _discard_stale(folder) == {"three"}
 
 
 def test_a_folder_without_a_cache_gets_one(tmp_path: Path) -> None:
