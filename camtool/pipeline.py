@@ -19,7 +19,8 @@ from camtool.findings import Finding, Severity, worst
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.machine.model import Interpolator, Machine
+    from camtool.machine.controllers import Interpolator
+    from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
     from camtool.preview.draw import Scene

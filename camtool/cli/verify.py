@@ -23,7 +23,7 @@ from camtool.cli.types import picture as picture_name
 from camtool.errors import ProgramError
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Interpolator
+    from camtool.machine.controllers import Interpolator
 
 
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")

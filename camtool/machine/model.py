@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
 from camtool.errors import MachineError
+from camtool.machine.controllers import Controller, PicMmhController
 
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
-Interpolator = Literal["dsm", "dda", "stairs"]
 
 
 class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -94,39 +94,6 @@ class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fit_tolerance_mm: Positive
     gap_mm: NotNegative = 0.01
 
-
-class PicMmhController(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="model", tag="pic-mmh"
-):
-    """The PIC18F8720's firmware; each option is a point on which its thesis leaves a choice."""
-
-    arcs: Interpolator = "dsm"
-    initial_error: Literal["zero", "rounded-radius"] = "zero"
-    time_base: Literal["event", "iteration"] = "event"
-    start_play: Literal["preloaded", "centred"] = "preloaded"
-    start_direction: Literal["+", "-"] = "+"
-    machine_zero_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where machine zero lies in the work frame: G28 goes there."""
-
-
-class PathController(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="model", tag="path"
-):
-    """Any controller, as if it followed the programmed lines and arcs exactly.
-
-    It stands in for controllers whose own arithmetic is not modelled. `grid` "steps": ends and
-    arc centres lie on the axes' coded steps; "none": they are taken as programmed.
-    """
-
-    grid: Literal["steps", "none"] = "steps"
-    start_play: Literal["preloaded", "centred"] = "preloaded"
-    start_direction: Literal["+", "-"] = "+"
-    machine_zero_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where machine zero lies in the work frame: homing goes there."""
-
-
-Controller = PicMmhController | PathController
-"""One record per controller model, told apart by `model`."""
 
 Scalar = bool | int | float | str
 

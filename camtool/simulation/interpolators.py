@@ -16,7 +16,7 @@ from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
 from camtool.kernels.direct_search import direct_search_fill, direct_search_start
 from camtool.kernels.heading import rounded_radius
 from camtool.kernels.stairs import stairs_fill, stairs_start
-from camtool.machine.model import Interpolator
+from camtool.machine.controllers import Interpolator
 from camtool.simulation.motion import Ints
 
 Filler: TypeAlias = Callable[[Ints], tuple[int, int, bool]]

@@ -11,25 +11,24 @@ from camtool.kernels.lattice import to_steps
 from camtool.kernels.play import play_fill, play_limits, play_path_fill, play_start
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Floats, Ints
+from camtool.simulation.options import Effects
 
 
 class Mechanics:
     """The slides of a machine, engaged as its controller record says, at rest at `start` (3,)
-    steps. Scale errors act about part zero. `ideal`: no play, no compensation, real = coded step.
-    """
+    steps. Scale errors act about part zero; `effects` says what there is."""
 
-    def __init__(self, machine: Machine, start: Ints, *, ideal: bool) -> None:
+    def __init__(self, machine: Machine, start: Ints, effects: Effects) -> None:
         direction = 1 if machine.controller.start_direction == "+" else -1
         self._axes = np.zeros((3, 4))
         self._states = np.zeros((3, 6))
         self.compensation = np.zeros(3, dtype=np.int64)
         """(3,) steps that the controller adds at each reversal."""
         for index, axis in enumerate(machine.axes):
-            step_mm = axis.coded_step_mm
-            low = high = 0.0
-            if not ideal:
-                step_mm = axis.real_step_mm
-                low, high = play_limits(axis.backlash_mm, machine.controller.start_play, direction)
+            step_mm = axis.real_step_mm if effects.scale else axis.coded_step_mm
+            play_mm = axis.backlash_mm if effects.play else 0.0
+            low, high = play_limits(play_mm, machine.controller.start_play, direction)
+            if effects.compensation:
                 self.compensation[index] = to_steps(axis.compensation_mm, axis.coded_step_mm)
             self._axes[index] = step_mm, low, high, self.compensation[index]
             self._states[index] = play_start(int(start[index]), step_mm, direction)
@@ -57,19 +56,18 @@ REVERSAL_STEPS = 0.5
 class PathMechanics:
     """The slides behind a motor that follows positions in mm, engaged as the controller record
     says, at rest at `start` (3,) mm. Scale errors act about part zero; compensation is whole
-    steps. `ideal`: no play, no compensation, real = coded step."""
+    steps; `effects` says what there is."""
 
-    def __init__(self, machine: Machine, start: Floats, *, ideal: bool) -> None:
+    def __init__(self, machine: Machine, start: Floats, effects: Effects) -> None:
         direction = 1 if machine.controller.start_direction == "+" else -1
         self._axes = np.zeros((3, 5))
         self._states = np.zeros((3, 5))
         for index, axis in enumerate(machine.axes):
-            scale, low, high, compensation_mm = 1.0, 0.0, 0.0, 0.0
-            if not ideal:
-                scale = axis.real_step_mm / axis.coded_step_mm
-                low, high = play_limits(axis.backlash_mm, machine.controller.start_play, direction)
-                steps = to_steps(axis.compensation_mm, axis.coded_step_mm)
-                compensation_mm = float(steps) * axis.coded_step_mm
+            scale = axis.real_step_mm / axis.coded_step_mm if effects.scale else 1.0
+            play_mm = axis.backlash_mm if effects.play else 0.0
+            low, high = play_limits(play_mm, machine.controller.start_play, direction)
+            steps = to_steps(axis.compensation_mm, axis.coded_step_mm)
+            compensation_mm = float(steps) * axis.coded_step_mm if effects.compensation else 0.0
             least = REVERSAL_STEPS * axis.coded_step_mm
             self._axes[index] = scale, low, high, compensation_mm, least
             self._states[index] = start[index], direction, 0.0, start[index] * scale, 0.0

@@ -9,30 +9,73 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Ledger:
+    """What each of R rows of the toolpath did in one chunk; what several chunks say of a row
+    adds up.
+
+    row (R,) ascending. duration_s (R,) of everything, and compensation_s (R,) of it for what the
+    controller issues at reversals; iterations (R,): passes of the interpolator, idle ones too;
+    steps (R, 3) of the program per axis, compensation left out; reversals (R, 3): changes of
+    direction per axis, each of which is one compensation. ended (R,): False when the stop test
+    of an arc was never met; its samples then stop at the nearest approach to the programmed end.
+    """
+
+    row: Ints
+    duration_s: Floats
+    compensation_s: Floats
+    iterations: Ints
+    steps: Ints
+    reversals: Ints
+    ended: Bools
 
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """K samples of one row of the toolpath, one per output of the controller, in order.
+    """K samples in order, of one row of the toolpath or of several.
 
-    commanded (K, 3) mm: where the controller believes that it stands, steps × coded step, work
-    frame, after each output (the start of the row is no sample of it). slide (K, 3) mm: where the
-    slides are at the same moment, with compensation, play and real step. duration_s and
-    iterations (passes of the interpolator, idle ones too) of these samples; steps (3,) of the
-    program per axis, compensation left out; reversals (3,): changes of direction per axis, each
-    of which is one compensation. Compensation steps take time but are no samples of their own.
+    row (K,) ascending. commanded (K, 3) mm: where the controller believes that it stands, work
+    frame, after each output (the start of a row is no sample of it). slide (K, 3) mm: where the
+    slides are at the same moment, with compensation, play, real step and the rest of the
+    mechanics. Compensation steps take time but are no samples of their own.
 
-    Every row of the toolpath gives at least one chunk, rows that do not move one with K = 0; the
-    last one of a row says `last`. `ended` is False on it when the arc's stop test was never met:
-    the samples then stop at the nearest approach to the programmed end.
+    Every row up to the end of the program is in the ledger of at least one chunk, in order; rows
+    that do not move have no samples.
     """
 
-    row: int
+    row: Ints
     commanded: Floats
     slide: Floats
-    duration_s: float
-    iterations: int
-    steps: Ints
-    reversals: Ints
-    last: bool
-    ended: bool
+    ledger: Ledger
+
+
+def one_row(
+    row: int,
+    commanded: Floats,
+    slide: Floats,
+    *,
+    duration_s: float = 0.0,
+    compensation_s: float = 0.0,
+    iterations: int = 0,
+    steps: npt.ArrayLike = (0, 0, 0),
+    reversals: npt.ArrayLike = (0, 0, 0),
+    ended: bool = True,
+) -> Chunk:
+    """A chunk of a single row: samples (K, 3), `steps` and `reversals` (3,)."""
+    ledger = Ledger(
+        row=np.array([row], dtype=np.int64),
+        duration_s=np.array([duration_s], dtype=np.float64),
+        compensation_s=np.array([compensation_s], dtype=np.float64),
+        iterations=np.array([iterations], dtype=np.int64),
+        steps=np.array([steps], dtype=np.int64),
+        reversals=np.array([reversals], dtype=np.int64),
+        ended=np.array([ended], dtype=np.bool_),
+    )
+    return Chunk(np.full(len(commanded), row, dtype=np.int64), commanded, slide, ledger)
+
+
+NO_SAMPLES: Floats = np.empty((0, 3))
+"""The samples of a row that does not move."""

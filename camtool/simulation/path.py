@@ -29,10 +29,12 @@ import numpy.typing as npt
 
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Machine, PathController
+from camtool.machine.controllers import PathController
+from camtool.machine.model import Machine
 from camtool.simulation.mechanics import PathMechanics
-from camtool.simulation.motion import Chunk, Floats, Ints
-from camtool.simulation.path_samples import PathSamples, move_lengths, spacing_mm
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, Ledger
+from camtool.simulation.options import Options
+from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
 from camtool.toolpath.moves import Kind, Toolpath
 
 Bools = npt.NDArray[np.bool_]
@@ -49,7 +51,30 @@ LEAST_CHORD_STEPS = 2.0
 """An arc with its ends nearer than this keeps its centre: no direction can be told from them."""
 
 
-def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.models.ControllerModel`."""
+    return PathRun(toolpath, machine, options).run()
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A coded step, or what a million samples of the whole program allow."""
+    return sample_spacing_mm(toolpath, machine)
+
+
+def interpolation(machine: Machine, options: Options) -> str:
+    """Nothing is interpolated."""
+    return "path"
+
+
+def assumptions(machine: Machine) -> tuple[str, ...]:
+    """What the times leave out."""
+    return (
+        "the controller follows every line and arc exactly",
+        "speeds change at once: there is no acceleration, and compensation takes no time",
+    )
+
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
     """The moves that the controller follows: ends on its grid, homing at machine zero.
 
     Raises ProgramError for arcs without a centre and for positions beyond all steps. An arc
@@ -128,53 +153,56 @@ def _on_grid(points: Floats, machine: Machine) -> Floats:
 class PathRun:
     """One run of a toolpath; ProgramError for rows that no controller can follow."""
 
-    def __init__(
-        self, toolpath: Toolpath, machine: Machine, *, ideal: bool, chunk_steps: int
-    ) -> None:
-        self._path = followed(toolpath, machine)
+    def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
+        self._path = held(toolpath, machine)
         ends = np.flatnonzero(self._path.kind == Kind.END)
         self._rows = int(ends[0]) + 1 if len(ends) else len(self._path)
         _check_rows(self._path, self._rows)
-        self._seconds: list[float] = _durations(self._path, machine).tolist()
-        self._samples = PathSamples(self._path, spacing_mm(self._path, machine))
-        self._mechanics = PathMechanics(machine, self._path.start, ideal=ideal)
+        self._seconds = _durations(self._path, machine)
+        self._samples = PathSamples(self._path, sample_spacing_mm(self._path, machine))
+        self._mechanics = PathMechanics(machine, self._path.start, options.effects)
         self._coded_mm = [axis.coded_step_mm for axis in machine.axes]
         self._steps = self._in_steps(self._path.start[None, :])
-        self._chunk_steps = chunk_steps
+        self._chunk_steps = options.chunk_steps
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
-        row = 0  # the first whose chunk has not been given
-        for chunk in self._moving():
-            yield from (self._still(number) for number in range(row, chunk.row))
-            yield chunk
-            row = chunk.row + 1
-        yield from (self._still(number) for number in range(row, self._rows))
-
-    def _moving(self) -> Iterator[Chunk]:
-        """The chunks of rows that move, window by window."""
         first = self._samples.first
         total = int(first[self._rows])
+        done = 0  # rows whose ledger is complete
         for low in range(0, total, self._chunk_steps):
             high = min(low + self._chunk_steps, total)
             row, commanded = self._samples.window(low, high)
-            offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [len(row)]])
-            slide, reversals = self._mechanics.follow(commanded, offsets)
-            steps = self._counted(commanded, offsets)
-            for run, number in enumerate(row[offsets[:-1]].tolist()):
-                here = slice(offsets[run], offsets[run + 1])
-                share = (here.stop - here.start) / (first[number + 1] - first[number])
-                yield Chunk(
-                    row=number,
-                    commanded=commanded[here],
-                    slide=slide[here],
-                    duration_s=self._seconds[number] * float(share),
-                    iterations=0,
-                    steps=steps[run],
-                    reversals=reversals[run],
-                    last=bool(low + here.stop == first[number + 1]),
-                    ended=True,
-                )
+            whole = self._rows if high == total else int(row[-1]) + int(high == first[row[-1] + 1])
+            yield self._chunk(np.arange(done, max(whole, int(row[-1]) + 1)), row, commanded)
+            done = whole
+        if total == 0 and self._rows:
+            yield self._chunk(np.arange(self._rows), np.empty(0, np.int64), NO_SAMPLES)
+
+    def _chunk(self, rows: Ints, row: Ints, commanded: Floats) -> Chunk:
+        """The samples of a window, and what the rows that it touches did in it."""
+        offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [len(row)]])
+        first = self._samples.first
+        samples = np.zeros(len(rows), dtype=np.int64)
+        steps, reversals = np.zeros((2, len(rows), 3), dtype=np.int64)
+        slide = NO_SAMPLES
+        if len(row):
+            moved = row[offsets[:-1]] - rows[0]
+            slide, reversals[moved] = self._mechanics.follow(commanded, offsets)
+            steps[moved] = self._counted(commanded, offsets)
+            samples[moved] = np.diff(offsets)
+        own = (first[1:] - first[:-1])[rows]
+        share = np.where(own > 0, samples / np.maximum(own, 1), 1.0)
+        ledger = Ledger(
+            row=rows,
+            duration_s=self._seconds[rows] * share,
+            compensation_s=np.zeros(len(rows)),
+            iterations=np.zeros(len(rows), dtype=np.int64),
+            steps=steps,
+            reversals=reversals,
+            ended=np.ones(len(rows), dtype=np.bool_),
+        )
+        return Chunk(row, commanded, slide, ledger)
 
     def _counted(self, commanded: Floats, offsets: Ints) -> Ints:
         """(R, 3) steps of each run, from where the last window ended."""
@@ -185,20 +213,6 @@ class PathRun:
     def _in_steps(self, points: Floats) -> Ints:
         columns = [to_steps(points[:, axis], step) for axis, step in enumerate(self._coded_mm)]
         return np.column_stack(columns)
-
-    def _still(self, row: int) -> Chunk:
-        """A chunk of a row without motion."""
-        return Chunk(
-            row=row,
-            commanded=np.empty((0, 3)),
-            slide=np.empty((0, 3)),
-            duration_s=self._seconds[row],
-            iterations=0,
-            steps=np.zeros(3, dtype=np.int64),
-            reversals=np.zeros(3, dtype=np.int64),
-            last=True,
-            ended=True,
-        )
 
 
 def _durations(path: Toolpath, machine: Machine) -> Floats:

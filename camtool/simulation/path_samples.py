@@ -30,7 +30,7 @@ TURNS_OF_ARC = 4
 """No arc passes more turning points between its ends than this."""
 
 
-def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+def sample_spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     """How far apart samples are: the finer coded step of X and Y, or what `MAX_SAMPLES` allows."""
     step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     return max(step, float(move_lengths(toolpath).sum()) / MAX_SAMPLES)

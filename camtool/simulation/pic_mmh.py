@@ -27,23 +27,58 @@ import numpy as np
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Interpolator, Machine, pic_mmh_controller
+from camtool.machine.model import Machine, pic_mmh_controller
 from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach, line_filler
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, one_row
+from camtool.simulation.options import Options
 from camtool.toolpath.moves import Kind, Toolpath
 
 MAX_STEPS = 1 << 30
 """Positions beyond this many steps (150 m at 140 nm) are refused: squares must fit 64 bits."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """How to simulate; see `camtool.simulation.simulate.simulate`."""
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.models.ControllerModel`."""
+    return PicMmh(toolpath, machine, options).run()
 
-    interpolator: Interpolator | None
-    ideal: bool
-    chunk_steps: int
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The same with start, ends and arc centres at their nearest steps."""
+    coded_mm = [axis.coded_step_mm for axis in machine.axes]
+    centre = _on_grid(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), coded_mm[:2])
+    return replace(
+        toolpath,
+        start=_on_grid(toolpath.start[None, :], coded_mm)[0],
+        end=_on_grid(toolpath.end, coded_mm),
+        centre=np.where(toolpath.is_arc[:, None], centre, np.nan),
+    )
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A step: every output is a sample."""
+    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+
+
+def interpolation(machine: Machine, options: Options) -> str:
+    """How arcs are made: dsm, dda or stairs."""
+    return options.interpolator or pic_mmh_controller(machine).arcs
+
+
+def assumptions(machine: Machine) -> tuple[str, ...]:
+    """What the times take for granted."""
+    base = pic_mmh_controller(machine).time_base
+    return (
+        f"each {base} of the interpolator takes one period of the feed (controller.time_base)",
+        f"rapids run at {machine.limits.rapid_step_rate_hz:g} steps/s (limits.rapid_step_rate_hz)",
+        "each step of a compensation takes a period of its own",
+    )
+
+
+def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:
+    """Points (J, A) mm, each coordinate at its nearest step."""
+    columns = [to_steps(points[:, axis], step) * step for axis, step in enumerate(coded_mm)]
+    return np.column_stack(columns)
 
 
 @dataclass(frozen=True)
@@ -86,20 +121,19 @@ class PicMmh:
         home_mm = np.array([self._controller.machine_zero_mm], dtype=np.float64)
         self._home: Ints = self._steps(home_mm, range(3), named=False)[0]
         self._position: Ints = self._steps(toolpath.start[None, :], range(3), named=False)[0]
-        self._mechanics = Mechanics(machine, self._position, ideal=options.ideal)
+        self._mechanics = Mechanics(machine, self._position, options.effects)
         self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
         for row, number in enumerate(self._toolpath.kind.tolist()):
             kind = Kind(number)
-            waiting, ended = self._still(row, kind), True
+            still, moved = self._still(row, kind), False
             for chunk in self._moving(row, kind):
-                ended = ended and chunk.ended
-                if len(waiting.commanded):
-                    yield waiting
-                waiting = chunk
-            yield replace(waiting, last=True, ended=ended)
+                moved = True
+                yield chunk
+            if not moved:
+                yield still
             if kind == Kind.END:
                 return
 
@@ -167,7 +201,7 @@ class PicMmh:
         """The samples of a leg in chunks; an empty one when it has none and never ends."""
         left, done = leg.samples, leg.samples == 0
         if done and not leg.ended:
-            yield _empty(row, ended=False)
+            yield one_row(row, NO_SAMPLES, NO_SAMPLES, ended=False)
         while not done:
             filled, passes, done = leg.fill(self._buffer[:left])
             left -= filled
@@ -185,16 +219,16 @@ class PicMmh:
         slide, reversals, travelled = self._mechanics.follow(steps)
         by_event = self._controller.time_base == "event"
         periods = len(steps) if by_event else passes
-        periods += int(reversals @ self._mechanics.compensation)
-        return Chunk(
-            row=row,
-            commanded=steps * self._coded_mm,
-            slide=slide,
-            duration_s=periods * leg.period_s,
+        added = int(reversals @ self._mechanics.compensation)
+        return one_row(
+            row,
+            steps * self._coded_mm,
+            slide,
+            duration_s=(periods + added) * leg.period_s,
+            compensation_s=added * leg.period_s,
             iterations=passes,
             steps=travelled,
             reversals=reversals,
-            last=False,
             ended=ended,
         )
 
@@ -211,7 +245,7 @@ class PicMmh:
                 where=self._place(row),
                 mend="set it once, before any move",
             )
-        return _empty(row, duration_s=seconds)
+        return one_row(row, NO_SAMPLES, NO_SAMPLES, duration_s=seconds)
 
     def _arc_centres(self) -> Ints:
         """(N, 2) steps; 0 where the row is no arc."""
@@ -237,18 +271,3 @@ class PicMmh:
         """The block (from 1) that a row was read from, or the row when it was planned."""
         block = int(self._toolpath.block[row])
         return f"block {block + 1}" if block >= 0 else f"move {row}"
-
-
-def _empty(row: int, *, duration_s: float = 0.0, ended: bool = True) -> Chunk:
-    """A chunk without samples."""
-    return Chunk(
-        row=row,
-        commanded=np.empty((0, 3)),
-        slide=np.empty((0, 3)),
-        duration_s=duration_s,
-        iterations=0,
-        steps=np.zeros(3, dtype=np.int64),
-        reversals=np.zeros(3, dtype=np.int64),
-        last=False,
-        ended=ended,
-    )

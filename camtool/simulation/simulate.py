@@ -5,40 +5,38 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from camtool.errors import OptionError
-from camtool.machine.model import Interpolator, Machine, PicMmhController
+from camtool.machine.controllers import PicMmhController
+from camtool.machine.model import Machine
+from camtool.simulation.models import model_of
 from camtool.simulation.motion import Chunk
+from camtool.simulation.options import Options
 from camtool.toolpath.moves import Toolpath
 
 
 def simulate(
-    toolpath: Toolpath,
-    machine: Machine,
-    *,
-    interpolator: Interpolator | None = None,
-    ideal: bool = False,
-    chunk_steps: int = 65536,
+    toolpath: Toolpath, machine: Machine, options: Options | None = None
 ) -> Iterator[Chunk]:
     """The motion that the machine's controller and mechanics make of a toolpath, chunk by chunk.
 
-    `interpolator` takes the place of the controller's own for arcs; `ideal` leaves out play,
-    compensation and scale, so that slide == commanded; no chunk has more than `chunk_steps`
-    samples. Rows behind the end of the program are not run. Raises OptionError, MachineError, and
+    Rows behind the end of the program are not run. Raises OptionError, MachineError, and
     ProgramError (some of them only when the row comes) naming the block.
     """
-    if chunk_steps < 1:
-        raise OptionError(f"chunk_steps is {chunk_steps}", mend="give at least 1")
-    if interpolator not in (None, "dsm", "dda", "stairs"):
-        raise OptionError(f"unknown interpolator {interpolator!r}", mend="dsm, dda or stairs")
-    if isinstance(machine.controller, PicMmhController):
-        from camtool.simulation.pic_mmh import Options, PicMmh  # loads numba
+    options = options or Options()
+    check_options(machine, options)
+    return model_of(machine).run(toolpath, machine, options)
 
-        return PicMmh(toolpath, machine, Options(interpolator, ideal, chunk_steps)).run()
-    if interpolator is not None:
+
+def check_options(machine: Machine, options: Options) -> None:
+    """OptionError for what the machine's controller cannot do."""
+    if options.chunk_steps < 1:
+        raise OptionError(f"chunk_steps is {options.chunk_steps}", mend="give at least 1")
+    if options.interpolator not in (None, "dsm", "dda", "stairs"):
+        raise OptionError(
+            f"unknown interpolator {options.interpolator!r}", mend="dsm, dda or stairs"
+        )
+    if options.interpolator is not None and not isinstance(machine.controller, PicMmhController):
         raise OptionError(
             f"the controller of {machine.target.name} has no interpolators to choose from",
             where="--interpolator",
             mend="leave it out",
         )
-    from camtool.simulation.path import PathRun  # loads numba
-
-    return PathRun(toolpath, machine, ideal=ideal, chunk_steps=chunk_steps).run()

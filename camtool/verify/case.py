@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from camtool.geometry.drawing import Drawing
-from camtool.machine.model import Interpolator, Machine, PicMmhController
+from camtool.machine.controllers import Interpolator
+from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
 COVERAGE_MM = 0.005
@@ -67,11 +68,9 @@ class Case:
     @property
     def spacing_mm(self) -> float:
         """How far apart the samples of the motion are, about."""
-        if isinstance(self.machine.controller, PicMmhController):
-            return self.step_mm
-        from camtool.simulation.path_samples import spacing_mm
+        from camtool.simulation.models import model_of
 
-        return spacing_mm(self.decoded, self.machine)
+        return model_of(self.machine).spacing_mm(self.decoded, self.machine)
 
     @property
     def coverage_mm(self) -> float:

@@ -49,36 +49,35 @@ class Tally:
         """Cutting, air moves and dwells together."""
         return self.cutting_s + self.air_s + self.dwell_s
 
-    def add(self, chunk: Chunk, *, cutting: bool, dwell: bool) -> None:
-        """Count one chunk of a row that cuts, waits, or neither."""
-        self.steps += chunk.steps
-        self.iterations += chunk.iterations
-        self.reversals += chunk.reversals
-        if cutting:
-            self.cutting_reversals += chunk.reversals
-            self.cutting_s += chunk.duration_s
-        elif dwell:
-            self.dwell_s += chunk.duration_s
-        else:
-            self.air_s += chunk.duration_s
-        if not chunk.ended:
-            x, y = chunk.commanded[-1, :2] if len(chunk.commanded) else (np.nan, np.nan)
-            self.gave_up[chunk.row] = (float(x), float(y))
+    def add(self, chunk: Chunk, cutting: Bools, dwell: Bools) -> None:
+        """Count one chunk; `cutting` and `dwell` (N,) tell rows that cut and rows that wait."""
+        ledger = chunk.ledger
+        cuts, waits = cutting[ledger.row], dwell[ledger.row]
+        self.steps += ledger.steps.sum(axis=0)
+        self.iterations += int(ledger.iterations.sum())
+        self.reversals += ledger.reversals.sum(axis=0)
+        self.cutting_reversals += ledger.reversals[cuts].sum(axis=0)
+        self.cutting_s += float(ledger.duration_s[cuts].sum())
+        self.dwell_s += float(ledger.duration_s[waits].sum())
+        self.air_s += float(ledger.duration_s[~cuts & ~waits].sum())
+        for row in ledger.row[~ledger.ended].tolist():
+            here = chunk.commanded[chunk.row == row, :2]
+            x, y = here[-1] if len(here) else (np.nan, np.nan)
+            self.gave_up[row] = (float(x), float(y))
 
 
 def batches(
     chunks: Iterable[Chunk], decoded: Toolpath, is_cut: Bools, tally: Tally
 ) -> Iterator[Batch]:
     """Chunks joined into batches of about `BATCH_STEPS`; `tally` is filled on the way."""
-    cutting = is_cut.tolist()
-    dwell = (decoded.kind == Kind.DWELL).tolist()
+    dwell = decoded.kind == Kind.DWELL
     waiting: list[Chunk] = []
     steps = 0
     for chunk in chunks:
-        tally.add(chunk, cutting=cutting[chunk.row], dwell=dwell[chunk.row])
-        if len(chunk.commanded):
+        tally.add(chunk, is_cut, dwell)
+        if len(chunk.row):
             waiting.append(chunk)
-            steps += len(chunk.commanded)
+            steps += len(chunk.row)
         if steps >= BATCH_STEPS:
             yield _joined(waiting)
             waiting, steps = [], 0
@@ -87,10 +86,8 @@ def batches(
 
 
 def _joined(chunks: list[Chunk]) -> Batch:
-    rows = np.array([chunk.row for chunk in chunks], dtype=np.int64)
-    counts = np.array([len(chunk.commanded) for chunk in chunks])
     return Batch(
-        row=np.repeat(rows, counts),
+        row=np.concatenate([chunk.row for chunk in chunks]),
         commanded=np.concatenate([chunk.commanded[:, :2] for chunk in chunks]),
         slide=np.concatenate([chunk.slide[:, :2] for chunk in chunks]),
     )

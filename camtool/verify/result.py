@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from camtool import __version__
 from camtool.findings import Finding
 from camtool.geometry.polylines import Floats
-from camtool.machine.model import PicMmhController
+from camtool.simulation.options import Options
 from camtool.verify import report as record
 from camtool.verify.case import Case
 from camtool.verify.circles import UNSEEN
@@ -128,11 +128,11 @@ def _max_rms(figure: Figure) -> record.MaxRms:
 
 
 def _interpolator(case: Case) -> str:
-    """What makes arcs: an interpolator of the controller, or "path" when they are followed."""
-    controller = case.machine.controller
-    if isinstance(controller, PicMmhController):
-        return case.options.interpolator or controller.arcs
-    return "path"
+    """How the controller makes lines and arcs."""
+    from camtool.simulation.models import model_of
+
+    options = Options(interpolator=case.options.interpolator)
+    return model_of(case.machine).interpolation(case.machine, options)
 
 
 def _blocks(case: Case) -> int | None:

@@ -20,7 +20,9 @@ import msgspec
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
+from camtool.simulation.models import model_of
 from camtool.simulation.motion import Chunk
+from camtool.simulation.options import Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Toolpath
@@ -30,7 +32,6 @@ from camtool.verify.compare import Target
 from camtool.verify.coverage import Coverage, cover
 from camtool.verify.cuts import cut_moves, is_flat
 from camtool.verify.figures import Figure
-from camtool.verify.held import held
 from camtool.verify.holes import hole_findings, holes_of
 from camtool.verify.match import Goal, own_match
 from camtool.verify.motion import Tally, batches
@@ -74,14 +75,16 @@ def verify(
     `drawing` gives the fitting error and its findings. Toolpaths are in the work frame.
     """
     case = Case(decoded, machine, wanted, drawing, options or VerifyOptions())
-    return judge(case, simulate(decoded, machine, interpolator=case.options.interpolator))
+    chunks = simulate(decoded, machine, Options(interpolator=case.options.interpolator))
+    return judge(case, chunks)
 
 
 def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
     """Judge a case by the chunks of its motion, whoever made them."""
     # Without Z on either side, all feed moves are taken to cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
-    decoded = Target(cut_moves(held(case.decoded, case.machine), flat_cuts=flat_cuts))
+    held = model_of(case.machine).held(case.decoded, case.machine)
+    decoded = Target(cut_moves(held, flat_cuts=flat_cuts))
     wanted = decoded
     if case.wanted is not None:
         wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))

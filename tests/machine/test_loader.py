@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError
+from camtool.machine.controllers import PathController
 from camtool.machine.loader import build_machine, missing_keys, read_table, target_of
-from camtool.machine.model import Machine, PathController, pic_mmh_controller
+from camtool.machine.model import Machine, pic_mmh_controller
 
 FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
 

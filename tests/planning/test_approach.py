@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import scaled
 from camtool.kernels.play import play_fill, play_limits
-from camtool.machine.model import Machine, PathController, PicMmhController
+from camtool.machine.controllers import PathController, PicMmhController
+from camtool.machine.model import Machine
 from camtool.planning.items import Run
 from camtool.planning.reversing.approach import (
     APPROACH_MARGIN_MM,

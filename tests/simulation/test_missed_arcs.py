@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from camtool.errors import OptionError
-from camtool.machine.model import Interpolator, Machine
+from camtool.machine.controllers import Interpolator
+from camtool.machine.model import Machine
 from camtool.simulation import Chunk, simulate
 from camtool.simulation.interpolators import Arc, arc_filler, arc_reach
 from camtool.toolpath.builder import ToolpathBuilder

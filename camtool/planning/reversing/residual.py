@@ -15,7 +15,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from camtool.machine.model import Axis, Controller, Machine
+from camtool.machine.controllers import Controller
+from camtool.machine.model import Axis, Machine
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,61 @@
+"""Which module simulates which controller, and what each of them offers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Any, Protocol, cast
+
+from camtool.machine.controllers import (
+    FlashcutController,
+    GrblController,
+    I8751Controller,
+    LinuxcncController,
+    MatlabRouterController,
+    PathController,
+    PicMmhController,
+    ValcncController,
+)
+from camtool.machine.model import Machine
+from camtool.simulation.motion import Chunk
+from camtool.simulation.options import Options
+from camtool.toolpath.moves import Toolpath
+
+
+class ControllerModel(Protocol):
+    """What the module of a controller offers."""
+
+    def run(self, toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+        """The motion, chunk by chunk, up to the end of the program. Raises MachineError, and
+        ProgramError (some only when the row comes) naming the block."""
+
+    def held(self, toolpath: Toolpath, machine: Machine) -> Toolpath:
+        """The moves as the controller holds them before it interpolates, row by row: what its
+        interpolation is measured against. ProgramError for rows that it cannot follow."""
+
+    def spacing_mm(self, toolpath: Toolpath, machine: Machine) -> float:
+        """How far apart in XY the samples of the motion are, about."""
+
+    def interpolation(self, machine: Machine, options: Options) -> str:
+        """A word for the report: how lines and arcs are made, such as "dsm" or "path"."""
+
+    def assumptions(self, machine: Machine) -> tuple[str, ...]:
+        """What the times and figures take for granted, one short sentence each."""
+
+
+_MODULES: dict[type, str] = {
+    PicMmhController: "pic_mmh",
+    PathController: "path",
+    FlashcutController: "flashcut",
+    MatlabRouterController: "matlab_router",
+    I8751Controller: "i8751",
+    ValcncController: "valcnc",
+    GrblController: "grbl",
+    LinuxcncController: "linuxcnc",
+}
+
+
+def model_of(machine: Machine) -> ControllerModel:
+    """The module that simulates the machine's controller; loads numba."""
+    module: Any = import_module(f"camtool.simulation.{_MODULES[type(machine.controller)]}")
+    return cast(ControllerModel, module)

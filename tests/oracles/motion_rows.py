@@ -1,0 +1,50 @@
+"""The chunks of a motion, row by row: what tests look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camtool.simulation.motion import Chunk, Floats, Ints
+
+
+@dataclass
+class RowMotion:
+    """All that the chunks say of one row, added up; `parts` is in how many of them it is."""
+
+    commanded: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    slide: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    duration_s: float = 0.0
+    compensation_s: float = 0.0
+    iterations: int = 0
+    steps: Ints = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    reversals: Ints = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    ended: bool = True
+    parts: int = 0
+
+
+def rows_of(chunks: Iterable[Chunk]) -> list[RowMotion]:
+    """The rows of a motion from 0 to the last that is in a ledger; they must come in order."""
+    rows: list[RowMotion] = []
+    for chunk in chunks:
+        ledger = chunk.ledger
+        assert (np.diff(ledger.row) > 0).all()
+        assert set(np.unique(chunk.row)) <= set(ledger.row.tolist())
+        assert (np.diff(chunk.row) >= 0).all()
+        for k, number in enumerate(ledger.row.tolist()):
+            if number == len(rows):
+                rows.append(RowMotion())
+            assert number == len(rows) - 1, "a row is missing, or comes too late"
+            one, here = rows[number], chunk.row == number
+            one.commanded = np.concatenate([one.commanded, chunk.commanded[here]])
+            one.slide = np.concatenate([one.slide, chunk.slide[here]])
+            one.duration_s += float(ledger.duration_s[k])
+            one.compensation_s += float(ledger.compensation_s[k])
+            one.iterations += int(ledger.iterations[k])
+            one.steps = one.steps + ledger.steps[k]
+            one.reversals = one.reversals + ledger.reversals[k]
+            one.ended = one.ended and bool(ledger.ended[k])
+            one.parts += 1
+    return rows
