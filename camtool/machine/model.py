@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -98,6 +98,26 @@ class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 Scalar = bool | int | float | str
 
 
+class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The line that the program comes down, where it costs time.
+
+    `baud` None: nobody has said, or the program is in the machine before it runs.
+    `bits_per_character` counts start, stop and parity bits. `wait` "sequential": a block is sent
+    when the one before has been cut, so that both times add up; "streamed": the next is sent
+    meanwhile."""
+
+    baud: Positive | None = None
+    bits_per_character: Positive = 10.0
+    wait: Literal["sequential", "streamed"] = "sequential"
+
+    def seconds(self, characters: int, motion_s: float) -> float:
+        """What the line adds to `motion_s` of motion for a program of so many characters."""
+        if self.baud is None:
+            return 0.0
+        sending = characters * self.bits_per_character / self.baud
+        return sending if self.wait == "sequential" else max(0.0, sending - motion_s)
+
+
 class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Everything known about one machine. `dialect` is checked by its post-processor."""
 
@@ -107,6 +127,7 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     limits: Limits
     defaults: Defaults
     controller: Controller
+    link: Link = Link()
     dialect: dict[str, Scalar] = {}
 
     @property
