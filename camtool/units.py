@@ -30,7 +30,7 @@ MM_PER_UNIT: dict[str, float] = {
 RAD_PER_UNIT: dict[str, float] = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles that a user may write, as rad."""
 
-S_PER_UNIT: dict[str, float] = {"s": 1.0, "ms": 0.001, "min": 60.0}
+S_PER_UNIT: dict[str, float] = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
 """Units of times that a user may write, as s."""
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -82,7 +82,7 @@ def parse_angle(text: str, *, name: str = "angle") -> float:
 
 
 def parse_time(text: str, *, name: str = "time") -> float:
-    """`"0.5"`, `"0.5s"`, `"200ms"` or `"1min"` as s: a bare number is seconds.
+    """`"0.5"`, `"0.5s"`, `"200ms"`, `"1min"` or `"1h"` as s: a bare number is seconds.
 
     >>> parse_time("0.5"), parse_time("200 ms")
     (0.5, 0.2)
@@ -90,7 +90,7 @@ def parse_time(text: str, *, name: str = "time") -> float:
     value, unit = _split(text, name)
     factor = S_PER_UNIT.get(unit.lower() or "s")
     if factor is None:
-        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use s, ms or min")
+        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use s, ms, min or h")
     return value * factor
 
 

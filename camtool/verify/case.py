@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from camtool.geometry.drawing import Drawing
 from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
+from camtool.simulation.options import ALL, Effects, Options
 from camtool.toolpath.moves import Toolpath
 
 COVERAGE_MM = 0.005
@@ -34,13 +35,15 @@ TRACE_POINTS = 20_000
 class VerifyOptions:
     """How to judge, and what the report says of the program.
 
-    `interpolator` None: as the machine does. `coverage_mm` None: `COVERAGE_MM`,
+    `interpolator` None: as the machine does. `effects`: the parts of the mechanics that act.
+    `coverage_mm` None: `COVERAGE_MM`,
     `COVERAGE_STEPS` or `COVERAGE_RESOLUTIONS`. `blocks` None: counted from the decoded toolpath
     where it was read. `tool_diameter_mm`: rapids below the stock top may run where the tool has
     cleared the way before; None, when nobody knows it: nowhere.
     """
 
     interpolator: Interpolator | None = None
+    effects: Effects = ALL
     tool_diameter_mm: float | None = None
     source: str = ""
     size_bytes: int | None = None
@@ -59,6 +62,11 @@ class Case:
     wanted: Toolpath | None
     drawing: Drawing | None
     options: VerifyOptions
+
+    @property
+    def simulation(self) -> Options:
+        """How to simulate it."""
+        return Options(interpolator=self.options.interpolator, effects=self.options.effects)
 
     @property
     def step_mm(self) -> float:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from camtool import __version__
 from camtool.findings import Finding
 from camtool.geometry.polylines import Floats
-from camtool.simulation.options import Options
 from camtool.verify import report as record
 from camtool.verify.case import Case
 from camtool.verify.circles import UNSEEN
@@ -131,8 +130,7 @@ def _interpolator(case: Case) -> str:
     """How the controller makes lines and arcs."""
     from camtool.simulation.models import model_of
 
-    options = Options(interpolator=case.options.interpolator)
-    return model_of(case.machine).interpolation(case.machine, options)
+    return model_of(case.machine).interpolation(case.machine, case.simulation)
 
 
 def _blocks(case: Case) -> int | None:

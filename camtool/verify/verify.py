@@ -22,7 +22,6 @@ from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
 from camtool.simulation.models import model_of
 from camtool.simulation.motion import Chunk
-from camtool.simulation.options import Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Toolpath
@@ -75,8 +74,7 @@ def verify(
     `drawing` gives the fitting error and its findings. Toolpaths are in the work frame.
     """
     case = Case(decoded, machine, wanted, drawing, options or VerifyOptions())
-    chunks = simulate(decoded, machine, Options(interpolator=case.options.interpolator))
-    return judge(case, chunks)
+    return judge(case, simulate(decoded, machine, case.simulation))
 
 
 def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
