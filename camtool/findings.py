@@ -77,6 +77,7 @@ class Code(IntEnum):
     PLAY_NOT_KNOWN = 405
     NO_MOTION = 406
     RETURN_TO_MACHINE_ZERO = 407
+    ABOVE_GATE = 408
 
 
 @dataclass(frozen=True)

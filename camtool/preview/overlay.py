@@ -1,0 +1,128 @@
+"""Several paths laid over each other in one window: what differs between ways to run a program.
+
+The wanted path lies below, pale and wide; each way to run it is one thin line with a colour of
+its own. The window is small (some tens of steps), so every step shows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import OutputError
+from camtool.preview import axes, legend, marks
+from camtool.preview.axes import Ticks
+from camtool.preview.colours import FEED_PALE, LAYERS, PAPER
+from camtool.preview.draw import png
+from camtool.preview.legend import Entry, line_swatch
+from camtool.preview.page import BAR_ROOM, FOOT, GUESSED_LEFT, HEAD_GAP, LEGEND_DROP
+from camtool.preview.render import PNG_WIDTH_PX
+from camtool.preview.strokes import strokes_of
+from camtool.preview.svg import Look, PathData, element, number, title
+from camtool.preview.trace import FINEST_SHARE
+from camtool.preview.view import MARGIN, PAGE, View, fit
+from camtool.toolpath.moves import Toolpath
+
+Floats = npt.NDArray[np.float64]
+
+WANTED_PEN, RUN_PEN = 8.0, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """`window` (2, 2) mm [[xmin, xmax], [ymin, ymax]]; `wanted` the path without any error;
+    `runs` (name, strokes of points (n, 2) mm), in the order of the legend."""
+
+    title: str
+    window: Floats
+    wanted: Toolpath
+    runs: Sequence[tuple[str, Sequence[Floats]]]
+    notes: tuple[str, ...] = ()
+
+
+def render_overlay(overlay: Overlay, name: str) -> bytes:
+    """SVG or PNG bytes for a file of this name; OutputError for other extensions."""
+    suffix = PurePath(name).suffix.lower()
+    if suffix not in (".svg", ".png"):
+        raise OutputError("is no kind of picture that we make", file=name, mend="use .svg or .png")
+    svg = draw_overlay(overlay)
+    return svg.encode() if suffix == ".svg" else png(svg, PNG_WIDTH_PX)
+
+
+def draw_overlay(overlay: Overlay) -> str:
+    """The paths as SVG text; equal input gives equal bytes."""
+    head, down = legend.head(overlay.title, overlay.notes)
+    view, ticks = _fitted(overlay.window, down + HEAD_GAP)
+    room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
+    table = legend.rows(_entries(overlay), room, view.box.width)
+    legend_y = view.box.bottom + LEGEND_DROP
+    height = round(legend_y + max(len(table) - 1, 0) * legend.ROW_STEP + FOOT)
+    box = view.box
+    plot: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
+    root: Look = {
+        "xmlns": "http://www.w3.org/2000/svg",
+        "width": str(round(PAGE)),
+        "height": str(height),
+        "viewBox": f"0 0 {number(PAGE)} {height}",
+    }
+    picture = element(
+        "svg",
+        root,
+        title(overlay.title),
+        element("rect", {"width": PAGE, "height": float(height), "fill": PAPER}),
+        head,
+        axes.frame(view, ticks),
+        element("clipPath", {"id": "plot-overlay"}, element("rect", plot)),
+        element("g", {"clip-path": "url(#plot-overlay)"}, _paths(overlay, view)),
+        axes.axes(view, ticks),
+        legend.legend(table, box.left, legend_y),
+        axes.scale_bar(view, box.right, legend_y),
+    )
+    return picture + "\n"
+
+
+def _fitted(window: Floats, top: float) -> tuple[View, Ticks]:
+    """The view and its ticks; fitted twice, since the room for numbers follows from the scale."""
+    left = MARGIN + GUESSED_LEFT
+    for _ in range(2):
+        view = fit(window, left, top, PAGE - MARGIN)
+        ticks = axes.ticks_of(view)
+        left = MARGIN + ticks.left_width + axes.TICK + axes.LABEL_GAP
+    return view, ticks
+
+
+def _colour(index: int) -> str:
+    return LAYERS[index % len(LAYERS)]
+
+
+def _entries(overlay: Overlay) -> list[Entry]:
+    wanted = Entry(line_swatch(FEED_PALE, WANTED_PEN), "wanted")
+    return [wanted] + [
+        Entry(line_swatch(_colour(index), RUN_PEN), name)
+        for index, (name, _) in enumerate(overlay.runs)
+    ]
+
+
+def _paths(overlay: Overlay, view: View) -> str:
+    """All paths in mm."""
+    strokes = strokes_of(overlay.wanted)
+    chains = (*strokes.feeds, *strokes.ramps)
+    layers = [marks.feeds(chains, view, view.mm(WANTED_PEN), pale=True)] if chains else []
+    low, high = view.x_range
+    decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
+    for index, (_, runs) in enumerate(overlay.runs):
+        data = PathData(decimals)
+        for run in runs:
+            data.move(*run[0].tolist())
+            for point in run[1:].tolist():
+                data.line(*point)
+        if data:
+            pen: Look = {"fill": "none", "stroke-width": view.mm(RUN_PEN)}
+            look: Look = {"stroke": _colour(index), "stroke-linejoin": "round", **pen}
+            layers.append(element("path", {"id": f"run-{index + 1}", "d": str(data), **look}))
+    return element("g", {"id": "mm", "transform": view.matrix()}, *layers)
