@@ -91,7 +91,9 @@ def test_part(benchmark: Any, what: str, shape: tuple[int, int]) -> None:
 
     def run() -> float:
         if what == "simulate":
-            return float(sum(chunk.duration_s for chunk in simulate(toolpath, machine)))
+            return sum(
+                float(chunk.ledger.duration_s.sum()) for chunk in simulate(toolpath, machine)
+            )
         return verify(toolpath, machine, wanted=toolpath).report.time_s
 
     assert benchmark.pedantic(run, rounds=3, warmup_rounds=1) > 0.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Chunk, Floats
+from camtool.simulation.motion import Chunk, Floats, one_row
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 
@@ -90,25 +90,20 @@ def follow(
             xy = np.array(points_of(move, count))[1:]
             z = np.linspace(move.start[2], move.end[2], count + 1)[1:]
             samples = np.column_stack([xy, z])
-        for number, part in enumerate(np.array_split(samples, pieces)):
-            yield chunk(move.index, part, bend, last=number == pieces - 1)
+        for part in np.array_split(samples, pieces):
+            yield chunk(move.index, part, bend)
 
 
-def chunk(
-    row: int, samples: Floats, bend: Callable[[Floats], Floats], *, last: bool = True
-) -> Chunk:
+def chunk(row: int, samples: Floats, bend: Callable[[Floats], Floats]) -> Chunk:
     """One chunk with a step, an iteration and a second per sample, and no reversals."""
     slide = samples.copy()
     if len(samples):
         slide[:, :2] = bend(samples[:, :2])
-    return Chunk(
-        row=row,
-        commanded=samples,
-        slide=slide,
+    return one_row(
+        row,
+        samples,
+        slide,
         duration_s=float(len(samples)),
         iterations=len(samples),
-        steps=np.full(3, len(samples), dtype=np.int64),
-        reversals=np.zeros(3, dtype=np.int64),
-        last=last,
-        ended=True,
+        steps=(len(samples),) * 3,
     )

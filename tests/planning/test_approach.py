@@ -90,8 +90,7 @@ def test_the_first_motion_of_a_cut_is_no_reversal(machine: Machine, paths: list[
     cuts = cut_moves(moves, flat_cuts=False).is_cut
     counted = np.zeros(2, dtype=np.int64)
     for chunk in simulate(moves, follower):
-        if cuts[chunk.row]:
-            counted += chunk.reversals[:2]
+        counted += chunk.ledger.reversals[cuts[chunk.ledger.row], :2].sum(axis=0)
     wanted = [reversals_of(run_of(path), follower) for path in paths]
     assert counted.tolist() == np.array(wanted).reshape(-1, 2).sum(axis=0).tolist()
 
@@ -109,9 +108,8 @@ def test_a_slide_stands_engaged_from_the_first_cut_on(machine: Machine, path: Po
     last = int(np.flatnonzero(cut_moves(moves, flat_cuts=False).is_cut)[-1])
     lag = np.concatenate(
         [
-            (chunk.slide - chunk.commanded)[:, :2]
+            (chunk.slide - chunk.commanded)[chunk.row == last, :2]
             for chunk in simulate(moves, follower)
-            if chunk.row == last
         ]
     )
     way = np.sign(path.end - path.start)

@@ -10,12 +10,13 @@ from camtool.errors import PostError
 from camtool.findings import Code
 from camtool.kernels.lattice import to_steps
 from camtool.machine.registry import LoadedTarget, load_target
-from camtool.simulation.motion import Chunk
+from camtool.simulation.options import IDEAL, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles import pic_mmh_program as oracle
+from tests.oracles.motion_rows import RowMotion, rows_of
 
 STEP_MM = 0.00014
 SEED = 20240607
@@ -57,13 +58,13 @@ def random_path(rng: np.random.Generator, count: int, low_mm: float, high_mm: fl
     return path.finish()
 
 
-def last_of_rows(target: LoadedTarget, program: Program) -> Iterator[tuple[int, Chunk]]:
+def last_of_rows(target: LoadedTarget, program: Program) -> Iterator[tuple[int, RowMotion]]:
     """Each block's motion as the simulated controller makes it from the bytes: the row of the
-    wanted toolpath, and the chunk (whole blocks come as one)."""
+    wanted toolpath, and what it did."""
     decoded = target.post.read(program.data, target.machine)
-    for chunk in simulate(decoded, target.machine, ideal=True, chunk_steps=1 << 20):
-        assert chunk.last
-        yield int(program.row_of_block[decoded.block[chunk.row]]), chunk
+    motion = rows_of(simulate(decoded, target.machine, Options(effects=IDEAL)))
+    for number, row in enumerate(motion):
+        yield int(program.row_of_block[decoded.block[number]]), row
 
 
 def check_ends(target: LoadedTarget, wanted: Toolpath, within_steps: float) -> Program:
@@ -76,15 +77,15 @@ def check_ends(target: LoadedTarget, wanted: Toolpath, within_steps: float) -> P
     iterations = np.zeros(len(wanted))
     row = -1
     position = np.zeros(3)
-    for now, chunk in last_of_rows(target, program):
-        assert chunk.ended, f"row {now} never ends"
+    for now, motion in last_of_rows(target, program):
+        assert motion.ended, f"row {now} never ends"
         at[row + 1 : now + 1] = position  # rows without blocks leave the tool where it is
         row = max(row, now)
-        if len(chunk.commanded):
-            position = chunk.commanded[-1]
+        if len(motion.commanded):
+            position = motion.commanded[-1]
             if wanted.is_arc[now]:
-                iterations[now] += chunk.iterations
-                out = chunk.commanded[:, :2] - wanted.centre[now]
+                iterations[now] += motion.iterations
+                out = motion.commanded[:, :2] - wanted.centre[now]
                 radius = math.dist(wanted.end[now, :2], wanted.centre[now])
                 stray = np.abs(np.hypot(out[:, 0], out[:, 1]) - radius).max()
                 assert stray < within_steps * STEP_MM, f"row {now} strays by {stray} mm"
@@ -218,8 +219,8 @@ def test_mends_are_counted_once_and_go_on_the_same_way() -> None:
     assert finding.measured is not None
     assert abs(np.hypot(rest[:, 0], rest[:, 1]).max() * 1000.0 - finding.measured) < 0.2
     # The price of a mend would be a reversal: with and without the lines there are as many.
-    chunks = list(simulate(decoded, target.machine, ideal=True, chunk_steps=1 << 20))
-    turned_round = sum(int(chunks[index].reversals.sum()) for index in mends)
+    motion = rows_of(simulate(decoded, target.machine, Options(effects=IDEAL)))
+    turned_round = sum(int(motion[index].reversals.sum()) for index in mends)
     assert turned_round <= len(mends) // 50
 
 
@@ -234,7 +235,7 @@ def test_arcs_end_with_another_step() -> None:
     target = load_target("pic-mmh", settings=settings)
     wanted = random_path(np.random.default_rng(SEED), 500, 0.01, 0.5)
     program = target.post.write(wanted, target.machine)
-    assert all(chunk.ended for _, chunk in last_of_rows(target, program))
+    assert all(motion.ended for _, motion in last_of_rows(target, program))
 
 
 def test_an_arc_written_as_lines_may_not_leave_the_digits() -> None:

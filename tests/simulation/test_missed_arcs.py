@@ -8,19 +8,20 @@ import pytest
 from camtool.errors import OptionError
 from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
-from camtool.simulation import Chunk, simulate
+from camtool.simulation import Options, simulate
 from camtool.simulation.interpolators import Arc, arc_filler, arc_reach
 from camtool.toolpath.builder import ToolpathBuilder
+from tests.oracles.motion_rows import RowMotion, rows_of
 
 STEP = 0.00014
 
 
-def run(path: ToolpathBuilder, machine: Machine) -> list[Chunk]:
-    return list(simulate(path.finish(), machine))
+def run(path: ToolpathBuilder, machine: Machine) -> list[RowMotion]:
+    return rows_of(simulate(path.finish(), machine))
 
 
-def steps_of(chunk: Chunk) -> np.ndarray:
-    return np.rint(chunk.commanded / STEP).astype(np.int64)
+def steps_of(row: RowMotion) -> np.ndarray:
+    return np.rint(row.commanded / STEP).astype(np.int64)
 
 
 def reach(arc: Arc, method: Interpolator = "dsm") -> tuple[int, bool, np.ndarray]:
@@ -96,7 +97,7 @@ def test_the_next_row_goes_on_from_the_programmed_end(machine: Machine) -> None:
     path = ToolpathBuilder((0.14, 0.0, 0.0)).arc(0, 0.14028, centre=(0, 0), ccw=True, feed=0.8)
     path.line(-0.014, 0.14028, feed=0.8)
     arc, line = run(path, machine)
-    assert (arc.last, arc.ended) == (True, False)
+    assert not arc.ended
     assert steps_of(arc)[-1, :2].tolist() == [0, 1000]
     assert arc.reversals.tolist() == [1, 0, 0]
     points = steps_of(line)
@@ -111,22 +112,22 @@ def test_an_arc_that_starts_at_its_centre_has_no_samples(machine: Machine) -> No
     path = ToolpathBuilder().arc(0.01, 0.02, centre=(0, 0), ccw=True, feed=0.8)
     path.arc(0.01, 0.02, centre=(0.01, 0.02), ccw=False, feed=0.8).rapid(0.01, 0.02, 0.001)
     first, second, rapid = run(path, machine)
-    for chunk in (first, second):
-        assert (len(chunk.commanded), chunk.ended, chunk.last) == (0, False, True)
-        assert chunk.duration_s == 0.0
+    for row in (first, second):
+        assert (len(row.commanded), row.ended) == (0, False)
+        assert row.duration_s == 0.0
     assert steps_of(rapid)[-1].tolist() == [71, 143, 7]
     assert len(rapid.commanded) == 7
 
 
-def test_a_missed_arc_with_z_says_so_on_its_last_chunk(machine: Machine) -> None:
+def test_a_missed_arc_with_z_says_so(machine: Machine) -> None:
     whole = ToolpathBuilder((0.14, 0.0, 0.0)).arc(0, 0.14028, centre=(0, 0), ccw=True, feed=0.8)
     toolpath = whole.finish()
     end = toolpath.end.copy()
     end[0, 2] = 0.0014
     climbing = type(toolpath)(**{**vars(toolpath), "end": end})
-    *_, last = simulate(climbing, machine)
-    assert (last.last, last.ended) == (True, False)
-    assert steps_of(last)[-1].tolist() == [0, 1002, 10]
+    (row,) = rows_of(simulate(climbing, machine))
+    assert not row.ended
+    assert steps_of(row)[-1].tolist() == [0, 1002, 10]
 
 
 @pytest.mark.parametrize("method", ["dsm", "dda", "stairs"])
@@ -138,13 +139,13 @@ def test_whole_circles_at_the_limits(
     path = ToolpathBuilder((-reach_mm, 0.0, 0.0))
     path.arc(-reach_mm, 0, centre=(0, 0), ccw=True, feed=0.8)
     radius = round(reach_mm / STEP)
-    samples, last = 0, None
+    samples, ended = 0, True
     per_radius = {"dsm": 4 * math.sqrt(2.0), "dda": 6.0, "stairs": 8.0}[method]
-    for last in simulate(path.finish(), machine, interpolator=method):
-        samples += len(last.commanded)
-        assert len(last.commanded) <= 65536
-    assert last is not None
-    assert last.ended
+    for chunk in simulate(path.finish(), machine, Options(method)):
+        samples += len(chunk.commanded)
+        ended = ended and bool(chunk.ledger.ended.all())
+        assert len(chunk.commanded) <= 65536
+    assert ended
     assert samples == pytest.approx(per_radius * radius, abs=0.01 * radius + 3)
 
 
@@ -163,6 +164,6 @@ def test_every_tiny_arc_comes_to_an_end() -> None:
 
 def test_options_are_checked_at_once(machine: Machine) -> None:
     with pytest.raises(OptionError, match="chunk_steps"):
-        simulate(ToolpathBuilder().finish(), machine, chunk_steps=0)
+        simulate(ToolpathBuilder().finish(), machine, Options(chunk_steps=0))
     with pytest.raises(OptionError, match="interpolator"):
-        simulate(ToolpathBuilder().finish(), machine, interpolator="spline")  # type: ignore[arg-type]
+        simulate(ToolpathBuilder().finish(), machine, Options("spline"))  # type: ignore[arg-type]

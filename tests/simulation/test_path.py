@@ -11,12 +11,14 @@ from camtool.errors import OptionError, ProgramError
 from camtool.machine.model import Machine
 from camtool.simulation import path_samples
 from camtool.simulation.motion import Chunk
-from camtool.simulation.path import followed
-from camtool.simulation.path_samples import PathSamples, move_lengths, spacing_mm
+from camtool.simulation.options import IDEAL, Options
+from camtool.simulation.path import held
+from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Kind, Toolpath
+from tests.oracles.motion_rows import rows_of
 from tests.oracles.path_machine import (
     STEP,
     Slide,
@@ -76,10 +78,15 @@ def machines(draw: st.DrawFn) -> Machine:
 def gathered(chunks: list[Chunk]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Row, commanded and slide of all samples."""
     return (
-        np.concatenate([np.full(len(c.commanded), c.row) for c in chunks]),
+        np.concatenate([c.row for c in chunks]),
         np.concatenate([c.commanded for c in chunks]),
         np.concatenate([c.slide for c in chunks]),
     )
+
+
+def total(chunks: list[Chunk], name: str) -> np.ndarray:
+    """(3,) the sum of a column of the ledgers."""
+    return sum((getattr(c.ledger, name).sum(axis=0) for c in chunks), np.zeros(3, dtype=np.int64))
 
 
 def square(side: float = 1.0) -> Toolpath:
@@ -91,10 +98,11 @@ def square(side: float = 1.0) -> Toolpath:
 
 @given(jobs(), st.sampled_from([1, 7, 65536]))
 def test_every_row_gives_its_chunks_in_order(toolpath: Toolpath, chunk_steps: int) -> None:
-    chunks = list(simulate(toolpath, path_machine(), chunk_steps=chunk_steps))
-    assert [c.row for c in chunks if c.last] == list(range(len(toolpath)))
-    assert [c.row for c in chunks] == sorted(c.row for c in chunks)
-    assert all(len(c.commanded) <= chunk_steps and c.ended for c in chunks)
+    chunks = list(simulate(toolpath, path_machine(), Options(chunk_steps=chunk_steps)))
+    rows = rows_of(chunks)
+    assert len(rows) == len(toolpath)
+    assert all(row.ended for row in rows)
+    assert all(len(c.commanded) <= chunk_steps for c in chunks)
 
 
 @given(jobs())
@@ -108,7 +116,9 @@ def test_ends_are_met_and_samples_are_no_wider_than_a_step(toolpath: Toolpath) -
             continue
         assert mine[-1].tolist() == list(move.end)
         apart = np.linalg.norm(np.diff([move.start, *mine.tolist()], axis=0), axis=1)
-        assert apart.max() <= spacing_mm(toolpath, machine) * (1.0 + path_samples.SPACING_EPS)
+        assert apart.max() <= sample_spacing_mm(toolpath, machine) * (
+            1.0 + path_samples.SPACING_EPS
+        )
         assert len(mine) <= length_of(toolpath, index) / STEP + 5
 
 
@@ -138,15 +148,13 @@ def test_extents_are_exact(toolpath: Toolpath) -> None:
 def test_chunks_do_not_matter(toolpath: Toolpath, chunk_steps: int) -> None:
     machine = path_machine(*both("backlash_mm", 0.03), *both("compensation_mm", 0.02))
     whole = list(simulate(toolpath, machine))
-    parts = list(simulate(toolpath, machine, chunk_steps=chunk_steps))
+    parts = list(simulate(toolpath, machine, Options(chunk_steps=chunk_steps)))
     for one, other in zip(gathered(whole), gathered(parts), strict=True):
         assert np.array_equal(one, other)
-    for name in ("steps", "reversals"):
-        assert np.array_equal(
-            sum(getattr(c, name) for c in whole), sum(getattr(c, name) for c in parts)
-        )
-    seconds = sum(c.duration_s for c in parts)
-    assert seconds == pytest.approx(sum(c.duration_s for c in whole))
+    for one, many in zip(rows_of(whole), rows_of(parts), strict=True):
+        assert np.array_equal(one.steps, many.steps)
+        assert np.array_equal(one.reversals, many.reversals)
+        assert many.duration_s == pytest.approx(one.duration_s)
 
 
 @given(
@@ -165,7 +173,7 @@ def test_slides_and_reversals_are_those_of_one_axis_at_a_time(
     )
     chunks = list(simulate(toolpath, machine))
     _, commanded, slide = gathered(chunks)
-    counted = sum(c.reversals for c in chunks)
+    counted = total(chunks, "reversals")
     for axis in (0, 1):
         twin = Slide(0.0, play, compensation, centred=convention == "centred")
         wanted = [twin.go(to) for to in commanded[:, axis].tolist()]
@@ -181,38 +189,38 @@ def test_reversals_and_steps_are_those_of_a_dense_path(toolpath: Toolpath) -> No
         twin = Slide(0.0, 0.0, 0.0, centred=False)
         for to in points[:, axis].tolist():
             twin.go(to)
-        assert sum(c.reversals for c in chunks)[axis] == twin.reversals
-        counted = int(sum(c.steps for c in chunks)[axis])
+        assert total(chunks, "reversals")[axis] == twin.reversals
+        counted = int(total(chunks, "steps")[axis])
         way = np.abs(np.diff(points[:, axis], prepend=0.0)).sum() / STEP
         assert counted == pytest.approx(way, abs=1.0 + 2.0 * len(toolpath))
 
 
 def test_the_steps_of_a_square_are_exact() -> None:
     chunks = list(simulate(square(), path_machine()))
-    assert sum(c.steps for c in chunks).tolist() == [400, 400, 0]
-    assert sum(c.reversals for c in chunks).tolist() == [1, 1, 0]
-    assert [c.reversals.tolist() for c in chunks] == [[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    assert [c.iterations for c in chunks] == [0, 0, 0, 0]
+    assert total(chunks, "steps").tolist() == [400, 400, 0]
+    rows = rows_of(chunks)
+    assert [r.reversals.tolist() for r in rows] == [[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert [r.iterations for r in rows] == [0, 0, 0, 0]
 
 
 def test_a_circle_from_its_right_end_reverses_where_it_turns() -> None:
     b = ToolpathBuilder((2.0, 0.0, 0.0)).arc(2, 0, centre=(0, 0), ccw=True, feed=60)
-    (chunk,) = simulate(b.finish(), path_machine())
+    (row,) = rows_of(simulate(b.finish(), path_machine()))
     # X: engaged to +, turns at once, then at the left; Y: at the top and at the bottom.
-    assert chunk.reversals.tolist() == [2, 2, 0]
-    assert chunk.steps.tolist() == [1600, 1600, 0]
+    assert row.reversals.tolist() == [2, 2, 0]
+    assert row.steps.tolist() == [1600, 1600, 0]
 
 
 def test_the_wrong_way_round_a_spiral_of_rounded_coordinates_reverses_no_axis() -> None:
     """Its radius grows by half a step, so that X first grows by a hair."""
     b = ToolpathBuilder((2.0, 0.0, 0.0)).arc(0, 2.0025, centre=(0, 0), ccw=True, feed=60)
-    (chunk,) = simulate(b.finish(), path_machine(FREE, "controller.start_direction=-"))
-    assert chunk.reversals.tolist() == [0, 1, 0]
+    (row,) = rows_of(simulate(b.finish(), path_machine(FREE, "controller.start_direction=-")))
+    assert row.reversals.tolist() == [0, 1, 0]
 
 
 def test_ideal_slides_are_the_commanded_positions_to_the_bit() -> None:
     machine = path_machine(*both("backlash_mm", 0.1), "axes.x.real_step_mm=0.006")
-    for chunk in simulate(square(0.7313), machine, ideal=True):
+    for chunk in simulate(square(0.7313), machine, Options(effects=IDEAL)):
         assert np.array_equal(chunk.slide, chunk.commanded)
     assert any((c.slide != c.commanded).any() for c in simulate(square(), machine))
 
@@ -225,7 +233,7 @@ def test_a_real_step_scales_the_slides() -> None:
 
 
 def seconds(toolpath: Toolpath, *settings: str) -> list[float]:
-    return [c.duration_s for c in simulate(toolpath, path_machine(*settings))]
+    return [row.duration_s for row in rows_of(simulate(toolpath, path_machine(*settings)))]
 
 
 def test_a_helix_takes_its_length_and_is_no_faster_than_z() -> None:
@@ -253,8 +261,8 @@ def test_time_is_way_over_feed() -> None:
 def test_homing_goes_to_machine_zero_and_on_from_there() -> None:
     b = ToolpathBuilder().line(1, 1, 1, feed=60)
     b.event(Kind.HOME_Z).event(Kind.HOME_XY).line(2, 3, 4, feed=60)
-    chunks = list(simulate(b.finish(), path_machine("controller.machine_zero_mm=[-1.0, -2.0, 5]")))
-    assert [c.commanded[-1].tolist() for c in chunks] == [
+    machine = path_machine("controller.machine_zero_mm=[-1.0, -2.0, 5]")
+    assert [r.commanded[-1].tolist() for r in rows_of(simulate(b.finish(), machine))] == [
         [1, 1, 1],
         [1, 1, 5],
         [-1, -2, 5],
@@ -264,7 +272,7 @@ def test_homing_goes_to_machine_zero_and_on_from_there() -> None:
 
 def test_nothing_runs_behind_the_end() -> None:
     b = ToolpathBuilder().line(1, feed=60).event(Kind.END).line(2, feed=math.nan)
-    assert [c.row for c in simulate(b.finish(), path_machine())] == [0, 1]
+    assert len(rows_of(simulate(b.finish(), path_machine()))) == 2
     assert list(simulate(ToolpathBuilder().finish(), path_machine())) == []
 
 
@@ -291,7 +299,7 @@ def test_what_cannot_be_followed_is_named(build, words: str) -> None:
 
 def test_it_has_no_interpolators() -> None:
     with pytest.raises(OptionError, match="no interpolators"):
-        simulate(square(), path_machine(), interpolator="dda")
+        simulate(square(), path_machine(), Options("dda"))
 
 
 @given(jobs())
@@ -301,12 +309,12 @@ def test_followed_ends_lie_on_the_grid_and_near(toolpath: Toolpath) -> None:
         if move.centre is None and move.kind == Kind.LINE:
             shifted.line(*(value + 0.0013 for value in move.end), feed=10.0)
     given_ = shifted.finish()
-    made = followed(given_, path_machine())
+    made = held(given_, path_machine())
     steps = made.end / STEP
     assert steps == pytest.approx(np.round(steps), abs=1e-9)
     if len(given_):
         assert np.abs(made.end - given_.end).max() <= 0.5 * STEP + 1e-12
-    free = followed(given_, path_machine(FREE))
+    free = held(given_, path_machine(FREE))
     assert np.array_equal(free.end, given_.end)
 
 
@@ -320,7 +328,7 @@ def test_rounding_turns_no_arc_inside_out(missing: float, ccw: bool) -> None:
             b = ToolpathBuilder((math.cos(turn), math.sin(turn), 0.0))
             b.arc(math.cos(end), math.sin(end), centre=(0, 0), ccw=ccw, feed=10)
             b.event(Kind.DWELL, 0.0)
-            made = followed(b.finish(), path_machine())
+            made = held(b.finish(), path_machine())
             assert move_lengths(made)[0] == pytest.approx(sweep, abs=2 * math.pi * STEP)
             assert np.array_equal(made.end[0], made.end[1])
 
@@ -330,11 +338,11 @@ def test_long_programs_are_sampled_more_coarsely(monkeypatch: pytest.MonkeyPatch
     b = ToolpathBuilder((3.0, 0.0, 0.0)).arc(3, 0, centre=(0, 0.0), ccw=True, feed=60)
     toolpath = b.line(-3, 1, feed=60).finish()
     machine = path_machine(*both("backlash_mm", 0.1))
-    wide = spacing_mm(toolpath, machine)
+    wide = sample_spacing_mm(toolpath, machine)
     assert wide == pytest.approx(move_lengths(toolpath).sum() / 100)
-    coarse = list(simulate(toolpath, machine))
+    coarse = rows_of(simulate(toolpath, machine))
     monkeypatch.undo()
-    fine = list(simulate(toolpath, machine))
+    fine = rows_of(simulate(toolpath, machine))
     assert 100 <= sum(len(c.commanded) for c in coarse) <= 110
     assert sum(len(c.commanded) for c in fine) > 3000
     for name in ("steps", "reversals"):
@@ -376,7 +384,7 @@ def test_arcs_on_the_grid_stay_within_a_step_of_what_was_programmed(
     _, commanded, _ = gathered(list(simulate(b.finish(), machine)))
     apart = np.abs(np.hypot(commanded[:, 0], commanded[:, 1]) - radius)
     assert max(apart, default=0.0) <= 1.5 * math.hypot(STEP, y_step)
-    made = followed(b.finish(), machine)
+    made = held(b.finish(), machine)
     start = math.dist(made.start[:2], made.centre[0])
     chord = math.dist(made.start[:2], made.end[0, :2])
     if made.is_arc[0] and chord >= max(radius * 1.01, 3 * y_step):
@@ -385,7 +393,7 @@ def test_arcs_on_the_grid_stay_within_a_step_of_what_was_programmed(
 
 def test_ends_that_the_program_put_at_two_radii_stay() -> None:
     b = ToolpathBuilder((1.0, 0.0, 0.0)).arc(0, 1.1, centre=(0, 0), ccw=True, feed=10)
-    assert followed(b.finish(), path_machine()).centre[0].tolist() == [0.0, 0.0]
+    assert held(b.finish(), path_machine()).centre[0].tolist() == [0.0, 0.0]
     (chunk,) = simulate(b.finish(), path_machine())
     angle = np.arctan2(chunk.commanded[:, 1], chunk.commanded[:, 0])
     radius = np.hypot(chunk.commanded[:, 0], chunk.commanded[:, 1])
@@ -396,11 +404,11 @@ def test_ends_that_the_program_put_at_two_radii_stay() -> None:
 def test_any_machine_keeps_its_slides_within_its_play(
     toolpath: Toolpath, machine: Machine
 ) -> None:
-    chunks = list(simulate(toolpath, machine, chunk_steps=500))
-    made = followed(toolpath, machine)
+    chunks = list(simulate(toolpath, machine, Options(chunk_steps=500)))
+    made = held(toolpath, machine)
     seconds = np.zeros(len(toolpath))
     for chunk in chunks:
-        seconds[chunk.row] += chunk.duration_s
+        seconds[chunk.ledger.row] += chunk.ledger.duration_s
         for index, axis in enumerate(machine.axes):
             motor = chunk.commanded[:, index] * (axis.real_step_mm / axis.coded_step_mm)
             lag = chunk.slide[:, index] - motor

@@ -8,9 +8,11 @@ import pytest
 
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
-from camtool.simulation import Chunk, simulate
+from camtool.simulation import IDEAL, Options, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
+from tests.oracles import motion_rows
+from tests.oracles.motion_rows import RowMotion
 from tests.oracles.pic_mmh_run import LiteralRun
 
 STEP = 0.00014
@@ -20,30 +22,16 @@ HZ = 0.8 / 60.0 / STEP
 MakeMachine = Callable[..., Machine]
 
 
-def rows_of(toolpath: Toolpath, machine: Machine, **options: object) -> list[list[Chunk]]:
-    """The chunks of each row."""
-    rows: list[list[Chunk]] = [[]]
-    for chunk in simulate(toolpath, machine, **options):  # type: ignore[arg-type]
-        assert chunk.row == len(rows) - 1
-        rows[-1].append(chunk)
-        if chunk.last:
-            rows.append([])
-    assert rows.pop() == []
-    return rows
+def rows_of(
+    toolpath: Toolpath, machine: Machine, options: Options | None = None
+) -> list[RowMotion]:
+    """What each row did."""
+    return motion_rows.rows_of(simulate(toolpath, machine, options))
 
 
-def steps_of(chunks: list[Chunk], z_step_mm: float = STEP) -> np.ndarray:
-    """(K, 3) steps commanded in these chunks."""
-    commanded = np.concatenate([c.commanded for c in chunks])
-    return np.rint(commanded / [STEP, STEP, z_step_mm]).astype(np.int64)
-
-
-def slide_of(chunks: list[Chunk]) -> np.ndarray:
-    return np.concatenate([c.slide for c in chunks])
-
-
-def seconds(chunks: list[Chunk]) -> float:
-    return sum(c.duration_s for c in chunks)
+def steps_of(row: RowMotion, z_step_mm: float = STEP) -> np.ndarray:
+    """(K, 3) steps commanded in a row."""
+    return np.rint(row.commanded / [STEP, STEP, z_step_mm]).astype(np.int64)
 
 
 def random_program(rng: np.random.Generator) -> Toolpath:
@@ -101,18 +89,18 @@ def test_random_programs_equal_the_literal_run(
     for _ in range(40):
         toolpath = random_program(rng)
         literal = LiteralRun(toolpath, machine)
-        for move, chunks in zip(toolpath, rows_of(toolpath, machine), strict=True):
-            if not chunks[-1].ended:
+        for move, row in zip(toolpath, rows_of(toolpath, machine), strict=True):
+            if not row.ended:
                 break  # the literal machine would never come back
             want = literal.row(move)
             arcs += toolpath.is_arc[move.index]
-            got = steps_of(chunks, machine.axes.z.coded_step_mm)
+            got = steps_of(row, machine.axes.z.coded_step_mm)
             assert np.array_equal(got, np.array(want.commanded, dtype=np.int64).reshape(-1, 3))
-            assert np.array_equal(slide_of(chunks), np.array(want.slide).reshape(-1, 3))
-            assert sum(c.iterations for c in chunks) == want.passes
-            assert seconds(chunks) == pytest.approx(want.seconds, rel=1e-12)
-            assert sum(c.steps for c in chunks).tolist() == list(want.steps)
-            assert sum(c.reversals for c in chunks).tolist() == list(want.reversals)
+            assert np.array_equal(row.slide, np.array(want.slide).reshape(-1, 3))
+            assert row.iterations == want.passes
+            assert row.duration_s == pytest.approx(want.seconds, rel=1e-12)
+            assert row.steps.tolist() == list(want.steps)
+            assert row.reversals.tolist() == list(want.reversals)
     assert arcs > 20
 
 
@@ -122,18 +110,17 @@ def test_the_size_of_chunks_does_not_matter(machine: Machine, size: int) -> None
     path.arc(-0.002, 0.01, centre=(0.005, 0.004), ccw=True, feed=0.4).rapid(0.14, 0, 0)
     path.arc(0, 0.14028, centre=(0, 0), ccw=True, feed=0.4)
     toolpath = path.finish()
-    whole, parts = rows_of(toolpath, machine), rows_of(toolpath, machine, chunk_steps=size)
-    assert not whole[-1][-1].ended
+    chunks = list(simulate(toolpath, machine, Options(chunk_steps=size)))
+    assert all(len(chunk.commanded) <= size for chunk in chunks)
+    whole, parts = rows_of(toolpath, machine), motion_rows.rows_of(chunks)
+    assert not whole[-1].ended
     for one, many in zip(whole, parts, strict=True):
-        assert np.array_equal(steps_of(one), steps_of(many))
-        assert np.array_equal(slide_of(one), slide_of(many))
-        assert seconds(one) == pytest.approx(seconds(many))
-        assert all(len(chunk.commanded) <= size for chunk in many)
-        assert [chunk.last for chunk in many] == [False] * (len(many) - 1) + [True]
-        for name in ("steps", "reversals", "iterations"):
-            total = sum(np.asarray(getattr(chunk, name)) for chunk in many)
-            assert np.array_equal(total, sum(np.asarray(getattr(chunk, name)) for chunk in one))
-        assert one[-1].ended == many[-1].ended
+        assert np.array_equal(one.commanded, many.commanded)
+        assert np.array_equal(one.slide, many.slide)
+        assert one.duration_s == pytest.approx(many.duration_s)
+        assert one.compensation_s == pytest.approx(many.compensation_s)
+        for name in ("steps", "reversals", "iterations", "ended"):
+            assert np.array_equal(getattr(one, name), getattr(many, name))
 
 
 def test_lines_end_on_their_step_and_stay_within_one(machine: Machine) -> None:
@@ -150,7 +137,7 @@ def test_lines_end_on_their_step_and_stay_within_one(machine: Machine) -> None:
         assert away.max() < 1.0
 
 
-def quarter(machine: Machine, ccw: bool, radius: int) -> list[Chunk]:
+def quarter(machine: Machine, ccw: bool, radius: int) -> RowMotion:
     """A quarter from the top on whole steps."""
     r = radius * STEP
     end = (-r, 0.0) if ccw else (r, 0.0)
@@ -161,12 +148,12 @@ def quarter(machine: Machine, ccw: bool, radius: int) -> list[Chunk]:
 @pytest.mark.parametrize("radius", [1, 2, 30, 214, 7143])
 def test_quarters_end_on_their_step_and_are_mirrored(machine: Machine, radius: int) -> None:
     right, left = quarter(machine, False, radius), quarter(machine, True, radius)
-    assert right[-1].ended
+    assert right.ended
     points = steps_of(right)[:, :2]
     assert points[-1].tolist() == [radius, 0]
     assert np.abs(np.hypot(points[:, 0], points[:, 1]) - radius).max() < 0.5
     assert np.array_equal(steps_of(left)[:, :2], points * [-1, 1])
-    assert seconds(right) == pytest.approx(
+    assert right.duration_s == pytest.approx(
         (len(points) + 1271) / HZ  # Y goes down: a compensation of 178 µm
     )
 
@@ -180,8 +167,8 @@ def test_circles_have_every_symmetry_of_the_square(machine: Machine) -> None:
             turned = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turns)
             x, y = (turned @ start * STEP).tolist()
             path = ToolpathBuilder((x, y, 0.0)).arc(x, y, centre=(0, 0), ccw=True, feed=0.8)
-            chunks = rows_of(path.finish(), machine, interpolator=method)[0]
-            paths.append(steps_of(chunks)[:, :2] @ turned)
+            row = rows_of(path.finish(), machine, Options(method))[0]
+            paths.append(steps_of(row)[:, :2] @ turned)
         assert all(np.array_equal(path, paths[0]) for path in paths[1:])
         assert len(paths[0]) > 100
 
@@ -192,8 +179,8 @@ def test_there_by_cw_and_back_by_ccw(machine: Machine) -> None:
     path.arc(0, r, centre=(0, 0), ccw=True, feed=0.8)
     there, back = rows_of(path.finish(), machine)
     assert steps_of(back)[-1].tolist() == [0, 1000, 0]
-    assert there[-1].reversals.tolist() == [0, 1, 0]
-    assert back[-1].reversals.tolist() == [1, 1, 0]
+    assert there.reversals.tolist() == [0, 1, 0]
+    assert back.reversals.tolist() == [1, 1, 0]
     assert len(steps_of(there)) == len(steps_of(back))
 
 
@@ -203,35 +190,35 @@ def test_times_by_hand(make_machine: MakeMachine) -> None:
     path.rapid(0.042, 0.014).event(Kind.DWELL, 7.0).event(Kind.SPINDLE_CW, 3000.0)
     toolpath = path.finish()
     assert pytest.approx(95.238, abs=0.001) == HZ
-    by_event = [seconds(row) for row in rows_of(toolpath, make_machine())]
+    by_event = [row.duration_s for row in rows_of(toolpath, make_machine())]
     assert by_event == pytest.approx([100 / HZ, 200 / HZ, 100 / 166.0, 7.0, 0.0])
     slow = make_machine("controller.time_base=iteration")
     line, diagonal, rapid, *_ = rows_of(toolpath, slow)
-    assert seconds(line) == pytest.approx(101 / HZ)
-    assert line[0].iterations == 101
-    assert seconds(diagonal) == pytest.approx(2 * diagonal[0].iterations / HZ)
-    assert diagonal[0].iterations == pytest.approx(100 * math.sqrt(2.0), abs=1.0)
-    assert seconds(rapid) == pytest.approx(101 / 166.0)
+    assert line.duration_s == pytest.approx(101 / HZ)
+    assert line.iterations == 101
+    assert diagonal.duration_s == pytest.approx(2 * diagonal.iterations / HZ)
+    assert diagonal.iterations == pytest.approx(100 * math.sqrt(2.0), abs=1.0)
+    assert rapid.duration_s == pytest.approx(101 / 166.0)
 
 
 def test_a_reversal_takes_the_compensation_at_the_same_rate(machine: Machine) -> None:
     """204 µm are 1457 steps of 140 nm; the slide then is too far by 204 − 192.5 µm."""
     path = ToolpathBuilder().line(0.14, 0, feed=0.8).line(0, 0, feed=0.8).line(0.14, 0, feed=0.8)
     out, back, again = rows_of(path.finish(), machine)
-    assert out[0].reversals.tolist() == [0, 0, 0]
-    assert back[0].reversals.tolist() == [1, 0, 0]
-    assert back[0].steps.tolist() == [1000, 0, 0]
-    assert seconds(back) == pytest.approx((1000 + 1457) / HZ)
-    assert slide_of(out)[-1, 0] == pytest.approx(0.14)
-    assert slide_of(back)[-1, 0] == pytest.approx(-(1457 * STEP - 0.1925))
-    assert slide_of(again)[-1, 0] == pytest.approx(0.14)
+    assert out.reversals.tolist() == [0, 0, 0]
+    assert back.reversals.tolist() == [1, 0, 0]
+    assert back.steps.tolist() == [1000, 0, 0]
+    assert back.duration_s == pytest.approx((1000 + 1457) / HZ)
+    assert out.slide[-1, 0] == pytest.approx(0.14)
+    assert back.slide[-1, 0] == pytest.approx(-(1457 * STEP - 0.1925))
+    assert again.slide[-1, 0] == pytest.approx(0.14)
 
 
 def test_play_without_compensation(make_machine: MakeMachine) -> None:
     machine = make_machine("axes.x.compensation_mm=0.0")
     path = ToolpathBuilder().line(0.28, 0, feed=0.8).line(0, 0, feed=0.8)
     _, back = rows_of(path.finish(), machine)
-    assert slide_of(back)[:, 0] == pytest.approx(
+    assert back.slide[:, 0] == pytest.approx(
         np.minimum(0.28, steps_of(back)[:, 0] * STEP + 0.1925)
     )
 
@@ -240,11 +227,11 @@ def test_ideal_slides_are_where_they_are_commanded(make_machine: MakeMachine) ->
     machine = make_machine("axes.x.real_step_mm=0.000139509", "axes.y.real_step_mm=0.0002")
     path = ToolpathBuilder().line(0.1, 0.03, 0.01, feed=0.8).line(0, 0, feed=0.8)
     path.arc(0, 0, centre=(-0.02, 0.01), ccw=True, feed=0.8)
-    for chunk in simulate(path.finish(), machine, ideal=True):
-        assert np.array_equal(chunk.slide, chunk.commanded)
-        assert chunk.duration_s == pytest.approx(len(chunk.commanded) / HZ)
+    for row in rows_of(path.finish(), machine, Options(effects=IDEAL)):
+        assert np.array_equal(row.slide, row.commanded)
+        assert row.duration_s == pytest.approx(len(row.commanded) / HZ)
     real = rows_of(path.finish(), machine)[0]
-    assert slide_of(real) == pytest.approx(steps_of(real) * [0.000139509, 0.0002, STEP])
+    assert real.slide == pytest.approx(steps_of(real) * [0.000139509, 0.0002, STEP])
 
 
 def test_z_follows_xy(machine: Machine) -> None:
@@ -253,7 +240,7 @@ def test_z_follows_xy(machine: Machine) -> None:
     xy = points[points[:, 2] == 0]
     assert xy[-1].tolist() == [10, 5, 0]
     assert points[len(xy) :].tolist() == [[10, 5, -k] for k in range(1, 21)]
-    assert row[-1].reversals.tolist() == [0, 0, 1]
+    assert row.reversals.tolist() == [0, 0, 1]
 
 
 def test_homing_goes_to_machine_zero_at_the_rapid_rate(make_machine: MakeMachine) -> None:
@@ -262,9 +249,9 @@ def test_homing_goes_to_machine_zero_at_the_rapid_rate(make_machine: MakeMachine
     path.line(0.028, 0, feed=0.8)
     up, over, on = rows_of(path.finish(), machine)
     assert steps_of(up)[-1].tolist() == [0, 0, 20]
-    assert seconds(up) == pytest.approx(20 / 166.0)
+    assert up.duration_s == pytest.approx(20 / 166.0)
     assert steps_of(over)[-1].tolist() == [100, 0, 20]
-    assert seconds(over) == pytest.approx(100 / 166.0)
+    assert over.duration_s == pytest.approx(100 / 166.0)
     assert len(steps_of(on)) == 100
 
 
@@ -273,12 +260,12 @@ def test_nothing_runs_behind_the_end(machine: Machine) -> None:
     assert len(rows_of(path.finish(), machine)) == 2
 
 
-def test_rows_that_do_not_move_give_one_empty_chunk(machine: Machine) -> None:
+def test_rows_that_do_not_move_have_no_samples(machine: Machine) -> None:
     path = ToolpathBuilder().event(Kind.SET_ZERO).line(0, 0, feed=0.8).message("hello").rapid(0, 0)
     for row in rows_of(path.finish(), machine):
-        assert [len(chunk.commanded) for chunk in row] == [0]
-        assert row[0].ended
-        assert row[0].duration_s == 0.0
+        assert len(row.commanded) == 0
+        assert row.ended
+        assert row.duration_s == 0.0
 
 
 @pytest.mark.parametrize("feed", [math.nan, 0.0, -1.0, math.inf])

@@ -78,7 +78,8 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
 
     def chunks(reversals: int):
         for piece in follow(decoded, 10):
-            yield replace(piece, reversals=np.array([reversals, 1, 1]))
+            counted = np.array([[reversals, 1, 1]])
+            yield replace(piece, ledger=replace(piece.ledger, reversals=counted))
 
     case = Case(decoded, MACHINE, None, None, VerifyOptions())
     found = judge(case, chunks(1))
@@ -102,10 +103,11 @@ def test_an_arc_that_never_ends_is_an_error_with_its_block() -> None:
 
     def chunks():
         for piece in follow(decoded, 10):
-            if piece.row == 3:
+            if piece.ledger.row[0] == 3:
                 missed = piece.commanded.copy()
                 missed[-1, :2] = end[:2] + np.array([STEP, -STEP])
-                yield replace(piece, commanded=missed, ended=False)
+                ledger = replace(piece.ledger, ended=np.array([False]))
+                yield replace(piece, commanded=missed, ledger=ledger)
             else:
                 yield piece
 

@@ -60,7 +60,7 @@ def test_every_figure_is_that_of_dense_points() -> None:
     wobble = {row: rng.normal(0, 0.004, (50, 4)) for row in range(len(decoded))}
     chunks = []
     for piece in follow(decoded, 50):
-        shake = wobble[piece.row][: len(piece.commanded)]
+        shake = wobble[int(piece.ledger.row[0])][: len(piece.commanded)]
         commanded, slide = piece.commanded.copy(), piece.slide.copy()
         commanded[:, :2] += shake[:, :2]
         slide[:, :2] = commanded[:, :2] + shake[:, 2:]
@@ -74,9 +74,10 @@ def test_every_figure_is_that_of_dense_points() -> None:
     target = np.concatenate([np.array(points_of(m, 20_000)) for m in wanted if m.index in clouds])
     inner, lag, total = [], [], []
     for piece in chunks:
-        if piece.row in clouds:
+        row = int(piece.ledger.row[0])
+        if row in clouds:
             for commanded, slide in zip(piece.commanded[:, :2], piece.slide[:, :2], strict=True):
-                inner.append(dense_distance(commanded, clouds[piece.row]))
+                inner.append(dense_distance(commanded, clouds[row]))
                 lag.append(float(np.hypot(*(slide - commanded))))
                 total.append(dense_distance(slide, target))
     for values, figure in ((inner, error.interpolation), (lag, error.mechanics)):

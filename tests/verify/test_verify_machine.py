@@ -7,12 +7,14 @@ import pytest
 
 from camtool.findings import Code, Severity
 from camtool.machine.registry import load_target
+from camtool.simulation.models import model_of
+from camtool.simulation.options import Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.verify.held import held
 from camtool.verify.verify import VerifyOptions, verify
 from tests.oracles.dense_moves import circle, cut, dense_distance, pic_mmh, points_of, square
+from tests.oracles.motion_rows import rows_of
 
 STEP = 0.00014
 UM = 1000.0
@@ -39,11 +41,7 @@ def test_the_three_methods_on_the_circle_of_the_thesis(
     toolpath = small_circle()
     machine = pic_mmh(*NO_PLAY)
     row = 3
-    passes = sum(
-        chunk.iterations
-        for chunk in simulate(toolpath, machine, interpolator=interpolator)
-        if chunk.row == row
-    )
+    passes = rows_of(simulate(toolpath, machine, Options(interpolator)))[row].iterations
     found = verify(toolpath, machine, options=VerifyOptions(interpolator=interpolator)).report
     assert passes == iterations
     assert 0.3 < found.error_um.interpolation.arcs_steps < most_steps
@@ -62,15 +60,15 @@ def test_interpolation_and_total_are_those_of_dense_points() -> None:
     b.arc(0.0763, 0.0818, centre=(0.0763, 0.0718), ccw=True, feed=0.8)
     b.line(0.0763, 0.0718, feed=0.8).rapid(z=0.2)
     wanted = b.finish()
-    decoded = held(wanted, machine)
+    decoded = model_of(machine).held(wanted, machine)
     clouds = {m.index: np.array(points_of(m, 3000)) for m in decoded if m.index in (3, 4, 5)}
     target = np.concatenate([np.array(points_of(m, 3000)) for m in wanted if m.index in clouds])
     inner, total = [], []
-    for chunk in simulate(wanted, machine):
-        if chunk.row in clouds:
-            cloud = clouds[chunk.row]
-            inner += [dense_distance(point, cloud) for point in chunk.commanded[:, :2]]
-            total += [dense_distance(point, target) for point in chunk.slide[:, :2]]
+    for number, row in enumerate(rows_of(simulate(wanted, machine))):
+        if number in clouds:
+            cloud = clouds[number]
+            inner += [dense_distance(point, cloud) for point in row.commanded[:, :2]]
+            total += [dense_distance(point, target) for point in row.slide[:, :2]]
     error = verify(wanted, machine, wanted=wanted).report.error_um
     assert error.interpolation.max == pytest.approx(max(inner) * UM, abs=1e-3)
     rms = float(np.sqrt(np.mean(np.square(inner))))
@@ -136,9 +134,9 @@ def test_arcs_that_miss_their_end_are_exactly_those_that_the_simulation_gave_up(
         b.block = -1
     decoded = b.finish()
     missed = {
-        f"block {decoded.block[chunk.row] + 1}"
-        for chunk in simulate(decoded, machine)
-        if not chunk.ended
+        f"block {decoded.block[number] + 1}"
+        for number, row in enumerate(rows_of(simulate(decoded, machine)))
+        if not row.ended
     }
     found = [f for f in verify(decoded, machine).findings if f.code == Code.ARC_MISSES_END]
     assert 3 <= len(missed) <= 20

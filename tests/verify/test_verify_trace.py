@@ -80,7 +80,7 @@ def test_the_trace_is_bounded_and_keeps_the_peak_and_the_row_ends() -> None:
 
     case = Case(decoded, MACHINE, decoded, None, VerifyOptions(trace_points=300))
     chunks = [
-        piece if piece.row != 11 else chunk(11, piece.commanded, spike)
+        piece if piece.ledger.row[0] != 11 else chunk(11, piece.commanded, spike)
         for piece in follow(decoded, 5000)
     ]
     found = judge(case, chunks)
