@@ -10,6 +10,7 @@ import click
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.finish import Asked, finish
 from camtool.cli.jobflags import JobFlags, job_options
+from camtool.cli.judging import GateFlags, gate_options
 from camtool.cli.options import (
     MachineFlags,
     machine_options,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
+@gate_options
 @job_options
 @drawing_options
 @talk_options
@@ -48,6 +50,7 @@ def post(
     preview: str | None,
     report: str | None,
     no_verify: bool,
+    gates: GateFlags,
     job: JobFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -59,6 +62,8 @@ def post(
     and mechanics, and compared with the drawing. Exit code 1 (and no file) when something is
     wrong.
     """
+    if no_verify and gates.given:
+        raise click.UsageError("--no-verify leaves nothing to hold against limits")
     target = machine.load()
     asked = Asked(source, output, report, preview)
     asked.check(target.machine.target.extension, verified=not no_verify)
@@ -69,7 +74,7 @@ def post(
     wanted = job.job(drawing)
     read = drawing.read(source, target.machine, wanted)
     with job.blamed():
-        posted = post_drawing(read, wanted, target, check=not no_verify)
+        posted = post_drawing(read, wanted, target, check=not no_verify, gates=gates.gates())
     return finish(
         posted,
         asked,

@@ -10,7 +10,7 @@ from pathlib import PurePath
 import click
 
 from camtool.errors import OptionError
-from camtool.units import parse_feed, parse_length
+from camtool.units import parse_feed, parse_length, parse_time
 
 PICTURES = (".svg", ".png")
 
@@ -27,6 +27,14 @@ def feed(ctx: click.Context, param: click.Parameter, value: str | None) -> float
     """`0.8`, `0.8mm/min`, `0.01mm/s` as mm/min."""
     try:
         return None if value is None else parse_feed(value)
+    except OptionError as error:
+        raise click.BadParameter(str(error), ctx, param) from error
+
+
+def duration(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """`90min`, `1h`, `200ms` or a bare number (s) as s."""
+    try:
+        return None if value is None else parse_time(value)
     except OptionError as error:
         raise click.BadParameter(str(error), ctx, param) from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -10,6 +11,7 @@ import click
 
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.jobflags import JobFlags, job_options
+from camtool.cli.judging import GateFlags, gate_options, left_out, ways_to_compare
 from camtool.cli.options import (
     INTERPOLATORS,
     MachineFlags,
@@ -23,7 +25,11 @@ from camtool.cli.types import picture as picture_name
 from camtool.errors import ProgramError
 
 if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
     from camtool.machine.controllers import Interpolator
+    from camtool.machine.registry import LoadedTarget
+    from camtool.pipeline import Judging, Way
+    from camtool.planning.job import Job
 
 
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")
@@ -36,12 +42,26 @@ if TYPE_CHECKING:
     help="How the controller draws arcs, to compare; default: as the machine does.",
 )
 @click.option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    help="Leave out a part of the mechanics: play, compensation, scale, squareness, "
+    "repeatability.",
+)
+@click.option(
+    "--compare",
+    metavar="WHAT",
+    help="Judge it several ways: interpolators, mechanics, backlash=0,0.1,0.2 or any "
+    "KEY=VALUE,VALUE of the machine.",
+)
+@click.option(
     "--preview",
     metavar="FILE",
     callback=picture_name,
-    help="Picture of the predicted result, .svg or .png.",
+    help="Picture of the predicted result (with --compare: of all ways), .svg or .png.",
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
+@gate_options
 @job_options
 @drawing_options
 @talk_options
@@ -50,8 +70,11 @@ def verify(
     machine: MachineFlags,
     against: str | None,
     interpolator: str | None,
+    without: tuple[str, ...],
+    compare: str | None,
     preview: str | None,
     report: str | None,
+    gates: GateFlags,
     job: JobFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -62,48 +85,104 @@ def verify(
     With --against, the path is compared with what DRAWING would give, planned with the same flags
     (--tool-diameter, --side ...). Exit code 1 when a finding is an error.
     """
-    target = machine.load()
     check_writable([preview, report], [program, *([against] if against else [])])
 
-    from camtool.findings import Severity, worst
-    from camtool.pipeline import picture, verify_program
+    from camtool.pipeline import Judging
 
+    judging = Judging(
+        interpolator=cast("Interpolator | None", interpolator),
+        effects=left_out(without) if without else None,
+        gates=gates.gates(),
+    )
+    target = machine.load()
     say_first_run(quiet=quiet)
     data = read_bytes(program)
     wanted = job.job(drawing)
     read = drawing.read(against, target.machine, wanted) if against else None
+    goal = Goal(shown(program), read, wanted)
+    if compare is not None:
+        if judging.gates is not None:
+            raise click.UsageError("limits hold for one way to run a program; drop --compare")
+        ways = ways_to_compare(compare, machine, judging)
+        with job.blamed():
+            return _compared(data, ways, goal, Wishes(preview, report, quiet))
     with job.blamed():
-        decoded, verification = verify_program(
-            data,
-            target,
-            source=shown(program),
-            drawing=read,
-            job=wanted,
-            interpolator=cast("Interpolator | None", interpolator),
-        )
+        return _judged(data, target, judging, goal, Wishes(preview, report, quiet, verbose))
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The program's name in messages, and what it is held against."""
+
+    name: str
+    drawing: Drawing | None
+    job: Job
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the user wants to have."""
+
+    preview: str | None
+    report: str | None
+    quiet: bool
+    verbose: bool = False
+
+
+def _judged(
+    data: bytes, target: LoadedTarget, judging: Judging, goal: Goal, wishes: Wishes
+) -> int:
+    """The verdict on one program; the exit code."""
+    from camtool.findings import Severity, worst
+    from camtool.pipeline import picture, verify_program
+
+    decoded, verification = verify_program(
+        data, target, source=goal.name, drawing=goal.drawing, job=goal.job, judging=judging
+    )
     files: dict[str, bytes] = {}
-    if preview is not None:
+    if wishes.preview is not None:
         from camtool.preview.render import render
 
         scene = picture(
-            title=Path(shown(program)).name,
-            drawing=read,
-            job=wanted,
+            title=Path(goal.name).name,
+            drawing=goal.drawing,
+            job=goal.job,
             toolpath=decoded,
             verification=verification,
             machine=target.machine,
         )
-        files[preview] = render(scene, preview)
-    if report is not None:
-        files[report] = verification.report.to_json().encode()
+        files[wishes.preview] = render(scene, wishes.preview)
+    if wishes.report is not None:
+        files[wishes.report] = verification.report.to_json().encode()
     write_all(files)
-    if report != STDOUT and not quiet:
+    if wishes.report != STDOUT and not wishes.quiet:
         click.echo(verification.report.to_text(findings=False))
-    say_findings(verification.findings, quiet=quiet, verbose=verbose)
+    say_findings(verification.findings, quiet=wishes.quiet, verbose=wishes.verbose)
     failed = worst(verification.findings) >= Severity.ERROR
     if failed:
-        say(f"camtool: error: {program}: the errors above would spoil the part", quiet=False)
+        say(f"camtool: error: {goal.name}: the errors above would spoil the part", quiet=False)
     return 1 if failed else 0
+
+
+def _compared(data: bytes, ways: list[Way], goal: Goal, wishes: Wishes) -> int:
+    """The table of all ways, and their picture; the exit code."""
+    from camtool.pipeline import compare_picture, compare_program
+    from camtool.verify.contrast import row_of, table, to_json
+
+    variants = compare_program(data, ways, source=goal.name, drawing=goal.drawing, job=goal.job)
+    rows = [row_of(variant.name, variant.verification.report) for variant in variants]
+    files: dict[str, bytes] = {}
+    if wishes.preview is not None:
+        from camtool.preview.overlay import render_overlay
+
+        overlay = compare_picture(data, ways, variants, title=Path(goal.name).name)
+        files[wishes.preview] = render_overlay(overlay, wishes.preview)
+    if wishes.report is not None:
+        files[wishes.report] = to_json(rows).encode()
+    write_all(files)
+    if wishes.report != STDOUT and not wishes.quiet:
+        click.echo(table(rows))
+    return 0
 
 
 def shown(name: str) -> str:

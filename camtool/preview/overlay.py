@@ -112,7 +112,7 @@ def _paths(overlay: Overlay, view: View) -> str:
     """All paths in mm."""
     strokes = strokes_of(overlay.wanted)
     chains = (*strokes.feeds, *strokes.ramps)
-    layers = [marks.feeds(chains, view, view.mm(WANTED_PEN), pale=True)] if chains else []
+    layers = [marks.feeds(chains, view, WANTED_PEN, pale=True)] if chains else []
     low, high = view.x_range
     decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
     for index, (_, runs) in enumerate(overlay.runs):

@@ -113,20 +113,23 @@ def strokes_within(
     """The cutting samples in the window [[xmin, xmax], [ymin, ymax]] mm, as runs (n, 2) that
     follow each other: slides, or `commanded` positions."""
     strokes: list[Floats] = []
-    shown, open_end = 0, False
+    shown, before = 0, np.empty((0, 2))
+    open_end = False
     for chunk in chunks:
         points = (chunk.commanded if commanded else chunk.slide)[:, :2]
         inside = ((points >= window[:, 0]) & (points <= window[:, 1])).all(axis=1)
         inside &= cutting[chunk.row]
         which = np.flatnonzero(inside)[: MOST_SHOWN - shown]
-        if len(which):
-            runs = [points[run] for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1)]
-            if open_end and which[0] == 0:
-                strokes[-1] = np.concatenate([strokes[-1], runs.pop(0)])
-            strokes += runs
-            shown += len(which)
+        line = np.concatenate([before, points])  # each run begins where the slide came from
+        for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1) if len(which) else []:
+            first, end = int(run[0]) + len(before), int(run[-1]) + len(before) + 1
+            if open_end and run[0] == 0:
+                strokes[-1] = np.concatenate([strokes[-1], line[first:end]])
+            else:
+                strokes.append(line[max(first - 1, 0) : end])
+        shown += len(which)
         if len(points):
-            open_end = bool(inside[-1])
+            open_end, before = bool(inside[-1]), points[-1:]
         if shown >= MOST_SHOWN:
             break
     return strokes

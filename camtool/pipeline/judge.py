@@ -1,12 +1,4 @@
-"""The whole way in four calls: what the commands and batches run.
-
-    post_drawing     Drawing + Job + target → program, read back, simulated and judged
-    verify_program   bytes of a program (anybody's) → judged, against a drawing if there is one
-    convert_program  bytes of one target's program → the program of another, judged as above
-    picture          any of the values on the way → the scene that `camtool.preview` draws
-
-Nothing here reads or writes a file.
-"""
+"""Programs made, read back and judged: of a drawing, of any program, of another program."""
 
 from __future__ import annotations
 
@@ -23,11 +15,22 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
-    from camtool.preview.draw import Scene
+    from camtool.simulation.options import Effects
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
+    from camtool.verify.gates import Gates
     from camtool.verify.report import Before
     from camtool.verify.verify import Verification, VerifyOptions
+
+
+@dataclass(frozen=True)
+class Judging:
+    """How a program is judged: the interpolator in place of the controller's own, the parts of
+    the mechanics that act (None: all), the limits that make findings (None: none)."""
+
+    interpolator: Interpolator | None = None
+    effects: Effects | None = None
+    gates: Gates | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,12 @@ class Posted:
 
 
 def post_drawing(
-    drawing: Drawing, job: Job, target: LoadedTarget, *, check: bool = True
+    drawing: Drawing,
+    job: Job,
+    target: LoadedTarget,
+    *,
+    check: bool = True,
+    gates: Gates | None = None,
 ) -> Posted:
     """Plan, write, read back, simulate and judge; `check=False` leaves out the last two."""
     from camtool.planning.plan import planned
@@ -79,7 +87,8 @@ def post_drawing(
         (goal, plan.placed),
         VerifyOptions(source=drawing.file, tool_diameter_mm=_tool_mm(job)),
     )
-    findings = _merged(findings, verification.findings, without=repeated)
+    beyond = _beyond(verification, gates)
+    findings = _merged(findings, verification.findings, beyond, without=repeated)
     verification = verification.with_planning(
         Planned(
             rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in plan.steps)),
@@ -97,13 +106,15 @@ def verify_program(
     source: str,
     drawing: Drawing | None = None,
     job: Job | None = None,
-    interpolator: Interpolator | None = None,
+    judging: Judging | None = None,
 ) -> tuple[Toolpath, Verification]:
     """(decoded toolpath, verification) of any program of the target; against `drawing` planned
     with `job` when there is one. ProgramError names file, block and column."""
     from camtool.planning.job import Job
+    from camtool.simulation.options import ALL
     from camtool.verify.verify import VerifyOptions
 
+    judging = judging or Judging()
     decoded = _read(data, target, source)
     wanted = None
     if drawing is not None:
@@ -112,9 +123,14 @@ def verify_program(
         plan = planned(drawing, _plain(job or Job()), target.machine)
         wanted, drawing = plan.toolpath, plan.placed
     options = VerifyOptions(
-        interpolator=interpolator, source=source, tool_diameter_mm=_tool_mm(job or Job())
+        interpolator=judging.interpolator,
+        effects=judging.effects or ALL,
+        source=source,
+        tool_diameter_mm=_tool_mm(job or Job()),
     )
-    return decoded, _judged(data, decoded, target.machine, (wanted, drawing), options)
+    found = _judged(data, decoded, target.machine, (wanted, drawing), options)
+    beyond = _beyond(found, judging.gates)
+    return decoded, found.with_findings((*found.findings, *beyond)) if beyond else found
 
 
 def convert_program(
@@ -153,6 +169,15 @@ def convert_program(
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
 
+def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, ...]:
+    """What exceeds the limits."""
+    if gates is None:
+        return ()
+    from camtool.verify.gates import gate_findings
+
+    return tuple(gate_findings(verification.report, gates))
+
+
 def _plain(job: Job) -> Job:
     """The job without what it does against reversals."""
     return replace(job, minimise="rapids", approach=False)
@@ -185,54 +210,6 @@ def _read(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
         error.file = error.file or file
         raise
     return toolpath
-
-
-def picture(
-    *,
-    title: str,
-    drawing: Drawing | None = None,
-    job: Job | None = None,
-    toolpath: Toolpath | None = None,
-    verification: Verification | None = None,
-    machine: Machine | None = None,
-) -> Scene:
-    """The scene of whatever is there; with a verification, the slides' path by its error.
-
-    `job` tells where it places the drawing in the work frame.
-    """
-    from camtool.preview.scene import Scene, scene_of_drawing
-
-    if drawing is not None and toolpath is None:
-        return replace(scene_of_drawing(drawing), title=title)
-    if drawing is not None and job is not None:
-        from camtool.planning.place import place
-
-        drawing = place(drawing, job)
-    trace = verification.trace if verification is not None else None
-    return Scene(
-        title=title,
-        drawing=drawing,
-        toolpath=toolpath,
-        trace_points=trace.points if trace is not None else None,
-        trace_error_mm=trace.error_mm if trace is not None else None,
-        trace_cutting=trace.cutting if trace is not None else None,
-        travel_mm=_travel(toolpath, machine),
-        notes=verification.report.notes() if verification is not None else (),
-    )
-
-
-def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
-    """The table's travel, mm, if the path lies in it with part zero at its lower-left corner:
-    only then is there a place where the frame can honestly be drawn."""
-    if toolpath is None or machine is None:
-        return None
-    from camtool.toolpath.extents import toolpath_extents
-
-    x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
-    (left, right), (low, high), _ = toolpath_extents(toolpath).tolist()
-    if x is None or y is None or left < 0.0 or low < 0.0 or right > x or high > y:
-        return None
-    return x, y
 
 
 def _tool_mm(job: Job) -> float | None:

@@ -1,0 +1,62 @@
+"""Any value on the way from drawing to report as the scene that `camtool.preview` draws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
+    from camtool.machine.model import Machine
+    from camtool.planning.job import Job
+    from camtool.preview.draw import Scene
+    from camtool.toolpath.moves import Toolpath
+    from camtool.verify.verify import Verification
+
+
+def picture(
+    *,
+    title: str,
+    drawing: Drawing | None = None,
+    job: Job | None = None,
+    toolpath: Toolpath | None = None,
+    verification: Verification | None = None,
+    machine: Machine | None = None,
+) -> Scene:
+    """The scene of whatever is there; with a verification, the slides' path by its error.
+
+    `job` tells where it places the drawing in the work frame.
+    """
+    from camtool.preview.scene import Scene, scene_of_drawing
+
+    if drawing is not None and toolpath is None:
+        return replace(scene_of_drawing(drawing), title=title)
+    if drawing is not None and job is not None:
+        from camtool.planning.place import place
+
+        drawing = place(drawing, job)
+    trace = verification.trace if verification is not None else None
+    return Scene(
+        title=title,
+        drawing=drawing,
+        toolpath=toolpath,
+        trace_points=trace.points if trace is not None else None,
+        trace_error_mm=trace.error_mm if trace is not None else None,
+        trace_cutting=trace.cutting if trace is not None else None,
+        travel_mm=_travel(toolpath, machine),
+        notes=verification.report.notes() if verification is not None else (),
+    )
+
+
+def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
+    """The table's travel, mm, if the path lies in it with part zero at its lower-left corner:
+    only then is there a place where the frame can honestly be drawn."""
+    if toolpath is None or machine is None:
+        return None
+    from camtool.toolpath.extents import toolpath_extents
+
+    x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
+    (left, right), (low, high), _ = toolpath_extents(toolpath).tolist()
+    if x is None or y is None or left < 0.0 or low < 0.0 or right > x or high > y:
+        return None
+    return x, y
