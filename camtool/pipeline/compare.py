@@ -64,6 +64,8 @@ def compare_picture(
 ) -> Overlay:
     """The paths laid over each other about the place of the largest error: slides, or commanded
     positions where only the interpolator differs."""
+    import numpy as np
+
     from camtool.preview.overlay import Overlay
     from camtool.simulation.models import model_of
     from camtool.simulation.options import ALL, Options
@@ -77,7 +79,7 @@ def compare_picture(
     wanted = model_of(first.machine).held(decoded, first.machine)
     window = _window(wanted, variants)
     room = ROOM * (window[:, 1] - window[:, 0]).max()
-    around = window + [-room, room]
+    around = window + np.array([-room, room])
     runs = []
     for way in ways:
         machine = way.target.machine
