@@ -1,0 +1,174 @@
+"""Moves by timers that run each axis on its own, the method of the parallel-port machine.
+
+A displacement of n steps of the longer axis and m ≤ n of the shorter one ends when the longer one
+has made n. With the half period P of the longer axis, that of the shorter one is P·n/m, so that
+both should end together (thesis L1127-1129, L1188). But a timer fires at the first whole
+millisecond above its half period (reading "whole-ms"):
+
+    longer:  every P + 1 ms        shorter:  every ⌊P·n/m⌋ + 1 ms
+    steps of the shorter one:  ⌊n (P + 1) / (⌊P·n/m⌋ + 1)⌋  ≥ m,  and = m as long as m ≤ P
+
+and nothing stops it at m. In the other reading ("late-longer") the longer axis is a millisecond
+late at each step and the shorter one never: it fires every P·n/m ms and makes ⌊m (P + 1) / P⌋
+steps. Steps of both axes at the same time are one sample; so is the one that ends the move.
+
+Exact, because times are integers (in the second reading those of a move are taken m times), and
+only the difference of the next two firings is carried along: below 2⁶² for all half periods and
+displacements below 2³¹. Lengths become steps as everywhere, by floor(length / step + a half and
+a guard); no position is summed up. Compiled, because a displacement may depend on what the one
+before it reached, and a part has millions of steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from camtool.kernels.inner import inner
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+XY, Z, HOME_X, HOME_Y, HOME_Z = range(5)
+"""What moves: X and Y by their timers, one axis alone, or one to its sensor at machine zero."""
+
+
+class Moves(NamedTuple):
+    """M moves: what moves (M,), where to (M, 3) mm, half period of the longer axis (M,) ms, and
+    their rows (M,) of `Issued.duration_ms` and `Issued.steps`."""
+
+    what: Ints
+    target: Floats
+    half_period: Ints
+    row: Ints
+
+
+class Rules(NamedTuple):
+    """Where all steps are counted from (3,) mm, steps (3,) mm, what is added to a quotient before
+    its floor is taken, whether displacements are counted from what was reached, and whether the
+    longer axis is late and the shorter one not."""
+
+    origin: Floats
+    step_mm: Floats
+    added: float
+    from_reached: bool
+    late_longer: bool
+
+
+class Counters(NamedTuple):
+    """What the controller knows, changed in place: steps issued so far (3,), where the program is
+    (3,) mm, and of the move that is under way (8,): steps of its longer axis to come, by how much
+    its shorter axis fires later than that, their columns (the shorter −1: none), their senses,
+    and the times between their steps."""
+
+    count: Ints
+    programmed: Floats
+    under_way: Ints
+
+
+class Issued(NamedTuple):
+    """Samples: positions (K, 3) mm and their rows (K,); of each row (R,) the half periods of the
+    longer axis with their lateness, ms, and (R, 3) steps: added to what is there."""
+
+    commanded: Floats
+    row: Ints
+    duration_ms: Ints
+    steps: Ints
+
+
+@inner
+def _displacement(axis: int, target: float, sensed: bool, rules: Rules, counters: Counters) -> int:
+    """Steps of an axis to its target, which then is where the program is."""
+    here = counters.programmed[axis]
+    if sensed or rules.from_reached:
+        here = rules.origin[axis] + counters.count[axis] * rules.step_mm[axis]
+    counters.programmed[axis] = target
+    way = target - here
+    steps = int(math.floor(abs(way) / rules.step_mm[axis] + rules.added))
+    return -steps if way < 0.0 else steps
+
+
+@inner
+def _begin(what: int, target: Floats, half_period: int, rules: Rules, counters: Counters) -> None:
+    """Set the timers of a move."""
+    longer, shorter, short_way = 2, -1, 0
+    if what == XY:
+        along_x = _displacement(0, target[0], False, rules, counters)
+        along_y = _displacement(1, target[1], False, rules, counters)
+        longer, shorter, long_way, short_way = 0, 1, along_x, along_y
+        if abs(along_y) > abs(along_x):
+            longer, shorter, long_way, short_way = 1, 0, along_y, along_x
+    else:
+        longer = 0 if what == HOME_X else 1 if what == HOME_Y else 2
+        long_way = _displacement(longer, target[longer], what != Z, rules, counters)
+    n, m = abs(long_way), abs(short_way)
+    every, short_every = half_period + 1, 0
+    if m == 0:
+        shorter = -1
+    elif rules.late_longer:
+        every, short_every = every * m, half_period * n
+    else:
+        short_every = half_period * n // m + 1
+    counters.under_way[0], counters.under_way[1] = n, short_every - every
+    counters.under_way[2], counters.under_way[3] = longer, shorter
+    counters.under_way[4] = 1 if long_way >= 0 else -1
+    counters.under_way[5] = 1 if short_way >= 0 else -1
+    counters.under_way[6], counters.under_way[7] = every, short_every
+
+
+@inner
+def _run(rules: Rules, counters: Counters, row: int, k: int, issued: Issued) -> int:
+    """Let the timers run until the move ends or the samples are full; the samples then filled."""
+    left, gap, longer, shorter, sense, short_sense, every, short_every = counters.under_way
+    here = rules.origin + counters.count * rules.step_mm
+    count, short_count = counters.count[longer], counters.count[max(shorter, 0)]
+    while left > 0 and k < len(issued.row):
+        fires = shorter < 0 or gap >= 0
+        if shorter >= 0 and gap <= 0:
+            short_count += short_sense
+            here[shorter] = rules.origin[shorter] + short_count * rules.step_mm[shorter]
+            gap += short_every
+        if fires:
+            count += sense
+            here[longer] = rules.origin[longer] + count * rules.step_mm[longer]
+            gap -= every
+            left -= 1
+        for axis in range(3):
+            issued.commanded[k, axis] = here[axis]
+        issued.row[k] = row
+        k += 1
+    issued.steps[row, longer] += abs(count - counters.count[longer])
+    counters.count[longer] = count
+    if shorter >= 0:
+        issued.steps[row, shorter] += abs(short_count - counters.count[shorter])
+        counters.count[shorter] = short_count
+    counters.under_way[0], counters.under_way[1] = left, gap
+    return k
+
+
+@njit(cache=True)
+def timers_fill(
+    moves: Moves, first: int, rules: Rules, counters: Counters, issued: Issued
+) -> tuple[int, int]:
+    """Run moves from `first` on until all are done or the samples of `issued` are full.
+
+    Returns the move to go on with and the samples filled.
+    """
+    k, move = 0, first
+    while move < len(moves.what):
+        if counters.under_way[0] == 0:
+            _begin(
+                moves.what[move], moves.target[move], moves.half_period[move], rules, counters
+            )
+        row, before = moves.row[move], counters.under_way[0]
+        k = _run(rules, counters, row, k, issued)
+        done = before - counters.under_way[0]
+        issued.duration_ms[row] += done * (moves.half_period[move] + 1)
+        if counters.under_way[0] > 0:
+            break
+        move += 1
+    return move, k
