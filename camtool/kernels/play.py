@@ -10,13 +10,19 @@ high = play; in − : low = −play, high = 0. "centred": low = −play/2, high 
 differ by half the play, and by nothing else.
 
 Compensation is the controller's own policy: whenever the commanded direction of an axis changes,
-it issues `compensation` more steps in the new direction before the step itself; they move the
-motor, not the controller's position. A first motion against the direction that the axis is
-believed to be engaged in counts as a change. (Thesis L1707-1709, L1774-1778.)
+it issues so much more in the new direction before the step itself; that moves the motor, not the
+controller's position. A first motion against the direction that the axis is believed to be
+engaged in counts as a change. (Thesis of the PIC18F8720, L1707-1709, L1774-1778.)
 
-Exact, because the motor is an integer number of steps and the slide is either left alone or set
-to motor × step + flank: nothing is summed up. The operator does not depend on the rate, so a
-monotone burst of compensation steps acts as its last one. Compiled, because every position
+An axis has reversed when it came back by half a coded step from the furthest that it went in its
+direction: rounding of positions in mm must not make a reversal, and any step does.
+
+Positions, compensation and the half step are in one unit, mm or steps; `scale` makes it mm.
+
+Exact, because the slide is either left alone or set to (position + added) · scale + flank, where
+`added` is 0 or one compensation, in the direction that is not the first one: nothing is summed
+up, and cutting the samples into blocks changes no bit. The operator does not depend on the rate,
+so a monotone burst of compensation steps acts as its last one. Compiled, because every position
 depends on the one before.
 """
 
@@ -25,6 +31,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from numba import njit
+
+from camtool.kernels.inner import inner
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -37,68 +45,59 @@ def play_limits(play_mm: float, convention: str, direction: int) -> tuple[float,
     return (0.0, play_mm) if direction > 0 else (-play_mm, 0.0)
 
 
-def play_start(position_steps: int, step_mm: float, direction: int) -> Floats:
-    """The state (6,) of an axis at rest, engaged in `direction` ±1.
+def play_start(position: float, scale: float, direction: int) -> Floats:
+    """The state (4,) of an axis at rest at `position`, engaged in `direction` ±1.
 
-    position (steps), direction, motor − position (steps), slide (mm), reversals so far, steps
-    of the program so far. The whole numbers among them are far below 2⁵³.
+    Furthest position in the present direction, that direction, compensation added so far, slide
+    in mm.
     """
-    slide_mm = position_steps * step_mm
-    return np.array([position_steps, direction, 0.0, slide_mm, 0.0, 0.0], dtype=np.float64)
+    return np.array([position, direction, 0.0, position * scale], dtype=np.float64)
+
+
+@inner
+def turned(
+    position: float, furthest: float, direction: float, least: float
+) -> tuple[float, float, bool]:
+    """The new furthest position and direction, and whether the axis has reversed."""
+    ahead = (position - furthest) * direction
+    if ahead >= 0.0:
+        return position, direction, False
+    if ahead <= -least:
+        return position, -direction, True
+    return furthest, direction, False
+
+
+@inner
+def taken_along(slide: float, motor: float, low: float, high: float) -> float:
+    """The play operator: the slide after the motor went to `motor` mm without turning round."""
+    return min(max(slide, motor + low), motor + high)
 
 
 @njit(cache=True)
-def play_fill(steps: Ints, axis: Floats, state: Floats, out: Floats) -> None:
-    """Positions of the slide in mm, `out` (n,), for commanded positions `steps` (n,).
-
-    `axis` (4,): real step in mm, low and high in mm, compensation in steps. `state` (6,) of
-    `play_start` is changed in place, so that the next call goes on.
-    """
-    step_mm, low, high, compensation = axis[0], axis[1], axis[2], axis[3]
-    position, direction, offset, slide = state[0], state[1], state[2], state[3]
-    for k in range(len(steps)):
-        change = steps[k] - position
-        if change != 0.0:
-            sense = 1.0 if change > 0.0 else -1.0
-            if sense != direction:
-                direction = sense
-                offset += sense * compensation
-                state[4] += 1.0
-            position = float(steps[k])
-            state[5] += abs(change)
-            motor = (position + offset) * step_mm
-            slide = min(max(slide, motor + low), motor + high)
-        out[k] = slide
-    state[0], state[1], state[2], state[3] = position, direction, offset, slide
-
-
-@njit(cache=True)
-def play_path_fill(
-    positions: Floats, offsets: Ints, axis: Floats, state: Floats, out: Floats, turns: Ints
+def play_fill(
+    positions: Floats, offsets: Ints, axes: Floats, states: Floats, out: Floats, turns: Ints
 ) -> None:
-    """Positions of the slide in mm, `out` (n,), for a motor that follows `positions` (n,) mm.
+    """Slides in mm, `out` (n, 3), for commanded `positions` (n, 3); reversals of each run.
 
-    `axis` (5,): real over coded step, low and high in mm, compensation in mm, and how far back
-    a position must go to be a reversal, mm (rounding must not make one). `state` (5,): furthest
-    position in the present direction, direction, compensation so far, slide, reversals so far;
-    changed in place, so that the next call goes on. Run r is offsets[r]:offsets[r+1];
-    `turns` (R,) are its reversals.
+    `axes` (3, 5): scale, low and high in mm, compensation, and how far back is a reversal.
+    `states` (3, 4), each of `play_start`, are changed in place, so that the next call goes on.
+    Run r is offsets[r]:offsets[r+1]; `turns` (R, 3) are its reversals.
     """
-    scale, low, high, compensation, least = axis[0], axis[1], axis[2], axis[3], axis[4]
-    furthest, direction, offset, slide = state[0], state[1], state[2], state[3]
-    for run in range(len(turns)):
-        turns[run] = 0
-        for k in range(offsets[run], offsets[run + 1]):
-            ahead = (positions[k] - furthest) * direction
-            if ahead >= 0.0:
-                furthest = positions[k]
-            elif -ahead >= least:
-                direction = -direction
-                offset += direction * compensation
-                turns[run] += 1
-                furthest = positions[k]
-            motor = (positions[k] + offset) * scale
-            slide = min(max(slide, motor + low), motor + high)
-            out[k] = slide
-        state[4] += turns[run]
-    state[0], state[1], state[2], state[3] = furthest, direction, offset, slide
+    for axis in range(3):
+        scale, low, high = axes[axis, 0], axes[axis, 1], axes[axis, 2]
+        compensation, least = axes[axis, 3], axes[axis, 4]
+        furthest, direction = states[axis, 0], states[axis, 1]
+        added, slide = states[axis, 2], states[axis, 3]
+        for run in range(len(turns)):
+            count = 0
+            for k in range(offsets[run], offsets[run + 1]):
+                position = positions[k, axis]
+                furthest, direction, reversed_ = turned(position, furthest, direction, least)
+                if reversed_:
+                    added += direction * compensation
+                    count += 1
+                slide = taken_along(slide, (position + added) * scale, low, high)
+                out[k, axis] = slide
+            turns[run, axis] = count
+        states[axis, 0], states[axis, 1] = furthest, direction
+        states[axis, 2], states[axis, 3] = added, slide

@@ -31,7 +31,7 @@ from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import PathController
 from camtool.machine.model import Machine
-from camtool.simulation.mechanics import PathMechanics
+from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, Ledger
 from camtool.simulation.options import Options
 from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
@@ -160,7 +160,7 @@ class PathRun:
         _check_rows(self._path, self._rows)
         self._seconds = _durations(self._path, machine)
         self._samples = PathSamples(self._path, sample_spacing_mm(self._path, machine))
-        self._mechanics = PathMechanics(machine, self._path.start, options.effects)
+        self._mechanics = Mechanics(machine, self._path.start, options.effects)
         self._coded_mm = [axis.coded_step_mm for axis in machine.axes]
         self._steps = self._in_steps(self._path.start[None, :])
         self._chunk_steps = options.chunk_steps

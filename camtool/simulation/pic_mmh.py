@@ -121,7 +121,7 @@ class PicMmh:
         home_mm = np.array([self._controller.machine_zero_mm], dtype=np.float64)
         self._home: Ints = self._steps(home_mm, range(3), named=False)[0]
         self._position: Ints = self._steps(toolpath.start[None, :], range(3), named=False)[0]
-        self._mechanics = Mechanics(machine, self._position, options.effects)
+        self._mechanics = Mechanics(machine, self._position * self._coded_mm, options.effects)
         self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
 
     def run(self) -> Iterator[Chunk]:
@@ -150,7 +150,7 @@ class PicMmh:
         if kind in (Kind.ARC_CW, Kind.ARC_CCW):
             yield from self._emit(row, self._arc(row, kind, target))
             self._position = np.array([target[0], target[1], self._position[2]])
-            self._mechanics.place(self._position)
+            self._mechanics.place(self._position * self._coded_mm)
         else:
             yield from self._emit(row, self._line((0, 1), target, self._period(row, kind, 0)))
         if target[2] != self._position[2]:
@@ -212,23 +212,25 @@ class PicMmh:
                 steps[:, column] = (
                     leg.origin[index] + leg.sign[index] * self._buffer[:filled, index]
                 )
-            self._position = steps[-1]
             yield self._chunk(row, leg, steps, passes, leg.ended or not done)
 
     def _chunk(self, row: int, leg: _Leg, steps: Ints, passes: int, ended: bool) -> Chunk:
-        slide, reversals, travelled = self._mechanics.follow(steps)
+        travelled = np.abs(np.diff(steps, axis=0, prepend=self._position[None, :])).sum(axis=0)
+        self._position = steps[-1]
+        commanded = steps * self._coded_mm
+        slide, reversals = self._mechanics.follow(commanded, np.array([0, len(steps)]))
         by_event = self._controller.time_base == "event"
         periods = len(steps) if by_event else passes
-        added = int(reversals @ self._mechanics.compensation)
+        added = int(reversals[0] @ self._mechanics.compensation_steps)
         return one_row(
             row,
-            steps * self._coded_mm,
+            commanded,
             slide,
             duration_s=(periods + added) * leg.period_s,
             compensation_s=added * leg.period_s,
             iterations=passes,
             steps=travelled,
-            reversals=reversals,
+            reversals=reversals[0],
             ended=ended,
         )
 

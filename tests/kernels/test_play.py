@@ -14,12 +14,30 @@ STEP = 0.00014
 
 def run(
     steps: np.ndarray, limits: tuple[float, float], compensation: int = 0, direction: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
-    """Slide (n,) mm and the state after, for commanded steps that begin at steps[0]."""
-    state = play_start(int(steps[0]), STEP, direction)
-    out = np.empty(len(steps))
-    play_fill(steps, np.array([STEP, *limits, float(compensation)]), state, out)
-    return out, state
+) -> tuple[np.ndarray, int]:
+    """Slide (n,) mm and reversals of X, for commanded steps that begin at steps[0]."""
+    walk = Walk(steps, limits, compensation, direction)
+    slide = walk.go(steps)
+    return slide, walk.reversals
+
+
+class Walk:
+    """X moves in steps, the other axes stand."""
+
+    def __init__(
+        self, steps: np.ndarray, limits: tuple[float, float], compensation: int, direction: int
+    ) -> None:
+        self.axes = np.array([[STEP, *limits, compensation, 0.5]] * 3)
+        self.states = np.array([play_start(at, STEP, direction) for at in (steps[0], 0, 0)])
+        self.reversals = 0
+
+    def go(self, steps: np.ndarray) -> np.ndarray:
+        """The slide (n,) for the next steps (n,)."""
+        positions = np.column_stack([steps, np.zeros((len(steps), 2))]).astype(float)
+        slide, turns = np.empty(positions.shape), np.zeros((1, 3), dtype=np.int64)
+        play_fill(positions, np.array([0, len(steps)]), self.axes, self.states, slide, turns)
+        self.reversals += int(turns[0, 0])
+        return slide[:, 0]
 
 
 def there_and_back(*turns: int) -> np.ndarray:
@@ -35,14 +53,13 @@ def test_preloaded_line_there_and_back() -> None:
     """Forward the slide follows at once; back it waits for the play, and lags by it ever after."""
     steps = there_and_back(0, 1000, 0, 1000)
     play = 300 * STEP
-    slide, state = run(steps, play_limits(play, "preloaded", 1))
+    slide, reversals = run(steps, play_limits(play, "preloaded", 1))
     motor = steps * STEP
     back = np.minimum(1000 * STEP, motor[1000:2001] + play)
     assert slide[:1001] == pytest.approx(motor[:1001], abs=1e-15)
     assert slide[1000:2001] == pytest.approx(back, abs=1e-15)
     assert slide[2000:] == pytest.approx(np.maximum(play, motor[2000:]), abs=1e-15)
-    assert state[4] == 2.0
-    assert state[5] == 3000.0
+    assert reversals == 2
 
 
 def test_conventions_differ_by_half_the_play() -> None:
@@ -60,9 +77,9 @@ def test_conventions_differ_by_half_the_play() -> None:
 
 def test_exact_compensation_undoes_the_play() -> None:
     steps = there_and_back(0, 1000, -400, 20, -7)
-    slide, state = run(steps, play_limits(300 * STEP, "preloaded", 1), compensation=300)
+    slide, reversals = run(steps, play_limits(300 * STEP, "preloaded", 1), compensation=300)
     assert slide == pytest.approx(steps * STEP, abs=1e-15)
-    assert state[4] == 3.0
+    assert reversals == 3
 
 
 def test_too_much_compensation_oversizes_by_the_excess() -> None:
@@ -74,11 +91,10 @@ def test_too_much_compensation_oversizes_by_the_excess() -> None:
 
 
 def test_a_first_motion_against_the_start_counts() -> None:
-    _, state = run(there_and_back(0, -10), (0.0, 0.0), compensation=5)
-    assert state[4] == 1.0
-    assert state[2] == -5.0
-    _, state = run(there_and_back(0, -10), (0.0, 0.0), compensation=5, direction=-1)
-    assert state[4] == 0.0
+    _, reversals = run(there_and_back(0, -10), (0.0, 0.0), compensation=5)
+    assert reversals == 1
+    _, reversals = run(there_and_back(0, -10), (0.0, 0.0), compensation=5, direction=-1)
+    assert reversals == 0
 
 
 def test_circle_with_play_is_four_shifted_quarters() -> None:
@@ -86,7 +102,7 @@ def test_circle_with_play_is_four_shifted_quarters() -> None:
     radius, play = 2000, 250 * STEP
     path = np.vstack([[(0, radius)], direct_search_path(0, radius, True, 0, 11312)])
     x = path[:, 0].copy()
-    slide, state = run(x, play_limits(play, "preloaded", 1))
+    slide, reversals = run(x, play_limits(play, "preloaded", 1))
     first, second = int(np.argmax(x)), int(np.argmin(x))
     motor, big = x * STEP, radius * STEP
     want = np.concatenate(
@@ -97,7 +113,7 @@ def test_circle_with_play_is_four_shifted_quarters() -> None:
         ]
     )
     assert slide == pytest.approx(want, abs=1e-15)
-    assert state[4] == 2.0
+    assert reversals == 2
 
 
 @pytest.mark.parametrize("convention", ["preloaded", "centred"])
@@ -108,23 +124,19 @@ def test_random_walks_equal_the_literal_loop(convention: str, direction: int) ->
         steps = np.cumsum(rng.integers(-3, 4, 400))
         limits = play_limits(float(rng.uniform(0, 40)) * STEP, convention, direction)
         compensation = int(rng.integers(0, 50))
-        slide, state = run(steps, limits, compensation, direction)
-        want, reversals = twins.play(
-            [int(s) for s in steps], STEP, *limits, compensation, direction
-        )
+        slide, reversals = run(steps, limits, compensation, direction)
+        want, turns = twins.play([int(s) for s in steps], STEP, *limits, compensation, direction)
         assert np.array_equal(slide, want)
-        assert state[4] == reversals
+        assert reversals == turns
 
 
 @pytest.mark.parametrize("size", [1, 13, 400])
 def test_chunks_do_not_matter(size: int) -> None:
     steps = np.cumsum(np.random.default_rng(41).integers(-1, 2, 2000))
-    whole, after = run(steps, (0.0, 0.002), 9)
-    axis = np.array([STEP, 0.0, 0.002, 9.0])
-    state, parts = play_start(int(steps[0]), STEP, 1), []
-    for at in range(0, len(steps), size):
-        out = np.empty(len(steps[at : at + size]))
-        play_fill(steps[at : at + size], axis, state, out)
-        parts.append(out)
-    assert np.array_equal(np.concatenate(parts), whole)
-    assert np.array_equal(state, after)
+    whole = Walk(steps, (0.0, 0.002), 9, 1)
+    parts = Walk(steps, (0.0, 0.002), 9, 1)
+    want = whole.go(steps)
+    found = [parts.go(steps[at : at + size]) for at in range(0, len(steps), size)]
+    assert np.array_equal(np.concatenate(found), want)
+    assert np.array_equal(parts.states, whole.states)
+    assert parts.reversals == whole.reversals
