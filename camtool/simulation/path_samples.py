@@ -79,19 +79,27 @@ class PathSamples:
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Row (K,) and position (K, 3) mm of the samples low:high."""
+        row, share = self.places(low, high)
+        return row, self.points(row, share)
+
+    def places(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row (K,) and share (K,) of its way, in (0, 1], of the samples low:high."""
         index = np.arange(low, high)
         piece = np.searchsorted(self._offsets, index, side="right") - 1
         part, parts = index - self._offsets[piece] + 1, self._parts[piece]
         begin, end = self._pieces.begin[piece], self._pieces.end[piece]
         share = np.where(part == parts, end, begin + (end - begin) * (part / parts))
-        row = self._pieces.row[piece]
+        return self._pieces.row[piece], share
+
+    def points(self, row: Ints, share: Floats) -> Floats:
+        """(K, 3) mm: the points at shares (K,) of the ways of rows (K,)."""
         points = self._starts[row] + share[:, None] * self._way[row]
         arm = self._arm_of_row[row]
         on_arc = np.flatnonzero(arm >= 0)
         points[on_arc] = self._arms.points(arm[on_arc], share[on_arc])
         last = np.flatnonzero(share == 1.0)
         points[last] = self._toolpath.end[row[last]]
-        return row, points
+        return points
 
 
 def _pieces(length: Floats, arms: Arms) -> _Pieces:
