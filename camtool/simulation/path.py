@@ -81,9 +81,9 @@ def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
     shorter than a step, whose rounded ends would turn it into a full circle, becomes a line; one
     that lacks less than a step of its full circle becomes that.
     """
-    _check_positions(toolpath, machine)
+    check_positions(toolpath, machine)
     home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
-    exact = _placed(toolpath, home)
+    exact = placed(toolpath, home)
     if isinstance(machine.controller, PathController) and machine.controller.grid == "none":
         return exact
     home = _on_grid(home, machine)
@@ -94,10 +94,10 @@ def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
         inside_out = made.is_arc & (np.abs(made.sweeps() - sweeps) > np.pi)
         if not inside_out.any():
             return made
-        made = _placed(_turned_back(made, inside_out, np.abs(sweeps) < np.pi), home)
+        made = placed(_turned_back(made, inside_out, np.abs(sweeps) < np.pi), home)
 
 
-def _placed(toolpath: Toolpath, home: Floats) -> Toolpath:
+def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
     """The same with events where the moves before them ended, and homing at `home` (3,) mm."""
     kind, count = toolpath.kind, len(toolpath)
     end = toolpath.end.copy()
@@ -157,7 +157,7 @@ class PathRun:
         self._path = held(toolpath, machine)
         ends = np.flatnonzero(self._path.kind == Kind.END)
         self._rows = int(ends[0]) + 1 if len(ends) else len(self._path)
-        _check_rows(self._path, self._rows)
+        check_rows(self._path, self._rows)
         self._seconds = _durations(self._path, machine)
         self._samples = PathSamples(self._path, sample_spacing_mm(self._path, machine))
         self._mechanics = Mechanics(machine, self._path.start, options.effects)
@@ -216,7 +216,7 @@ class PathRun:
 
 
 def _durations(path: Toolpath, machine: Machine) -> Floats:
-    """(N,) s of each row; NaN feeds, which `_check_rows` refuses, only behind the end."""
+    """(N,) s of each row; NaN feeds, which `check_rows` refuses, only behind the end."""
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
     speed = np.where(path.is_feed, path.feed, machine.rapid_mm_min)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -230,7 +230,7 @@ def _durations(path: Toolpath, machine: Machine) -> Floats:
     return np.where(path.kind == Kind.DWELL, path.value, seconds)
 
 
-def _check_positions(toolpath: Toolpath, machine: Machine) -> None:
+def check_positions(toolpath: Toolpath, machine: Machine) -> None:
     """ProgramError for an arc without a centre or a position that cannot be counted."""
     bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
     if bad.any():
@@ -245,7 +245,7 @@ def _check_positions(toolpath: Toolpath, machine: Machine) -> None:
         )
 
 
-def _check_rows(path: Toolpath, rows: int) -> None:
+def check_rows(path: Toolpath, rows: int) -> None:
     """ProgramError for moves without a feed and events that cannot be followed."""
     running = np.arange(len(path)) < rows
     with np.errstate(invalid="ignore"):
