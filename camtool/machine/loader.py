@@ -21,6 +21,7 @@ from typing import Any, TypeVar, get_args
 import msgspec
 
 from camtool.errors import MachineError
+from camtool.machine.controllers import Controller, SlideStart
 from camtool.machine.model import Machine, Target
 
 NEEDS = "needs"
@@ -63,9 +64,9 @@ def build_machine(
                 where="key extends",
                 mend=f'write extends = "{base["target"]["name"]}" or change --target',
             )
-        table, name = _laid_over(table, extra), str(user_file)
+        table, name = _overlaid(table, extra), str(user_file)
     for setting in settings:
-        table, name = _laid_over(table, _setting(setting)), f"--set {setting}"
+        table, name = _overlaid(table, _setting(setting)), f"--set {setting}"
     _refuse_incomplete(table, str(user_file or base_name))
     return convert({key: table[key] for key in table if key != NEEDS}, Machine, name)
 
@@ -168,6 +169,27 @@ def _finite(value: object, file: str, at: str) -> None:
     elif isinstance(value, list):
         for item in value:
             _finite(item, file, at)
+
+
+def _overlaid(below: Table, above: Table) -> Table:
+    """`_laid_over`; where `above` names another controller model, the options of the model below
+    go with it, but for those that all controllers have."""
+    old, new = below.get("controller"), above.get("controller")
+    if isinstance(old, dict) and isinstance(new, dict) and "model" in new:
+        own = _own_options(old.get("model")) if new["model"] != old.get("model") else set()
+        below = below | {"controller": {key: old[key] for key in old.keys() - own}}
+    return _laid_over(below, above)
+
+
+def _own_options(model: object) -> set[str]:
+    """The options that only this model of a controller has."""
+    shared = {field.name for field in msgspec.structs.fields(SlideStart)}
+    return {
+        field.name
+        for record in get_args(Controller)
+        if record.__struct_config__.tag == model
+        for field in msgspec.structs.fields(record)
+    } - shared
 
 
 def _laid_over(below: Table, above: Table) -> Table:

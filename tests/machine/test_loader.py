@@ -204,3 +204,17 @@ def test_a_controller_that_follows_the_path_has_a_table_of_its_own() -> None:
         build_machine(path_machine(), "a.toml", None, ["controller.arcs=dsm"])
     with pytest.raises(MachineError, match="needs the controller pic-mmh"):
         pic_mmh_controller(machine)
+
+
+def test_another_controller_model_leaves_the_options_of_the_first_behind(tmp_path: Path) -> None:
+    table = base()
+    assert table["controller"]["arcs"] == "dsm"  # which path does not know
+    settings = ["controller.start_direction=-", "controller.grid=none", "controller.model=path"]
+    machine = build_machine(table, "pic_mmh.toml", None, settings)
+    assert machine.controller == PathController(start_direction="-", grid="none")
+    user = tmp_path / "mine.toml"
+    user.write_text('extends = "pic-mmh"\n[controller]\nmodel = "path"\narcs = "dsm"\n')
+    with pytest.raises(MachineError, match=r"\[controller\], key arcs: unknown"):
+        build_machine(table, "pic_mmh.toml", user)
+    assert built("controller.arcs=dda").controller.start_direction == "+"  # nothing is lost
+    assert pic_mmh_controller(built("controller.model=pic-mmh")).arcs == "dsm"
