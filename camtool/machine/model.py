@@ -15,6 +15,7 @@ from msgspec import Meta
 
 from camtool.errors import MachineError
 from camtool.machine.controllers import Controller, PicMmhController
+from camtool.machine.mechanics import MechanicsOptions, PlayMap
 
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
@@ -36,7 +37,8 @@ AS_CODED = 0.0
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One axis. `coded_step_mm` is what the controller believes a step to be, `real_step_mm`
     what the slide moves, as coded where left out; `backlash_mm` is the play of the mechanics,
-    `compensation_mm` what the controller adds at each reversal. `resolution_mm` is the finest
+    `compensation_mm` what the controller adds at each reversal; `repeatability_mm` is the standard
+    deviation of the places where the slide arrives from one side. `resolution_mm` is the finest
     difference of places that a program can say, where that is coarser than the step. `travel_mm`,
     `max_rate_mm_min` and `acceleration_mm_s2` are None when nobody has said."""
 
@@ -46,6 +48,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     travel_mm: Positive | None = None
     backlash_mm: NotNegative = 0.0
     compensation_mm: NotNegative = 0.0
+    repeatability_mm: NotNegative = 0.0
     max_rate_mm_min: Positive | None = None
     acceleration_mm_s2: Positive | None = None
 
@@ -128,6 +131,8 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     defaults: Defaults
     controller: Controller
     link: Link = Link()
+    mechanics: MechanicsOptions = MechanicsOptions()
+    play_map: PlayMap = PlayMap()
     dialect: dict[str, Scalar] = {}
 
     @property
