@@ -51,4 +51,4 @@ class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `seed`: which draws the random repeatability of the axes makes."""
 
     squareness_rad: Annotated[float, Meta(ge=-MAX_SQUARENESS_RAD, le=MAX_SQUARENESS_RAD)] = 0.0
-    seed: Annotated[int, Meta(ge=0, lt=1 << 63)] = 0
+    seed: Annotated[int, Meta(ge=0, lt=1 << 32)] = 0
