@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from msgspec import Meta
+
 from camtool.machine.controllers.base import SlideStart
 
 
 class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
-    """A controller on grbl 1.1, and the options of its model."""
+    """A controller on grbl 1.1, and the options of its model.
+
+    `arc_tolerance_mm` is its $12 and `junction_deviation_mm` its $11 (defaults.h, general
+    machine). `buffer_blocks`: places of its planner's ring, of which one stays empty
+    (BLOCK_BUFFER_SIZE, planner.h). `arc_correction`: chords between two that it computes by sine
+    and cosine (N_ARC_CORRECTION, config.h).
+    """
+
+    arc_tolerance_mm: Annotated[float, Meta(gt=0.0)] = 0.002
+    junction_deviation_mm: Annotated[float, Meta(ge=0.0)] = 0.01
+    buffer_blocks: Annotated[int, Meta(ge=3)] = 16
+    arc_correction: Annotated[int, Meta(ge=1)] = 12

@@ -1,0 +1,51 @@
+"""How long blocks take: trapezoids of speed between corners, planned ahead.
+
+A block is a straight piece or an arc that is accelerated and slowed down as one: d mm long, at
+most v mm/s within it, a mm/s² along it. From entry speed v0 to exit speed v1 it rises at a to a
+peak, stays there, and falls at a:
+
+    peak² = min(v², a d + (v0² + v1²)/2)
+    time  = (peak − v0)/a + (peak − v1)/a + (d − (2 peak² − v0² − v1²)/(2a)) / peak
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.simulation.motion import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedPlan:
+    """N blocks in order: length_mm, speed_mm_s (the highest within each), acceleration_mm_s2, and
+    corner_mm_s, the highest speed at the start of each, 0 where the machine stands before it;
+    each (N,), all above 0 but the corners."""
+
+    length_mm: Floats
+    speed_mm_s: Floats
+    acceleration_mm_s2: Floats
+    corner_mm_s: Floats
+
+    def entries(self, window: int) -> Floats:
+        """(N + 1,) mm/s at the start of each block, and 0 behind the last, for a planner that
+        holds `window` blocks with the one under way."""
+        from camtool.kernels.lookahead import entry_speeds
+
+        before = np.concatenate([[0.0], self.speed_mm_s[:-1]])
+        highest = np.minimum(np.minimum(before, self.speed_mm_s), self.corner_mm_s)
+        square = np.zeros(len(self.length_mm) + 1)
+        gain = 2.0 * self.acceleration_mm_s2 * self.length_mm
+        entry_speeds(gain, highest**2, window, square[:-1])
+        return np.sqrt(square)
+
+    def seconds(self, window: int) -> Floats:
+        """(N,) s that each block takes."""
+        entry = self.entries(window)
+        first, last = entry[:-1], entry[1:]
+        a, d = self.acceleration_mm_s2, self.length_mm
+        peak = np.minimum(self.speed_mm_s, np.sqrt(a * d + 0.5 * (first**2 + last**2)))
+        ramps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * a)
+        steady = np.maximum(d - ramps, 0.0) / peak
+        return np.asarray((2.0 * peak - first - last) / a + steady)
