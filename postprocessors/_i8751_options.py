@@ -7,12 +7,10 @@ docs/dialects/i8751.md explains each, with the lines of the thesis.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Final, Literal
-
-import msgspec
-from msgspec import Meta
+from typing import Final, Literal
 
 from camtool.errors import MachineError
+from camtool.machine.controllers.i8751_pulses import Firmware
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine, Positive
 
@@ -23,11 +21,12 @@ MOST_DWELL_BYTE_S: Final = 255
 """Seconds that one byte of a dwell pair can say (L4136-4147)."""
 
 
-class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How programs look, how near lines are followed, and one reading for each open question.
 
     `tolerance_mm`: how far the dog-leg of a line may stray from it; `arc_tolerance_mm`: how far
-    the chords of an arc may. `plus_backward`: axes ("xz") whose motors turn backward for +.
+    the chords of an arc may. `plus_backward`: axes ("xz") whose motors turn backward for +. The
+    options of `Firmware` are those on pulses.
     """
 
     tolerance_mm: Positive
@@ -38,13 +37,7 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     dwell_mark: Literal["00H", "30H"] = "00H"
     motor_reply: Literal["B", "8"] = "B"
     dwell_reply: Literal["unstated", "M", "none"] = "unstated"
-    high_byte: Literal["256", "255"] = "256"
-    first_pulse: Literal["moves", "repeats"] = "moves"
     z_alone: Literal["plain", "with-step"] = "plain"
-    cruise: Literal["coded", "declared"] = "coded"
-    delay: Literal["thesis", "counted"] = "thesis"
-    start_reload: Annotated[int, Meta(ge=1, le=255)] = 242
-    elbow: Literal["ramps", "flows"] = "ramps"
 
     @property
     def high_byte_steps(self) -> int:
@@ -55,11 +48,6 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def dwell_mark_byte(self) -> int:
         """The first byte of a dwell pair."""
         return int(self.dwell_mark[:-1], 16)
-
-    @property
-    def lost_pulses(self) -> int:
-        """Pulses at the start of each motor's move that do not move it."""
-        return 1 if self.first_pulse == "repeats" else 0
 
     @property
     def most_steps(self) -> int:

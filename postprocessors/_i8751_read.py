@@ -6,7 +6,7 @@ from 0; the END has the block after the last record. Ends are steps times the co
 The machine has one speed, so nothing tells a rapid from a cut. Part zero is the top of the stock:
 in a program that goes below it, what stays at or above it and what rises straight up are rapids,
 all else are lines. Their feed is the way along the line over the controller's time for it, ramps
-and dog-leg included (`_i8751_times`).
+and dog-leg included.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from camtool.errors import ProgramError
 from camtool.findings import Code, Finding, Severity
+from camtool.machine.controllers.i8751_pulses import PulseTimes
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -24,7 +25,6 @@ from ._i8751_faults import ByteFault, Decoded
 from ._i8751_listing import ListingReader
 from ._i8751_options import Dialect, dialect_of
 from ._i8751_packets import PacketReader
-from ._i8751_times import StepTimes
 
 Ints = npt.NDArray[np.int64]
 
@@ -73,7 +73,7 @@ def _toolpath(decoded: Decoded, machine: Machine, dialect: Dialect) -> Toolpath:
     ends[before_z, 2] -= steps[record[before_z], 2]
     is_wait = slot % 2 == 1
     kind = np.where(is_wait, np.int64(Kind.DWELL), _kinds(ends, steps[record], slot))
-    feeds = np.column_stack(_feeds(steps, step_mm, StepTimes(dialect)))[record, slot // 2]
+    feeds = np.column_stack(_feeds(steps, step_mm, PulseTimes(dialect)))[record, slot // 2]
     value = np.where(is_wait, waits[record, slot // 2].astype(np.float64), np.nan)
     count = len(record) + 1
     last = at[-1:]
@@ -102,15 +102,15 @@ def _kinds(ends: Ints, steps: Ints, slot: Ints) -> Ints:
 
 
 def _feeds(
-    steps: Ints, step_mm: npt.NDArray[np.float64], times: StepTimes
+    steps: Ints, step_mm: npt.NDArray[np.float64], times: PulseTimes
 ) -> list[npt.NDArray[np.float64]]:
     """Feeds (R,) in X and Y, and in Z, mm/min; NaN where nothing moves."""
     way_xy = np.hypot(*(steps[:, :2] * step_mm[:2]).T)
     way_z = np.abs(steps[:, 2]) * step_mm[2]
     with np.errstate(invalid="ignore", divide="ignore"):
         return [
-            60.0 * way_xy / times.dog_leg_seconds(steps[:, :2]),
-            60.0 * way_z / times.seconds(np.abs(steps[:, 2])),
+            60.0 * way_xy / times.legs_s(steps[:, :2]).sum(axis=1),
+            60.0 * way_z / times.alone_s(steps[:, 2]),
         ]
 
 

@@ -1,0 +1,128 @@
+"""Pulses of the Intel 8751: what its firmware makes of steps, and how long it takes.
+
+A delay X between pulses lasts t(X) = (6156·X + 10272)/12 MHz (L3156-3174); counted cycle by cycle
+from the listing (L3126-3144) it is (6120·X + 8196)/12 MHz. A run of less than 90 pulses has the
+start delay throughout; a longer one takes 45 pulses to speed up, each with a delay of 5 less, and
+45 to slow down again (L3197-3245). That leaves 17 (11H) for the cruise, 104 Hz by the equation,
+while the authors speak of 70 Hz and of 2.46 ms less at each pulse: "declared".
+
+The motors of X and Y run together for as many pulses as the smaller of their counts, and then the
+other one goes on alone (L4683-4705). Both are routines of their own (L4768-4873).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+from msgspec import Meta
+
+from camtool.machine.loader import convert
+from camtool.machine.model import Machine
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+CLOCK_HZ: Final = 12e6
+"""The controller's crystal (L2993)."""
+
+DELAY_PERIODS: Final = {"thesis": (6156.0, 10272.0), "counted": (6120.0, 8196.0)}
+"""Periods of the crystal in a delay X: a·X + b."""
+
+RAMP_PULSES: Final = 45
+"""Pulses of the ramp, up and down (L3199-3203)."""
+
+RAMP_RELOAD: Final = 5
+"""What each pulse of the ramp takes off the delay (L3213-3236)."""
+
+DECLARED_HZ: Final = 70.0
+"""The rate of pulses that the thesis declares for the cruise (L3187-3191)."""
+
+BURST_PULSES: Final = 255
+"""Pulses of a burst: one unit of PH where `high_byte` is "255" (L5039)."""
+
+
+class Firmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One reading for each question on pulses that the thesis leaves open: keys of `[dialect]`.
+
+    `high_byte`: steps of one unit of PH (L4121-4127), or bursts with ramps of their own (L5039).
+    `first_pulse`: whether the first pulse of a motor's move is the last one again (L4556-4566).
+    `cruise`: the delay that is left, or the rate that is declared. `delay`: the equation, or the
+    cycles of the listing. `start_reload`: F2H, L3171-3180. `elbow`: whether the motor that goes
+    on alone begins a ramp anew.
+    """
+
+    high_byte: Literal["256", "255"] = "256"
+    first_pulse: Literal["moves", "repeats"] = "moves"
+    cruise: Literal["coded", "declared"] = "coded"
+    delay: Literal["thesis", "counted"] = "thesis"
+    start_reload: Annotated[int, Meta(ge=1, le=255)] = 242
+    elbow: Literal["ramps", "flows"] = "ramps"
+
+    @property
+    def lost_pulses(self) -> int:
+        """Pulses at the start of each motor's move that do not move it."""
+        return 1 if self.first_pulse == "repeats" else 0
+
+    def pulses(self, steps: Ints) -> Ints:
+        """Pulses that steps of either sign take, of any shape."""
+        return np.where(steps != 0, np.abs(steps) + self.lost_pulses, 0)
+
+
+def firmware_of(machine: Machine) -> Firmware:
+    """The options of the machine's `[dialect]`, as they are where it has none of them.
+
+    MachineError names the key that does not fit.
+    """
+    known = {field.name for field in msgspec.structs.fields(Firmware)}
+    table = {key: value for key, value in machine.dialect.items() if key in known}
+    return convert(table, Firmware, machine.target.name, "dialect")
+
+
+class PulseTimes:
+    """Seconds for counts of steps."""
+
+    def __init__(self, firmware: Firmware) -> None:
+        self._firmware = firmware
+        each, always = DELAY_PERIODS[firmware.delay]
+        reloads = firmware.start_reload - RAMP_RELOAD * np.arange(RAMP_PULSES + 1)
+        periods = (each * np.maximum(reloads, 1) + always) / CLOCK_HZ
+        if firmware.cruise == "declared":
+            periods = np.linspace(periods[0], 1.0 / DECLARED_HZ, RAMP_PULSES + 1)
+        self.periods_s: Floats = periods
+        """(46,) s between pulses: the ramp up, and the cruise."""
+        self._ramp_s = float(periods[:-1].sum())
+
+    def alone_s(self, steps: Ints) -> Floats:
+        """(N,) s for moves of one motor by `steps` (N,)."""
+        return self._run_s(self._firmware.pulses(steps))
+
+    def legs_s(self, steps: Ints) -> Floats:
+        """(N, 2) s for records of `steps` (N, 2): both motors together, and one alone.
+
+        Where one ramp serves both ("flows"), each has the part of the time that it has of the
+        pulses.
+        """
+        pulses = self._firmware.pulses(steps)
+        together, most = pulses.min(axis=1), pulses.max(axis=1)
+        both = self._run_s(together)
+        if self._firmware.elbow == "ramps":
+            return np.column_stack([both, self._run_s(most - together)])
+        whole = self._run_s(most)
+        both = whole * together / np.maximum(most, 1)
+        return np.column_stack([both, whole - both])
+
+    def _run_s(self, pulses: Ints) -> Floats:
+        """(N,) s for runs of pulses."""
+        if self._firmware.high_byte == "256":
+            return self._burst_s(pulses)
+        bursts = np.maximum(pulses - 1, 0) // BURST_PULSES
+        burst_s = self._burst_s(np.array([BURST_PULSES]))
+        return np.asarray(bursts * burst_s + self._burst_s(pulses - BURST_PULSES * bursts))
+
+    def _burst_s(self, pulses: Ints) -> Floats:
+        """(N,) s with one ramp up and one down, from 90 pulses on."""
+        ramped = 2.0 * self._ramp_s + (pulses - 2 * RAMP_PULSES) * self.periods_s[-1]
+        return np.asarray(np.where(pulses < 2 * RAMP_PULSES, pulses * self.periods_s[0], ramped))

@@ -1,0 +1,112 @@
+"""The controller on the Intel 8751: records by the dog-leg, and the ramps of its pulses.
+
+What it does with a row of the toolpath:
+
+1. Ends go to the nearest coded step of each axis; the controller itself knows only the steps from
+   where it stands (L5246-5254), so nothing is rounded twice.
+2. X and Y step together as often as the one with fewer steps, then the other one goes on alone
+   (L4683-4705); Z moves after them (L4204-4222). Each of the three is a leg.
+3. Each leg takes its pulses' time with their ramps: `camtool.machine.controllers.i8751_pulses`,
+   where the options of `[dialect]` say which reading of the thesis is meant.
+
+It issues nothing at reversals; compensation in a machine file would be steps at the start rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from camtool.errors import ProgramError
+from camtool.kernels.lattice import to_steps
+from camtool.machine.controllers.i8751_pulses import PulseTimes, firmware_of
+from camtool.machine.model import Machine
+from camtool.simulation.legs import LegRun, Legs, Standing
+from camtool.simulation.legs_rows import check_rows, coded_steps_mm, place, rows_up_to_end, waits_s
+from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.simulation.options import Options
+from camtool.toolpath.moves import Toolpath
+
+ROWS_AT_ONCE = 1 << 14
+"""Rows whose legs are worked out together: some 5 MB."""
+
+
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.models.ControllerModel`."""
+    _check(toolpath, machine)
+    count = rows_up_to_end(toolpath)
+    times = PulseTimes(firmware_of(machine))
+    points = np.concatenate([toolpath.start[None, :], toolpath.end[:count]])
+    at = _in_steps(points, machine)
+    standing = Standing(at[0], waits_s(toolpath, count), float(times.periods_s[0]))
+    return LegRun(standing, machine, options).run(_blocks(np.diff(at, axis=0), times))
+
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The same with start and ends at their nearest steps. ProgramError for arcs and homing."""
+    _check(toolpath, machine)
+    step_mm = coded_steps_mm(machine)
+    return replace(
+        toolpath,
+        start=_in_steps(toolpath.start[None, :], machine)[0] * step_mm,
+        end=_in_steps(toolpath.end, machine) * step_mm,
+    )
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A step: every pulse is a sample."""
+    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+
+
+def interpolation(machine: Machine, options: Options) -> str:
+    """A diagonal and the rest along an axis; there are no arcs."""
+    return "dog-leg"
+
+
+def assumptions(machine: Machine) -> tuple[str, ...]:
+    """What the times take for granted."""
+    firmware = firmware_of(machine)
+    periods = PulseTimes(firmware).periods_s
+    elbow = "each leg of a dog-leg has" if firmware.elbow == "ramps" else "a dog-leg has"
+    delay = "its listing's cycles" if firmware.delay == "counted" else "the thesis's equation"
+    return (
+        f"pulses start at {1.0 / periods[0]:.2f} Hz and run at {1.0 / periods[-1]:.1f} Hz "
+        f"(dialect.cruise, dialect.start_reload), by {delay} (dialect.delay)",
+        f"{elbow} a ramp of its own, from 90 pulses on (dialect.elbow)",
+        "the steps of the controller's own arithmetic take no time",
+    )
+
+
+def _check(toolpath: Toolpath, machine: Machine) -> None:
+    check_rows(toolpath, machine)
+    arcs = toolpath.is_arc[: rows_up_to_end(toolpath)]
+    if arcs.any():
+        raise ProgramError(
+            "this controller has no arcs",
+            where=place(toolpath, int(arcs.argmax())),
+            mend="write them as lines",
+        )
+
+
+def _in_steps(points: Floats, machine: Machine) -> Ints:
+    """Points (N, 3) mm in steps."""
+    columns = [to_steps(points[:, at], axis.coded_step_mm) for at, axis in enumerate(machine.axes)]
+    return np.column_stack(columns)
+
+
+def _blocks(steps: Ints, times: PulseTimes) -> Iterator[Legs]:
+    """The legs of rows of `steps` (R, 3): X and Y together, one of them alone, Z."""
+    for low in range(0, len(steps), ROWS_AT_ONCE):
+        moved = steps[low : low + ROWS_AT_ONCE]
+        xy = moved[:, :2]
+        size, sense = np.abs(xy), np.sign(xy)
+        together = size.min(axis=1, keepdims=True)
+        way = np.zeros((len(moved), 3, 3), dtype=np.int64)
+        way[:, 0, :2] = sense * together
+        way[:, 1, :2] = sense * (size - together)
+        way[:, 2, 2] = moved[:, 2]
+        seconds = np.column_stack([times.legs_s(xy), times.alone_s(moved[:, 2])])
+        row, leg = np.nonzero(way.any(axis=2))
+        yield Legs(low + row, way[row, leg], seconds[row, leg])

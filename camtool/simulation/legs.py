@@ -1,0 +1,128 @@
+"""The motion of controllers whose every move is a sequence of straight legs of whole steps.
+
+    legs of a program, block by block ─legs_fill─▶ commanded ─Mechanics─▶ slides, in chunks
+
+A sample is the position after a pass of the controller's loop, which moves at least one axis.
+Memory grows with the legs that are given at a time, not with their steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.kernels.legs import legs_fill
+from camtool.machine.model import Machine
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, Ledger
+from camtool.simulation.options import Options
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """L legs, each of which goes on from where the one before ended: row (L,) of the toolpath,
+    ascending; way (L, 3) steps, none of them all 0; seconds (L,) that it takes."""
+
+    row: Ints
+    way: Ints
+    seconds: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What is known of all R rows up to the end of the program: `start` (3,) steps where the
+    first begins; waits (R,) s of those that do not move; `compensation_s` of each step that is
+    issued at a reversal."""
+
+    start: Ints
+    waits: Floats
+    compensation_s: float
+
+
+class LegRun:
+    """One run of legs."""
+
+    def __init__(self, standing: Standing, machine: Machine, options: Options) -> None:
+        self._standing, self._position = standing, standing.start
+        self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+        self._mechanics = Mechanics(machine, standing.start * self._step_mm, options.effects)
+        self._chunk_steps = options.chunk_steps
+        self._row = -1  # the last row that is in a ledger
+
+    def run(self, blocks: Iterable[Legs]) -> Iterator[Chunk]:
+        """The chunks of all legs and of all rows."""
+        for legs in blocks:
+            yield from self._block(legs)
+        rows = np.arange(self._row + 1, len(self._standing.waits))
+        if len(rows):
+            ledger = _still(rows, self._standing.waits[rows])
+            yield Chunk(np.empty(0, dtype=np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
+
+    def _block(self, legs: Legs) -> Iterator[Chunk]:
+        first = np.concatenate([[0], np.cumsum(np.abs(legs.way).max(axis=1, initial=0))])
+        begin = self._position + np.cumsum(legs.way, axis=0) - legs.way
+        for low in range(0, int(first[-1]), self._chunk_steps):
+            high = min(low + self._chunk_steps, int(first[-1]))
+            commanded = np.empty((high - low, 3))
+            legs_fill(low, first, begin, legs.way, self._step_mm, commanded)
+            yield self._chunk(legs, _Share(first, low, high), commanded)
+        self._position = self._position + legs.way.sum(axis=0)
+
+    def _chunk(self, legs: Legs, share: _Share, commanded: Floats) -> Chunk:
+        """The samples of a window, and what the rows up to its last one did in it."""
+        leg_row = legs.row[share.legs]
+        turn = np.flatnonzero(np.diff(leg_row, prepend=-1))
+        moving = leg_row[turn]
+        offsets = np.append(np.cumsum(share.passes)[turn] - share.passes[turn], len(commanded))
+        slide, reversals = self._mechanics.follow(commanded, offsets)
+        rows = np.arange(self._row + (0 if moving[0] == self._row else 1), moving[-1] + 1)
+        self._row = int(moving[-1])
+        ledger = _still(rows, self._standing.waits[rows])
+        here = moving - rows[0]
+        added = reversals @ self._mechanics.compensation_steps * self._standing.compensation_s
+        ledger.compensation_s[here] = added
+        ledger.duration_s[here] = np.add.reduceat(share.part(legs.seconds), turn) + added
+        ledger.iterations[here] = np.diff(offsets)
+        ledger.steps[here] = np.add.reduceat(share.steps(legs.way), turn, axis=0)
+        ledger.reversals[here] = reversals
+        return Chunk(np.repeat(moving, np.diff(offsets)), commanded, slide, ledger)
+
+
+class _Share:
+    """The part of each leg that lies in the window low:high of all passes."""
+
+    def __init__(self, first: Ints, low: int, high: int) -> None:
+        begin = int(np.searchsorted(first, low, side="right")) - 1
+        end = int(np.searchsorted(first, high, side="left"))
+        self.legs = slice(begin, end)
+        edges = first[begin : end + 1]
+        self._whole = np.diff(edges)
+        self._from = np.maximum(low - edges[:-1], 0)
+        self._to = np.minimum(high - edges[:-1], self._whole)
+        self.passes: Ints = self._to - self._from
+        """(J,) passes of each of the legs in the window."""
+
+    def part(self, seconds: Floats) -> Floats:
+        """(J,) s of legs' `seconds` (L,) that fall in the window."""
+        return np.asarray(seconds[self.legs] * (self.passes / self._whole))
+
+    def steps(self, way: Ints) -> Ints:
+        """(J, 3) steps of legs by `way` (L, 3) that fall in the window; see the kernel."""
+        size, whole = np.abs(way[self.legs]), self._whole[:, None]
+        return np.asarray(self._to[:, None] * size // whole - self._from[:, None] * size // whole)
+
+
+def _still(rows: Ints, waits: Floats) -> Ledger:
+    """A ledger of rows that only wait."""
+    count = len(rows)
+    return Ledger(
+        row=rows,
+        duration_s=waits.copy(),
+        compensation_s=np.zeros(count),
+        iterations=np.zeros(count, dtype=np.int64),
+        steps=np.zeros((count, 3), dtype=np.int64),
+        reversals=np.zeros((count, 3), dtype=np.int64),
+        ended=np.ones(count, dtype=np.bool_),
+    )

@@ -1,0 +1,207 @@
+"""The controller of ValCNC on the PIC18F4550: lines by its counter, arcs as lines.
+
+What it does with a row of the toolpath:
+
+1. A coordinate becomes steps: the nearest ones, or those that are whole (`controller.rounding`);
+   by itself, or as the difference to the one before (`controller.counting`), whose rests then
+   add up (L1226, L1334: neither is said).
+2. A line steps the axis with more steps at a constant rate, and the other one whenever the sum of
+   its steps reaches those (CUENTA, L1234, Tabla 8). Z has no part in that; where a row moves Z
+   along with X or Y (dialect.z_order "together"), it is counted in the same way.
+3. An arc is drawn as lines to points on the circle through its start (L1266-1330), see
+   `camtool.kernels.valcnc_arcs`. It ends where its angle leads, and the next row begins there.
+4. Every pass takes one delay of 166.667 µs (L1336): there are no ramps, feeds or faster rapids.
+
+It issues nothing at reversals; compensation in a machine file would be steps at the same rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from camtool.errors import ProgramError
+from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
+from camtool.kernels.valcnc_arcs import arc_angles
+from camtool.machine.controllers import ValcncController
+from camtool.machine.model import Machine
+from camtool.simulation import path
+from camtool.simulation.legs import LegRun, Legs, Standing
+from camtool.simulation.legs_rows import (
+    MAX_STEPS,
+    check_rows,
+    coded_steps_mm,
+    place,
+    rows_up_to_end,
+    waits_s,
+)
+from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.simulation.options import Options
+from camtool.toolpath.moves import Kind, Toolpath
+
+PIECES_AT_ONCE = 1 << 14
+"""Lines, those of arcs too, that are worked out together: some 5 MB."""
+
+PIECE_EPS = 1e-9
+"""A part of a piece by which an arc may be longer than whole pieces, by rounding alone."""
+
+
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.models.ControllerModel`."""
+    pieces = _Pieces(toolpath, machine)
+    period_s = 1.0 / _controller(machine).step_rate_hz
+    waits = waits_s(toolpath, rows_up_to_end(toolpath))
+    standing = Standing(pieces.in_steps(toolpath.start), waits, period_s)
+    return LegRun(standing, machine, options).run(pieces.legs())
+
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The moves with their ends on whole steps, and arcs about centres as far from both.
+
+    ProgramError for what the controller cannot follow.
+    """
+    pieces = _Pieces(toolpath, machine)
+    if _controller(machine).rounding == "nearest":
+        return path.held(toolpath, machine)
+    step_mm = coded_steps_mm(machine)
+    start, end = (pieces.in_steps(point) * step_mm for point in (toolpath.start, toolpath.end))
+    whole = replace(toolpath, start=start, end=end)
+    # Arcs of less than a step: their ends may have become one point, and they a circle.
+    closed = (whole.end == whole.starts)[:, :2].all(axis=1) & (np.abs(toolpath.sweeps()) < np.pi)
+    lost = toolpath.is_arc & closed
+    kind = np.where(lost, np.int64(Kind.LINE), whole.kind)
+    centre = np.where(lost[:, None], np.nan, whole.centre)
+    return path.held(replace(whole, kind=kind, centre=centre), machine)
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A step: every pass is a sample."""
+    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+
+
+def interpolation(machine: Machine, options: Options) -> str:
+    """Lines by the counter, arcs by lines."""
+    return "counter"
+
+
+def assumptions(machine: Machine) -> tuple[str, ...]:
+    """What the times and the path take for granted."""
+    controller = _controller(machine)
+    pieces = f"pieces of {controller.arc_segment_mm:g} mm (controller.arc_segment_mm)"
+    if controller.arc_segments is not None:
+        pieces = f"{controller.arc_segments} pieces each (controller.arc_segments)"
+    return (
+        f"the axis with more steps makes {controller.step_rate_hz:g} a second from rest to rest "
+        "(controller.step_rate_hz): no ramps, no steps lost",
+        f"arcs are drawn in {pieces}",
+        "the controller's own arithmetic takes no time",
+    )
+
+
+def _controller(machine: Machine) -> ValcncController:
+    return cast(ValcncController, machine.controller)
+
+
+class _Pieces:
+    """The lines of a toolpath: one for each straight row, several for each arc."""
+
+    def __init__(self, toolpath: Toolpath, machine: Machine) -> None:
+        check_rows(toolpath, machine)
+        self._controller = _controller(machine)
+        self._step_mm = coded_steps_mm(machine)
+        count = rows_up_to_end(toolpath)
+        self._start, self._end = toolpath.start, toolpath.end[:count]
+        self._arcs = self._angles(toolpath, count)
+        self._count = np.where(toolpath.is_motion[:count], 1, 0)
+        is_arc = toolpath.is_arc[:count]
+        self._count[is_arc] = self._parts(self._arcs[is_arc])
+        self._first = np.concatenate([[0], np.cumsum(self._count)])
+
+    def in_steps(self, points: Floats) -> Ints:
+        """Coordinates, or differences of them, (..., 3) mm in steps."""
+        if self._controller.rounding == "nearest":
+            columns = [to_steps(points[..., at], self._step_mm[at]) for at in range(3)]
+            return np.stack(columns, axis=-1)
+        return np.asarray(np.trunc(points / self._step_mm + self._guard(points)).astype(np.int64))
+
+    def legs(self) -> Iterator[Legs]:
+        """The legs, some thousands at a time."""
+        period_s = 1.0 / self._controller.step_rate_hz
+        before, at = self._start[None, :], self.in_steps(self._start[None, :])
+        for low in range(0, int(self._first[-1]), PIECES_AT_ONCE):
+            row, points = self._points(low, min(low + PIECES_AT_ONCE, int(self._first[-1])))
+            if self._controller.counting == "coordinates":
+                places = np.concatenate([at, self.in_steps(points)])
+                at, way = places[-1:], np.diff(places, axis=0)
+            else:
+                way = self.in_steps(np.diff(np.concatenate([before, points]), axis=0))
+                before = points[-1:]
+            passes = np.abs(way).max(axis=1)
+            moves = np.flatnonzero(passes)
+            yield Legs(row[moves], way[moves], passes[moves] * period_s)
+
+    def _points(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row (J,) and end (J, 3) mm of the pieces low:high."""
+        index = np.arange(low, high)
+        row = np.searchsorted(self._first, index, side="right") - 1
+        part, parts = index - self._first[row] + 1, self._count[row]
+        points = self._end[row]
+        curved = self._arcs[row, 2] > 0.0
+        if self._controller.arc_end == "programmed":
+            curved &= part < parts
+        x, y, radius, theta, alpha = self._arcs[row[curved]].T
+        angle = theta + alpha * (part[curved] / parts[curved])
+        points[curved, 0] = x + radius * np.cos(angle)
+        points[curved, 1] = y + radius * np.sin(angle)
+        return row, points
+
+    def _angles(self, toolpath: Toolpath, count: int) -> Floats:
+        """(count, 5) of `arc_angles`; ProgramError for an arc that has none."""
+        angles = np.zeros((count, 5))
+        kind = toolpath.kind[:count]
+        turn = (kind == Kind.ARC_CCW).astype(np.int64) - (kind == Kind.ARC_CW)
+        if not turn.any():
+            return angles
+        ends = np.concatenate([toolpath.start[None, :], self._end])
+        self._check_arcs(toolpath, turn != 0)
+        offset = np.where(turn[:, None] != 0, toolpath.centre[:count] - ends[:-1, :2], 0.0)
+        computed = self._controller.arc_end == "computed"
+        bad = int(arc_angles(turn, ends[:, :2].copy(), offset, computed, angles))
+        if bad >= 0:
+            raise ProgramError(
+                "an arc about its own start, or with a chord longer than its diameter",
+                where=place(toolpath, bad),
+                mend="give I and J from the start to the centre",
+            )
+        return angles
+
+    def _check_arcs(self, toolpath: Toolpath, arcs: np.ndarray) -> None:
+        """ProgramError for arcs that it cannot count."""
+        rows = np.flatnonzero(arcs)
+        centre = toolpath.centre[rows]
+        reach = np.abs(centre) + np.abs(centre - toolpath.starts[rows, :2]).max(axis=1)[:, None]
+        with np.errstate(invalid="ignore"):
+            countable = (reach <= MAX_STEPS * self._step_mm[:2]).all(axis=1)
+        rises = toolpath.end[rows, 2] != toolpath.starts[rows, 2]
+        unequal = np.full(len(rows), self._step_mm[0] != self._step_mm[1])
+        for bad, message in (
+            (~countable, "an arc without a centre, or far beyond all that can be counted"),
+            (rises, "Z moves along with an arc"),
+            (unequal, "on axes of unequal steps an arc is an ellipse"),
+        ):
+            if bad.any():
+                raise ProgramError(message, where=place(toolpath, int(rows[bad.argmax()])))
+
+    def _parts(self, arcs: Floats) -> Ints:
+        """(J,) pieces of arcs (J, 5)."""
+        if self._controller.arc_segments is not None:
+            return np.full(len(arcs), self._controller.arc_segments)
+        length = arcs[:, 2] * np.abs(arcs[:, 4]) / self._controller.arc_segment_mm
+        return np.maximum(np.ceil(length - PIECE_EPS), 1.0).astype(np.int64)
+
+    @staticmethod
+    def _guard(points: Floats) -> Floats:
+        return np.copysign(HALF_STEP_GUARD, points)
