@@ -32,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from camtool.kernels.deviates import deviate
 from camtool.kernels.inner import inner
 
 Ints = npt.NDArray[np.int64]
@@ -46,12 +47,12 @@ def play_limits(play_mm: float, convention: str, direction: int) -> tuple[float,
 
 
 def play_start(position: float, scale: float, direction: int) -> Floats:
-    """The state (4,) of an axis at rest at `position`, engaged in `direction` ±1.
+    """The state (6,) of an axis at rest at `position`, engaged in `direction` ±1.
 
     Furthest position in the present direction, that direction, compensation added so far, slide
-    in mm.
+    in mm; reversals so far and shift in mm, where the axis scatters.
     """
-    return np.array([position, direction, 0.0, position * scale], dtype=np.float64)
+    return np.array([position, direction, 0.0, position * scale, 0.0, 0.0], dtype=np.float64)
 
 
 @inner
@@ -80,7 +81,7 @@ def play_fill(
     """Slides in mm, `out` (n, 3), for commanded `positions` (n, 3); reversals of each run.
 
     `axes` (3, 5): scale, low and high in mm, compensation, and how far back is a reversal.
-    `states` (3, 4), each of `play_start`, are changed in place, so that the next call goes on.
+    `states` (3, 6), each of `play_start`, are changed in place, so that the next call goes on.
     Run r is offsets[r]:offsets[r+1]; `turns` (R, 3) are its reversals.
     """
     for axis in range(3):
@@ -101,3 +102,46 @@ def play_fill(
             turns[run, axis] = count
         states[axis, 0], states[axis, 1] = furthest, direction
         states[axis, 2], states[axis, 3] = added, slide
+
+
+@njit(cache=True)
+def play_varied_fill(
+    positions: Floats,
+    offsets: Ints,
+    axes: Floats,
+    states: Floats,
+    plays: Floats,
+    shares: Floats,
+    scatter: Floats,
+    seed: int,
+    out: Floats,
+    turns: Ints,
+) -> None:
+    """As `play_fill`, with a play for each sample and axes that scatter.
+
+    `plays` (n, 3) mm take the place of low and high in `axes`, which are shares (2,) of them. At
+    each reversal both flanks of an axis go to a new random place, `scatter` (3,) mm is its
+    standard deviation; the first ones are at 0.
+    """
+    for axis in range(3):
+        scale, compensation, least = axes[axis, 0], axes[axis, 3], axes[axis, 4]
+        furthest, direction = states[axis, 0], states[axis, 1]
+        added, slide = states[axis, 2], states[axis, 3]
+        number, shift = int(states[axis, 4]), states[axis, 5]
+        for run in range(len(turns)):
+            before = number
+            for k in range(offsets[run], offsets[run + 1]):
+                position = positions[k, axis]
+                furthest, direction, reversed_ = turned(position, furthest, direction, least)
+                if reversed_:
+                    added += direction * compensation
+                    shift = scatter[axis] * deviate(seed, axis, number)
+                    number += 1
+                play = plays[k, axis]
+                motor = (position + added) * scale + shift
+                slide = taken_along(slide, motor, shares[0] * play, shares[1] * play)
+                out[k, axis] = slide
+            turns[run, axis] = number - before
+        states[axis, 0], states[axis, 1] = furthest, direction
+        states[axis, 2], states[axis, 3] = added, slide
+        states[axis, 4], states[axis, 5] = number, shift
