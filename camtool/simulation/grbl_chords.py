@@ -148,7 +148,7 @@ class _Chords:
 
     def _heights(self, segments: Ints, arc: Ints) -> Singles:
         """Z of the chords' ends within the arcs: an equal rise added each time."""
-        z = self._begin[arc, 2].copy()
+        z: Singles = self._begin[arc, 2].copy()
         rise = (self._end[:, 2] - self._begin[:, 2]) / segments.astype(np.float32)
         behind = np.cumsum(segments - 1)
         for which in np.flatnonzero((rise != 0.0) & (segments > 1)).tolist():

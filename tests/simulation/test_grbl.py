@@ -1,0 +1,253 @@
+"""grbl from the program to the slides: positions, counts and times."""
+
+import math
+
+import numpy as np
+import pytest
+
+from camtool.errors import MachineError, ProgramError
+from camtool.machine.model import Machine
+from camtool.simulation.options import Options
+from camtool.simulation.simulate import simulate
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+from tests.oracles.gcode_machines import grbl_machine
+from tests.oracles.grbl_run import F, chord_ends, nearest_step, number_as_read, ticks
+from tests.oracles.motion_rows import RowMotion, rows_of
+
+STEP = 0.004
+
+
+def run(path: Toolpath, machine: Machine, **options: int) -> list[RowMotion]:
+    return rows_of(simulate(path, machine, Options(**options)))
+
+
+def seconds(path: Toolpath, machine: Machine) -> list[float]:
+    return [row.duration_s for row in run(path, machine)]
+
+
+def part() -> Toolpath:
+    """Lines in all directions, arcs, helices, events, moves below a step and of none."""
+    builder = ToolpathBuilder()
+    builder.event(Kind.SPINDLE_CW, 1000.0).rapid(0.0, 0.0, 5.0).rapid(3.0, 1.002, 5.0)
+    builder.line(3.0, 1.002, -0.5, feed=60.0).line(3.001, 1.003, -0.5, feed=100.0)
+    builder.line(3.001, 1.003, -0.5, feed=100.0).arc(
+        2.0, 2.002, -0.5, centre=(2.0, 1.002), ccw=True, feed=300.0
+    )
+    builder.arc(2.0, 2.002, -1.0, centre=(2.5, 2.002), ccw=False, feed=200.0)
+    builder.message("half way").line(-1.234, 0.567, -0.25, feed=500.0)
+    builder.event(Kind.DWELL, 0.21).line(-1.234, 0.617, -0.3, feed=20.0)
+    builder.rapid(-1.234, 0.617, 5.0).moved_to(0.0, 0.0, 5.0).event(Kind.HOME_XY)
+    return builder.event(Kind.END).rapid(50.0, 50.0, 5.0).finish()
+
+
+def literal(path: Toolpath) -> list[list[tuple[int, ...]]]:
+    """The step events of each row of a program in three decimals."""
+    rows = []
+    at_mm = tuple(number_as_read(f"{v:.3f}") for v in path.start)
+    at = [nearest_step(v, F(1.0 / STEP)) for v in at_mm]
+    for move in path:
+        events: list[tuple[int, ...]] = []
+        end = tuple(number_as_read(f"{v:.3f}") for v in move.end)
+        targets = []
+        if move.centre is not None:
+            i, j = (
+                number_as_read(f"{c - s:.3f}")
+                for c, s in zip(move.centre, move.start[:2], strict=True)
+            )
+            targets = chord_ends(at_mm, end, (i, j), move.kind == Kind.ARC_CW, 0.002)
+        elif move.kind in (Kind.RAPID, Kind.LINE, Kind.HOME_XY):
+            targets = [end]
+        for target in targets:
+            goal = [nearest_step(v, F(1.0 / STEP)) for v in target]
+            way = (goal[0] - at[0], goal[1] - at[1], goal[2] - at[2])
+            events += [tuple(a + s for a, s in zip(at, tick, strict=True)) for tick in ticks(way)]
+            at, at_mm = goal, end
+        rows.append(events)
+        if move.kind == Kind.END:
+            break
+    return rows
+
+
+@pytest.mark.parametrize("chunk_steps", [1, 7, 1000, 1 << 16])
+def test_motion_is_that_of_the_loop(chunk_steps: int) -> None:
+    wanted = literal(part())
+    found = run(part(), grbl_machine(), chunk_steps=chunk_steps)
+    assert len(found) == len(wanted) == 15
+    before = np.zeros((1, 3))
+    for row, events in zip(found, wanted, strict=True):
+        steps = np.array(events, dtype=np.float64).reshape(-1, 3)
+        assert (row.commanded == steps * STEP).all()
+        assert (row.slide == row.commanded).all()
+        assert row.iterations == len(events)
+        taken = np.abs(np.diff(np.concatenate([before, steps]), axis=0)).sum(axis=0)
+        assert row.steps.tolist() == taken.tolist()
+        before = steps[-1:] if len(steps) else before
+        assert row.ended
+        assert row.compensation_s == 0.0
+
+
+def test_times_do_not_depend_on_chunks() -> None:
+    whole, split = (run(part(), grbl_machine(), chunk_steps=k) for k in (1 << 16, 11))
+    for one, other in zip(whole, split, strict=True):
+        assert other.duration_s == pytest.approx(one.duration_s, abs=1e-12)
+
+
+def test_rounding_does_not_add_up() -> None:
+    builder = ToolpathBuilder()
+    for k in range(1, 1001):
+        builder.line(round(k * 0.001, 3), 0.0, 0.0, feed=100.0)
+    rows = run(builder.finish(), grbl_machine())
+    assert rows[-2].commanded[-1, 0] == pytest.approx(1.0, abs=1e-12)
+    assert sum(int(row.steps[0]) for row in rows) == 250
+    assert sum(len(row.commanded) == 0 for row in rows) == 750
+
+
+def test_one_trapezoid() -> None:
+    """100 mm at 500 mm/min, 10 mm/s²: d/v + v/a."""
+    path = ToolpathBuilder().rapid(100.0, 0.0, 0.0).finish()
+    v = 500.0 / 60.0
+    assert seconds(path, grbl_machine()) == pytest.approx([100.0 / v + v / 10.0])
+
+
+def test_one_triangle() -> None:
+    """2 mm is too short to reach 500 mm/min: 2 √(d/a)."""
+    path = ToolpathBuilder().rapid(2.0, 0.0, 0.0).finish()
+    assert seconds(path, grbl_machine()) == pytest.approx([2.0 * math.sqrt(2.0 / 10.0)])
+
+
+def test_two_axes_share_the_limits() -> None:
+    """At 45° each axis may have its own 500 mm/min and 10 mm/s²."""
+    path = ToolpathBuilder().rapid(100.0, 100.0, 0.0).finish()
+    v, a, d = 500.0 / 60.0 * math.sqrt(2.0), 10.0 * math.sqrt(2.0), 100.0 * math.sqrt(2.0)
+    assert seconds(path, grbl_machine()) == pytest.approx([d / v + v / a])
+
+
+def test_a_rectangle() -> None:
+    """Corners of 90°: v² = a √2 · δ s/(1 − s), s = sin 45°, for a √2 is what both axes give."""
+    builder = ToolpathBuilder()
+    for x, y in ((40.0, 0.0), (40.0, 20.0), (0.0, 20.0), (0.0, 0.0)):
+        builder.line(x, y, 0.0, feed=300.0)
+    machine = grbl_machine()
+    s = math.sqrt(0.5)
+    corner = math.sqrt(10.0 * math.sqrt(2.0) * 0.01 * s / (1.0 - s))
+    v, a = 5.0, 10.0
+
+    def side(d: float, first: float, last: float) -> float:
+        ramps = (2.0 * v**2 - first**2 - last**2) / (2.0 * a)
+        return (2.0 * v - first - last) / a + (d - ramps) / v
+
+    wanted = [side(40, 0, corner), side(20, corner, corner), side(40, corner, corner)]
+    assert seconds(builder.finish(), machine) == pytest.approx([*wanted, side(20, corner, 0)])
+
+
+def circle(radius: float, feed: float = 400.0) -> Toolpath:
+    builder = ToolpathBuilder((radius, 0.0, 0.0))
+    return builder.arc(radius, 0.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=feed).finish()
+
+
+def test_a_circle_takes_its_polygon() -> None:
+    """⌊π r / √(δ(2r − δ))⌋ chords of 2 r sin(π/n); they slow nothing down at this feed. Away
+    from the axis the first and last chords may ramp a little faster than 10 mm/s²."""
+    n = int(math.pi * 10.0 / math.sqrt(0.002 * (20.0 - 0.002)))
+    v = 400.0 / 60.0
+    way = n * 20.0 * math.sin(math.pi / n)
+    fine = ("axes.x.coded_step_mm=0.0001", "axes.y.coded_step_mm=0.0001")
+    found = seconds(circle(10.0), grbl_machine(*fine))[0]
+    assert found == pytest.approx(way / v + v / 10.0, rel=2e-4)
+
+
+def test_the_buffer_bounds_the_speed_on_short_chords() -> None:
+    """With chords of c mm and 15 blocks in the buffer, all but the one under way must suffice to
+    stop: v ≤ √(2 a · 14 c)."""
+    machine = grbl_machine("controller.arc_tolerance_mm=0.00005", "axes.x.coded_step_mm=0.0001",
+                           "axes.y.coded_step_mm=0.0001")  # fmt: skip
+    n = int(math.pi * 10.0 / math.sqrt(0.00005 * (20.0 - 0.00005)))
+    chord = 20.0 * math.sin(math.pi / n)
+    a = 10.0  # along an axis; 14.1 at 45°
+    slow, fast = (math.sqrt(2.0 * k * a * 14.0 * chord) for k in (1.0, math.sqrt(2.0)))
+    found = 20.0 * math.pi / seconds(circle(10.0, feed=480.0), machine)[0]
+    assert fast < 8.0
+    assert 0.9 * slow < found < fast
+
+
+@pytest.mark.parametrize("tolerance", [0.002, 0.02])
+def test_chords_lie_inside_by_their_sagitta_and_the_drift(tolerance: float) -> None:
+    """r (1 − cos(θ/2)), and what twelve turns by the short series lose: a turn shortens the
+    radius by the factor √(1 − θ⁴/12 + θ⁶/36), about 1 − θ⁴/24."""
+    fine = [f"axes.{axis}.coded_step_mm=0.00005" for axis in "xy"]
+    machine = grbl_machine(f"controller.arc_tolerance_mm={tolerance}", *fine)
+    points = run(circle(10.0), machine)[0].commanded
+    radius = np.hypot(points[:, 0], points[:, 1])
+    n = int(math.pi * 10.0 / math.sqrt(tolerance * (20.0 - tolerance)))
+    theta = 2.0 * math.pi / n
+    sagitta = 10.0 * (1.0 - math.cos(0.5 * theta))
+    drift = 12.0 * 10.0 * theta**4 / 24.0
+    assert 0.95 * tolerance < sagitta < 1.05 * tolerance
+    assert 10.0 - radius.min() == pytest.approx(sagitta + drift, abs=0.0001)
+    assert radius.max() < 10.0001
+
+
+def test_events_bring_the_machine_to_rest() -> None:
+    v, a = 5.0, 10.0
+    one = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).line(10.0, 0.0, 0.0, feed=300.0)
+    passing = sum(seconds(one.finish(), grbl_machine()))
+    assert passing == pytest.approx(10.0 / v + v / a)
+    for kind in (Kind.SPINDLE_CW, Kind.SPINDLE_OFF, Kind.TOOL_CHANGE):
+        two = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).event(kind, 1.0)
+        found = seconds(two.line(10.0, 0.0, 0.0, feed=300.0).finish(), grbl_machine())
+        assert sum(found) == pytest.approx(10.0 / v + 2.0 * v / a)
+
+
+def test_a_message_stops_nothing() -> None:
+    two = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).message("on we go")
+    path = two.line(10.0, 0.0, 0.0, feed=300.0).finish()
+    assert sum(seconds(path, grbl_machine())) == pytest.approx(10.0 / 5.0 + 0.5)
+
+
+@pytest.mark.parametrize(("said", "taken"), [(2.0, 2.0), (0.21, 0.25), (0.0, 0.0), (0.001, 0.05)])
+def test_dwells_are_whole_twentieths(said: float, taken: float) -> None:
+    path = ToolpathBuilder().event(Kind.DWELL, said).finish()
+    assert seconds(path, grbl_machine()) == pytest.approx([taken])
+
+
+def test_a_way_back_starts_from_rest() -> None:
+    path = ToolpathBuilder().rapid(2.0, 0.0, 0.0).rapid(0.0, 0.0, 0.0).finish()
+    assert seconds(path, grbl_machine()) == pytest.approx([2.0 * math.sqrt(0.2)] * 2)
+
+
+def test_play_shows_at_reversals() -> None:
+    machine = grbl_machine("axes.x.backlash_mm=0.1")
+    path = ToolpathBuilder().rapid(2.0, 0.0, 0.0).rapid(0.0, 0.0, 0.0).finish()
+    out, back = run(path, machine)
+    assert (out.slide == out.commanded).all()
+    assert back.slide[-1, 0] == pytest.approx(0.1)
+    assert back.reversals.tolist() == [1, 0, 0]
+
+
+def test_radius_0_and_no_rows() -> None:
+    path = ToolpathBuilder().arc(0.0, 0.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=100.0).finish()
+    (row,) = run(path, grbl_machine())
+    assert len(row.commanded) == 0
+    assert row.duration_s == 0.0
+    assert run(ToolpathBuilder().finish(), grbl_machine()) == []
+
+
+def test_positions_at_the_limit() -> None:
+    far = ToolpathBuilder().rapid(2.147e6, 0.0, 0.0).finish()
+    chunk = next(iter(simulate(far, grbl_machine())))
+    assert chunk.commanded[0, 0] == pytest.approx(STEP)
+    with pytest.raises(ProgramError, match="count"):
+        simulate(ToolpathBuilder().rapid(2.148e6, 0.0, 0.0).finish(), grbl_machine())
+
+
+def test_a_compensation_is_refused() -> None:
+    path = ToolpathBuilder().rapid(1.0, 0.0, 0.0).finish()
+    with pytest.raises(MachineError, match="compensates no play"):
+        simulate(path, grbl_machine("axes.y.compensation_mm=0.01"))
+
+
+def test_a_feed_is_needed() -> None:
+    path = ToolpathBuilder().line(1.0, 0.0, 0.0, feed=float("nan")).finish()
+    with pytest.raises(ProgramError, match="without a feed"):
+        simulate(path, grbl_machine())
