@@ -38,10 +38,11 @@ class Residual:
 def residuals(machine: Machine) -> tuple[Residual, Residual]:
     """X and Y of a machine."""
     x, y, _ = machine.axes
-    return _residual(x, machine.controller), _residual(y, machine.controller)
+    return residual(x, machine.controller), residual(y, machine.controller)
 
 
-def _residual(axis: Axis, controller: Controller) -> Residual:
+def residual(axis: Axis, controller: Controller) -> Residual:
+    """One axis of a machine with this controller."""
     from camtool.kernels.play import play_limits
 
     first = 1 if controller.start_direction == "+" else -1
