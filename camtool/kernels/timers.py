@@ -65,7 +65,7 @@ class Counters(NamedTuple):
     its shorter axis fires later than that, their columns (the shorter −1: none), their senses,
     and the times between their steps."""
 
-    count: Ints
+    steps: Ints
     programmed: Floats
     under_way: Ints
 
@@ -85,10 +85,10 @@ def _displacement(axis: int, target: float, sensed: bool, rules: Rules, counters
     """Steps of an axis to its target, which then is where the program is."""
     here = counters.programmed[axis]
     if sensed or rules.from_reached:
-        here = rules.origin[axis] + counters.count[axis] * rules.step_mm[axis]
+        here = rules.origin[axis] + counters.steps[axis] * rules.step_mm[axis]
     counters.programmed[axis] = target
     way = target - here
-    steps = int(math.floor(abs(way) / rules.step_mm[axis] + rules.added))
+    steps: int = math.floor(abs(way) / rules.step_mm[axis] + rules.added)
     return -steps if way < 0.0 else steps
 
 
@@ -124,8 +124,8 @@ def _begin(what: int, target: Floats, half_period: int, rules: Rules, counters: 
 def _run(rules: Rules, counters: Counters, row: int, k: int, issued: Issued) -> int:
     """Let the timers run until the move ends or the samples are full; the samples then filled."""
     left, gap, longer, shorter, sense, short_sense, every, short_every = counters.under_way
-    here = rules.origin + counters.count * rules.step_mm
-    count, short_count = counters.count[longer], counters.count[max(shorter, 0)]
+    here = rules.origin + counters.steps * rules.step_mm
+    count, short_count = counters.steps[longer], counters.steps[max(shorter, 0)]
     while left > 0 and k < len(issued.row):
         fires = shorter < 0 or gap >= 0
         if shorter >= 0 and gap <= 0:
@@ -141,11 +141,11 @@ def _run(rules: Rules, counters: Counters, row: int, k: int, issued: Issued) -> 
             issued.commanded[k, axis] = here[axis]
         issued.row[k] = row
         k += 1
-    issued.steps[row, longer] += abs(count - counters.count[longer])
-    counters.count[longer] = count
+    issued.steps[row, longer] += abs(count - counters.steps[longer])
+    counters.steps[longer] = count
     if shorter >= 0:
-        issued.steps[row, shorter] += abs(short_count - counters.count[shorter])
-        counters.count[shorter] = short_count
+        issued.steps[row, shorter] += abs(short_count - counters.steps[shorter])
+        counters.steps[shorter] = short_count
     counters.under_way[0], counters.under_way[1] = left, gap
     return k
 
@@ -161,9 +161,7 @@ def timers_fill(
     k, move = 0, first
     while move < len(moves.what):
         if counters.under_way[0] == 0:
-            _begin(
-                moves.what[move], moves.target[move], moves.half_period[move], rules, counters
-            )
+            _begin(moves.what[move], moves.target[move], moves.half_period[move], rules, counters)
         row, before = moves.row[move], counters.under_way[0]
         k = _run(rules, counters, row, k, issued)
         done = before - counters.under_way[0]

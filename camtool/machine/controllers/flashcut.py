@@ -30,4 +30,4 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     half_periods_per_step: Annotated[int, Meta(ge=1, le=2)] = 2
     rounding: Literal["nearest", "truncate"] = "nearest"
     goes_on_from: Literal["programmed", "reached"] = "programmed"
-    chords_per_turn: Annotated[int, Meta(ge=4, le=10_000)] = 360
+    chords_per_turn: Annotated[int, Meta(ge=4, le=10_000)] = 72

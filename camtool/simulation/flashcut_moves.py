@@ -1,0 +1,162 @@
+"""Rows of a toolpath as the displacements that the parallel-port machine's program makes of them.
+
+line, rapid     one of X and Y, and one of Z where Z changes (G01 never has both, L980-992)
+arc             chords of one angle each, from its start to its programmed end
+homing          Y, then X, each alone until its sensor; Z alone
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import MachineError, ProgramError
+from camtool.kernels.lattice import HALF_STEP_GUARD
+from camtool.kernels.timers import HOME_X, HOME_Y, HOME_Z, XY, Moves, Z
+from camtool.machine.controllers import FlashcutController
+from camtool.machine.model import Machine
+from camtool.simulation.motion import Floats, Ints
+from camtool.simulation.path import check_positions, placed
+from camtool.toolpath.moves import Kind, Toolpath
+
+MOST_LONG = (1 << 31) - 1
+"""The largest of the controller's whole numbers (timeGetTime is a Long, L1334-1340): half periods
+of more milliseconds are refused, and positions and radii of more than a quarter as many steps, so
+that no displacement between two of them has more."""
+
+CHORD_GUARD = 1e-9
+"""Part of a chord: an arc longer than whole chords by less has no further one."""
+
+
+def flashcut_controller(machine: Machine) -> FlashcutController:
+    """The machine's controller, which must be this PC; MachineError when it is not."""
+    if not isinstance(machine.controller, FlashcutController):
+        raise MachineError(
+            f"{machine.target.name} needs the controller flashcut",
+            where="table [controller], key model",
+            mend='write model = "flashcut"',
+        )
+    return machine.controller
+
+
+def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The same with homing at machine zero, and events where the moves before them ended.
+
+    ProgramError for arcs without a centre and positions of more steps than can be counted.
+    """
+    check_positions(toolpath, machine)
+    most = 0.25 * MOST_LONG * np.array([axis.coded_step_mm for axis in machine.axes])
+    far = (np.abs(toolpath.end) > most).any(axis=1) | (np.abs(toolpath.start) > most).any()
+    spoke = np.where(toolpath.is_arc[:, None], toolpath.centre - toolpath.starts[:, :2], 0.0)
+    far |= (np.abs(spoke) > most[:2]).any(axis=1)
+    if far.any():
+        raise ProgramError(
+            "a position is beyond all that the controller can count",
+            where=row_place(toolpath, far),
+        )
+    return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
+
+
+def half_periods(toolpath: Toolpath, machine: Machine, step_mm: float) -> Ints:
+    """(N,) ms of the longer axis of each row, for steps of `step_mm`.
+
+    A step takes so many half periods P of the feed's time, each a millisecond late:
+
+        60 step / feed = parts (P + 1) / 1000,      the nearest whole P, never a shorter one
+
+    Rapids have the shortest. ProgramError for moves without a feed, or with one too slow.
+    """
+    controller = flashcut_controller(machine)
+    parts, shortest = controller.half_periods_per_step, controller.half_period_ms
+    feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        no_feed = ~(feed > 0.0) | (toolpath.is_feed & np.isinf(feed))
+        wanted = np.maximum(60_000.0 * step_mm / (feed * parts) - 1.0, float(shortest))
+        slow = ~no_feed & (wanted >= MOST_LONG)
+    if no_feed.any():
+        raise ProgramError(
+            "a move at a feed without a feed above 0",
+            where=row_place(toolpath, no_feed),
+            mend="give it one (F)",
+        )
+    if slow.any():
+        raise ProgramError(
+            f"a feed of {float(feed[slow][0]):g} mm/min is a step in weeks",
+            where=row_place(toolpath, slow),
+            mend="give it a higher one (F)",
+        )
+    return np.floor(wanted + (0.5 + HALF_STEP_GUARD)).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class MoveTable:
+    """How many moves each row of a placed toolpath makes, and the moves of any window of rows."""
+
+    toolpath: Toolpath
+    starts: Floats
+    sweeps: Floats
+    chords: Ints
+    rises: npt.NDArray[np.bool_]
+    half_period_xy: Ints
+    half_period_z: Ints
+
+    @classmethod
+    def of(cls, toolpath: Toolpath, machine: Machine) -> MoveTable:
+        """The table of a toolpath that `followed` gave."""
+        kind, starts, sweeps = toolpath.kind, toolpath.starts, toolpath.sweeps()
+        per_turn = flashcut_controller(machine).chords_per_turn
+        homes_xy, homes_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
+        rises = homes_z | (toolpath.is_motion & (toolpath.end[:, 2] != starts[:, 2]))
+        along = toolpath.is_motion & ((toolpath.end[:, :2] != starts[:, :2]).any(axis=1) | ~rises)
+        chords = np.ceil(np.abs(sweeps) * (per_turn / (2.0 * np.pi)) - CHORD_GUARD)
+        parts = np.where(toolpath.is_arc, np.maximum(chords, 1.0), along + 2.0 * homes_xy)
+        x, y, z = (axis.coded_step_mm for axis in machine.axes)
+        return cls(
+            toolpath,
+            starts,
+            sweeps,
+            parts.astype(np.int64),
+            rises,
+            half_periods(toolpath, machine, max(x, y)),
+            half_periods(toolpath, machine, z),
+        )
+
+    @property
+    def moves_of_row(self) -> Ints:
+        """(N,) moves of each row."""
+        return self.chords + self.rises
+
+    def moves(self, low: int, high: int) -> Moves:
+        """The moves of the rows low:high; `Moves.row` counts from `low`."""
+        count = self.moves_of_row[low:high]
+        row = low + np.repeat(np.arange(high - low), count)
+        part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        path, chords = self.toolpath, self.chords[row]
+        homes = path.kind[row] >= Kind.HOME_XY
+        upward = part == chords
+        what = np.where(upward, np.where(homes, HOME_Z, Z), XY)
+        what[homes & ~upward] = np.where(part[homes & ~upward] == 0, HOME_Y, HOME_X)
+        target = path.end[row].copy()
+        inner = np.flatnonzero(path.is_arc[row] & (part < chords - 1))
+        target[inner, :2] = self._on_arc(row[inner], (part[inner] + 1) / chords[inner])
+        half_period = np.where(upward, self.half_period_z[row], self.half_period_xy[row])
+        return Moves(what, target, half_period, row - low)
+
+    def _on_arc(self, row: Ints, share: Floats) -> Floats:
+        """(J, 2) mm at these shares of the arcs' sweeps, as far from the centre as the start
+        is: r = hypot(I, J) from the angle of the start on (L1378)."""
+        centre = self.toolpath.centre[row]
+        spoke = self.starts[row, :2] - centre
+        radius = np.hypot(spoke[:, 0], spoke[:, 1])
+        angle = np.arctan2(spoke[:, 1], spoke[:, 0]) + share * self.sweeps[row]
+        turned = np.column_stack([np.cos(angle), np.sin(angle)])
+        return np.asarray(centre + radius[:, None] * turned)
+
+
+def row_place(toolpath: Toolpath, bad: npt.ArrayLike) -> str:
+    """The block (from 1) that the first bad row was read from, or the row when planned."""
+    row = int(np.argmax(bad))
+    block = int(toolpath.block[row])
+    return f"block {block + 1}" if block >= 0 else f"move {row}"
