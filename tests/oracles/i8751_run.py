@@ -7,10 +7,12 @@ routines RUT1, RUT2 and GIRA1 (L4683-4742, L4768-4873). Nothing here is shared w
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 
 CRYSTAL_HZ = 12e6
 
 
+@cache
 def listing_periods(x: int) -> int:
     """Periods of the crystal that the delay routine takes, instruction by instruction."""
     periods = 12  # MOV R0,#0AAH
