@@ -7,7 +7,7 @@ import pytest
 
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
-from camtool.simulation.options import Options
+from camtool.simulation.options import CHUNK_STEPS, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -18,8 +18,8 @@ from tests.oracles.motion_rows import RowMotion, rows_of
 STEP = 0.004
 
 
-def run(path: Toolpath, machine: Machine, **options: int) -> list[RowMotion]:
-    return rows_of(simulate(path, machine, Options(**options)))
+def run(path: Toolpath, machine: Machine, chunk_steps: int = CHUNK_STEPS) -> list[RowMotion]:
+    return rows_of(simulate(path, machine, Options(chunk_steps=chunk_steps)))
 
 
 def seconds(path: Toolpath, machine: Machine) -> list[float]:
