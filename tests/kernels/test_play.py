@@ -1,6 +1,6 @@
 """The play operator and the compensation against a literal loop and against mathematics."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import pytest
 from camtool.kernels.direct_search import direct_search_path
 from camtool.kernels.play import play_fill, play_limits, play_start
 from tests.oracles import controllers as twins
+from tests.oracles.mechanics import PulsedAxis
 
 STEP = 0.00014
 
@@ -114,6 +115,28 @@ def test_circle_with_play_is_four_shifted_quarters() -> None:
     )
     assert slide == pytest.approx(want, abs=1e-15)
     assert reversals == 2
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 0), (0, 1), (0, 3), (-2, 0), (-1, 1), (-2, 2)])
+@pytest.mark.parametrize("compensation", [0, 1, 2, 4])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_all_short_walks_equal_the_nut_in_whole_numbers(
+    low: int, high: int, compensation: int, direction: int
+) -> None:
+    """All walks of seven steps forward, back or none, three of them at once, one for each axis."""
+    walks = np.array(list(product((1, 0, -1), repeat=7)))
+    positions = np.cumsum(walks, axis=1).reshape(-1, 3, 7).transpose(0, 2, 1).astype(float)
+    axes = np.array([[1.0, low, high, compensation, 0.5]] * 3)
+    offsets, found = np.array([0, 7]), np.empty(positions.shape)
+    turns = np.zeros((len(positions), 3), dtype=np.int64)
+    for at, out, count in zip(positions, found, turns[:, None, :], strict=True):
+        states = np.array([play_start(0.0, 1.0, direction)] * 3)
+        play_fill(np.ascontiguousarray(at), offsets, axes, states, out, count)
+    slides = found.transpose(0, 2, 1).reshape(-1, 7)
+    for walk, slide, count in zip(walks.tolist(), slides.tolist(), turns.ravel(), strict=True):
+        nut = PulsedAxis(low, high, compensation, direction)
+        assert slide == [nut.go(sense) for sense in walk]
+        assert count == nut.reversals
 
 
 @pytest.mark.parametrize("convention", ["preloaded", "centred"])
