@@ -14,8 +14,10 @@ from typing import NoReturn
 import click
 
 from camtool import __version__
+from camtool.cli.calibrate import calibrate
 from camtool.cli.check import check
 from camtool.cli.convert import convert
+from camtool.cli.coupon import coupon
 from camtool.cli.job import job
 from camtool.cli.post import post
 from camtool.cli.preview import preview
@@ -41,12 +43,14 @@ def cli() -> None:
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
+    camtool coupon  lines -o coupon.dxf         a drawing to cut and measure
+    camtool calibrate lengths.toml -t pic-mmh   the machine's numbers from what was measured
 
     Lengths take units: 0.2mm, 1/8in, 200um; bare numbers are mm. Every command has --help.
     """
 
 
-for _command in (post, verify, convert, preview, check, job, targets):
+for _command in (post, verify, convert, preview, check, job, targets, coupon, calibrate):
     cli.add_command(_command)
 
 

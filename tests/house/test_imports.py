@@ -29,8 +29,9 @@ ALLOWED = {
     "postprocessors": SHARED,
     "verify": JUDGE,
     "preview": JUDGE,
+    "calibration": SHARED,
     "pipeline": JUDGE | {"verify", "preview"},
-    "cli": JUDGE | {"verify", "preview", "pipeline"},
+    "cli": JUDGE | {"verify", "preview", "calibration", "pipeline"},
     "__main__": {"cli"},
     "__init__": set(),
 }

@@ -1,0 +1,1 @@
+"""What coupons say of a machine: drawings, measurements, and the numbers they give."""

@@ -1,0 +1,72 @@
+"""`camtool calibrate`: a machine's numbers from measured coupons."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from camtool.cli.options import talk_options
+from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.sections import SectionedCommand
+
+
+@click.command(cls=SectionedCommand, short_help="A machine's numbers from measured coupons.")
+@click.argument("measurements", metavar="MEASUREMENTS")
+@click.option("--target", "-t", metavar="NAME", help="The machine; see camtool targets.")
+@click.option(
+    "--machine", metavar="FILE", help="What is known of it so far, a file that extends the target."
+)
+@click.option("-o", "--output", metavar="FILE", help="The machine file to write; - is stdout.")
+@click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
+@talk_options
+def calibrate(
+    measurements: str,
+    target: str | None,
+    machine: str | None,
+    output: str | None,
+    report: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Estimate steps, play and squareness from MEASUREMENTS, a TOML file of measured coupons.
+
+    `camtool coupon` draws them and begins that file. With -o, a machine file for --machine is
+    written, with the uncertainty and the source of each number behind it.
+    """
+    from camtool.calibration.calibrate import calibrate as estimated
+    from camtool.calibration.machinefile import machine_file
+    from camtool.calibration.measurements import read_measurements
+    from camtool.calibration.report import outliers, to_data, to_text
+    from camtool.cli.options import MachineFlags
+    from camtool.cli.talk import one_line, say
+
+    check_writable([output, report], [measurements])
+    said = read_measurements(Path(measurements))
+    flags = MachineFlags(target or (None if machine else said.target or None), machine, ())
+    known = flags.load().machine
+    found = estimated(said, known)
+    files: dict[str, bytes] = {}
+    if output is not None:
+        own = _own_table(machine, str(flags.name()))
+        files[output] = machine_file(found, said, known, own).encode()
+    if report is not None:
+        data = json.dumps(to_data(found, known), indent=2, ensure_ascii=False)
+        files[report] = f"{data}\n".encode()
+    write_all(files)
+    if STDOUT not in files and not quiet:
+        for line in to_text(found, known).splitlines():
+            click.echo(one_line(line))
+    for line in outliers(found):
+        say(f"camtool: warning: outlier: {one_line(line)}", quiet=quiet)
+    if output is not None:
+        say(f"written: {'stdout' if output == STDOUT else output}", quiet=quiet)
+
+
+def _own_table(machine: str | None, target: str) -> dict[str, Any]:
+    """What the user's machine file says; without one, only what it extends."""
+    from camtool.machine.loader import read_table
+
+    return {"extends": target} if machine is None else read_table(Path(machine))

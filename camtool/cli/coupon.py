@@ -1,0 +1,124 @@
+"""`camtool coupon`: drawings to cut and measure, for `camtool calibrate`."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import PurePath
+from typing import TYPE_CHECKING, cast
+
+import click
+
+from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.sections import SectionedCommand
+from camtool.errors import OptionError, OutputError
+
+if TYPE_CHECKING:
+    from camtool.calibration.coupons import Kind
+    from camtool.machine.model import Machine
+
+KINDS = ("lines", "squares", "circles", "steps")
+DRAWINGS = (".dxf", ".svg")
+SIZE = (50.0, 50.0)
+"""Of a sheet when neither --size nor the machine's travel says it, mm."""
+
+
+def _size(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[float, float] | None:
+    """`40x30mm` as two lengths in mm."""
+    from camtool.units import parse_length
+
+    if value is None:
+        return None
+    match = re.fullmatch(r"([\d.]+)[x×]([\d.]+)([a-zA-Zµμ\"]*)", value)
+    try:
+        sides = tuple(parse_length(side + match[3]) for side in match.group(1, 2)) if match else ()
+    except OptionError as error:
+        raise click.BadParameter(str(error), ctx, param) from error
+    if len(sides) != 2:
+        raise click.BadParameter(f"{value!r}: write it like 40x30mm", ctx, param)
+    if min(sides) <= 0.0:
+        raise click.BadParameter(f"{value!r} has no area", ctx, param)
+    return sides[0], sides[1]
+
+
+def _regions(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int, int]:
+    """`3x2` as columns and rows."""
+    match = re.fullmatch(r"(\d{1,3})x(\d{1,3})", value)
+    if match is None:
+        raise click.BadParameter(f"{value!r}: write it like 3x2", ctx, param)
+    return int(match[1]), int(match[2])
+
+
+@click.command(cls=SectionedCommand, short_help="Drawings to cut and measure.")
+@click.argument("kind", type=click.Choice(KINDS), metavar="KIND")
+@click.option("-o", "--output", metavar="FILE", help="The drawing, .dxf or .svg.  [coupon.dxf]")
+@click.option(
+    "--measurements", metavar="FILE", help="Also a file to fill in, for camtool calibrate."
+)
+@click.option(
+    "--size", metavar="WxH", callback=_size, help="Of the sheet; the machine's travel, or 50x50mm."
+)
+@click.option(
+    "--regions",
+    metavar="NxM",
+    default="1x1",
+    callback=_regions,
+    help="Columns and rows of the table in which lines measure the play.  [1x1]",
+)
+@machine_options
+@talk_options
+def coupon(
+    kind: str,
+    output: str | None,
+    measurements: str | None,
+    size: tuple[float, float] | None,
+    regions: tuple[int, int],
+    machine: MachineFlags,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Draw coupons of a KIND: what `camtool calibrate` wants to have cut and measured.
+
+    \b
+    lines    two lines along each axis, joined at one end: play, and play by --regions
+    squares  three of them: step scale, play, squareness
+    circles  three of them: the same, from eight diameters each
+    steps    a ruler along each axis, forwards and backwards: step scale and play
+
+    Cut them on the line: camtool post coupon.dxf --kind engrave.
+    """
+    from camtool.calibration import drawings
+    from camtool.calibration.coupons import sheet
+    from camtool.calibration.skeleton import skeleton
+    from camtool.cli.talk import say
+
+    output = output or "coupon.dxf"
+    if output != STDOUT and PurePath(output).suffix.lower() not in DRAWINGS:
+        raise click.UsageError(f"-o {output!r} ends in neither .dxf nor .svg")
+    check_writable([output, measurements], [])
+    if measurements not in (None, STDOUT) and os.path.lexists(str(measurements)):
+        raise OutputError("exists already", file=str(measurements), mend="give another name")
+    known = machine.load().machine if machine.name() is not None else None
+    made = sheet(cast("Kind", kind), size or _travel(known), regions, known)
+    draw = drawings.svg if output.lower().endswith(".svg") else drawings.dxf
+    files = {output: draw(made)}
+    if measurements is not None:
+        files[measurements] = skeleton(made, known).encode()
+    write_all(files)
+    for name in files:
+        say(f"written: {'stdout' if name == STDOUT else name}", quiet=quiet)
+
+
+def _travel(machine: Machine | None) -> tuple[float, float]:
+    """The machine's table, mm; OptionError when nobody has said how large it is."""
+    if machine is None:
+        return SIZE
+    x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
+    if x is None or y is None:
+        raise OptionError(
+            f"the travel of {machine.target.name} is not said", mend="give --size, such as 40x30mm"
+        )
+    return x, y
