@@ -1,0 +1,146 @@
+"""Limits, comparisons, and mechanics with parts left out, from the command line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Run
+
+CIRCLE = "G00X00000.00Y00004.20;G02X00000.00Y00004.20I00000.00J00000.00F08;M30;"
+"""A circle of 30 steps: the one whose iterations the thesis counts (Tabla 7)."""
+
+
+@pytest.fixture
+def circle(tmp_path: Path) -> str:
+    (tmp_path / "circle.pic").write_text(CIRCLE)
+    return "circle.pic"
+
+
+def rows(camtool: Run, *arguments: str) -> list[dict[str, object]]:
+    done = camtool("verify", *arguments, "-t", "pic-mmh", "--json", "-")
+    assert done.returncode == 0, done.stderr
+    found: list[dict[str, object]] = json.loads(done.stdout)
+    return found
+
+
+def test_interpolators_side_by_side(camtool: Run, circle: str) -> None:
+    found = {row["name"]: row for row in rows(camtool, circle, "--compare", "interpolators")}
+    assert list(found) == ["dsm", "dda", "stairs"]
+    # Tabla 7, L1438-1458, and the 30 steps of the way to the circle with the line's idle pass.
+    way = found["dsm"]["iterations"] - 168  # type: ignore[operator]
+    assert way in (30, 31)
+    assert found["dda"]["iterations"] == 188 + way
+    assert found["stairs"]["iterations"] == 240 + way
+    assert found["dsm"]["interpolation_max_um"] <= 0.07  # type: ignore[operator]
+    assert found["stairs"]["interpolation_max_um"] <= 0.14  # type: ignore[operator]
+
+
+def test_play_side_by_side(camtool: Run, circle: str) -> None:
+    none = ("--set", "axes.x.compensation_mm=0", "--set", "axes.y.compensation_mm=0")
+    found = rows(camtool, circle, "--compare", "backlash=0,0.001,0.002", *none)
+    assert [row["name"] for row in found] == ["backlash=0", "backlash=0.001", "backlash=0.002"]
+    errors = [row["total_max_um"] for row in found]
+    assert errors == sorted(errors)  # type: ignore[type-var]
+    assert errors[0] < 0.1  # type: ignore[operator]
+    assert errors[2] > 1.0  # type: ignore[operator]
+
+
+def test_any_key_and_the_table(camtool: Run, circle: str) -> None:
+    done = camtool(
+        "verify", circle, "-t", "pic-mmh", "--compare", "limits.rapid_step_rate_hz=50,100"
+    )
+    assert done.returncode == 0
+    head, first, second = done.stdout.decode().splitlines()
+    assert head.split()[:4] == ["µm", "interp.", "mechanics", "total"]
+    assert first.startswith("limits.rapid_step_rate_hz=50 ")
+    assert second.startswith("limits.rapid_step_rate_hz=100 ")
+
+
+def test_shares_of_the_mechanics(camtool: Run, circle: str) -> None:
+    found = {row["name"]: row for row in rows(camtool, circle, "--compare", "mechanics")}
+    assert {"as it is", "without play", "without compensation", "ideal"} <= set(found)
+    assert found["ideal"]["mechanics_max_um"] == 0.0
+    assert found["without compensation"]["time_s"] < found["as it is"]["time_s"]  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("nothing", "interpolators, mechanics"),
+        ("backlash=", "is nothing to compare"),
+        ("axes.x.no_such=1,2", "unknown key"),
+        ("backlash=0.1,wide", "axes.x"),
+    ],
+)
+def test_what_cannot_be_compared(camtool: Run, circle: str, spec: str, words: str) -> None:
+    done = camtool("verify", circle, "-t", "pic-mmh", "--compare", spec)
+    assert done.returncode == 2
+    assert words in done.stderr.decode()
+
+
+def test_the_picture_of_a_comparison(camtool: Run, circle: str, tmp_path: Path) -> None:
+    for name in ("a.svg", "b.svg"):
+        done = camtool(
+            "verify", circle, "-t", "pic-mmh", "--compare", "interpolators", "--preview", name
+        )
+        assert done.returncode == 0, done.stderr
+    first = (tmp_path / "a.svg").read_text()
+    assert first == (tmp_path / "b.svg").read_text()
+    assert [f'id="run-{number}"' in first for number in (1, 2, 3, 4)] == [True] * 3 + [False]
+    assert "stairs" in first
+
+
+def test_without_a_part_of_the_mechanics(camtool: Run, circle: str) -> None:
+    def error(*arguments: str) -> float:
+        done = camtool("verify", circle, "-t", "pic-mmh", "--json", "-", *arguments)
+        found: float = json.loads(done.stdout)["error_um"]["mechanics"]["max"]
+        return found
+
+    assert error("--without", "play", "--without", "compensation") == 0.0
+    assert error("--without", "compensation") > 2.0
+    done = camtool("verify", circle, "-t", "pic-mmh", "--without", "gravity")
+    assert done.returncode == 2
+    assert b"no part of the mechanics" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("limit", "held", "broken"),
+    [
+        ("--max-error", "1mm", "0.01um"),
+        ("--max-reversals", "100", "1"),
+        ("--max-time", "1h", "100ms"),
+    ],
+)
+def test_limits(camtool: Run, circle: str, limit: str, held: str, broken: str) -> None:
+    fine = camtool("verify", circle, "-t", "pic-mmh", limit, held)
+    assert fine.returncode == 0, fine.stderr
+    done = camtool("verify", circle, "-t", "pic-mmh", limit, broken, "--json", "r.json")
+    assert done.returncode == 1
+    assert f"ABOVE_GATE [{limit}]".encode() in done.stderr
+
+
+def test_a_post_beyond_its_limits_writes_nothing(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "square.csv").write_text("0,0\n1,0\n1,1\n0,1\n0,0\n")
+    common = ("post", "square.csv", "-t", "pic-mmh", "-o", "square.pic", "--units", "mm")
+    done = camtool(*common, "--max-error", "0.1um")
+    assert done.returncode == 1
+    assert b"ABOVE_GATE [--max-error]" in done.stderr
+    assert not (tmp_path / "square.pic").exists()
+    assert camtool(*common, "--max-error", "1mm").returncode == 0
+    assert camtool(*common, "--max-error", "1mm", "--no-verify").returncode == 2
+
+
+def test_limits_and_comparisons_do_not_go_together(camtool: Run, circle: str) -> None:
+    done = camtool(
+        "verify", circle, "-t", "pic-mmh", "--compare", "interpolators", "--max-error", "1um"
+    )
+    assert done.returncode == 2
+    assert b"drop --compare" in done.stderr
+
+
+def test_a_limit_that_nothing_can_be_held_against(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "still.pic").write_text("G54;M30;")
+    done = camtool("verify", "still.pic", "-t", "pic-mmh", "--max-error", "1um")
+    assert done.returncode == 1
+    assert b"no error is known" in done.stderr
