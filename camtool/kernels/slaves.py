@@ -185,7 +185,9 @@ def _to_go(slave: Ints, axis: Floats, sense: int) -> int:
     wraps = int(slave[WRAPS])
     here = _seen_way(slave, axis, up) - (TURN - 1) * wraps
     turn = max(wraps, (wanted + TURN - 2) // (TURN - 1) - 1)
-    return (turn - wraps) * TURN + max(wanted - (TURN - 1) * turn, 0) - here
+    way = (turn - wraps) * TURN + max(wanted - (TURN - 1) * turn, 0) - here
+    # The direction is that of the last count: a motor that turns back must count first.
+    return way if up == int(slave[UP]) else max(way, 1)
 
 
 @inner
