@@ -11,7 +11,8 @@ What it does with a row of the toolpath, in the order of this file and `flashcut
    "programmed" nobody ever sees what is too much, and it stays for the rest of the program.
 4. The half period comes from the feed and is at least `controller.half_period_ms`; a step takes
    `controller.half_periods_per_step` of them, and each is a millisecond late.
-5. At each change of an axis's direction the compensation steps are issued, a step's time each.
+5. At each change of an axis's direction the compensation steps are issued, a step's time each
+   (`controller.compensation_half_period_ms`).
 
 Every move ends: the longer axis arrives.
 """
@@ -25,6 +26,7 @@ import numpy as np
 
 from camtool.kernels.lattice import HALF_STEP_GUARD
 from camtool.kernels.timers import Counters, Issued, Rules, timers_fill
+from camtool.machine.controllers import FlashcutController
 from camtool.machine.model import Machine
 from camtool.simulation.flashcut_moves import (
     MoveTable,
@@ -76,7 +78,15 @@ def assumptions(machine: Machine) -> tuple[str, ...]:
         f"an arc becomes {controller.chords_per_turn} chords a turn (controller.chords_per_turn)",
         f"displacements are counted from where the program {_FROM[controller.goes_on_from]} "
         "(controller.goes_on_from)",
-        "each step of a compensation takes as long as a step of the move that it precedes",
+        f"each step of a compensation has {_compensation(controller)} "
+        "(controller.compensation_half_period_ms)",
+    )
+
+
+def _compensation(controller: FlashcutController) -> str:
+    half_period = controller.compensation_half_period_ms
+    return (
+        "its move's half period" if half_period is None else f"a half period of {half_period} ms"
     )
 
 
@@ -95,6 +105,7 @@ class FlashcutRun:
         self._table = MoveTable.of(path, machine)
         self._mechanics = Mechanics(machine, path.start, options.effects)
         self._parts = controller.half_periods_per_step
+        self._compensation_ms = controller.compensation_half_period_ms
         nearest = controller.rounding == "nearest"
         self._rules = Rules(
             origin=path.start,
@@ -160,9 +171,10 @@ class FlashcutRun:
     def _seconds(self, reversals: Ints, rows: Ints) -> Floats:
         """(R,) s of the compensation steps that the reversals (R, 3) of these rows cost."""
         steps = reversals * self._mechanics.compensation_steps
-        late_xy = self._table.half_period_xy[rows] + 1
-        late_z = self._table.half_period_z[rows] + 1
-        milliseconds = (steps[:, 0] + steps[:, 1]) * late_xy + steps[:, 2] * late_z
+        half_xy, half_z = self._table.half_period_xy[rows], self._table.half_period_z[rows]
+        if self._compensation_ms is not None:
+            half_xy = half_z = np.full(len(rows), self._compensation_ms)
+        milliseconds = (steps[:, 0] + steps[:, 1]) * (half_xy + 1) + steps[:, 2] * (half_z + 1)
         return np.asarray(self._parts * milliseconds / 1000.0)
 
 

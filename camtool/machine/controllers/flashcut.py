@@ -16,7 +16,9 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     says why these defaults.
 
     `half_period_ms`: the "periodo medio" of the configuration window (L1404), the shortest that
-    any move has (L1127); rapids have it, and a feed can only lengthen it. `clock`: how a timer
+    any move has (L1127); rapids have it, and a feed can only lengthen it.
+    `compensation_half_period_ms` of the steps at a reversal: as the move's own where left out
+    (they are issued by the same routine, L1147, L1388). `clock`: how a timer
     sees its half period go by: "whole-ms": every axis fires at the first whole millisecond above
     it; "late-longer": the longer axis a millisecond late at each step, the shorter one exactly;
     both give Tabla 3.8 (L1210-1214). `half_periods_per_step`: 2 fits the times of Tabla 4.1
@@ -26,6 +28,7 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     """
 
     half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] = 3
+    compensation_half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] | None = None
     clock: Literal["whole-ms", "late-longer"] = "whole-ms"
     half_periods_per_step: Annotated[int, Meta(ge=1, le=2)] = 2
     rounding: Literal["nearest", "truncate"] = "nearest"
