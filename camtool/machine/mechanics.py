@@ -45,6 +45,11 @@ class PlayMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     x: PlayCells | None = None
     y: PlayCells | None = None
 
+    @property
+    def used(self) -> tuple[PlayCells | None, PlayCells | None, None]:
+        """The cells of X, Y and Z that hold; None where `backlash_mm` does."""
+        return (self.x, self.y, None) if self.use else (None, None, None)
+
 
 class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """`squareness_rad`: how much the angle between +X and +Y is less than a right one.

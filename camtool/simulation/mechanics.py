@@ -117,11 +117,10 @@ def _play_mm(axis: Axis, effects: Effects) -> float:
 
 def _varied(machine: Machine, effects: Effects, shares: Floats) -> _Varied | None:
     """None where `play_fill` does."""
-    play_map, axes = machine.play_map, list(machine.axes)
-    by_region = play_map.use and effects.play
-    cells = (play_map.x, play_map.y) if by_region else (None, None)
+    axes = list(machine.axes)
+    cells = machine.play_map.used if effects.play else (None, None, None)
     scatter = [axis.repeatability_mm if effects.repeatability else 0.0 for axis in axes]
-    if cells == (None, None) and not any(scatter):
+    if not any(cells) and not any(scatter):
         return None
     return _Varied(
         plays=np.array([_play_mm(axis, effects) for axis in axes]),

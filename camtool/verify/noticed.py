@@ -151,8 +151,10 @@ def _homing(decoded: Toolpath, machine: Machine) -> Iterator[Finding]:
 
 
 def _unknown_play(machine: Machine, tally: Tally) -> Iterator[Finding]:
-    for name, axis, steps in zip(AXES, machine.axes, tally.steps, strict=True):
-        if steps and axis.backlash_mm == 0.0 and axis.compensation_mm == 0.0:
+    given = zip(AXES, machine.axes, machine.play_map.used, tally.steps, strict=True)
+    for name, axis, cells, steps in given:
+        known = cells is not None or axis.backlash_mm > 0.0 or axis.compensation_mm > 0.0
+        if steps and not known:
             yield Finding(
                 Code.PLAY_NOT_KNOWN,
                 Severity.INFO,
