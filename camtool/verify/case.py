@@ -8,6 +8,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
 from camtool.simulation.options import ALL, Effects, Options
+from camtool.toolpath.bent import Bent
 from camtool.toolpath.moves import Toolpath
 
 COVERAGE_MM = 0.005
@@ -55,13 +56,15 @@ class VerifyOptions:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is to be judged."""
+    """What is to be judged. `sent`: what the program should say, where it is not `wanted` itself
+    but bent against the mechanics."""
 
     decoded: Toolpath
     machine: Machine
     wanted: Toolpath | None
     drawing: Drawing | None
     options: VerifyOptions
+    sent: Bent | None = None
 
     @property
     def simulation(self) -> Options:

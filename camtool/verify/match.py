@@ -65,6 +65,22 @@ def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     return Match(row, cuts.contour, cuts.contour, circle, np.zeros(count))
 
 
+def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
+    """What belongs to a row of a bent toolpath belongs to the wanted row that it is there for:
+    `of` (S,) of each bent row. Contours may have become several by bending, circles too."""
+    known = match.row >= 0
+    row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
+    contour = np.where(known, goal.target.cuts.contour[np.maximum(row, 0)], -1)
+    circle = _circle_of_row(goal.circles, len(goal.target.cuts.contour))
+    return replace(
+        match,
+        row=row,
+        contour=contour,
+        only=np.where(match.only == ANY_CONTOUR, ANY_CONTOUR, contour),
+        circle=np.where(known, circle[np.maximum(row, 0)], -1),
+    )
+
+
 def nearest_at_height(
     samples: Samples, choice: Ints | None, target: Target, limits_mm: tuple[float, float]
 ) -> tuple[Found, Bools]:

@@ -23,6 +23,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.models import model_of
 from camtool.simulation.motion import Chunk
 from camtool.simulation.simulate import simulate
+from camtool.toolpath.bent import Bent
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Toolpath
 from camtool.verify.case import Case, VerifyOptions
@@ -32,7 +33,7 @@ from camtool.verify.coverage import Coverage, cover
 from camtool.verify.cuts import cut_moves, is_flat
 from camtool.verify.figures import Figure
 from camtool.verify.holes import hole_findings, holes_of
-from camtool.verify.match import Goal, own_match
+from camtool.verify.match import Goal, carried_match, own_match
 from camtool.verify.motion import Tally, batches
 from camtool.verify.noticed import motion_findings
 from camtool.verify.report import Before, Planned, Report
@@ -68,12 +69,14 @@ def verify(
     wanted: Toolpath | None = None,
     drawing: Drawing | None = None,
     options: VerifyOptions | None = None,
+    sent: Bent | None = None,
 ) -> Verification:
     """Simulate `decoded` on `machine` and judge it; against `wanted` when there is one.
 
-    `drawing` gives the fitting error and its findings. Toolpaths are in the work frame.
+    `drawing` gives the fitting error and its findings; `sent` is what the program was written from
+    where `wanted` was bent. Toolpaths are in the work frame.
     """
-    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions())
+    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent)
     return judge(case, simulate(decoded, machine, case.simulation))
 
 
@@ -88,7 +91,7 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
         wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
     circles = full_circles(wanted.cuts, case.coverage_mm)
     goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
-    coverage = _coverage(case, decoded, goal)
+    coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
     trace = TraceBuffer(case.decoded, case.spacing_mm, case.options.trace_points)
     slides = SlidePass(decoded, goal, coverage.match, trace)
     tally = Tally()
@@ -101,17 +104,24 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
     return Verification(result.report(extents, findings), trace.trace(), findings)
 
 
-def _coverage(case: Case, decoded: Target, goal: Goal) -> Coverage:
+def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:
     if case.wanted is None:
         return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
-    coverage = cover(decoded, goal, case.options.sample_mm)
+    said = goal  # what the program should say
+    if case.sent is not None:
+        cuts = cut_moves(case.sent.toolpath, flat_cuts=flat_cuts)
+        said = Goal(Target(cuts), [], goal.limit_mm, goal.depth_mm)
+    coverage = cover(decoded, said, case.options.sample_mm)
     holes = hole_findings(
         holes_of(decoded.cuts.toolpath),
-        holes_of(goal.target.cuts.toolpath),
+        holes_of(said.target.cuts.toolpath),
         goal.limit_mm,
         goal.depth_mm,
     )
-    return replace(coverage, findings=(*coverage.findings, *holes))
+    match = coverage.match
+    if case.sent is not None:
+        match = carried_match(match, case.sent.row, goal)
+    return replace(coverage, match=match, findings=(*coverage.findings, *holes))
 
 
 def _all_findings(

@@ -87,14 +87,14 @@ def machines(draw: st.DrawFn) -> Machine:
 @given(contours(max_points=6) | open_contours(), machines())
 def test_nothing_is_left_of_play_and_scale(path: Polyline, machine: Machine) -> None:
     wanted = cut(path)
-    assert errors_mm(compensated(wanted, machine), wanted, machine).max() < FINE_MM
+    assert errors_mm(compensated(wanted, machine).toolpath, wanted, machine).max() < FINE_MM
 
 
 def test_without_it_the_same_part_is_off_by_the_play() -> None:
     machine = path_machine(FREE, "axes.x.backlash_mm=0.4", "axes.y.backlash_mm=0.4")
     wanted = cut(Polyline(np.array([[0, 0, 0], [5, 1, 0], [1, 6, 0]], dtype=float), True))
     assert errors_mm(wanted, wanted, machine).max() > 0.3
-    assert errors_mm(compensated(wanted, machine), wanted, machine).max() < FINE_MM
+    assert errors_mm(compensated(wanted, machine).toolpath, wanted, machine).max() < FINE_MM
 
 
 @given(
@@ -109,7 +109,7 @@ def test_of_too_much_compensation_half_is_left_at_reversals(
     machine = path_machine(FREE, f"controller.start_play={start}", *step, *play, *set_to)
     wanted = cut(path)
     before = errors_mm(wanted, wanted, machine)
-    after = errors_mm(compensated(wanted, machine), wanted, machine)
+    after = errors_mm(compensated(wanted, machine).toolpath, wanted, machine)
     # Both axes may turn at the same place, and a step back is a whole step.
     assert after.max() <= 0.5 * math.sqrt(2.0) * excess + 0.009
     assert np.sqrt((after**2).mean()) < np.sqrt((before**2).mean())
@@ -123,7 +123,7 @@ def test_play_by_region() -> None:
     points = [[-5, -4, 0.2], [6, -3, 0], [4, 5, -0.3], [-6, 3, 0.1]]
     wanted = cut(Polyline(np.array(points, dtype=float), True))
     before = errors_mm(wanted, wanted, machine)
-    after = errors_mm(compensated(wanted, machine), wanted, machine)
+    after = errors_mm(compensated(wanted, machine).toolpath, wanted, machine)
     assert before.max() > 0.2
     # Near an edge the play of the neighbour may be taken.
     assert np.quantile(after, 0.9) < FINE_MM
@@ -132,7 +132,7 @@ def test_play_by_region() -> None:
 
 def test_a_perfect_machine_gets_what_was_wanted() -> None:
     wanted = cut(Polyline(np.array([[0, 0, 0], [1, 0, 1.0], [1, 1, 0]], dtype=float), True))
-    assert compensated(wanted, path_machine(FREE)) is wanted
+    assert compensated(wanted, path_machine(FREE)).toolpath is wanted
 
 
 def test_rows_keep_their_sources_feeds_and_events() -> None:
@@ -141,7 +141,9 @@ def test_rows_keep_their_sources_feeds_and_events() -> None:
     b.source = "layer 7"
     b.rapid(1.0, 1.0).line(z=-1.0, feed=5.0).line(2.0, 0.5, feed=7.0).event(Kind.DWELL, 0.5)
     machine = path_machine(FREE, "axes.x.backlash_mm=0.1", "axes.y.backlash_mm=0.1")
-    made = compensated(b.event(Kind.END).finish(), machine)
+    bent = compensated(b.event(Kind.END).finish(), machine)
+    made = bent.toolpath
+    assert bent.row.tolist() == [0, 1, 2, 3, 4, 4, 5, 6]
     kinds = [Kind(kind).name for kind in made.kind.tolist()]
     assert kinds == ["MESSAGE", "SPINDLE_CW", "RAPID", "LINE", "LINE", "LINE", "DWELL", "END"]
     assert [move.source for move in made][2:6] == ["layer 7"] * 4
@@ -155,7 +157,7 @@ def test_scale_alike_in_both_axes_keeps_arcs() -> None:
     scale = [f"axes.{axis}.real_step_mm=0.00404" for axis in "xy"]
     step = [f"axes.{axis}.coded_step_mm=0.004" for axis in "xyz"]
     wanted = cut(Polyline(np.array([[1, 0, 1.0], [-1, 0, 1.0]], dtype=float), True))
-    made = motor_path(wanted, path_machine(FREE, *step, *scale))
+    made = motor_path(wanted, path_machine(FREE, *step, *scale)).toolpath
     assert made.is_arc.sum() == 2
     assert made.end[:, :2] == pytest.approx(wanted.end[:, :2] / 1.01)
 
@@ -164,7 +166,7 @@ def test_unequal_scale_makes_ellipses() -> None:
     step = [f"axes.{axis}.coded_step_mm=0.004" for axis in "xyz"]
     machine = path_machine(FREE, *step, "axes.x.real_step_mm=0.0042")
     wanted = cut(Polyline(np.array([[1, 0, 1.0], [-1, 0, 1.0]], dtype=float), True))
-    made = motor_path(wanted, machine)
+    made = motor_path(wanted, machine).toolpath
     assert made.is_arc.sum() > 4
     points = dense(made, 100)
     spoke = points[np.abs(points[:, 2] + 0.1) < 1e-9, :2] * [1.05, 1.0]

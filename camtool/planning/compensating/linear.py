@@ -21,6 +21,7 @@ from camtool.geometry.curves import EllipseCurve
 from camtool.geometry.fit import fit_curve
 from camtool.machine.model import Machine
 from camtool.planning.compensating.stretch import Point
+from camtool.toolpath.bent import Bent
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Floats, Kind, Move, Toolpath
 
@@ -32,12 +33,12 @@ def motor_matrix(machine: Machine) -> Floats:
     return np.diag([axis.coded_step_mm / axis.real_step_mm for axis in machine.axes]) @ square
 
 
-def motor_path(toolpath: Toolpath, machine: Machine) -> Toolpath:
+def motor_path(toolpath: Toolpath, machine: Machine) -> Bent:
     """The path of the motors for slides on `toolpath`; itself where both are as they should."""
     matrix = motor_matrix(machine)
     if np.array_equal(matrix, np.eye(3)):
-        return toolpath
-    return _Mapped(toolpath, matrix, machine.defaults.fit_tolerance_mm).toolpath()
+        return Bent(toolpath, np.arange(len(toolpath)))
+    return _Mapped(toolpath, matrix, machine.defaults.fit_tolerance_mm).bent()
 
 
 class _Mapped:
@@ -51,8 +52,9 @@ class _Mapped:
         self._scale = float(sizes.mean())
         self._b = ToolpathBuilder(self._to(tuple(toolpath.start.tolist())))
 
-    def toolpath(self) -> Toolpath:
+    def bent(self) -> Bent:
         sweeps = self._toolpath.sweeps()
+        rows: list[int] = []
         for move in self._toolpath:
             self._b.source = move.source
             end = self._to(move.end)
@@ -65,7 +67,8 @@ class _Mapped:
             else:
                 _event(self._b, move, self._toolpath)
                 self._b.moved_to(*end)
-        return self._b.finish(self._toolpath.findings)
+            rows += [move.index] * (len(self._b) - len(rows))
+        return Bent(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
 
     def _to(self, point: tuple[float, ...]) -> Point:
         x, y, z = (self._matrix @ np.array(point)).tolist()

@@ -24,11 +24,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Axis, Machine
 from camtool.planning.compensating.regions import Regions
 from camtool.planning.compensating.stretch import Point, Stretch, stretches
 from camtool.planning.reversing.residual import Residual
+from camtool.toolpath.bent import Bent
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 
@@ -76,13 +79,13 @@ class _Drive:
                 return
 
 
-def taken_up(toolpath: Toolpath, machine: Machine) -> Toolpath:
+def taken_up(toolpath: Toolpath, machine: Machine) -> Bent:
     """The positions that a controller must be given for slides on `toolpath` (in motor mm); the
     same toolpath where there is neither play nor compensation."""
     regions = Regions(machine)
     if not regions.matter:
-        return toolpath
-    return _TakenUp(toolpath, machine, regions).toolpath()
+        return Bent(toolpath, np.arange(len(toolpath)))
+    return _TakenUp(toolpath, machine, regions).bent()
 
 
 class _TakenUp:
@@ -99,7 +102,8 @@ class _TakenUp:
         ]
         self._b = ToolpathBuilder(self._place())
 
-    def toolpath(self) -> Toolpath:
+    def bent(self) -> Bent:
+        rows: list[int] = []
         sweeps = self._toolpath.sweeps()
         for move in self._toolpath:
             self._b.source = move.source
@@ -115,7 +119,8 @@ class _TakenUp:
                         self._cut(part, move)
             else:
                 self._event(move)
-        return self._b.finish(self._toolpath.findings)
+            rows += [move.index] * (len(self._b) - len(rows))
+        return Bent(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
 
     def _enter(self, point: Point) -> None:
         """From here on the play is that of the region around a point."""
