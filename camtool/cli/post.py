@@ -39,6 +39,11 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
+@click.option(
+    "--compensate",
+    is_flag=True,
+    help="Bend the path against the machine's play, scale and squareness.",
+)
 @gate_options
 @job_options
 @drawing_options
@@ -50,6 +55,7 @@ def post(
     preview: str | None,
     report: str | None,
     no_verify: bool,
+    compensate: bool,
     gates: GateFlags,
     job: JobFlags,
     drawing: DrawingFlags,
@@ -74,7 +80,9 @@ def post(
     wanted = job.job(drawing)
     read = drawing.read(source, target.machine, wanted)
     with job.blamed():
-        posted = post_drawing(read, wanted, target, check=not no_verify, gates=gates.gates())
+        posted = post_drawing(
+            read, wanted, target, check=not no_verify, compensate=compensate, gates=gates.gates()
+        )
     return finish(
         posted,
         asked,

@@ -5,11 +5,17 @@ from __future__ import annotations
 import json
 import math
 import os
-from typing import Any
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from camtool.cli.options import talk_options
+
+if TYPE_CHECKING:
+    from camtool.machine.mechanics import PlayCells
+    from camtool.machine.model import Machine
 
 
 class _Targets(click.Group):
@@ -118,6 +124,9 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
         return
     for key, value in _flat("", values):
         click.echo(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+    for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
+        if cells is not None:
+            click.echo("\n" + "\n".join(_play_table(name, cells, loaded.machine)), err=True)
     click.echo(
         f"\nhighest feed {_speed(loaded.machine.max_feed_mm_min)}, "
         f"rapids {_speed(loaded.machine.rapid_mm_min)}; "
@@ -125,6 +134,23 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
         err=True,
     )
     click.echo(f"{loaded.file}", err=True)
+
+
+def _play_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:
+    """The cells as they lie on the table: +X to the right, +Y up."""
+    mean_um = getattr(machine.axes, name).backlash_mm * 1000.0
+    instead = "" if machine.play_map.use else f", not used: play_map.use; {mean_um:g} everywhere"
+    yield f"play of {name.upper()} by region of the table, µm{instead}"
+    rows = [("y \\ x mm", *_spans(cells.x_mm))]
+    for span, plays in zip(_spans(cells.y_mm), cells.play_mm, strict=True):
+        rows.insert(1, (span, *(f"{play * 1000.0:g}" for play in plays)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  " + "  ".join(f"{text:>{w}}" for text, w in zip(row, widths, strict=True))
+
+
+def _spans(edges_mm: tuple[float, ...]) -> list[str]:
+    return [f"{a:g}…{b:g}" for a, b in pairwise(edges_mm)]
 
 
 def _speed(mm_min: float) -> str:

@@ -49,6 +49,11 @@ if TYPE_CHECKING:
     "repeatability.",
 )
 @click.option(
+    "--compensated",
+    is_flag=True,
+    help="It was posted with --compensate; for --against.",
+)
+@click.option(
     "--compare",
     metavar="WHAT",
     help="Judge it several ways: interpolators, mechanics, backlash=0,0.1,0.2 or any "
@@ -71,6 +76,7 @@ def verify(
     against: str | None,
     interpolator: str | None,
     without: tuple[str, ...],
+    compensated: bool,
     compare: str | None,
     preview: str | None,
     report: str | None,
@@ -93,6 +99,7 @@ def verify(
         interpolator=cast("Interpolator | None", interpolator),
         effects=left_out(without) if without else None,
         gates=gates.gates(),
+        compensated=compensated,
     )
     target = machine.load()
     say_first_run(quiet=quiet)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
     from camtool.simulation.options import Effects
+    from camtool.toolpath.bent import Bent
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
     from camtool.verify.gates import Gates
@@ -26,11 +27,23 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Judging:
     """How a program is judged: the interpolator in place of the controller's own, the parts of
-    the mechanics that act (None: all), the limits that make findings (None: none)."""
+    the mechanics that act (None: all), the limits that make findings (None: none), and whether
+    it was posted bent against the mechanics."""
 
     interpolator: Interpolator | None = None
     effects: Effects | None = None
     gates: Gates | None = None
+    compensated: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What a program is held against: the wanted toolpath, the drawing in its frame, and what
+    was sent where that was bent; None where there is none."""
+
+    wanted: Toolpath | None = None
+    drawing: Drawing | None = None
+    sent: Bent | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +69,11 @@ def post_drawing(
     target: LoadedTarget,
     *,
     check: bool = True,
+    compensate: bool = False,
     gates: Gates | None = None,
 ) -> Posted:
-    """Plan, write, read back, simulate and judge; `check=False` leaves out the last two."""
+    """Plan, write, read back, simulate and judge; `check=False` leaves out the last two;
+    `compensate` bends what is written against the machine's mechanics."""
     from camtool.planning.plan import planned
 
     plan = planned(drawing, job, target.machine)
@@ -66,7 +81,8 @@ def post_drawing(
     findings = _merged(drawing.findings, wanted.findings)
     if worst(findings) >= Severity.ERROR:
         return Posted(wanted, None, None, None, findings)
-    program = target.post.write(wanted, target.machine)
+    sent = _bent(wanted, target.machine) if compensate else None
+    program = target.post.write(wanted if sent is None else sent.toolpath, target.machine)
     decoded = target.post.read(program.data, target.machine)
     # What the writer said of its blocks, the reader need not say again in other words.
     said = {finding.code for finding in program.findings}
@@ -77,14 +93,14 @@ def post_drawing(
     from camtool.verify.report import Planned, certain
     from camtool.verify.verify import VerifyOptions
 
-    plain = _plainly(drawing, job, target)
+    plain = _plainly(drawing, job, target, compensate=compensate)
     # Runs that never turn back are judged by the whole contours that they are parts of.
-    goal = wanted if plain is None else plain.wanted
+    goal = wanted if plain is None or sent is not None else plain.wanted
     verification = _judged(
         program.data,
         decoded,
         target.machine,
-        (goal, plan.placed),
+        Goal(goal, plan.placed, sent),
         VerifyOptions(source=drawing.file, tool_diameter_mm=_tool_mm(job)),
     )
     beyond = _beyond(verification, gates)
@@ -116,19 +132,20 @@ def verify_program(
 
     judging = judging or Judging()
     decoded = _read(data, target, source)
-    wanted = None
+    goal = Goal()
     if drawing is not None:
         from camtool.planning.plan import planned
 
         plan = planned(drawing, _plain(job or Job()), target.machine)
-        wanted, drawing = plan.toolpath, plan.placed
+        sent = _bent(plan.toolpath, target.machine) if judging.compensated else None
+        goal = Goal(plan.toolpath, plan.placed, sent)
     options = VerifyOptions(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
         source=source,
         tool_diameter_mm=_tool_mm(job or Job()),
     )
-    found = _judged(data, decoded, target.machine, (wanted, drawing), options)
+    found = _judged(data, decoded, target.machine, goal, options)
     beyond = _beyond(found, judging.gates)
     return decoded, found.with_findings((*found.findings, *beyond)) if beyond else found
 
@@ -164,7 +181,7 @@ def convert_program(
     if not check:
         return Posted(wanted, program, again, None, findings)
     options = VerifyOptions(source=file)
-    judged = _judged(program.data, again, target.machine, (wanted, None), options)
+    judged = _judged(program.data, again, target.machine, Goal(wanted), options)
     findings = _merged(findings, judged.findings)
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
@@ -178,15 +195,24 @@ def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, .
     return tuple(gate_findings(verification.report, gates))
 
 
+def _bent(wanted: Toolpath, machine: Machine) -> Bent:
+    """What the controller must be told for its slides to come out on `wanted`."""
+    from camtool.planning.compensating import compensated
+
+    return compensated(wanted, machine)
+
+
 def _plain(job: Job) -> Job:
     """The job without what it does against reversals."""
     return replace(job, minimise="rapids", approach=False)
 
 
-def _plainly(drawing: Drawing, job: Job, target: LoadedTarget) -> Posted | None:
-    """The job made without what it does against reversals; None when it does nothing."""
+def _plainly(
+    drawing: Drawing, job: Job, target: LoadedTarget, *, compensate: bool
+) -> Posted | None:
+    """The job made without what is done against reversals and play; None when nothing is."""
     plain = _plain(job)
-    return None if plain == job else post_drawing(drawing, plain, target)
+    return None if plain == job and not compensate else post_drawing(drawing, plain, target)
 
 
 def _before(plain: Posted | None) -> Before | None:
@@ -219,18 +245,20 @@ def _tool_mm(job: Job) -> float | None:
 
 
 def _judged(
-    data: bytes,
-    decoded: Toolpath,
-    machine: Machine,
-    goal: tuple[Toolpath | None, Drawing | None],
-    options: VerifyOptions,
+    data: bytes, decoded: Toolpath, machine: Machine, goal: Goal, options: VerifyOptions
 ) -> Verification:
-    """Simulated and compared with what was wanted, and drawn."""
+    """Simulated, and compared with what was wanted and drawn."""
     from camtool.verify.verify import verify
 
-    wanted, drawing = goal
     sized = replace(options, size_bytes=len(data))
-    return verify(decoded, machine, wanted=wanted, drawing=drawing, options=sized)
+    return verify(
+        decoded,
+        machine,
+        wanted=goal.wanted,
+        drawing=goal.drawing,
+        options=sized,
+        sent=goal.sent,
+    )
 
 
 def _merged(

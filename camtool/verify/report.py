@@ -150,7 +150,7 @@ class Planned(msgspec.Struct, frozen=True):
 
 
 class Before(msgspec.Struct, frozen=True):
-    """The same job without `--minimise reversals` and `--approach`: reversals of X and Y, the
+    """The same job without `--minimise reversals`, `--approach`, `--compensate`: reversals of X and Y, the
     largest predicted error, the time. Null where that job could not be made."""
 
     reversals_cutting: int | None = None

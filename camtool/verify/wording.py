@@ -87,10 +87,10 @@ def _facts(report: Report) -> Iterator[tuple[str, str]]:
 
 
 def _before(report: Report) -> str:
-    """What the same job would be without what was done against reversals."""
+    """What the same job would be without what was done against reversals and play."""
     before = report.before
     if before is None or before.time_s is None:
-        return "not known: the job cannot be cut without --minimise reversals"
+        return "not known: the job cannot be cut the plain way"
     error, time = f"{_um(before.total_max_um)} µm", clock(before.time_s)
     return (
         f"{before.reversals_cutting} reversals while cutting, {before.reversals_air} in the air,"

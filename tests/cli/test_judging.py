@@ -144,3 +144,30 @@ def test_a_limit_that_nothing_can_be_held_against(camtool: Run, tmp_path: Path) 
     done = camtool("verify", "still.pic", "-t", "pic-mmh", "--max-error", "1um")
     assert done.returncode == 1
     assert b"no error is known" in done.stderr
+
+
+def test_compensation_makes_the_part_better(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "square.csv").write_text("0,0\n1,0.2\n1.2,1.3\n0.1,1\n0,0\n")
+    play = ("--set", "axes.x.backlash_mm=0.1", "--set", "axes.y.backlash_mm=0.06")
+    post = ("post", "square.csv", "-t", "grbl", "--units", "mm", "-o", "square.nc", *play)
+    done = camtool(*post, "--compensate", "--json", "r.json")
+    assert done.returncode == 0, done.stderr
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["before"]["total_max_um"] > 60.0
+    assert report["error_um"]["total"]["max"] < 10.0
+    # Judged on its own, it is held against the same.
+    verify = (
+        "verify",
+        "square.nc",
+        "-t",
+        "grbl",
+        "--against",
+        "square.csv",
+        "--units",
+        "mm",
+        *play,
+    )
+    again = camtool(*verify, "--compensated", "--json", "-")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["error_um"]["total"] == report["error_um"]["total"]
+    assert camtool(*verify).returncode == 1  # taken as it stands, it cuts beside the drawing
