@@ -150,8 +150,8 @@ class Planned(msgspec.Struct, frozen=True):
 
 
 class Before(msgspec.Struct, frozen=True):
-    """The same job without `--minimise reversals`, `--approach`, `--compensate`: reversals of X and Y, the
-    largest predicted error, the time. Null where that job could not be made."""
+    """The same job without `--minimise reversals`, `--approach` and `--compensate`: reversals of
+    X and Y, the largest predicted error, the time. Null where that job could not be made."""
 
     reversals_cutting: int | None = None
     reversals_air: int | None = None
