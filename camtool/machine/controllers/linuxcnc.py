@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from msgspec import Meta
+
 from camtool.machine.controllers.base import SlideStart
 
 
 class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxcnc"):
-    """LinuxCNC, and the options of its model."""
+    """LinuxCNC 2.9 with its trapezoid planner, and the options of its model.
+
+    How corners are met says `[dialect]`, keys `path` and `blend_tolerance_mm`, for the program
+    says it. `servo_period_s`: SERVO_PERIOD of the ini file. `lookahead_moves`:
+    ARC_BLEND_OPTIMIZATION_DEPTH, `kink_ratio`: ARC_BLEND_KINK_RATIO, the part of the highest
+    acceleration that a bend may take up within one period and pass for straight (defaults of
+    initraj.cc).
+    """
+
+    servo_period_s: Annotated[float, Meta(gt=0.0)] = 0.001
+    lookahead_moves: Annotated[int, Meta(ge=2)] = 50
+    kink_ratio: Annotated[float, Meta(ge=0.001, le=0.7071)] = 0.1

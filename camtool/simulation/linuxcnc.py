@@ -1,0 +1,216 @@
+"""LinuxCNC: the programmed lines and arcs themselves, corners as the path mode says.
+
+What it does with a program, in the order of the files:
+
+1. In the mode "blend", lines that lie on one line but for the tolerance are merged
+   (`linuxcnc_moves`, `camtool.kernels.merge_lines`; G64 P says both tolerances).
+2. Corners: stops, bends that pass for straight, blends (`linuxcnc_corners`). Samples near a
+   blended corner carry the largest departure that the tolerance allows: a bound, no prediction.
+3. Speeds: limits of the axes, turning in arcs, corners, so many moves ahead
+   (`camtool.kernels.lookahead`), trapezoids (`speed_plan`).
+
+Positions are the trajectory's, in 64-bit floats. The step generator follows them to the nearest
+step, or an encoder to its count: half a step of each axis, which is not in the samples. Steps are
+counted, not taken. Rounding never adds up.
+
+BACKLASH of an axis (`compensation_mm`) is added at a change of its direction. LinuxCNC spreads it
+over some milliseconds at half of the axis's limits; here it acts at once, and takes no time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from camtool.errors import MachineError
+from camtool.kernels.lattice import to_steps
+from camtool.machine.controllers import LinuxcncController
+from camtool.machine.model import Machine
+from camtool.simulation.linuxcnc_corners import CornerRules, Corners, corners_of
+from camtool.simulation.linuxcnc_moves import Moves, axis_limits, merged, moves_of
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.simulation.options import Options
+from camtool.simulation.path import check_positions, check_rows, placed
+from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
+from camtool.simulation.row_chunks import RowTotals, row_chunks
+from camtool.simulation.speed_plan import SpeedPlan
+from camtool.toolpath.moves import Kind, Toolpath
+
+MODES = ("blend", "exact-path", "exact-stop")
+"""What `[dialect]` may say of corners."""
+
+
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.models.ControllerModel`."""
+    controller = _controller(machine)
+    path = held(toolpath, machine)
+    ends = np.flatnonzero(path.kind == Kind.END)
+    rows = int(ends[0]) + 1 if len(ends) else len(path)
+    check_rows(path, rows)
+    path = _until(path, rows)
+    rules = _rules(machine)
+    path, chain = merged(path, rules.tolerance_mm if rules.mode == "blend" else 0.0)
+    moves = moves_of(path, chain, machine, controller.servo_period_s)
+    corners = corners_of(moves, rules)
+    samples = LinuxcncSamples(path, machine, moves, corners)
+    seconds = _seconds(path, moves, corners, controller.lookahead_moves)
+    mechanics = Mechanics(machine, path.start, options.effects)
+    return row_chunks(samples, RowTotals(seconds), mechanics, options.chunk_steps)
+
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The moves as read, homing at machine zero: nothing is rounded."""
+    check_positions(toolpath, machine)
+    return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A coded step, or what a million samples of the whole program allow."""
+    return sample_spacing_mm(toolpath, machine)
+
+
+def interpolation(machine: Machine, options: Options) -> str:
+    """The mode of corners."""
+    mode, _ = _path_mode(machine)
+    return mode
+
+
+def assumptions(machine: Machine) -> tuple[str, ...]:
+    """What the figures and times take for granted."""
+    mode, tolerance_mm = _path_mode(machine)
+    said = {
+        "blend": f"corners are rounded by as much as P {tolerance_mm:g} mm allows: a bound, "
+        "slow corners are sharper",
+        "exact-path": "no corner is rounded (G61)",
+        "exact-stop": "the machine stops at each corner (G61.1)",
+    }
+    return (
+        said[mode],
+        "speeds by trapezoids within the limits of the axes, overrides at 100 %",
+        "the step generator may be half a step off on each axis, which is not in the figures",
+    )
+
+
+class LinuxcncSamples:
+    """Points along the moves, blends included, numbered from 0; only one window is held."""
+
+    def __init__(self, path: Toolpath, machine: Machine, moves: Moves, corners: Corners) -> None:
+        self._samples = PathSamples(path, sample_spacing_mm(path, machine))
+        self.first = self._samples.first
+        self._step_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._moves, self._corners = moves, corners
+        self._row_length = move_lengths(path)
+        lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
+        so_far = np.cumsum(lengths) - lengths
+        begins = np.concatenate([[0.0], np.cumsum(moves.length)])
+        self._into = so_far - begins[np.maximum(moves.row_of, 0)]
+        self._at = self._in_steps(path.start[None, :])
+        self._counts = np.zeros((1, 3), dtype=np.int64)
+        self._low = 0
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row and position of the samples low:high, which follow those of the last call."""
+        row, share = self._samples.places(low, high)
+        points = self._samples.points(row, share)
+        self._blend(points, row, share)
+        steps = np.concatenate([self._at, self._in_steps(points)])
+        self._at, self._low = steps[-1:], low
+        self._counts = np.zeros((len(steps), 3), dtype=np.int64)
+        np.cumsum(np.abs(np.diff(steps, axis=0)), axis=0, out=self._counts[1:])
+        return row, points
+
+    def steps(self, bounds: Ints) -> Ints:
+        """Steps of each axis between samples of the window: changes of the nearest step."""
+        return np.diff(self._counts[bounds - self._low], axis=0)
+
+    def _blend(self, points: Floats, row: Ints, share: Floats) -> None:
+        """Move points (K, 3) near blended corners inward.
+
+        On the tangent at s from the corner P stands Q = P ∓ s t_±; the blend's point there is
+        B = P + h n + R (−n cos α ∓ t sin α), with α = (π/2 − θ) s / d, n inward, t onward, and
+        h = d / cos θ. What lies between them, B − Q, is added to the point of the move itself.
+        """
+        moves, corners = self._moves, self._corners
+        if not corners.reach.any():
+            return
+        move = moves.row_of[row]
+        along = self._into[row] + share * self._row_length[row]
+        left = np.maximum(moves.length[move] - along, 0.0)
+        following = np.append(corners.reach, 0.0)
+        ahead = np.flatnonzero(left < following[move + 1])
+        behind = np.flatnonzero(along < corners.reach[move])
+        self._inward(points, ahead, move[ahead] + 1, left[ahead], -1.0)
+        self._inward(points, behind, move[behind], along[behind], 1.0)
+
+    def _inward(self, points: Floats, on: Ints, corner: Ints, s: Floats, side: float) -> None:
+        corners = self._corners
+        d, theta = corners.reach[corner], corners.theta[corner]
+        alpha = (0.5 * np.pi - theta) * s / d
+        radius, height = d * np.tan(theta), d / np.cos(theta)
+        # n and t parts of B − P and of Q − P = s (n cos θ ± t sin θ)
+        inward = height - radius * np.cos(alpha) - s * np.cos(theta)
+        onward = side * (radius * np.sin(alpha) - s * np.sin(theta))
+        points[on] += inward[:, None] * corners.inward[corner]
+        points[on] += onward[:, None] * corners.onward[corner]
+
+    def _in_steps(self, points: Floats) -> Ints:
+        columns = [to_steps(points[:, axis], step) for axis, step in enumerate(self._step_mm)]
+        return np.column_stack(columns)
+
+
+def _seconds(path: Toolpath, moves: Moves, corners: Corners, lookahead: int) -> Floats:
+    """(N,) s of each row; the rows of a merged line share its time by their lengths."""
+    seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
+    lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
+    plan = SpeedPlan(moves.length, moves.speed, moves.acceleration * (1.0 - lost), corners.speed)
+    moving = np.flatnonzero(moves.row_of >= 0)
+    move = moves.row_of[moving]
+    part = move_lengths(path)[moving] / moves.length[move]
+    seconds[moving] = plan.seconds(lookahead)[move] * part
+    return seconds
+
+
+def _rules(machine: Machine) -> CornerRules:
+    controller = _controller(machine)
+    mode, tolerance_mm = _path_mode(machine)
+    return CornerRules(
+        mode=mode,
+        tolerance_mm=tolerance_mm,
+        kink_ratio=controller.kink_ratio,
+        period_s=controller.servo_period_s,
+        rate=axis_limits(machine, "max_rate_mm_min") / 60.0,
+        acceleration=axis_limits(machine, "acceleration_mm_s2"),
+    )
+
+
+def _path_mode(machine: Machine) -> tuple[str, float]:
+    """Mode and blend tolerance that `[dialect]` says; MachineError when it does not."""
+    mode = machine.dialect.get("path")
+    tolerance = machine.dialect.get("blend_tolerance_mm")
+    if mode not in MODES or not isinstance(mode, str):
+        raise MachineError(
+            "LinuxCNC needs to know how it meets corners",
+            where="table [dialect], key path",
+            mend=f"one of {', '.join(MODES)}",
+        )
+    if mode == "blend" and not isinstance(tolerance, (int, float)):
+        raise MachineError(
+            "blending needs its tolerance",
+            where="table [dialect], key blend_tolerance_mm",
+            mend="the P of G64, in mm",
+        )
+    return mode, float(tolerance) if mode == "blend" and tolerance is not None else 0.0
+
+
+def _controller(machine: Machine) -> LinuxcncController:
+    assert isinstance(machine.controller, LinuxcncController)
+    return machine.controller
+
+
+def _until(path: Toolpath, rows: int) -> Toolpath:
+    """The first rows of a toolpath."""
+    columns = ("kind", "end", "centre", "feed", "value", "source", "block")
+    return replace(path, **{name: getattr(path, name)[:rows] for name in columns})
