@@ -49,7 +49,7 @@ class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     arc_tolerance_mm: Positive = 0.05
     bend_tolerance_mm: Positive = 0.1
     plunge_mm: Positive = 10.0
-    plunge_mm_min: Positive = 201.545
+    plunge_mm_min: Positive = 234.375
     spindle_rpm: Positive | None = None
     grid_mm: Positive | None = None
     max_lines: Lines | None = None

@@ -142,18 +142,18 @@ def _listed_loop(motor: Floats, slave: Ints, axis: Floats, table: Ints) -> None:
 
 @inner
 def _text_loop(motor: Floats, slave: Ints, axis: Floats, top: int) -> None:
-    """Equations 4.15-4.18 and 4.27: the speed by the way that is left, held in both directions."""
+    """Equations 4.15-4.18 and 4.27: the reference by the way that is left, and the loop in its
+    velocity form. Nothing drives an axis that has arrived."""
     speed = float(slave[COUNT] - slave[SHOWN])
     slave[SHOWN] = slave[COUNT]
-    left = float(slave[TARGET] - slave[COUNT])
-    most = float(abs(slave[REF]) if slave[STAGE] == FOLLOWING else top)
-    ref = min(most, top * math.sqrt(min(abs(left) / TABLE_COUNTS, 1.0)))
-    if abs(left) > TABLE_COUNTS:
-        ref = most
-    ref = math.copysign(ref, left)
-    change = axis[KID] * (ref - speed) - axis[KPD] * (speed - motor[SPEED_BEFORE])
+    if slave[STAGE] == FOLLOWING:
+        left = float(slave[TARGET] - slave[COUNT])
+        most = float(abs(slave[REF]))
+        ref = min(most, top * math.sqrt(abs(left) / TABLE_COUNTS))
+        ref = math.copysign(ref if abs(left) < TABLE_COUNTS else most, left)
+        change = axis[KID] * (ref - speed) - axis[KPD] * (speed - motor[SPEED_BEFORE])
+        motor[DRIVE] = min(max(motor[DRIVE] + change / 1000.0, -100.0), 100.0)
     motor[SPEED_BEFORE] = speed
-    motor[DRIVE] = min(max(motor[DRIVE] + change / 1000.0, -100.0), 100.0)
 
 
 @inner
@@ -191,7 +191,7 @@ def _to_go(slave: Ints, axis: Floats, sense: int) -> int:
 
 
 @inner
-def _next_stage(motor: Floats, slave: Ints, moment: float, text: bool) -> None:
+def _next_stage(motor: Floats, slave: Ints, moment: float) -> None:
     """The count that the slave waited for has come."""
     if slave[STAGE] == CRUISING and slave[LEFT] > 1:
         slave[LEFT] -= 1
@@ -200,14 +200,13 @@ def _next_stage(motor: Floats, slave: Ints, moment: float, text: bool) -> None:
         slave[STAGE] = SLOWING
     else:
         slave[STAGE], slave[REF], slave[SEEN], slave[WRAPS] = STILL, 0, 0, 0
-        motor[DONE] = moment
-        if not text:
-            motor[DRIVE] = 0.0
+        motor[DONE], motor[DRIVE] = moment, 0.0
 
 
 @inner
 def _start(motor: Floats, slave: Ints, text: bool) -> None:
-    """The master's word to go: L5422 passes over a distance of 0."""
+    """The master's word to go. The text's distances add up, so that what an axis went too far is
+    taken back by its next line; the listing's begin where the axis is."""
     slave[WRAPS], slave[REF] = 0, slave[NEXT_REF]
     amount = slave[LEFT]
     motor[DONE] = motor[BEGIN]
@@ -216,6 +215,7 @@ def _start(motor: Floats, slave: Ints, text: bool) -> None:
     elif text:
         slave[STAGE] = FOLLOWING
         slave[TARGET] += amount if slave[NEXT_REF] >= 0 else -amount
+        slave[NEXT_REF] = -1 if slave[TARGET] < slave[COUNT] else 1
     else:
         slave[STAGE] = CRUISING
 
@@ -304,7 +304,7 @@ def _advance(motor: Floats, slave: Ints, axis: Floats, tick: int, text: bool) ->
         sense = int(np.sign(speed if speed != 0.0 else pushed))
         to_go = _to_go(slave, axis, sense)
         if to_go <= 0:
-            _next_stage(motor, slave, tick + at, text)
+            _next_stage(motor, slave, tick + at)
             continue
         if sense == 0:
             at = until
@@ -316,7 +316,7 @@ def _advance(motor: Floats, slave: Ints, axis: Floats, tick: int, text: bool) ->
             ticks, turns = min(ticks, back), back <= ticks
         took, reached = _glide(motor, slave, axis, aim, (sense, ticks, to_go))
         if reached:
-            _next_stage(motor, slave, tick + at + took, text)
+            _next_stage(motor, slave, tick + at + took)
             at += took
         else:
             at = at + ticks if turns else until

@@ -55,7 +55,7 @@ def test_a_job_as_the_machine_runs_it() -> None:
         ("LINE", (14.0, 20.0, -1.0), 2),
         ("END", (14.0, 20.0, -1.0), 2),
     ]
-    assert path.feed[3:6].tolist() == pytest.approx([201.545, 225.0, 225.0])
+    assert path.feed[3:6].tolist() == pytest.approx([234.375, 225.0, 225.0])
     assert path.findings == ()
 
 
