@@ -138,13 +138,14 @@ def left_out(names: Sequence[str]) -> Effects:
 
 def _matters(effect: str, machine: Machine) -> bool:
     """Whether leaving out this part of the mechanics can change anything."""
-    if effect == "play":
-        return any(axis.backlash_mm for axis in machine.axes)
-    if effect == "compensation":
-        return any(axis.compensation_mm for axis in machine.axes)
-    if effect == "scale":
-        return any(axis.real_step_mm != axis.coded_step_mm for axis in machine.axes)
-    return True
+    axes = list(machine.axes)
+    return {
+        "play": any(axis.backlash_mm for axis in axes) or any(machine.play_map.used),
+        "compensation": any(axis.compensation_mm for axis in axes),
+        "scale": any(axis.real_step_mm != axis.coded_step_mm for axis in axes),
+        "squareness": machine.mechanics.squareness_rad != 0.0,
+        "repeatability": any(axis.repeatability_mm for axis in axes),
+    }[effect]
 
 
 def _settings(key: str, value: str) -> tuple[str, ...]:
