@@ -8,6 +8,7 @@ from camtool.importers.read import read_drawing
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.moves import Move
+from camtool.verify.verify import verify
 from tests.oracles.corte_recto import walk
 from tests.postprocessors.i8751_machines import ROOT, STEP_MM, loaded
 
@@ -33,6 +34,9 @@ def test_every_step_stays_near_what_was_wanted() -> None:
             at = ((x + px) * STEP_MM, (y + py) * STEP_MM)
             worst = max(worst, distance(moves[owner], at))
     assert STEP_MM < worst <= limit
+    # The verifier sees what was walked, and the fit of the drawing besides.
+    report = verify(read, target.machine, wanted=wanted).report
+    assert 0.9 * worst < report.error_um.total.max / 1000.0 <= worst + 1e-9
 
 
 def distance(move: Move, at: tuple[float, float]) -> float:

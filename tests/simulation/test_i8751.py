@@ -2,11 +2,13 @@
 
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
 
 from camtool.errors import ProgramError
+from camtool.machine.controllers.i8751_pulses import Firmware
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
 from camtool.simulation.models import model_of
@@ -18,7 +20,7 @@ from camtool.verify.verify import verify
 from tests.oracles.corte_recto import walk
 from tests.oracles.i8751_run import Reading, record
 from tests.oracles.motion_rows import RowMotion, rows_of
-from tests.postprocessors.i8751_machines import SAMPLE, STEP_MM, loaded
+from tests.postprocessors.i8751_machines import ROOT, SAMPLE, STEP_MM, loaded
 
 
 def machine(*settings: str) -> Machine:
@@ -284,6 +286,27 @@ def test_the_longest_record_and_many_short_ones() -> None:
     chunks = list(simulate(moves, machine()))
     assert len(chunks) < 20
     assert sum(int(chunk.ledger.steps[:, 0].sum()) for chunk in chunks) == count
+
+
+def test_the_page_names_every_option() -> None:
+    page = (ROOT / "docs" / "controllers" / "i8751.md").read_text(encoding="utf-8")
+    keys = Firmware.__struct_fields__
+    assert [key for key in keys if f"`dialect.{key}`" not in page] == []
+
+
+@pytest.mark.parametrize(
+    ("column", "settings"),
+    [(1, ()), (2, ("delay=counted",)), (3, ("cruise=declared",)), (4, ("high_byte='255'",))],
+)
+def test_the_table_of_the_page(column: int, settings: tuple[str, ...]) -> None:
+    """The times of ramps there are those of the simulation."""
+    page = (ROOT / "docs" / "controllers" / "i8751.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^\|( \d+ \|(?: \d+\.\d+ \|){4})$", page, re.MULTILINE)
+    table = [[float(cell) for cell in line.rstrip(" |").split("|")] for line in lines]
+    assert len(table) == 7
+    for row in table:
+        (moved,) = run(in_steps((int(row[0]), 0, 0)), machine(*settings))
+        assert moved.duration_s == pytest.approx(row[column], abs=0.051 if row[0] > 1e4 else 6e-4)
 
 
 def test_what_it_says_of_itself() -> None:

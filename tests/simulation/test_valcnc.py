@@ -1,12 +1,14 @@
 """The ValCNC controller as a whole: against a literal run, and by the figures of its thesis."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from camtool.errors import MachineError, ProgramError
+from camtool.machine.controllers import SlideStart, ValcncController
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
 from camtool.simulation.models import model_of
@@ -18,6 +20,7 @@ from camtool.verify.verify import verify
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.oracles.valcnc_run import Valcnc, table_8
 
+ROOT = Path(__file__).parents[2]
 STEP_MM = 0.04
 """8 mm a turn by 200 steps (L1643)."""
 
@@ -436,6 +439,12 @@ def test_wrong_options_are_named() -> None:
     for setting in ("step_rate_hz=0", "arc_segment_mm=0", "arc_segments=0", "rounding=up"):
         with pytest.raises(MachineError, match=setting.partition("=")[0]):
             machine(f"controller.{setting}")
+
+
+def test_the_page_names_every_option() -> None:
+    page = (ROOT / "docs" / "controllers" / "valcnc.md").read_text(encoding="utf-8")
+    own = set(ValcncController.__struct_fields__) - set(SlideStart.__struct_fields__)
+    assert [key for key in sorted(own) if f"`controller.{key}`" not in page] == []
 
 
 def test_what_it_says_of_itself() -> None:
