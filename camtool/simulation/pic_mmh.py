@@ -30,8 +30,9 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine, pic_mmh_controller
 from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach, line_filler
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, one_row
+from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, one_row
 from camtool.simulation.options import Options
+from camtool.simulation.pic_mmh_legs import JudgedSteps, legs_of, positions
 from camtool.toolpath.moves import Kind, Toolpath
 
 MAX_STEPS = 1 << 30
@@ -53,6 +54,12 @@ def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
         end=_on_grid(toolpath.end, coded_mm),
         centre=np.where(toolpath.is_arc[:, None], centre, np.nan),
     )
+
+
+def judged_steps(toolpath: Toolpath, machine: Machine, options: Options) -> JudgedSteps | None:
+    """The same motion as that of `run`, judged as it is made, without chunks; None where the
+    mechanics needs these. Raises as `run` does, all at once."""
+    return PicMmh(toolpath, machine, options).judged_steps()
 
 
 def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
@@ -128,7 +135,7 @@ class PicMmh:
         """The chunks of all rows up to the end of the program."""
         for row, number in enumerate(self._toolpath.kind.tolist()):
             kind = Kind(number)
-            still, moved = self._still(row, kind), False
+            still, moved = self._still(row, kind, self._position), False
             for chunk in self._moving(row, kind):
                 moved = True
                 yield chunk
@@ -136,6 +143,49 @@ class PicMmh:
                 yield still
             if kind == Kind.END:
                 return
+
+    def judged_steps(self) -> JudgedSteps | None:
+        """All rows up to the end of the program as legs."""
+        if not self._mechanics.plain:
+            return None
+        toolpath = self._toolpath
+        ends = np.flatnonzero(toolpath.kind == Kind.END)
+        rows = int(ends[0]) + 1 if len(ends) else len(toolpath)
+        places = positions(toolpath, self._position, self._ends, self._home)
+        for row in np.flatnonzero(self._suspect(places)[:rows]).tolist():
+            self._check(row, places[row])
+        feeds = toolpath.is_feed[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            feed_s = 60.0 * self._coded_mm[None, [0, 2]] / toolpath.feed[:, None]
+        waits = toolpath.kind[:rows] == Kind.DWELL
+        legs = legs_of(toolpath, places, self._centres)
+        return JudgedSteps(
+            legs=legs,
+            periods_s=np.where(feeds, feed_s, self._rapid_period_s),
+            still_s=np.where(waits, toolpath.value[:rows], 0.0),
+            how=(
+                self._options.interpolator or self._controller.arcs,
+                self._controller.initial_error == "rounded-radius",
+                self._controller.time_base == "event",
+                float(self._coded_mm[0]),
+            ),
+            mechanics=self._mechanics,
+        )
+
+    def _suspect(self, places: Ints) -> Bools:
+        """(N,) true for the rows that `_check` has to look at."""
+        kind, feed = self._toolpath.kind, self._toolpath.feed
+        with np.errstate(invalid="ignore"):
+            no_feed = self._toolpath.is_feed & ~((feed > 0.0) & np.isfinite(feed))
+        away = (kind == Kind.SET_ZERO) & places[:-1].any(axis=1)
+        return np.asarray(no_feed | away | (kind == Kind.DWELL))
+
+    def _check(self, row: int, position: Ints) -> None:
+        """ProgramError for a row that cannot be followed from `position` (3,) steps."""
+        kind = Kind(int(self._toolpath.kind[row]))
+        if kind <= Kind.ARC_CCW:
+            self._period(row, kind, 0)
+        self._still(row, kind, position)
 
     def _moving(self, row: int, kind: Kind) -> Iterator[Chunk]:
         """Chunks of a row's motion; the controller then stands at the end that it was given."""
@@ -234,14 +284,14 @@ class PicMmh:
             ended=ended,
         )
 
-    def _still(self, row: int, kind: Kind) -> Chunk:
+    def _still(self, row: int, kind: Kind, position: Ints) -> Chunk:
         """A chunk of a row without motion; ProgramError for an event that cannot be followed."""
         seconds = 0.0
         if kind == Kind.DWELL:
             seconds = float(self._toolpath.value[row])
             if not (math.isfinite(seconds) and seconds >= 0.0):
                 raise ProgramError("a dwell without its seconds", where=self._place(row))
-        elif kind == Kind.SET_ZERO and self._position.any():
+        elif kind == Kind.SET_ZERO and position.any():
             raise ProgramError(
                 "part zero is set away from part zero",
                 where=self._place(row),

@@ -1,8 +1,8 @@
 """Full circles of a toolpath, and the figures of ISO 230-4 for what became of them.
 
 About a programmed circle (centre c, radius R) the slides are seen as radii over the angle, kept
-in `ANGLE_BINS` bins: of each bin the points with the least and the largest radius and the mean
-point. Memory is that of the bins, however many steps the circle has.
+in bins of half a degree (`camtool.kernels.circle_bins`): of each bin the points with the least and
+the largest radius and the mean point. Memory is that of the bins, however many steps there are.
 
     F max, F min = largest, least |p − c| − R           (radial error, programmed centre)
     G            = largest − least |p − c'|              (circular error)
@@ -11,7 +11,7 @@ point. Memory is that of the bins, however many steps the circle has.
 c' is the centre of the circle that fits the bins' mean points best by least squares of the radial
 distances; each bin counts alike, as the angle does for a ball-bar. With the centres e apart, the
 extreme of a bin is found about c and taken about c': that is wrong by no more than
-e · 2π/ANGLE_BINS, 0.9 % of e.
+e · 2π/720, 0.9 % of e.
 """
 
 from __future__ import annotations
@@ -24,10 +24,6 @@ import numpy as np
 from camtool.geometry.polylines import Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verify.cuts import CutMoves
-from camtool.verify.runs import run_offsets, run_peaks
-
-ANGLE_BINS = 720
-"""Angle bins of a circle: half a degree each."""
 
 FIT_ROUNDS = 30
 """The least-squares centre converges in about four rounds; more than this many are not tried."""
@@ -125,59 +121,22 @@ def _circle(toolpath: Toolpath, run: Ints, radius: float) -> Circle:
     )
 
 
-class CircleBins:
-    """The slides about one programmed circle, bin by bin."""
-
-    def __init__(self, circle: Circle) -> None:
-        self._centre = np.array(circle.centre_mm)
-        self._radius = circle.radius_mm
-        self._count = np.zeros(ANGLE_BINS, dtype=np.int64)
-        self._sum = np.zeros((ANGLE_BINS, 2))
-        self._least = np.full(ANGLE_BINS, np.inf)
-        self._largest = np.full(ANGLE_BINS, -np.inf)
-        self._inner = np.zeros((ANGLE_BINS, 2))
-        self._outer = np.zeros((ANGLE_BINS, 2))
-
-    def add(self, points: Floats) -> None:
-        """Points (J, 2) mm of the slides on their way round this circle."""
-        if len(points) == 0:
-            return
-        spoke = points - self._centre
-        radius = np.hypot(spoke[:, 0], spoke[:, 1])
-        turn = np.arctan2(spoke[:, 1], spoke[:, 0]) / (2.0 * np.pi) % 1.0
-        bins = np.minimum((turn * ANGLE_BINS).astype(np.int64), ANGLE_BINS - 1)
-        self._count += np.bincount(bins, minlength=ANGLE_BINS)
-        for axis in (0, 1):
-            self._sum[:, axis] += np.bincount(bins, spoke[:, axis], minlength=ANGLE_BINS)
-        # Neighbours share a bin: of each run of them only the two extremes go on.
-        runs = run_offsets(bins, len(bins))
-        for sign, best, place in (
-            (-1.0, self._least, self._inner),
-            (1.0, self._largest, self._outer),
-        ):
-            peaks = run_peaks(sign * radius, runs)
-            order = peaks[np.lexsort((sign * radius[peaks], bins[peaks]))]
-            which = order[np.flatnonzero(np.diff(bins[order], append=ANGLE_BINS))]
-            better = which[sign * radius[which] > sign * best[bins[which]]]
-            best[bins[better]] = radius[better]
-            place[bins[better]] = spoke[better]
-
-    def figures(self) -> CircleFigures:
-        """G, F max, F min and D of what was added."""
-        seen = self._count > 0
-        if int(seen.sum()) < FEWEST_BINS:
-            return UNSEEN
-        mean = self._sum[seen] / self._count[seen, None]
-        centre = least_squares_centre(mean)
-        inner, outer = self._inner[seen] - centre, self._outer[seen] - centre
-        return CircleFigures(
-            circular_mm=float(
-                np.hypot(outer[:, 0], outer[:, 1]).max() - np.hypot(inner[:, 0], inner[:, 1]).min()
-            ),
-            radial_max_mm=float(self._largest.max()) - self._radius,
-            radial_min_mm=float(self._least.min()) - self._radius,
-            radial_mean_mm=float(np.hypot(mean[:, 0], mean[:, 1]).mean()) - self._radius,
-        )
+def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
+    """G, F max, F min and D of the bins (720, 9) of `camtool.kernels.circle_bins`."""
+    seen = bins[bins[:, 0] > 0.0]
+    if len(seen) < FEWEST_BINS:
+        return UNSEEN
+    mean = seen[:, 1:3] / seen[:, :1]
+    centre = least_squares_centre(mean)
+    inner, outer = seen[:, 4:6] - centre, seen[:, 7:9] - centre
+    return CircleFigures(
+        circular_mm=float(
+            np.hypot(outer[:, 0], outer[:, 1]).max() - np.hypot(inner[:, 0], inner[:, 1]).min()
+        ),
+        radial_max_mm=math.sqrt(seen[:, 6].max()) - radius_mm,
+        radial_min_mm=math.sqrt(seen[:, 3].min()) - radius_mm,
+        radial_mean_mm=float(np.hypot(mean[:, 0], mean[:, 1]).mean()) - radius_mm,
+    )
 
 
 def least_squares_centre(points: Floats) -> Floats:

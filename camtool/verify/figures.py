@@ -4,9 +4,8 @@
 root of the mean square (exact, every sample counts alike) and the 95th percentile. The percentile
 comes from a histogram: the middle of the bin that holds the sample of that rank.
 
-The bins are those of a float's own bits: the exponent and the first `MANTISSA_BITS` bits of the
-mantissa, taken as one integer, grow with the number and make bins whose width is between 1/256
-and 1/128 of their value. So the percentile is within 0.4 % of a sample's true value.
+Bins (`camtool.kernels.error_bins`) are between 1/256 and 1/128 of their value wide. So the
+percentile is within 0.4 % of a sample's true value.
 """
 
 from __future__ import annotations
@@ -16,29 +15,10 @@ import math
 import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
-
-MANTISSA_BITS = 7
-"""Bits of the mantissa that tell bins apart: bins are at most 2⁻⁷, 0.8 %, wide."""
-
-SMALLEST_MM = 2.0**-30
-"""Errors below this (a thousandth of a nanometre) are counted as 0 by the percentile."""
-
-LARGEST_MM = 2.0**20
-"""Errors above this (a kilometre) share the last bin of the percentile."""
+from camtool.kernels.error_bins import BEFORE_FIRST, BINS, SHIFT, leading_bits
 
 PERCENTILE = 0.95
 """Which percentile of the errors the report calls p95."""
-
-_SHIFT = 52 - MANTISSA_BITS
-
-
-def _bits(values: Floats) -> Ints:
-    """The leading bits of each float64 ≥ 0, as integers in the order of the values."""
-    return np.right_shift(np.ascontiguousarray(values).view(np.int64), _SHIFT)
-
-
-_FIRST = int(_bits(np.array([SMALLEST_MM]))[0])
-_BINS = int(_bits(np.array([LARGEST_MM]))[0]) - _FIRST + 2
 
 
 class Figure:
@@ -52,7 +32,7 @@ class Figure:
         """Toolpath row of the maximum."""
         self._max = -math.inf
         self._squares = 0.0
-        self._histogram = np.zeros(_BINS, dtype=np.int64)
+        self._histogram = np.zeros(BINS, dtype=np.int64)
 
     def add(self, errors: Floats, points: Floats, rows: Ints) -> None:
         """Errors (J,) mm measured at points (J, 2) mm of these rows (J,)."""
@@ -66,8 +46,24 @@ class Figure:
             self.at_mm = (float(points[worst, 0]), float(points[worst, 1]))
             self.row = int(rows[worst])
         # Bin 0 is for 0; the last one for what is too large.
-        bins = np.clip(_bits(errors) - (_FIRST - 1), 0, _BINS - 1)
-        self._histogram += np.bincount(bins, minlength=_BINS)
+        bins = np.clip(leading_bits(errors) - BEFORE_FIRST, 0, BINS - 1)
+        self._histogram += np.bincount(bins, minlength=BINS)
+
+    @classmethod
+    def of_rows(
+        cls, largest: Floats, squares: Floats, counts: Ints, histogram: Ints | None
+    ) -> Figure:
+        """The figure of what was judged row by row: the largest error (N,) mm of each row or NaN,
+        sums of squares (N,) mm², counts (N,); `histogram` (BINS, L) of all, its columns added."""
+        made = cls()
+        made.count = int(counts.sum())
+        if made.count:
+            made.row = int(np.nanargmax(largest))
+            made._max = float(largest[made.row])
+            made._squares = float(squares.sum())
+        if histogram is not None:
+            made._histogram = histogram.sum(axis=1)
+        return made
 
     @property
     def max(self) -> float:
@@ -88,19 +84,6 @@ class Figure:
         chosen = int(np.searchsorted(np.cumsum(self._histogram), rank))
         if chosen == 0:
             return 0.0
-        edges = np.array([chosen, chosen + 1], dtype=np.int64) + (_FIRST - 1)
-        middle = float(np.left_shift(edges, _SHIFT).view(np.float64).mean())
+        edges = np.array([chosen, chosen + 1], dtype=np.int64) + BEFORE_FIRST
+        middle = float(np.left_shift(edges, SHIFT).view(np.float64).mean())
         return min(middle, self._max)
-
-
-class LargestError:
-    """The maximum alone, mm; NaN while nothing was added."""
-
-    def __init__(self) -> None:
-        self.max = math.nan
-
-    def add(self, errors: Floats) -> None:
-        """Errors (J,) mm."""
-        if len(errors):
-            worst = float(errors.max())
-            self.max = worst if math.isnan(self.max) else max(self.max, worst)

@@ -16,7 +16,8 @@ from camtool.verify.dimensions import RowSlides, closure_mm, places_between, siz
 from camtool.verify.figures import Figure
 from camtool.verify.motion import Tally
 from camtool.verify.report import Report, certain, number
-from camtool.verify.slides import SlidePass
+from camtool.verify.rows import RowFigures
+from camtool.verify.slides import SlidePass, largest
 
 UM = 1000.0
 """µm in a mm."""
@@ -31,6 +32,7 @@ class Result:
     wanted: CutMoves
     coverage: Coverage
     slides: SlidePass
+    rows: RowFigures
     tally: Tally
 
     def report(self, extents: Floats, findings: tuple[Finding, ...]) -> Report:
@@ -38,9 +40,9 @@ class Result:
         case, tally = self.case, self.tally
         options = case.options
         slides = RowSlides(
-            self.slides.low,
-            self.slides.high,
-            places_between(case.decoded.start[:2], self.slides.row_end),
+            self.rows.low,
+            self.rows.high,
+            places_between(case.decoded.start[:2], self.rows.slide_end),
         )
         x, y, z = ((certain(low), certain(high)) for low, high in extents)
         return Report(
@@ -69,7 +71,11 @@ class Result:
         fit = record.MaxRms()
         if drawing is not None:
             fit = record.MaxRms(number(drawing.fit.max_mm, UM), number(drawing.fit.rms_mm, UM))
-        inside, step = slides.interpolation, self.case.step_mm
+        inside, step = slides.interpolation(), self.case.step_mm
+        is_arc = self.cuts.toolpath.is_arc
+        lines_mm = largest(self.rows.interpolation, ~is_arc)
+        arcs_mm = largest(self.rows.interpolation, is_arc)
+        total = slides.total()
         return record.Errors(
             fit=fit,
             rounding=_max_rms(self.coverage.rounding),
@@ -77,16 +83,16 @@ class Result:
                 max=number(inside.max, UM),
                 rms=number(inside.rms, UM),
                 p95=number(inside.p95, UM),
-                lines_max=number(slides.lines.max, UM),
-                arcs_max=number(slides.arcs.max, UM),
-                lines_steps=number(slides.lines.max / step),
-                arcs_steps=number(slides.arcs.max / step),
+                lines_max=number(lines_mm, UM),
+                arcs_max=number(arcs_mm, UM),
+                lines_steps=number(lines_mm / step),
+                arcs_steps=number(arcs_mm / step),
             ),
-            mechanics=_max_rms(slides.mechanics),
+            mechanics=_max_rms(slides.mechanics()),
             total=record.ErrorFigures(
-                number(slides.total.max, UM),
-                number(slides.total.rms, UM),
-                number(slides.total.p95, UM),
+                number(total.max, UM),
+                number(total.rms, UM),
+                number(total.p95, UM),
             ),
         )
 

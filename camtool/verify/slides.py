@@ -1,132 +1,183 @@
 """One pass over the motion: the errors of interpolation and mechanics, and what the part becomes.
 
-Per step that cuts:  interpolation = commanded position to the decoded move of its row;
-mechanics = |slide − commanded|;  total = slide to the nearest move of the wanted contour that its
-row belongs to. Per row, whatever it does: the extents of the slides and where they end.
-Memory grows with the rows of the program, not with the steps.
+The compiled judge (`camtool.kernels.judge`) takes the samples, from chunks or from a controller
+that is run on the way, and fills columns of the rows; this module sets its task and reads what it
+found. Circles are closed as soon as their last row is done, so that bins are there only for those
+that are under way. Memory grows with the rows of the program, not with the steps.
 """
 
 from __future__ import annotations
 
+import heapq
+import math
+from collections.abc import Iterator
 from itertools import pairwise
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
-from camtool.verify.circles import UNSEEN, CircleBins, CircleFigures
-from camtool.verify.compare import Groups, Target
-from camtool.verify.figures import Figure, LargestError
+from camtool.simulation.motion import Chunk, Ledger
+from camtool.verify.circles import UNSEEN, CircleFigures, circle_figures
+from camtool.verify.compare import Target
+from camtool.verify.cuts import Bools
+from camtool.verify.figures import Figure
 from camtool.verify.match import Goal, Match
-from camtool.verify.motion import Batch
-from camtool.verify.runs import run_offsets
-from camtool.verify.trace import Trace, TraceBuffer
+from camtool.verify.rows import RowFigures, add_ledger, empty_columns, empty_ledger, row_figures
+from camtool.verify.tables import move_table
+from camtool.verify.trace import Trace, TraceSize, trace_of
 
-STEPS_PER_GROUP = 128
-"""Neighbouring steps of a row that share one search for near moves."""
+if TYPE_CHECKING:
+    from camtool.kernels.judge import Sums, Task
+
+
+class Steps(Protocol):
+    """A controller that is run and judged on the way."""
+
+    @property
+    def rows(self) -> int:
+        """How many rows it runs."""
+
+    def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
+        """Run the rows low:high, which follow those run before."""
 
 
 class SlidePass:
-    """Takes batches in order; its figures hold for all that was added so far."""
+    """Takes the motion in order; its figures hold after `finish`."""
 
-    def __init__(
-        self,
-        decoded: Target,
-        goal: Goal,
-        match: Match,
-        trace: TraceBuffer,
-    ) -> None:
-        self.interpolation = Figure()
-        self.lines, self.arcs = LargestError(), LargestError()
-        self.mechanics = Figure()
-        self.total = Figure()
-        self.trace = trace
-        count = len(match.contour)
-        self.low = np.full((count, 2), np.inf)
-        """(N, 2) mm: lowest X and Y of the slides in each row; inf where they did not move."""
-        self.high = np.full((count, 2), -np.inf)
-        """(N, 2) mm: highest X and Y of the slides in each row; −inf where they did not move."""
-        self.row_end = np.full((count, 2), np.nan)
-        """(N, 2) mm: where the slides stand after each row; NaN where they did not move."""
+    def __init__(self, decoded: Target, goal: Goal, match: Match, trace: TraceSize) -> None:
         self.circles = goal.circles
         self.circle_figures: list[CircleFigures] = [UNSEEN] * len(goal.circles)
-        self._decoded, self._wanted, self._match = decoded, goal.target, match
-        self._heights = _heights(decoded, goal.depth_mm)
-        self._bins: dict[int, CircleBins] = {}
-        self._last_row = _last_rows(match.circle, len(goal.circles))
+        self._cuts = decoded.cuts
+        self._ledger = empty_ledger(len(match.contour))
+        self._first, self._last = _rows_of_circles(match.circle, len(goal.circles))
+        self._slot = _slots(self._first, self._last)
+        seen = np.flatnonzero(self._last >= 0)
+        self._closing = seen[np.argsort(self._last[seen], kind="stable")].tolist()
+        self._task = _task(decoded, goal, match, self._slot)
+        slots = int(self._slot.max(initial=-1)) + 1
+        self._sums = _sums(len(match.contour), slots, len(self._task.moves), trace)
+        self._start, self._most = trace.start, trace.most
 
-    def add(self, batch: Batch) -> None:
-        """The next steps of the program."""
-        offsets = run_offsets(batch.row, len(batch.row))
-        rows = batch.row[offsets[:-1]]
-        self.low[rows] = np.minimum(
-            self.low[rows], np.minimum.reduceat(batch.slide, offsets[:-1], axis=0)
-        )
-        self.high[rows] = np.maximum(
-            self.high[rows], np.maximum.reduceat(batch.slide, offsets[:-1], axis=0)
-        )
-        self.row_end[rows] = batch.slide[offsets[1:] - 1]
-        cutting = self._decoded.cuts.is_cut[batch.row]
-        error = np.zeros(len(batch.row))
-        if cutting.any():
-            cut = Batch(batch.row[cutting], batch.commanded[cutting], batch.slide[cutting])
-            error[cutting] = self._errors(cut)
-            self._add_circles(cut)
-        self.trace.add(Trace(batch.slide, error, batch.row, cutting))
+    def add(self, chunk: Chunk) -> None:
+        """The next samples of the program."""
+        from camtool.kernels.judge import judge_samples
+
+        add_ledger(self._ledger, chunk.ledger)
+        if len(chunk.row) == 0:
+            return
+        bounds = self._bounds(int(chunk.row[0]), int(chunk.row[-1]) + 1)
+        cuts = np.searchsorted(chunk.row, bounds)
+        for (low, high), row in zip(pairwise(cuts.tolist()), bounds[:-1], strict=True):
+            self._close(row)
+            judge_samples(
+                np.ascontiguousarray(chunk.row[low:high]),
+                np.ascontiguousarray(chunk.commanded[low:high]),
+                np.ascontiguousarray(chunk.slide[low:high]),
+                self._task,
+                self._sums,
+            )
+
+    def run(self, steps: Steps) -> None:
+        """All rows of a controller that is run on the way."""
+        for low, high in pairwise(self._bounds(0, steps.rows)):
+            self._close(low)
+            add_ledger(self._ledger, steps.judge(low, high, self._task, self._sums))
 
     def finish(self) -> None:
-        """No more batches will come: close the circles."""
-        for index in list(self._bins):
-            self.circle_figures[index] = self._bins.pop(index).figures()
+        """No more motion will come: close the circles."""
+        self._close(len(self._ledger.row))
 
-    def _errors(self, cut: Batch) -> Floats:
-        """Count the steps (J,) that cut; returns their total error (J,) mm."""
-        row, commanded, slide = cut.row, cut.commanded, cut.slide
-        interpolation = self._decoded.own(commanded, row)
-        self.interpolation.add(interpolation, commanded, row)
-        is_arc = self._decoded.cuts.toolpath.is_arc[row]
-        self.arcs.add(interpolation[is_arc])
-        self.lines.add(interpolation[~is_arc])
-        lag = slide - commanded
-        mechanics = np.sqrt(lag[:, 0] ** 2 + lag[:, 1] ** 2)
-        self.mechanics.add(mechanics, slide, row)
-        # No way is longer than the sum of its parts: a margin within which the search succeeds.
-        bound = self._match.apart_mm[row] + interpolation + mechanics
-        total = self._nearest(slide, row, bound)
-        known = np.isfinite(total)
-        self.total.add(total[known], slide[known], row[known])
-        return np.where(known, total, 0.0)
+    def _bounds(self, low: int, high: int) -> list[int]:
+        """Rows from low to high at which circles must be closed first, both ends included."""
+        inner = sorted({int(self._last[circle]) + 1 for circle in self._closing})
+        return [low, *(row for row in inner if low < row < high), high]
 
-    def _nearest(self, slide: Floats, row: Ints, bound: Floats) -> Floats:
-        """Distances to wanted moves at the row's height, and at any height where none is there."""
-        distance = self._nearest_within(slide, row, bound, self._heights[row])
-        rest = np.flatnonzero(np.isinf(distance))
-        if len(rest):
-            any_z = np.tile([-np.inf, np.inf], (len(rest), 1))
-            distance[rest] = self._nearest_within(slide[rest], row[rest], bound[rest], any_z)
-        return distance
+    def _close(self, row: int) -> None:
+        """Take the figures of the circles that end before a row, and free their bins."""
+        while self._closing and self._last[self._closing[0]] < row:
+            circle = self._closing.pop(0)
+            bins = self._sums.bins[self._slot[circle]]
+            self.circle_figures[circle] = circle_figures(bins, self.circles[circle].radius_mm)
+            from camtool.kernels.circle_bins import empty_bins
 
-    def _nearest_within(self, slide: Floats, row: Ints, bound: Floats, z: Floats) -> Floats:
-        offsets = run_offsets(row, STEPS_PER_GROUP)
-        first = offsets[:-1]
-        margin = np.maximum.reduceat(bound, first)
-        groups = Groups(offsets, margin, self._match.only[row[first]], z[first])
-        return self._wanted.nearest(slide, groups).distance
+            bins[:] = empty_bins(1)[0]
 
-    def _add_circles(self, cut: Batch) -> None:
-        """Give the steps to the circles that they belong to; close those that are done."""
-        if not self.circles:
-            return
-        circle = self._match.circle[cut.row]
-        offsets = run_offsets(circle, len(circle))
-        for low, high in pairwise(offsets.tolist()):
-            index = int(circle[low])
-            if index >= 0:
-                bins = self._bins.get(index) or CircleBins(self.circles[index])
-                self._bins[index] = bins
-                bins.add(cut.slide[low:high])
-        row = int(cut.row[-1])
-        for index in [index for index in self._bins if self._last_row[index] < row]:
-            self.circle_figures[index] = self._bins.pop(index).figures()
+    @property
+    def rows(self) -> RowFigures:
+        """What became of each row."""
+        return row_figures(self._sums.rows, self._cuts.is_cut, self._ledger)
+
+    def trace(self) -> Trace:
+        """The slides' path, thinned."""
+        return trace_of(self._sums, self._start, self._cuts.is_cut, self._most)
+
+    def interpolation(self) -> Figure:
+        """Interpolation over all samples that cut."""
+        rows = self.rows
+        judged = np.where(self._cuts.is_cut, rows.samples, 0)
+        return Figure.of_rows(
+            rows.interpolation, rows.interpolation_squares, judged, self._sums.histograms[0]
+        )
+
+    def mechanics(self) -> Figure:
+        """Mechanics over all samples that cut; without a percentile."""
+        rows = self.rows
+        judged = np.where(self._cuts.is_cut, rows.samples, 0)
+        return Figure.of_rows(rows.mechanics, rows.mechanics_squares, judged, None)
+
+    def total(self) -> Figure:
+        """The total over all samples that have one."""
+        rows = self.rows
+        return Figure.of_rows(rows.total, rows.total_squares, rows.known, self._sums.histograms[1])
+
+
+def largest(errors: Floats, which: Bools) -> float:
+    """The largest of the errors (N,) that are picked and known, mm; NaN without any."""
+    picked = errors[which & np.isfinite(errors)]
+    return float(picked.max()) if len(picked) else math.nan
+
+
+def _task(decoded: Target, goal: Goal, match: Match, slot: Ints) -> Task:
+    from camtool.kernels.box_tree import tree_of
+    from camtool.kernels.circle_bins import bin_directions
+    from camtool.kernels.judge import Task
+
+    own = move_table(decoded.cuts)
+    wanted = own if goal.target is decoded else move_table(goal.target.cuts)
+    return Task(
+        own=own.moves,
+        own_of=own.of_row,
+        moves=wanted.moves,
+        heights=wanted.heights,
+        tree=tree_of(wanted.boxes),
+        only=wanted.ranges(match.only),
+        window=_heights(decoded, goal.depth_mm),
+        circle=match.circle,
+        centre=np.array([circle.centre_mm for circle in goal.circles]).reshape(-1, 2),
+        slot=slot,
+        directions=bin_directions(),
+    )
+
+
+def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
+    from camtool.kernels.circle_bins import empty_bins
+    from camtool.kernels.error_bins import BINS
+    from camtool.kernels.judge import Sums
+    from camtool.kernels.near_moves import new_memo
+    from camtool.kernels.thin_trace import new_pen
+
+    room = 2 * trace.most + rows
+    return Sums(
+        rows=empty_columns(rows),
+        histograms=np.zeros((2, BINS, 4), dtype=np.int64),
+        bins=empty_bins(slots),
+        trace=np.empty((room + rows + 1, 3)),
+        trace_row=np.empty(room + rows + 1, dtype=np.int64),
+        pen=new_pen(trace.stride, room),
+        found=np.empty(moves, dtype=np.int64),
+        memo=new_memo(),
+    )
 
 
 def _heights(decoded: Target, depth_mm: float) -> Floats:
@@ -136,9 +187,29 @@ def _heights(decoded: Target, depth_mm: float) -> Floats:
     return np.asarray(np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]))
 
 
-def _last_rows(circle: Ints, count: int) -> Ints:
-    """(count,) last row (N,) that belongs to each circle."""
+def _rows_of_circles(circle: Ints, count: int) -> tuple[Ints, Ints]:
+    """(count,), (count,) first and last row (N,) that belong to each circle; last −1: none."""
+    first = np.full(count, len(circle), dtype=np.int64)
     last = np.full(count, -1, dtype=np.int64)
     rows = np.flatnonzero(circle >= 0)
+    np.minimum.at(first, circle[rows], rows)
     np.maximum.at(last, circle[rows], rows)
-    return last
+    return first, last
+
+
+def _slots(first: Ints, last: Ints) -> Ints:
+    """(C,) bins for each circle: other ones than those of circles whose rows overlap its own."""
+    slot = np.full(len(first), -1, dtype=np.int64)
+    busy: list[tuple[int, int]] = []
+    free: list[int] = []
+    for circle in _in_order(first, last):
+        while busy and busy[0][0] < first[circle]:
+            heapq.heappush(free, heapq.heappop(busy)[1])
+        slot[circle] = heapq.heappop(free) if free else len(busy)
+        heapq.heappush(busy, (int(last[circle]), int(slot[circle])))
+    return slot
+
+
+def _in_order(first: Ints, last: Ints) -> Iterator[int]:
+    seen = np.flatnonzero(last >= 0)
+    yield from seen[np.argsort(first[seen], kind="stable")].tolist()

@@ -1,15 +1,23 @@
-"""The path of the slides, thinned for pictures: bounded, with row ends and error peaks kept."""
+"""The path of the slides, thinned for pictures: bounded, with row ends and error peaks kept.
+
+Of every `stride` samples of a row the judge keeps the one with the largest error, and each row's
+last (`camtool.kernels.thin_trace`).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
 from camtool.toolpath.moves import Toolpath
 from camtool.verify.cuts import Bools, moved_lengths
-from camtool.verify.runs import run_offsets, run_peaks
+from camtool.verify.runs import run_peaks
+
+if TYPE_CHECKING:
+    from camtool.kernels.judge import Sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,48 +31,45 @@ class Trace:
     cutting: Bools
 
 
-class TraceBuffer:
-    """Collects a Trace of at most `most` points.
+@dataclass(frozen=True, eq=False)
+class TraceSize:
+    """Where the slides begin (1, 2) mm, of how many samples of a row one is kept, and how many
+    points there may be in the end."""
 
-    Of every `stride` samples of a row the one with the largest error is kept, and each row's last.
-    The stride is chosen from the way of the whole toolpath, so that about half of `most` come of
-    it. What is too many in the end (more rows than points) is thinned likewise.
-    """
-
-    def __init__(self, decoded: Toolpath, spacing_mm: float, most: int) -> None:
-        rise = np.abs(decoded.end[:, 2] - decoded.starts[:, 2]) if len(decoded) else np.zeros(0)
-        expected = float((moved_lengths(decoded) + rise).sum()) / spacing_mm
-        self._most = most
-        self._stride = max(1, int(np.ceil(2.0 * expected / most)))
-        start = decoded.start[None, :2]
-        self._parts = [Trace(start, np.zeros(1), np.zeros(1, np.int64), np.zeros(1, np.bool_))]
-
-    def add(self, part: Trace) -> None:
-        """The next points, not yet thinned; rows ascend."""
-        self._parts.append(_thinned(part, run_offsets(part.row, self._stride)))
-
-    def trace(self) -> Trace:
-        """What was kept."""
-        whole = Trace(
-            np.concatenate([part.points for part in self._parts]),
-            np.concatenate([part.error_mm for part in self._parts]),
-            np.concatenate([part.row for part in self._parts]),
-            np.concatenate([part.cutting for part in self._parts]),
-        )
-        count = len(whole.row)
-        if count <= self._most:
-            return whole
-        longest = -(-count // self._most)
-        offsets = np.append(np.arange(0, count, longest), count)
-        return _picked(whole, run_peaks(whole.error_mm, offsets))
+    start: Floats
+    stride: int
+    most: int
 
 
-def _thinned(part: Trace, offsets: Ints) -> Trace:
-    """The peak of each run, and the last point of each row."""
-    if len(part.row) == 0:
-        return part
-    ends = np.append(np.flatnonzero(np.diff(part.row)), len(part.row) - 1)
-    return _picked(part, np.union1d(run_peaks(part.error_mm, offsets), ends))
+def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
+    """A stride for samples about `spacing_mm` apart, so that about half of `most` come of it."""
+    rise = np.abs(decoded.end[:, 2] - decoded.starts[:, 2]) if len(decoded) else np.zeros(0)
+    expected = float((moved_lengths(decoded) + rise).sum()) / spacing_mm
+    stride = max(1, int(np.ceil(2.0 * expected / most)))
+    return TraceSize(decoded.start[None, :2], stride, most)
+
+
+def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
+    """What the judge kept, and the start (1, 2) mm before it; of what is more than `most` points
+    (more rows than points) the peaks again. `cutting` (N,) tells the rows that cut."""
+    from camtool.kernels.thin_trace import ROW, WRITTEN, unwritten
+
+    written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)
+    kept = np.concatenate([sums.trace[:written], held])
+    last = np.full(len(held), int(sums.pen[ROW]), dtype=np.int64)
+    row = np.concatenate([sums.trace_row[:written], last])
+    count = len(kept)
+    whole = Trace(
+        np.concatenate([start, kept[:, :2]]),
+        np.concatenate([[0.0], kept[:, 2]]),
+        np.concatenate([[0], row]),
+        np.concatenate([[False], cutting[row]]),
+    )
+    if count + 1 <= most:
+        return whole
+    longest = -(-(count + 1) // most)
+    offsets = np.append(np.arange(0, count + 1, longest), count + 1)
+    return _picked(whole, run_peaks(whole.error_mm, offsets))
 
 
 def _picked(part: Trace, which: Ints) -> Trace:

@@ -3,7 +3,7 @@
     decoded ─held─▶ as the controller rounds it
     held, wanted ─cuts─▶ lines and arcs that cut, by contour
     held × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
-    decoded ─simulate─▶ chunks ─motion─▶ batches ─slides─▶ errors, circles, extents, trace
+    decoded ─simulate─▶ chunks ─slides─▶ rows: errors, circles, extents, trace
     all of it ─▶ Report and Trace
 
 Every distance is to true lines and arcs. Memory grows with the rows of the program, not with the
@@ -22,7 +22,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
 from camtool.simulation.models import model_of
 from camtool.simulation.motion import Chunk
-from camtool.simulation.simulate import simulate
+from camtool.simulation.simulate import check_options, simulate
 from camtool.toolpath.bent import Bent
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Toolpath
@@ -34,12 +34,12 @@ from camtool.verify.cuts import cut_moves, is_flat
 from camtool.verify.figures import Figure
 from camtool.verify.holes import hole_findings, holes_of
 from camtool.verify.match import Goal, carried_match, own_match
-from camtool.verify.motion import Tally, batches
+from camtool.verify.motion import tally_of
 from camtool.verify.noticed import motion_findings
 from camtool.verify.report import Before, Planned, Report
 from camtool.verify.result import Result
-from camtool.verify.slides import SlidePass
-from camtool.verify.trace import Trace, TraceBuffer
+from camtool.verify.slides import SlidePass, Steps
+from camtool.verify.trace import Trace, trace_size
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
@@ -77,11 +77,15 @@ def verify(
     where `wanted` was bent. Toolpaths are in the work frame.
     """
     case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent)
-    return judge(case, simulate(decoded, machine, case.simulation))
+    check_options(machine, case.simulation)
+    on_the_way = getattr(model_of(machine), "judged_steps", None)
+    steps: Steps | None = on_the_way and on_the_way(decoded, machine, case.simulation)
+    return judge(case, steps or simulate(decoded, machine, case.simulation))
 
 
-def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
-    """Judge a case by the chunks of its motion, whoever made them."""
+def judge(case: Case, motion: Iterable[Chunk] | Steps) -> Verification:
+    """Judge a case by the chunks of its motion, whoever made them, or by a controller that is run
+    on the way."""
     # Without Z on either side, all feed moves are taken to cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
     held = model_of(case.machine).held(case.decoded, case.machine)
@@ -92,16 +96,20 @@ def judge(case: Case, chunks: Iterable[Chunk]) -> Verification:
     circles = full_circles(wanted.cuts, case.coverage_mm)
     goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
     coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
-    trace = TraceBuffer(case.decoded, case.spacing_mm, case.options.trace_points)
-    slides = SlidePass(decoded, goal, coverage.match, trace)
-    tally = Tally()
-    for batch in batches(chunks, case.decoded, decoded.cuts.is_cut, tally):
-        slides.add(batch)
+    size = trace_size(case.decoded, case.spacing_mm, case.options.trace_points)
+    slides = SlidePass(decoded, goal, coverage.match, size)
+    if isinstance(motion, Iterable):
+        for chunk in motion:
+            slides.add(chunk)
+    else:
+        slides.run(motion)
     slides.finish()
+    rows = slides.rows
+    tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
     extents = toolpath_extents(case.decoded)
     findings = _all_findings(case, coverage, motion_findings(decoded.cuts, case, tally, extents))
-    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, tally)
-    return Verification(result.report(extents, findings), trace.trace(), findings)
+    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally)
+    return Verification(result.report(extents, findings), slides.trace(), findings)
 
 
 def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:

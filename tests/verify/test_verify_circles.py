@@ -5,17 +5,18 @@ import math
 import numpy as np
 import pytest
 
+from camtool.kernels.circle_bins import ANGLE_BINS, bin_directions, empty_bins
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verify.circles import (
-    ANGLE_BINS,
     UNSEEN,
     Circle,
-    CircleBins,
+    circle_figures,
     full_circles,
     least_squares_centre,
 )
 from camtool.verify.cuts import cut_moves
 from tests.oracles.dense_moves import circle, cut
+from tests.oracles.kernel_doors import fill_bins_
 
 GAP_MM = 0.005
 RADIUS = 1.5
@@ -28,10 +29,11 @@ def ring(count: int, turns: float = 1.0) -> np.ndarray:
 
 
 def figures(points: np.ndarray, parts: int = 1):
-    bins = CircleBins(UNIT)
+    bins = empty_bins(1)[0]
     for part in np.array_split(points, parts):
-        bins.add(part)
-    return bins.figures()
+        x, y = np.ascontiguousarray(part.T)
+        fill_bins_(x, y, np.array(UNIT.centre_mm), bin_directions(), bins)
+    return circle_figures(bins, UNIT.radius_mm)
 
 
 def test_a_perfect_circle_has_no_error() -> None:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.verify.figures import Figure, LargestError
+from camtool.verify.figures import Figure
 from camtool.verify.runs import group_boxes, ranges, run_offsets, run_peaks
+from camtool.verify.slides import largest
 
 P95_ACCURACY = 0.004
 
@@ -75,12 +76,10 @@ def test_memory_does_not_grow_with_the_stream() -> None:
 
 
 def test_the_largest_error_alone() -> None:
-    largest = LargestError()
-    largest.add(np.empty(0))
-    assert math.isnan(largest.max)
-    largest.add(np.array([0.2, 0.5]))
-    largest.add(np.array([0.3]))
-    assert largest.max == 0.5
+    none = np.zeros(3, dtype=np.bool_)
+    assert math.isnan(largest(np.array([0.2, np.nan, 0.5]), none))
+    assert largest(np.array([0.2, np.nan, 0.5]), ~none) == 0.5
+    assert math.isnan(largest(np.full(3, np.nan), ~none))
 
 
 @given(st.lists(st.integers(0, 2), max_size=30), st.integers(1, 7))

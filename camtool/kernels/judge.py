@@ -1,0 +1,251 @@
+"""Judging the samples of a motion: errors, extents, circles and a thinned trace in one pass.
+
+Samples come in blocks of at most `BLOCK`, each of one row of the program, and stay in the
+processor's cache: a few loops run over a block before the next one comes. Per sample of a row
+that cuts:
+
+    interpolation = commanded position to the row's own move
+    mechanics     = |slide − commanded|
+    total         = slide to the nearest wanted move that the row may be compared with,
+                    positive to its left
+
+Memory is that of the rows, the moves and the circles; it does not grow with the samples.
+Distances are exact (`camtool.kernels.move_errors`, `camtool.kernels.near_moves`); sums are taken
+in no certain order. Compiled, because a program takes millions of steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from camtool.kernels.circle_bins import fill_bins
+from camtool.kernels.error_bins import BEFORE_FIRST, BINS, SHIFT
+from camtool.kernels.move_errors import lower_errors
+from camtool.kernels.near_moves import COUNT, nearest_errors
+from camtool.kernels.thin_trace import trace_block
+from camtool.kernels.wide import larger, smaller, wide
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+BLOCK = 512
+"""Samples that are judged together: their columns fill half of a processor's first cache."""
+
+(
+    SAMPLES,
+    INNER_MAX,
+    INNER_SQUARES,
+    LAG_MAX,
+    LAG_SQUARES,
+    KNOWN,
+    TOTAL_MAX,
+    TOTAL_SQUARES,
+    TOTAL_SUM,
+    TOTAL_X,
+    TOTAL_Y,
+    LOW_X,
+    LOW_Y,
+    HIGH_X,
+    HIGH_Y,
+    END_X,
+    END_Y,
+    COMMANDED_X,
+    COMMANDED_Y,
+) = range(19)
+"""Columns of the rows: how many samples; of those of rows that cut the largest error and the sum
+of squares; how many have a total, that with its sum and its place; extents; last positions."""
+
+ROW_COLUMNS = 19
+"""How many columns."""
+
+
+class Task(NamedTuple):
+    """What N rows are judged by.
+
+    own (J, 17) moves of the rows that cut (`move_errors`), own_of (N,) which is a row's, −1 where
+    nothing is cut; moves (K, 17) wanted, heights (K, 2) and tree over them; only (N, 2) which of
+    them a row is compared with, window (N, 2) between which heights; circle (N,) that a row goes
+    round or −1, centre (C, 2) mm, slot (C,) of the bins; directions (721, 2) of `circle_bins`.
+    """
+
+    own: Floats
+    own_of: Ints
+    moves: Floats
+    heights: Floats
+    tree: Floats
+    only: Ints
+    window: Floats
+    circle: Ints
+    centre: Floats
+    slot: Ints
+    directions: Floats
+
+
+class Sums(NamedTuple):
+    """What is found: rows (N, 19); histograms (2, BINS, 4) of interpolation and total, every
+    fourth sample in each column; bins (S, 720, 9); trace (T, 3) x, y, error with trace_row (T,)
+    and its pen; found (K,) and memo, the list of near moves."""
+
+    rows: Floats
+    histograms: Ints
+    bins: Floats
+    trace: Floats
+    trace_row: Ints
+    pen: Floats
+    found: Ints
+    memo: Floats
+
+
+class Bench(NamedTuple):
+    """Room for a block: x, y commanded, slide_x, slide_y mm, their errors, the sizes of these."""
+
+    x: Floats
+    y: Floats
+    slide_x: Floats
+    slide_y: Floats
+    errors: Floats
+    size: Floats
+    spot: Floats
+
+
+@wide
+def new_bench() -> Bench:
+    """Room for a block."""
+    return Bench(
+        np.empty(BLOCK),
+        np.empty(BLOCK),
+        np.empty(BLOCK),
+        np.empty(BLOCK),
+        np.empty(BLOCK),
+        np.empty(BLOCK),
+        np.empty((3, 1)),
+    )
+
+
+@wide
+def _extents(figures: Floats, x: Floats, y: Floats) -> None:
+    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+    for k in range(len(x)):
+        low_x = smaller(low_x, x[k])
+        high_x = larger(high_x, x[k])
+        low_y = smaller(low_y, y[k])
+        high_y = larger(high_y, y[k])
+    figures[LOW_X], figures[HIGH_X] = min(figures[LOW_X], low_x), max(figures[HIGH_X], high_x)
+    figures[LOW_Y], figures[HIGH_Y] = min(figures[LOW_Y], low_y), max(figures[HIGH_Y], high_y)
+
+
+@wide
+def _count_sizes(size: Floats, histogram: Ints) -> None:
+    """`histogram` (BINS, 4): four samples take turns, so that none waits for the one before."""
+    bits = size.view(np.int64)
+    for k in range(len(bits)):
+        place = (bits[k] >> SHIFT) - BEFORE_FIRST
+        place = place if place > 0 else 0
+        place = place if place < BINS else BINS - 1
+        histogram[place, k & 3] += 1
+
+
+@wide
+def _inner(figures: Floats, errors: Floats, size: Floats) -> None:
+    """Interpolation of samples; their sizes go to `size`."""
+    largest, squares = 0.0, 0.0
+    for k in range(len(errors)):
+        error = abs(errors[k])
+        size[k] = error
+        squares += error * error
+        largest = larger(largest, error)
+    figures[INNER_MAX] = max(figures[INNER_MAX], largest)
+    figures[INNER_SQUARES] += squares
+
+
+@wide
+def _lag(figures: Floats, x: Floats, y: Floats, slide_x: Floats, slide_y: Floats) -> None:
+    """Mechanics of samples."""
+    lag, lags = 0.0, 0.0
+    for k in range(len(x)):
+        off_x, off_y = slide_x[k] - x[k], slide_y[k] - y[k]
+        square = off_x * off_x + off_y * off_y
+        lags += square
+        lag = larger(lag, square)
+    figures[LAG_MAX] = max(figures[LAG_MAX], math.sqrt(lag))
+    figures[LAG_SQUARES] += lags
+
+
+@wide
+def _total(figures: Floats, errors: Floats, x: Floats, y: Floats, size: Floats) -> float:
+    """Total error of samples; their sizes go to `size`. Returns the largest."""
+    largest, squares, signed = 0.0, 0.0, 0.0
+    for k in range(len(errors)):
+        error = errors[k]
+        absolute = abs(error)
+        size[k] = absolute
+        signed += error
+        squares += error * error
+        largest = larger(largest, absolute)
+    figures[TOTAL_SQUARES] += squares
+    figures[TOTAL_SUM] += signed
+    if largest > figures[TOTAL_MAX] or figures[KNOWN] == 0.0:
+        k = 0
+        while size[k] != largest:
+            k += 1
+        figures[TOTAL_MAX] = largest
+        figures[TOTAL_X], figures[TOTAL_Y] = x[k], y[k]
+    figures[KNOWN] += len(errors)
+    return largest
+
+
+@wide
+def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Bench) -> None:
+    """Judge the first `count` samples of the bench, all of one row."""
+    if count == 0:
+        return
+    x, y = bench.x[:count], bench.y[:count]
+    slide_x, slide_y = bench.slide_x[:count], bench.slide_y[:count]
+    errors, size = bench.errors[:count], bench.size[:count]
+    figures = sums.rows[row]
+    _extents(figures, slide_x, slide_y)
+    last = count - 1
+    figures[SAMPLES] += count
+    figures[END_X], figures[END_Y] = slide_x[last], slide_y[last]
+    figures[COMMANDED_X], figures[COMMANDED_Y] = x[last], y[last]
+    own, largest = task.own_of[row], 0.0
+    if own >= 0:
+        for k in range(len(errors)):
+            errors[k] = np.inf
+        lower_errors(task.own[own], x, y, errors)
+        _inner(figures, errors, size)
+        _count_sizes(size, sums.histograms[0])
+        _lag(figures, x, y, slide_x, slide_y)
+        only = task.only[row, 0], task.only[row, 1], task.window[row, 0], task.window[row, 1]
+        moves = task.moves, task.heights, task.tree
+        nearest_errors((slide_x, slide_y), only, moves, sums.found, sums.memo, bench.spot, errors)
+        if sums.memo[COUNT] > 0.0:
+            largest = _total(figures, errors, slide_x, slide_y, size)
+            _count_sizes(size, sums.histograms[1])
+        circle = task.circle[row]
+        if circle >= 0:
+            bins = sums.bins[task.slot[circle]]
+            fill_bins(slide_x, slide_y, task.centre[circle], task.directions, bins)
+    trace_block(row, slide_x, slide_y, size, largest, sums.pen, sums.trace, sums.trace_row)
+
+
+@njit(cache=True)
+def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> None:
+    """Judge K samples in order: row (K,), commanded and slide (K, 3) mm, whose Z is not looked at;
+    any number of rows."""
+    bench = new_bench()
+    done = 0
+    while done < len(row):
+        count = 0
+        while count < BLOCK and done + count < len(row) and row[done + count] == row[done]:
+            k = done + count
+            bench.x[count], bench.y[count] = commanded[k, 0], commanded[k, 1]
+            bench.slide_x[count], bench.slide_y[count] = slide[k, 0], slide[k, 1]
+            count += 1
+        judge_block(row[done], count, task, sums, bench)
+        done += count

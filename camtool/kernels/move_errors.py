@@ -1,0 +1,104 @@
+"""How far points are from a move, with the side that they lie on: a line or an arc, many at once.
+
+A move is a row of numbers (see the columns below). The error of a point is its distance to the
+move, exact to the true line or arc, and positive to the left of the move's direction:
+
+    line a→b:  |p − a − t·d|,  d = b − a,  t = clamp((p − a)·d / d², 0, 1),  sign of d × (p − a)
+    arc:       ±(R − |p − c|) inside the wedge that the arc spans at its centre c, otherwise the
+               distance to its nearer end with that sign
+
+The wedge is told by the cross products with the spokes of the two ends: both, up to half a turn,
+and either, above it. What is exact: no angle is ever taken, and no chord. Compiled, and written
+as loops without branches over blocks of points, which the processor runs several at a time.
+
+`best` holds the error of least size so far; each call lowers it where this move is nearer.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.kernels.wide import larger, smaller, wide
+
+Floats = npt.NDArray[np.float64]
+
+COLUMNS = 16
+"""Numbers of a move: start x, y; end x, y; way x, y; 1 / way²; centre x, y; radius (0: a line);
+turn (+1 ccw, −1 cw); normals into the wedge at its start x, y and its end x, y; 1 when it is wider
+than half a turn, 2 when it is a whole turn, else 0."""
+
+FULL = 2.0
+"""What a whole turn has in its last column."""
+
+AX, AY, BX, BY, DX, DY, OVER, CX, CY, RADIUS, TURN, UX, UY, VX, VY, WIDE = range(16)
+
+
+@wide
+def _to_line(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
+    ax, ay, dx, dy, over = move[AX], move[AY], move[DX], move[DY], move[OVER]
+    for k in range(len(x)):
+        px, py = x[k] - ax, y[k] - ay
+        t = (px * dx + py * dy) * over
+        t = smaller(larger(t, 0.0), 1.0)
+        off_x, off_y = px - t * dx, py - t * dy
+        apart = math.sqrt(off_x * off_x + off_y * off_y)
+        best[k] = math.copysign(apart, dx * py - dy * px) if apart < abs(best[k]) else best[k]
+
+
+@wide
+def _all_in_wedge(move: Floats, x: Floats, y: Floats) -> bool:
+    cx, cy, ux, uy, vx, vy = move[CX], move[CY], move[UX], move[UY], move[VX], move[VY]
+    above_half = move[WIDE] != 0.0
+    least = np.inf
+    for k in range(len(x)):
+        px, py = x[k] - cx, y[k] - cy
+        least = smaller(least, _depth(ux * py - uy * px, px * vy - py * vx, above_half))
+    return bool(least >= 0.0)
+
+
+@wide
+def _depth(from_start: float, from_end: float, above_half: bool) -> float:
+    """Not below 0 in the wedge, from what a point is to the inside of its two edges."""
+    if above_half:
+        return larger(from_start, from_end)
+    return smaller(from_start, from_end)
+
+
+@wide
+def _to_circle(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
+    cx, cy, radius, turn = move[CX], move[CY], move[RADIUS], move[TURN]
+    for k in range(len(x)):
+        px, py = x[k] - cx, y[k] - cy
+        error = turn * (radius - math.sqrt(px * px + py * py))
+        best[k] = error if abs(error) < abs(best[k]) else best[k]
+
+
+@wide
+def _to_arc(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
+    ax, ay, bx, by = move[AX], move[AY], move[BX], move[BY]
+    cx, cy, radius, turn = move[CX], move[CY], move[RADIUS], move[TURN]
+    ux, uy, vx, vy = move[UX], move[UY], move[VX], move[VY]
+    above_half = move[WIDE] != 0.0
+    for k in range(len(x)):
+        px, py = x[k] - cx, y[k] - cy
+        inward = turn * (radius - math.sqrt(px * px + py * py))
+        to_a = (x[k] - ax) * (x[k] - ax) + (y[k] - ay) * (y[k] - ay)
+        to_b = (x[k] - bx) * (x[k] - bx) + (y[k] - by) * (y[k] - by)
+        end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
+        inside = _depth(ux * py - uy * px, px * vy - py * vx, above_half) >= 0.0
+        error = inward if inside else end
+        best[k] = error if abs(error) < abs(best[k]) else best[k]
+
+
+@wide
+def lower_errors(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
+    """Lower `best` (n,) to the errors of the points x, y (n,) against `move`."""
+    if move[RADIUS] == 0.0:
+        _to_line(move, x, y, best)
+    elif move[WIDE] == FULL or _all_in_wedge(move, x, y):
+        _to_circle(move, x, y, best)
+    else:
+        _to_arc(move, x, y, best)

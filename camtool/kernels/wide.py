@@ -1,0 +1,48 @@
+"""Loops of which the processor runs several turns at once, and what they need.
+
+Compilers leave a loop for the least or the largest number narrow, since numbers that are none
+(NaN) and the sign of 0 would come out otherwise. `smaller` and `larger` promise that there are
+none, and `wide` that sums may be taken in any order. Indices should run from 0 to the length of
+an array, which needs no look at their signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_LOOSE = {"nnan", "nsz", "reassoc"}
+
+
+def wide(function: Function) -> Function:
+    """As `camtool.kernels.inner`, for loops over errors: sums may be taken in any order."""
+    options = {"cache": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return cast(Function, cast(Any, njit)(**options, fastmath=_LOOSE)(function))
+
+
+def _of_two(name: str) -> Callable[[float, float], float]:
+    """The compiler's instruction `name` of two float64."""
+
+    def typed(typing_context: Any, a: Any, b: Any) -> tuple[Any, Callable[..., Any]]:
+        return types.float64(types.float64, types.float64), emit
+
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = args[0].type
+        made = ir.FunctionType(kind, [kind, kind])
+        function = builder.module.declare_intrinsic(name, [kind], fnty=made)
+        return builder.call(function, args, fastmath=("nnan", "nsz"))
+
+    return cast(Callable[[float, float], float], intrinsic(typed))
+
+
+smaller = _of_two("llvm.minnum")
+"""The smaller of two float64, neither of which is NaN."""
+
+larger = _of_two("llvm.maxnum")
+"""The larger of two float64, neither of which is NaN."""

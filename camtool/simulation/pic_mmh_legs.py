@@ -1,0 +1,126 @@
+"""A whole program of the PIC controller as legs, in columns, for the compiled run that judges.
+
+The controller goes on from the end that each row gave it, whatever became of the row; so where
+every leg begins is known before any is run.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import Floats, Ints, Ledger
+from camtool.toolpath.moves import Kind, Toolpath
+
+if TYPE_CHECKING:
+    from camtool.kernels.judge import Sums, Task
+    from camtool.machine.controllers import Interpolator
+
+
+def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
+    """(N + 1, 3) steps where the controller stands before each row and after the last one."""
+    kind, count = toolpath.kind, len(toolpath)
+    places = np.empty((count + 1, 3), dtype=np.int64)
+    for axis, homing in enumerate((Kind.HOME_XY, Kind.HOME_XY, Kind.HOME_Z)):
+        goes, homes = toolpath.is_motion, kind == homing
+        given = np.concatenate(
+            [start[axis : axis + 1], np.where(homes, home[axis], ends[:, axis])]
+        )
+        latest = np.where(goes | homes, np.arange(1, count + 1), 0)
+        latest = np.concatenate([[0], np.maximum.accumulate(latest)])
+        places[:, axis] = given[latest]
+    return places
+
+
+def legs_of(toolpath: Toolpath, places: Ints, centres: Ints) -> Ints:
+    """(L, 13) legs of `camtool.kernels.judge_steps` of all rows; `places` (N + 1, 3) of
+    `positions`, `centres` (N, 2) steps."""
+    from camtool.kernels import judge_steps as columns
+
+    count = len(toolpath)
+    begin, way = places[:-1], np.diff(places, axis=0)
+    flat = np.zeros((count, columns.LEG_COLUMNS), dtype=np.int64)
+    flat[:, columns.ROW] = np.arange(count)
+    flat[:, [columns.FROM_X, columns.FROM_Y]] = begin[:, :2]
+    deep = flat.copy()
+    arc = toolpath.is_arc
+    flat[:, columns.KIND] = np.where(arc, columns.ARC, columns.LINE)
+    about = np.where(arc[:, None], centres, begin[:, :2])
+    flat[:, [columns.ORIGIN_X, columns.ORIGIN_Y]] = about
+    sign = np.where((way[:, :2] < 0) & ~arc[:, None], -1, 1)
+    flat[:, [columns.SIGN_X, columns.SIGN_Y]] = sign
+    spoke = begin[:, :2] - centres
+    flat[:, [columns.A, columns.B]] = np.where(arc[:, None], spoke, np.abs(way[:, :2]))
+    flat[:, [columns.END_X, columns.END_Y]] = places[1:, :2] - about
+    flat[:, columns.CW] = toolpath.kind == Kind.ARC_CW
+    deep[:, columns.KIND] = columns.DEPTH
+    deep[:, [columns.SIGN_X, columns.SIGN_Y]] = 1
+    deep[:, columns.A] = np.abs(way[:, 2])
+    deep[:, columns.CW] = np.sign(way[:, 2])
+    both = np.stack([flat, deep], axis=1).reshape(-1, columns.LEG_COLUMNS)
+    moves = np.column_stack([arc | way[:, :2].any(axis=1), way[:, 2] != 0]).reshape(-1)
+    return np.ascontiguousarray(both[moves])
+
+
+class JudgedSteps:
+    """Runs the rows of a program in order, some at a time, and judges them on the way."""
+
+    def __init__(
+        self,
+        legs: Ints,
+        periods_s: Floats,
+        still_s: Floats,
+        how: tuple[Interpolator, bool, bool, float],
+        mechanics: Mechanics,
+    ) -> None:
+        """`legs` (L, 13); periods_s (N, 2) of an output in XY and in Z of each row; still_s (N,)
+        what rows take that do not move. `how`: the method of arcs, whether their error starts as
+        that of the rounded radius, whether only outputs take time, mm of a step. `mechanics` is
+        plain."""
+        self._legs, self._periods_s, self._still_s = legs, periods_s, still_s
+        self._how, self._mechanics = how, mechanics
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are to run."""
+        return len(self._still_s)
+
+    def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
+        """Run the rows low:high, which follow those run before, and judge them."""
+        from camtool.kernels import judge_steps as columns
+
+        method, rounded, by_event, step_mm = self._how
+        first, last = np.searchsorted(self._legs[:, columns.ROW], [low, high])
+        legs = self._legs[first:last]
+        counts = np.zeros((len(legs), columns.COUNT_COLUMNS), dtype=np.int64)
+        number = {"dsm": columns.DSM, "stairs": columns.STAIRS, "dda": columns.DDA}[method]
+        mechanics = self._mechanics.axes, self._mechanics.states
+        columns.judge_legs(legs, (number, rounded), step_mm, mechanics, counts, task, sums)
+        row = legs[:, columns.ROW] - low
+        deep = (legs[:, columns.KIND] == columns.DEPTH).astype(np.int64)
+        reversals = counts[:, columns.REVERSALS : columns.REVERSALS + 3]
+        added = reversals @ self._mechanics.compensation_steps
+        outputs = counts[:, columns.SAMPLES if by_event else columns.PASSES]
+        period_s = self._periods_s[low + row, deep]
+        count = high - low
+        missed = np.bincount(row[counts[:, columns.ENDED] == 0], minlength=count)
+        steps = counts[:, columns.STEPS : columns.STEPS + 3]
+        return Ledger(
+            row=np.arange(low, high),
+            duration_s=self._still_s[low:high]
+            + np.bincount(row, (outputs + added) * period_s, minlength=count),
+            compensation_s=np.asarray(np.bincount(row, added * period_s, minlength=count) * 1.0),
+            iterations=_summed(row, counts[:, columns.PASSES : columns.PASSES + 1], count)[:, 0],
+            steps=_summed(row, steps, count),
+            reversals=_summed(row, reversals, count),
+            ended=missed == 0,
+        )
+
+
+def _summed(row: Ints, numbers: Ints, count: int) -> Ints:
+    """(count, C) sums of the columns of numbers (L, C) by row (L,)."""
+    sums = np.zeros((count, numbers.shape[1]), dtype=np.int64)
+    np.add.at(sums, row, numbers)
+    return sums
