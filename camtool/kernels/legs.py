@@ -20,17 +20,15 @@ Floats = npt.NDArray[np.float64]
 
 
 @njit(cache=True)
-def legs_fill(low: int, first: Ints, begin: Ints, way: Ints, step_mm: Floats, out: Floats) -> None:
-    """Positions after passes low, low + 1, … of all legs, `out` (n, 3) mm.
+def legs_fill(done: int, begin: Ints, way: Ints, step_mm: Floats, out: Floats) -> None:
+    """Positions after the passes of legs, `out` (n, 3) mm, those of the first from `done` on.
 
-    Leg l has the passes first[l]:first[l + 1], `first` (L + 1,) ascending; it starts at `begin`
-    (L, 3) steps and goes by `way` (L, 3) steps; `step_mm` (3,).
+    Each leg starts at `begin` (L, 3) steps and goes by `way` (L, 3) steps, not all of them 0;
+    `step_mm` (3,). `out` may end within a leg, not behind the last one.
     """
-    leg = np.searchsorted(first, low, side="right") - 1
-    filled = 0
+    leg, filled = 0, 0
     while filled < len(out):
-        passes = first[leg + 1] - first[leg]
-        done = low + filled - first[leg]
+        passes = max(abs(way[leg, 0]), abs(way[leg, 1]), abs(way[leg, 2]))
         run = min(passes - done, len(out) - filled)
         for axis in range(3):
             size, sense = abs(way[leg, axis]), 1 if way[leg, axis] > 0 else -1
@@ -44,3 +42,4 @@ def legs_fill(low: int, first: Ints, begin: Ints, way: Ints, step_mm: Floats, ou
                 out[k, axis] = position * step
         filled += run
         leg += 1
+        done = 0

@@ -65,9 +65,10 @@ class LegRun:
         begin = self._position + np.cumsum(legs.way, axis=0) - legs.way
         for low in range(0, int(first[-1]), self._chunk_steps):
             high = min(low + self._chunk_steps, int(first[-1]))
-            commanded = np.empty((high - low, 3))
-            legs_fill(low, first, begin, legs.way, self._step_mm, commanded)
-            yield self._chunk(legs, _Share(first, low, high), commanded)
+            share, commanded = _Share(first, low, high), np.empty((high - low, 3))
+            at, way = begin[share.legs], legs.way[share.legs]
+            legs_fill(share.done, at, way, self._step_mm, commanded)
+            yield self._chunk(legs, share, commanded)
         self._position = self._position + legs.way.sum(axis=0)
 
     def _chunk(self, legs: Legs, share: _Share, commanded: Floats) -> Chunk:
@@ -101,6 +102,8 @@ class _Share:
         self._whole = np.diff(edges)
         self._from = np.maximum(low - edges[:-1], 0)
         self._to = np.minimum(high - edges[:-1], self._whole)
+        self.done = int(self._from[0])
+        """Passes of the first of the legs that lie before the window."""
         self.passes: Ints = self._to - self._from
         """(J,) passes of each of the legs in the window."""
 

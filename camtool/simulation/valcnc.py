@@ -22,6 +22,7 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
+import numpy.typing as npt
 
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
@@ -178,7 +179,7 @@ class _Pieces:
             )
         return angles
 
-    def _check_arcs(self, toolpath: Toolpath, arcs: np.ndarray) -> None:
+    def _check_arcs(self, toolpath: Toolpath, arcs: npt.NDArray[np.bool_]) -> None:
         """ProgramError for arcs that it cannot count."""
         rows = np.flatnonzero(arcs)
         centre = toolpath.centre[rows]

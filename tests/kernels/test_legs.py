@@ -18,7 +18,9 @@ def filled(begin: Place, ways: list[Place], size: int) -> np.ndarray:
     starts = np.array(begin) + np.cumsum(way, axis=0) - way
     out = np.empty((int(first[-1]), 3))
     for low in range(0, len(out), size):
-        legs_fill(low, first, starts, way, UNIT, out[low : low + size])
+        leg = int(np.searchsorted(first, low, side="right")) - 1
+        done = low - int(first[leg])
+        legs_fill(done, starts[leg:], way[leg:], UNIT, out[low : low + size])
     return out.astype(np.int64)
 
 
@@ -55,10 +57,10 @@ def test_long_legs_by_division() -> None:
     """⌊k·d/M⌋ in Python's integers, near the longest legs that are allowed."""
     way = (-(1 << 31) + 1, 1_234_567_891, 3)
     most = -way[0]
-    first, begin = np.array([0, most]), np.zeros((1, 3), dtype=np.int64)
+    begin = np.zeros((1, 3), dtype=np.int64)
     for low in (0, most // 3, most - 500):
         out = np.empty((500, 3))
-        legs_fill(low, first, begin, np.array([way]), UNIT, out)
+        legs_fill(low, begin, np.array([way]), UNIT, out)
         passes = range(low + 1, low + 501)
         wanted = [[-k, k * way[1] // most, k * way[2] // most] for k in passes]
         assert out.astype(np.int64).tolist() == wanted
@@ -67,7 +69,7 @@ def test_long_legs_by_division() -> None:
 def test_lengths_are_steps_by_the_step() -> None:
     out = np.empty((3, 3))
     step_mm = np.array([0.1, 0.0125, 0.04])
-    legs_fill(0, np.array([0, 3]), np.array([[7, 0, -2]]), np.array([[3, -3, 1]]), step_mm, out)
+    legs_fill(0, np.array([[7, 0, -2]]), np.array([[3, -3, 1]]), step_mm, out)
     assert out.tolist() == [
         [8 * 0.1, -1 * 0.0125, -2 * 0.04],
         [9 * 0.1, -2 * 0.0125, -2 * 0.04],
