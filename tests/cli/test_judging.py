@@ -65,6 +65,27 @@ def test_shares_of_the_mechanics(camtool: Run, circle: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("setting", "share"),
+    [
+        ("axes.x.backlash_mm=0.19", "play"),
+        ("play_map.use=true", "play"),
+        ("axes.z.compensation_mm=0.1", "compensation"),
+        ("axes.y.real_step_mm=0.000141", "scale"),
+        ("mechanics.squareness_rad=0.001", "squareness"),
+        ("axes.z.repeatability_mm=0.001", "repeatability"),
+    ],
+)
+def test_only_what_the_machine_has_is_a_share(
+    camtool: Run, circle: str, setting: str, share: str
+) -> None:
+    """Of a machine made ideal first."""
+    nothing = [f"axes.{name}.{key}_mm=0" for name in "xy" for key in ("backlash", "compensation")]
+    flags = [word for value in (*nothing, setting) for word in ("--set", value)]
+    found = rows(camtool, circle, "--compare", "mechanics", *flags)
+    assert [row["name"] for row in found] == ["as it is", f"without {share}", "ideal"]
+
+
+@pytest.mark.parametrize(
     ("spec", "words"),
     [
         ("nothing", "interpolators, mechanics"),
