@@ -54,7 +54,7 @@ COUNT, UP, WRAPS, STAGE, LEFT, SHOWN, SEEN, SUM, REF, NEXT_REF, TARGET = range(1
 STILL, WAITING, CRUISING, SLOWING, HOMING, FOLLOWING = range(6)
 """What a slave does, in its column STAGE; FOLLOWING is the text's way of running a line."""
 
-FIRST_ROW, SECOND_ROW, MOST_TICKS = 6, 7, 8
+FIRST_ROW, SECOND_ROW, MOST_TICKS, PART_AXIS, PART_COUNT = 6, 7, 8, 9, 10
 """Columns of `Program.lines` behind the amounts and the speeds of three axes."""
 
 HOME_AMOUNT = -1
@@ -82,10 +82,11 @@ REST_COUNTS = 1e-6
 class Program(NamedTuple):
     """What the slaves are told, and what they are.
 
-    lines (L, 9): amount of each axis (chunks; counts when `text`; `HOME_AMOUNT`; 0), its speed
-    with sign, the row of its samples, the row once the first axis has arrived, and the ticks after
-    which it is given up. pauses (L,) ticks behind each, at least 1; axes (3, 8); table (1001,);
-    lag: ticks by which Y begins after X; text: the chapters' way instead of the listing's.
+    lines (L, 11): amount of each axis (chunks; counts when `text`; `HOME_AMOUNT`; 0), its speed
+    with sign, the row of its samples, the row of those from where an axis (its number) has passed
+    a count on, the ticks after which it is given up, that axis and that count. pauses (L,) ticks
+    behind each, at least 1; axes (3, 8); table (1001,); lag: ticks by which Y begins after X;
+    text: the chapters' way instead of the listing's.
     """
 
     lines: Ints
@@ -98,7 +99,7 @@ class Program(NamedTuple):
 
 class State(NamedTuple):
     """Where everything stands between two calls: motors (3, 6), slaves (3, 11); clock (3,): tick,
-    line, row of the line before; begin (1,) of the line, in ticks."""
+    line, row of the line before; begin (2,) of the line and of its second row, in ticks."""
 
     motors: Floats
     slaves: Ints
@@ -338,39 +339,31 @@ def _open(program: Program, state: State, line: int) -> None:
 
 
 @inner
-def _first_done(program: Program, state: State, line: int) -> float:
-    """When the first of the axes that move had its counts; inf before."""
-    first = math.inf
-    for index in range(3):
-        if program.lines[line, index] != 0 and state.slaves[index, STAGE] == STILL:
-            first = min(first, state.motors[index, DONE])
-    return first
-
-
-@inner
 def _close(program: Program, state: State, account: Account, line: int, tick: int) -> None:
     """All slaves have answered: account for the line, and tell when the next one begins."""
-    lines, motors = program.lines, state.motors
-    begin = state.begin[0]
+    lines, motors, begin = program.lines, state.motors, state.begin
     done = max(motors[0, DONE], motors[1, DONE], motors[2, DONE])
     after = max(done + program.pauses[line], float(tick))
-    first, second = lines[line, FIRST_ROW], lines[line, SECOND_ROW]
-    parted = min(_first_done(program, state, line), after) if first != second else after
-    account.ticks[first] += parted - begin
-    account.ticks[second] += after - parted
-    state.begin[0] = after
-    state.clock[2] = second
+    parted = min(begin[1], after) if begin[1] > begin[0] else after
+    account.ticks[lines[line, FIRST_ROW]] += parted - begin[0]
+    account.ticks[lines[line, SECOND_ROW]] += after - parted
+    begin[0] = after
+    state.clock[2] = lines[line, SECOND_ROW]
 
 
 @inner
 def _row(program: Program, state: State, line: int, tick: int) -> int:
     """Whose sample the places at a tick are: the start of a row is none of it."""
-    if line == len(program.lines) or tick <= state.begin[0]:
+    lines, begin = program.lines, state.begin
+    if line == len(lines) or tick <= begin[0]:
         return int(state.clock[2])
-    first, second = program.lines[line, FIRST_ROW], program.lines[line, SECOND_ROW]
-    if first != second and _first_done(program, state, line) < tick:
-        return int(second)
-    return int(first)
+    first, second = lines[line, FIRST_ROW], lines[line, SECOND_ROW]
+    if first != second and begin[1] <= begin[0]:
+        axis = lines[line, PART_AXIS]
+        ahead = state.slaves[axis, COUNT] - lines[line, PART_COUNT]
+        if (ahead if lines[line, 3 + axis] >= 0 else -ahead) > 0:
+            begin[1] = tick
+    return int(second if begin[1] > begin[0] else first)
 
 
 @inner

@@ -57,6 +57,9 @@ PAIR_COUNTS = 10
 PAIR_TOLERANCE = 1e-4
 """A sum of squares of speeds that is a whole number within this comes from a program."""
 
+IDENTIFIED = 70.0
+"""The drive at which gains were measured (L2704): whatever the friction, that speed stays."""
+
 ON_HOME_COUNTS = 0.5
 """A place within so many counts of home is home."""
 
@@ -75,7 +78,7 @@ equal parts."""
 class Lines:
     """L orders of the master.
 
-    orders (L, 9): `Program.lines` of the kernel; pauses_s (L,) behind each; extra_s (N,): what
+    orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each; extra_s (N,): what
     rows take besides (dwells, and the numbers of a job on their way from the PC).
     """
 
@@ -124,8 +127,10 @@ def lines_of(path: Toolpath, rows: int, machine: Machine) -> Lines:
     first, second, way, speeds = first[keep], second[keep], way[keep], speeds[keep]
     amount = _amounts(way, router, machine)
     ref = np.where(way < 0.0, -speeds, speeds)
+    part = _parting(path, first, second, machine)
     amount = np.where(homes[first][:, None] & (way != 0.0), -1, amount)
-    orders = np.column_stack([amount, ref, first, second, _patience(way, ref, amount, machine)])
+    most = _patience(way, ref, amount, machine)
+    orders = np.column_stack([amount, ref, first, second, most, part])
     header = ~straight[first] | (way[:, 2] != 0.0)
     extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
     return Lines(orders, _pauses(header, router), extra + _link(header, first, rows, router))
@@ -165,6 +170,19 @@ def _tails(path: Toolpath, first: Ints) -> np.ndarray:
     tail[1:] &= np.diff(first) == 1
     tail[2:] &= ~tail[1:-1]
     return tail
+
+
+def _parting(path: Toolpath, first: Ints, second: Ints, machine: Machine) -> Ints:
+    """(L, 2) the axis that goes on after the end of the first of two rows, and its count there;
+    zeros where there is one row."""
+    part = np.zeros((len(first), 2), dtype=np.int64)
+    both = np.flatnonzero(first != second)
+    axis = np.abs(path.end[second] - path.end[first])[both, :2].argmax(axis=1)
+    home = np.array(machine.controller.machine_zero_mm)
+    coded = np.array([each.coded_step_mm for each in machine.axes])
+    part[both, 0] = axis
+    part[both, 1] = np.rint((path.end[first[both], axis] - home[axis]) / coded[axis])
+    return part
 
 
 def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: Machine) -> Ints:
@@ -252,7 +270,8 @@ def program_of(lines: Lines, machine: Machine) -> Program:
     router = router_of(machine)
     text = router.slaves == "text"
     axes = np.zeros((3, 8))
-    axes[:, 0] = router.plant_gain
+    friction = np.array(router.friction_percent)
+    axes[:, 0] = np.array(router.plant_gain) * IDENTIFIED / (IDENTIFIED - friction)
     axes[:, 1] = np.array(router.time_constant_s) * TICKS_PER_S
     axes[:, 2] = router.friction_percent
     axes[:, 3] = router.kid or (TEXT_KID if text else (28.0,) * 3)
@@ -284,7 +303,7 @@ def state_of(start_mm: Floats, machine: Machine) -> State:
     slaves[:, COUNT] = slaves[:, TARGET] = slaves[:, SHOWN] = place
     if router.slaves == "listing":
         slaves[:, SHOWN] = (slaves[:, COUNT] + np.array(router.home_phase_counts)) % TURN
-    return State(motors, slaves, np.zeros(3, dtype=np.int64), np.zeros(1))
+    return State(motors, slaves, np.zeros(3, dtype=np.int64), np.zeros(2))
 
 
 def account_of(rows: int) -> Account:

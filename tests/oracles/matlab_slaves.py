@@ -188,6 +188,39 @@ class Slave:
         return at + time
 
 
+@dataclass
+class TextSlave(Slave):
+    """The chapters' program: equations 4.15-4.18 and 4.27; distances are counts."""
+
+    target: int = 0
+    before: int = 0
+    last: int = 0
+    drive: float = 0.0
+
+    def interrupt(self) -> None:
+        omega = self.count - self.before
+        self.before = self.count
+        if self.task is not None:
+            q = self.target - self.count
+            if abs(q) >= 1000:
+                ref = math.copysign(abs(self.Ref), q)
+            else:
+                ref = math.copysign(min(abs(self.Ref), self.top * math.sqrt(abs(q) / 1000)), q)
+            added = -self.kpd / 1000 * (omega - self.last) + self.kid / 1000 * (ref - omega)
+            self.drive = min(max(self.drive + added, -100.0), 100.0)
+        self.last = omega
+        self.u = self.drive  # type: ignore[assignment]
+
+    def movimiento(self, distancia: int, velocidad: int) -> Iterator[None]:
+        self.target += distancia if velocidad >= 0 else -distancia
+        self.Ref = velocidad
+        below = self.count <= self.target
+        while self.count < self.target if below else self.count > self.target:
+            yield
+        self.Ref, self.drive = 0, 0.0
+        self.u = 0
+
+
 def run(
     slaves: list[Slave],
     orders: list[list[tuple[int, int]]],

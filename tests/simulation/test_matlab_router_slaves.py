@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from camtool.kernels.slaves import Account, Program, State, slaves_fill
-from tests.oracles.matlab_slaves import Motor, Slave, run, table
+from tests.oracles.matlab_slaves import Motor, Slave, TextSlave, run, table
 
 X = (8.896, 12.2)
 
@@ -21,6 +21,7 @@ def filled(
     chunk: int = 100_000,
 ) -> tuple[np.ndarray, np.ndarray, Account]:
     """Counts, rows and the account of the kernel for what the literal loop would run."""
+    text = isinstance(slaves[0], TextSlave)
     axes = np.array(
         [
             [s.motor.gain, s.motor.tau, s.motor.friction, s.kid, s.kpd, s.chunk, s.phase, 500.0]
@@ -29,18 +30,18 @@ def filled(
     )
     lines = np.array(
         [
-            [((d // 2 - 1) % 65536) + 1 if d else 0 for d, _ in order]
+            [d if text or d == 0 else ((d // 2 - 1) % 65536) + 1 for d, _ in order]
             + [v for _, v in order]
-            + [row, row, 10_000]
+            + [row, row, 10_000, 0, 0]
             for row, order in enumerate(orders)
         ]
     )
-    program = Program(lines, np.array(pauses), axes, np.array(table(slaves[0].top)), lag, False)
+    program = Program(lines, np.array(pauses), axes, np.array(table(slaves[0].top)), lag, text)
     motors, inside = np.zeros((3, 6)), np.zeros((3, 11), dtype=np.int64)
     for index, slave in enumerate(slaves):
         motors[index, 0] = inside[index, 0] = slave.count
-        inside[index, 5] = slave.conv
-    state = State(motors, inside, np.zeros(3, dtype=np.int64), np.zeros(1))
+        inside[index, 5] = slave.count if text else slave.conv
+    state = State(motors, inside, np.zeros(3, dtype=np.int64), np.zeros(2))
     count = len(orders)
     account = Account(np.zeros(count), np.zeros(count, np.int64), np.ones(count, np.bool_))
     found, rows, over = [], [], False
@@ -108,6 +109,29 @@ def test_random_lines(seed: int) -> None:
     same(slaves, orders, [luck.choice([1.0, 1.24, 3.7, 30.0]) for _ in orders])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_random_lines_of_the_text(seed: int) -> None:
+    """The reference's roots and the loop's sums are floats, taken in two orders: a count may fall
+    to one side or the other of a tick."""
+    luck = random.Random(seed)
+    slaves: list[Slave] = [
+        TextSlave(slave.motor, kid=luck.choice([17, 28]), kpd=luck.choice([98, 159]))
+        for slave in three(friction=luck.choice([0.0, 5.0]))
+    ]
+    orders = [
+        [
+            (luck.choice([0, 1500, 8000]), luck.choice([-1, 1]) * luck.randint(60, 480))
+            for _ in "XYZ"
+        ]
+        for _ in range(5)
+    ]
+    pauses = [luck.choice([1.0, 1.24, 30.0]) for _ in orders]
+    found, _, account = filled(slaves, orders, pauses)
+    counts, begins = run(slaves, orders, pauses, 0.08)
+    assert np.abs(found - np.array(counts)).max() <= 1
+    assert account.ticks == pytest.approx(np.diff(begins), abs=1e-6)
+
+
 def test_chunks_of_the_run_change_nothing() -> None:
     orders = [[(6, 480), (4, -320), (0, 0)], [(2, -480), (4, 480), (2, 500)]]
     whole, rows, account = filled(three(), orders, [1.24, 20.0])
@@ -171,10 +195,10 @@ def test_a_loop_that_never_gets_there_is_given_up() -> None:
     slaves = three()
     slaves[0].motor.friction = 100.0
     axes = np.array([[8.9, 12.2, 100.0, 28, 159, 5120, 0, 500.0]] * 3)
-    lines = np.array([[1, 0, 0, 480, 0, 0, 0, 0, 50]])
+    lines = np.array([[1, 0, 0, 480, 0, 0, 0, 0, 50, 0, 0]])
     program = Program(lines, np.array([2.0]), axes, np.array(table(480)), 0.0, False)
     state = State(
-        np.zeros((3, 6)), np.zeros((3, 11), np.int64), np.zeros(3, np.int64), np.zeros(1)
+        np.zeros((3, 6)), np.zeros((3, 11), np.int64), np.zeros(3, np.int64), np.zeros(2)
     )
     account = Account(np.zeros(1), np.zeros(1, np.int64), np.ones(1, np.bool_))
     out, row = np.empty((1000, 3), np.int64), np.empty(1000, np.int64)

@@ -10,7 +10,7 @@ from camtool.machine.controllers.base import SlideStart
 
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
-Percent = Annotated[float, Meta(ge=0.0, le=100.0)]
+Percent = Annotated[float, Meta(ge=0.0, le=60.0)]
 Gain = Annotated[float, Meta(ge=0.0, le=100_000.0)]
 Speed = Annotated[int, Meta(ge=1, le=1023)]
 Phase = Annotated[int, Meta(ge=0, le=1023)]
@@ -24,7 +24,8 @@ class MatlabRouterController(SlideStart, frozen=True, tag_field="model", tag="ma
     `slaves` "listing": slave X's program (L5104-5729) on all axes; "text": what the chapters say
     (equations 4.15-4.18, 4.27, 4.48, 4.49 and the gains of table 4.1).
     `plant_gain` (counts in 5 ms for a percent of drive) and `time_constant_s`: the motors, worked
-    out of table 4.1 (L2872-2880). `friction_percent`: the drive that only just does not move them.
+    out of table 4.1 (L2872-2880). `friction_percent`: the drive that only just does not move them;
+    the speed at 70 % (L2704) stays that of the gain.
     `kid`, `kpd`: gains in thousandths, whole ones for the listing's integers; None: 28 and 159
     (L5104-5106) or table 4.1, as `slaves` says.
     `table_counts`: the speed of the deceleration table 1000 counts before the end (not listed).
