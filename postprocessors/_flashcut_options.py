@@ -24,9 +24,10 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     `decimals` of a coordinate; `trailing_zeros` says 1.000 for 1.0; `feed_words`: F only where
     the thesis's syntax has it ("syntax": G01 in XY) or on every feed move ("everywhere");
-    `full_circles` as two "halves" or as one block ("whole"); `program_end`; `z_up`: the sign of Z
-    away from the work; `spindle_stops`: M05 stops it; `arc_spread_mm`: the radii at an arc's start
-    and end may differ by this much.
+    `full_circles` as two "halves" or as one block ("whole"); `program_end`; `rapids` above the
+    stock go "straight" to their end, or along X and then along Y ("one-axis"), which the timers
+    do exactly; `z_up`: the sign of Z away from the work; `spindle_stops`: M05 stops it;
+    `arc_spread_mm`: the radii at an arc's start and end may differ by this much.
     """
 
     decimals: Annotated[int, Meta(ge=1, le=4)] = 3
@@ -34,6 +35,7 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     feed_words: Literal["syntax", "everywhere"] = "syntax"
     full_circles: Literal["halves", "whole"] = "halves"
     program_end: Literal["M30", "M02"] = "M30"
+    rapids: Literal["straight", "one-axis"] = "straight"
     z_up: Literal["+", "-"] = "+"
     spindle_stops: bool = True
     arc_spread_mm: Annotated[float, Meta(gt=0.0)] = 0.005

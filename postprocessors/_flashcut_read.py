@@ -7,7 +7,7 @@ template is not said, so here such a line is an error with block, line and colum
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from camtool.errors import ProgramError
@@ -17,6 +17,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ._flashcut_options import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from ._flashcut_seen import timer_findings
 from ._gcode_words import Block, Lexing, blocks_of
 
 LEXING: Final = Lexing(letters="GMXYZIJF")
@@ -56,7 +57,8 @@ def read_program(data: bytes, machine: Machine) -> Toolpath:
         reader.block(block)
     if not reader.blocks:
         raise ProgramError("the program is empty", mend="a program has blocks such as M30")
-    return reader.path.finish(reader.findings())
+    path = reader.path.finish(reader.findings())
+    return replace(path, findings=(*path.findings, *timer_findings(path, machine)))
 
 
 @dataclass

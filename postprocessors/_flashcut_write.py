@@ -158,6 +158,7 @@ class _Writer:
             feeds.tolist(),
             strict=True,
         )
+        cornered = (table.end[:, 2] >= 0) & (dialect.rapids == "one-axis")
         at = self._xy_texts(table.start[None, :])[0]
         for index, (kind, moves, in_xy, row, feed) in enumerate(columns):
             if kind > Kind.ARC_CCW:
@@ -167,12 +168,20 @@ class _Writer:
                 target = xy[index] if in_xy or kind >= Kind.ARC_CW else f"Z{z[index]}"
                 if kind >= Kind.ARC_CW:
                     target += f" I{next(i)} J{next(j)}"
+                if kind == Kind.RAPID and in_xy and cornered[index]:
+                    self._corner(at, target, row)
                 self._move(WORD[kind], target, row, feed, at)
             at = xy[index]
 
     def _xy_texts(self, units: Ints) -> list[str]:
         x, y = (_texts(units[:, axis], self._dialect) for axis in (0, 1))
         return [f"X{one} Y{two}" for one, two in zip(x, y, strict=True)]
+
+    def _corner(self, at: str, target: str, row: int) -> None:
+        """The way along X of a rapid of both axes, before that along Y."""
+        corner = f"{target.partition(' ')[0]} {at.partition(' ')[2]}"
+        if corner not in (at, target):
+            self._send(f"{WORD[Kind.RAPID]} {corner}", row)
 
     def _move(self, word: str, target: str, row: int, feed: int, at: str) -> None:
         """One move, and a block in front that says the feed where its own cannot."""

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.errors import MachineError, ProgramError
-from camtool.kernels.lattice import HALF_STEP_GUARD
 from camtool.kernels.timers import HOME_X, HOME_Y, HOME_Z, XY, Moves, Z
 from camtool.machine.controllers import FlashcutController
+from camtool.machine.controllers.flashcut_timers import half_periods_ms
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Floats, Ints
 from camtool.simulation.path import check_positions, placed
@@ -60,34 +60,20 @@ def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
 
 
 def half_periods(toolpath: Toolpath, machine: Machine, step_mm: float) -> Ints:
-    """(N,) ms of the longer axis of each row, for steps of `step_mm`.
+    """(N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the shortest.
 
-    A step takes so many half periods P of the feed's time, each a millisecond late:
-
-        60 step / feed = parts (P + 1) / 1000,      the nearest whole P, never a shorter one
-
-    Rapids have the shortest. ProgramError for moves without a feed, or with one too slow.
+    ProgramError for feeds whose half period the controller cannot count.
     """
-    controller = flashcut_controller(machine)
-    parts, shortest = controller.half_periods_per_step, controller.half_period_ms
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        no_feed = ~(feed > 0.0) | (toolpath.is_feed & np.isinf(feed))
-        wanted = np.maximum(60_000.0 * step_mm / (feed * parts) - 1.0, float(shortest))
-        slow = ~no_feed & (wanted >= MOST_LONG)
-    if no_feed.any():
-        raise ProgramError(
-            "a move at a feed without a feed above 0",
-            where=row_place(toolpath, no_feed),
-            mend="give it one (F)",
-        )
+    wanted = half_periods_ms(feed, step_mm, flashcut_controller(machine))
+    slow = wanted >= MOST_LONG
     if slow.any():
         raise ProgramError(
             f"a feed of {float(feed[slow][0]):g} mm/min is a step in weeks",
             where=row_place(toolpath, slow),
             mend="give it a higher one (F)",
         )
-    return np.floor(wanted + (0.5 + HALF_STEP_GUARD)).astype(np.int64)
+    return wanted.astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)

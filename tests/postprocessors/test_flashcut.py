@@ -115,6 +115,50 @@ def test_options() -> None:
     assert write(path, "feed.unit_mm_min=0.01") == write(path)
 
 
+def test_rapids_above_the_stock_go_along_one_axis_at_a_time() -> None:
+    path = ToolpathBuilder().rapid(z=0.5).rapid(1.0, 2.0).rapid(3.0, 2.0).rapid(3.0, 0.0)
+    path.rapid(z=0.0).rapid(1.0, 1.0).rapid(z=-0.1).rapid(2.0, 2.0)  # in what is cleared
+    wanted = path.finish()
+    straight = [
+        "G00 Z0.5",
+        "G00 X1.0 Y2.0",
+        "G00 X3.0 Y2.0",
+        "G00 X3.0 Y0.0",
+        "G00 Z0.0",
+        "G00 X1.0 Y1.0",
+        "G00 Z-0.1",
+        "G00 X2.0 Y2.0",
+        "M30",
+    ]
+    assert write(wanted, "dialect.rapids=straight") == straight
+    corners = straight.copy()
+    corners.insert(5, "G00 X1.0 Y0.0")
+    corners.insert(1, "G00 X1.0 Y0.0")
+    assert write(wanted) == corners
+    back = read("\n".join(corners).encode())
+    assert back.end[back.block == 7].tolist() == [[1.0, 1.0, 0.0]]
+
+
+def test_what_the_timers_make_too_long_is_found() -> None:
+    program = b"G00 X1.9 Y0.95\nG01 X0.0 Y0.0 F3.0\nG01 X1.9 Y0.0\nG01 X1.928 Y0.028\nM30\n"
+    (finding,) = read(program).findings
+    # At 20 ms ⌊1000·21 / (20·1000/500 + 1)⌋ = 512 steps instead of 500; F3.0 would be 18 ms.
+    assert (finding.code, finding.severity) == (Code.EXECUTED_OTHERWISE, Severity.WARNING)
+    assert finding.message.startswith("2 straight moves of both axes")
+    assert (finding.where, finding.measured) == ("block 1", pytest.approx(12 * 1.9))
+    assert "it stays in all that follows" in finding.message
+    (late,) = read(program, "controller.clock=late-longer").findings
+    assert late.measured == pytest.approx(25 * 1.9)
+    (seen,) = read(
+        program, "controller.goes_on_from=reached", "controller.half_period_ms=3"
+    ).findings
+    assert seen.measured == pytest.approx(71 * 1.9)  # the rapid at 3 ms, ⌊4000 / 7⌋
+    assert "stays" not in seen.message
+    for gone in ("controller.half_period_ms=1000", "controller.model=path"):
+        assert read(program, gone).findings == ()
+    assert read(b"G01 X1.0 Y0.0 F3.0\nG01 X1.03 Y0.03\nM30\n").findings == ()
+
+
 def test_the_spindle_may_not_stop() -> None:
     target = load_target("flashcut", settings=["dialect.spindle_stops=false"])
     path = ToolpathBuilder().event(Kind.SPINDLE_CW).event(Kind.SPINDLE_OFF).finish()
@@ -290,7 +334,7 @@ class TestReferee:
     def test_linuxcnc_finds_the_same_moves(
         self, wanted: Toolpath, tmp_path_factory: pytest.TempPathFactory
     ) -> None:
-        lines = write(wanted, "dialect.feed_words=everywhere")
+        lines = write(wanted, "dialect.feed_words=everywhere", "dialect.rapids=straight")
         data = FRAME + "\n".join(lines).encode() + b"\n"
         compare(moving(wanted), data, tmp_path_factory.mktemp("rs274"))
 
