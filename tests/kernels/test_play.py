@@ -98,6 +98,17 @@ def test_a_first_motion_against_the_start_counts() -> None:
     assert reversals == 0
 
 
+@pytest.mark.parametrize(
+    ("back", "reversals"), [(0.5, 1), (0.5000001, 0), (0.75, 0), (0.4999999, 1)]
+)
+def test_half_a_step_back_is_a_reversal_and_less_is_none(back: float, reversals: int) -> None:
+    """From the furthest place, whatever jitter was on the way; compensation moves the motor."""
+    steps = np.array([0.0, 1.0, 0.75, 1.0, 0.875, back])
+    slide, count = run(steps, (0.0, 0.0), compensation=3)
+    assert count == reversals
+    assert slide[-1] == pytest.approx((back - 3 * reversals) * STEP)
+
+
 def test_circle_with_play_is_four_shifted_quarters() -> None:
     """X of a CW circle from the top: up to +R, down to −R, up to 0, with play and nothing else."""
     radius, play = 2000, 250 * STEP

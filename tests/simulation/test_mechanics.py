@@ -314,6 +314,20 @@ def test_the_nearest_cell_holds_outside_and_the_upper_one_on_an_edge() -> None:
         assert slides(machine, points)[-1, 0] == pytest.approx(play, abs=1e-12)
 
 
+def test_columns_are_those_of_x_from_machine_zero() -> None:
+    """Play of Y at places along X: on an edge the cell beyond it, outside the nearest."""
+    machine = path_machine(
+        "play_map.use=true",
+        "play_map.y.x_mm=[-1.0, 0.0, 1.0, 2.0]",
+        "play_map.y.y_mm=[5.0, 6.0]",
+        "play_map.y.play_mm=[[0.01, 0.02, 0.03]]",
+        "controller.machine_zero_mm=[3.0, 100.0, 0.0]",
+    )
+    for x, play in ((-50.0, 0.01), (2.999, 0.01), (3.0, 0.02), (4.0, 0.03), (99.0, 0.03)):
+        points = along(1, 0.0, 1.0, 0.0) + np.array([x, 0.0, 0.0])
+        assert slides(machine, points)[-1, 1] == pytest.approx(play, abs=1e-12)
+
+
 def test_place_moves_without_a_reversal() -> None:
     machine = path_machine("axes.x.backlash_mm=0.05", "axes.x.compensation_mm=0.05")
     mechanics = Mechanics(machine, START, ALL)
