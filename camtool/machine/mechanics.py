@@ -45,6 +45,10 @@ class PlayMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     x: PlayCells | None = None
     y: PlayCells | None = None
 
+    def __post_init__(self) -> None:
+        if self.use and self.x is None and self.y is None:
+            raise ValueError("use is true, but neither play_map.x nor play_map.y is there")
+
     @property
     def used(self) -> tuple[PlayCells | None, PlayCells | None, None]:
         """The cells of X, Y and Z that hold; None where `backlash_mm` does."""

@@ -90,3 +90,10 @@ def test_a_map_needs_all_of_its_keys() -> None:
     del table["play_map"]["x"]["y_mm"]
     with pytest.raises(MachineError, match=r"table \[play_map.x\], key y_mm: key is missing"):
         build_machine(table, "pic_mmh.toml")
+
+
+def test_a_map_in_use_has_cells() -> None:
+    table = read_table(FILE)
+    table["play_map"] = {"use": True}
+    with pytest.raises(MachineError, match=r"key play_map: use is true, but neither"):
+        build_machine(table, "pic_mmh.toml")

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from camtool.findings import Code
@@ -45,6 +46,32 @@ def test_a_circle_out_of_square_is_an_ellipse_at_45_degrees(lean: float) -> None
     found = verify(path, path_machine(*settings), wanted=path).report
     (ring,) = found.circles
     assert ring.G_um == pytest.approx(1000.0 * RADIUS * abs(math.tan(lean)), rel=1e-3)
+
+
+@pytest.mark.parametrize("play", [0.01, 0.2])
+def test_a_circle_with_play_in_both_axes(play: float) -> None:
+    """From the right end, counter-clockwise, engaged towards +: on the right X stands still while
+    Y goes by w = √(2Rb − b²), on the left and below one axis lacks b; the figures against the
+    closed form of all four quarters, and against its least-squares centre by Gauss-Newton."""
+    path = circle(ToolpathBuilder(), 30.0, 30.0, RADIUS).finish()
+    settings = (*both("backlash_mm", play), "controller.grid=none")
+    (ring,) = verify(path, path_machine(*settings), wanted=path).report.circles
+    w = math.sqrt(2.0 * RADIUS * play - play**2)
+    assert ring.Fmax_um == pytest.approx(1000.0 * (math.hypot(RADIUS, w) - RADIUS), rel=1e-3)
+    assert ring.Fmin_um == pytest.approx(-1000.0 * play, rel=1e-3)
+    angle = np.linspace(0.0, 2.0 * math.pi, 100_000, endpoint=False)
+    x, y = RADIUS * np.cos(angle), RADIUS * np.sin(angle)
+    right, upper = angle <= math.pi, (angle <= 0.5 * math.pi, angle <= 1.5 * math.pi)
+    slide_x = np.where(right, np.minimum(RADIUS, x + play), np.maximum(play - RADIUS, x))
+    falling = np.where(upper[1], np.minimum(RADIUS, y + play), np.maximum(play - RADIUS, y))
+    slide_y = np.where(upper[0], y, falling)
+    centre = np.zeros(3)
+    for _ in range(20):
+        off = np.stack([slide_x - centre[0], slide_y - centre[1]])
+        radii = np.hypot(*off)
+        slopes = np.column_stack([-off[0] / radii, -off[1] / radii, -np.ones_like(radii)])
+        centre -= np.linalg.lstsq(slopes, radii - centre[2], rcond=None)[0]
+    assert ring.G_um == pytest.approx(1000.0 * np.ptp(radii), rel=5e-3)
 
 
 def test_a_part_scatters_within_bounds_and_as_the_seed_says() -> None:
