@@ -78,6 +78,7 @@ class Code(IntEnum):
     NO_MOTION = 406
     RETURN_TO_MACHINE_ZERO = 407
     ABOVE_GATE = 408
+    END_NOT_REACHED = 409
 
 
 @dataclass(frozen=True)

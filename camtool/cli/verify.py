@@ -49,6 +49,12 @@ if TYPE_CHECKING:
     "repeatability.",
 )
 @click.option(
+    "--worst",
+    type=click.IntRange(min=0),
+    metavar="COUNT",
+    help="List so many moves with the largest errors.",
+)
+@click.option(
     "--compensated",
     is_flag=True,
     help="It was posted with --compensate; for --against.",
@@ -76,6 +82,7 @@ def verify(
     against: str | None,
     interpolator: str | None,
     without: tuple[str, ...],
+    worst: int | None,
     compensated: bool,
     compare: str | None,
     preview: str | None,
@@ -100,6 +107,7 @@ def verify(
         effects=left_out(without) if without else None,
         gates=gates.gates(),
         compensated=compensated,
+        worst=worst,
     )
     target = machine.load()
     say_first_run(quiet=quiet)
@@ -164,6 +172,8 @@ def _judged(
     write_all(files)
     if wishes.report != STDOUT and not wishes.quiet:
         click.echo(verification.report.to_text(findings=False))
+        if judging.worst:
+            click.echo(verification.report.worst_text())
     say_findings(verification.findings, quiet=wishes.quiet, verbose=wishes.verbose)
     failed = worst(verification.findings) >= Severity.ERROR
     if failed:

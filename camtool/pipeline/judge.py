@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
     from camtool.verify.gates import Gates
-    from camtool.verify.report import Before
+    from camtool.verify.records import Before
     from camtool.verify.verify import Verification, VerifyOptions
 
 
@@ -28,12 +28,14 @@ if TYPE_CHECKING:
 class Judging:
     """How a program is judged: the interpolator in place of the controller's own, the parts of
     the mechanics that act (None: all), the limits that make findings (None: none), and whether
-    it was posted bent against the mechanics."""
+    it was posted bent against the mechanics; how many of the worst moves are listed (None: as
+    usual)."""
 
     interpolator: Interpolator | None = None
     effects: Effects | None = None
     gates: Gates | None = None
     compensated: bool = False
+    worst: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,8 @@ def post_drawing(
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return Posted(wanted, program, decoded, None, findings)
-    from camtool.verify.report import Planned, certain
+    from camtool.verify.records import Planned
+    from camtool.verify.report import certain
     from camtool.verify.verify import VerifyOptions
 
     plain = _plainly(drawing, job, target, compensate=compensate)
@@ -128,6 +131,7 @@ def verify_program(
     with `job` when there is one. ProgramError names file, block and column."""
     from camtool.planning.job import Job
     from camtool.simulation.options import ALL
+    from camtool.verify.case import WORST_LISTED
     from camtool.verify.verify import VerifyOptions
 
     judging = judging or Judging()
@@ -144,6 +148,7 @@ def verify_program(
         effects=judging.effects or ALL,
         source=source,
         tool_diameter_mm=_tool_mm(job or Job()),
+        worst=WORST_LISTED if judging.worst is None else judging.worst,
     )
     found = _judged(data, decoded, target.machine, goal, options)
     beyond = _beyond(found, judging.gates)
@@ -217,7 +222,7 @@ def _plainly(
 
 def _before(plain: Posted | None) -> Before | None:
     """Its figures, for the report."""
-    from camtool.verify.report import Before
+    from camtool.verify.records import Before
 
     if plain is None:
         return None

@@ -110,23 +110,35 @@ def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
     return float(found[3]), float(found[4])
 
 
-def both_ways(circles: Sequence[Circle], bins: Sequence[Floats]) -> list[BothWays]:
-    """The circles that are cut clockwise and counterclockwise about one centre, once each."""
-    found = []
-    for first, one in enumerate(circles):
-        if not one.ccw:
-            continue
-        for second, other in enumerate(circles):
-            if not other.ccw and _same(one, other):
-                found.append(_both(one, np.concatenate([bins[first], bins[second]])))
-                break
-    return found
+class Pairs:
+    """The circles that are cut clockwise and counterclockwise about one centre. Only their bins
+    are kept, and only until the second of them is done."""
 
+    def __init__(self, circles: Sequence[Circle]) -> None:
+        """Each takes the first free partner: as many pairs as there are of the rarer way."""
+        self._circles = circles
+        self._partner: dict[int, int] = {}
+        self._waiting: dict[int, Floats] = {}
+        if not circles:
+            return
+        table = np.array([(*one.centre_mm, one.radius_mm) for one in circles])
+        free = np.array([not one.ccw for one in circles])
+        for first, one in enumerate(circles):
+            if one.ccw and free.any():
+                apart = np.abs(table - table[first]).max(axis=1)
+                for second in np.flatnonzero(free & (apart <= SAME_SHARE * one.radius_mm))[:1]:
+                    free[second] = False
+                    self._partner[first], self._partner[int(second)] = int(second), first
 
-def _same(one: Circle, other: Circle) -> bool:
-    near = SAME_SHARE * one.radius_mm
-    apart = math.dist(one.centre_mm, other.centre_mm)
-    return apart <= near and abs(one.radius_mm - other.radius_mm) <= near
+    def add(self, circle: int, bins: Floats) -> list[BothWays]:
+        """Take the bins of a circle; what it and its partner make when that is done already."""
+        partner = self._partner.get(circle)
+        if partner is None:
+            return []
+        if partner not in self._waiting:
+            self._waiting[circle] = bins.copy()
+            return []
+        return [_both(self._circles[circle], np.concatenate([self._waiting.pop(partner), bins]))]
 
 
 def _both(circle: Circle, bins: Floats) -> BothWays:

@@ -78,10 +78,16 @@ class MissedEnds:
     most_mm: float
 
 
-def missed_ends(rows: RowFigures, held: Toolpath, steps_mm: tuple[float, float]) -> MissedEnds:
-    """Where the controller stood after each row against the end of it as `held`; `steps_mm` are
-    the coded steps of X and Y."""
+def missed_ends(
+    rows: RowFigures,
+    held: Toolpath,
+    steps_mm: tuple[float, float],
+    without: tuple[int, ...] = (),
+) -> MissedEnds:
+    """Where the controller stood after each row against the end of it as `held`, but for the rows
+    `without`; `steps_mm` are the coded steps of X and Y."""
     stood = np.isfinite(rows.commanded_end[:, 0])
+    stood[list(without)] = False
     off = np.abs(np.where(stood[:, None], rows.commanded_end - held.end[:, :2], 0.0))
     missed = (off > END_STEPS * np.array(steps_mm)).any(axis=1)
     if not missed.any():

@@ -32,12 +32,16 @@ TRACE_POINTS = 20_000
 """Points of the slides' path that are kept for pictures."""
 
 
+WORST_LISTED = 10
+"""So many moves with the largest errors are in a report, unless more are asked for."""
+
+
 @dataclass(frozen=True)
 class VerifyOptions:
     """How to judge, and what the report says of the program.
 
     `interpolator` None: as the machine does. `effects`: the parts of the mechanics that act.
-    `coverage_mm` None: `COVERAGE_MM`,
+    `worst`: so many moves with the largest errors are listed. `coverage_mm` None: `COVERAGE_MM`,
     `COVERAGE_STEPS` or `COVERAGE_RESOLUTIONS`. `blocks` None: counted from the decoded toolpath
     where it was read. `tool_diameter_mm`: rapids below the stock top may run where the tool has
     cleared the way before; None, when nobody knows it: nowhere.
@@ -52,6 +56,7 @@ class VerifyOptions:
     coverage_mm: float | None = None
     sample_mm: float = SAMPLE_MM
     trace_points: int = TRACE_POINTS
+    worst: int = WORST_LISTED
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,8 @@ from camtool.verify.rows import RowFigures
 
 @dataclass(frozen=True, eq=False)
 class Tally:
-    """Sums over the whole program; reversals and times also apart for cutting and the rest."""
+    """Sums over the whole program; reversals and times also apart for cutting and the rest.
+    `compensation_s` is a part of cutting and air."""
 
     steps: Ints
     iterations: int
@@ -23,6 +24,7 @@ class Tally:
     cutting_s: float
     air_s: float
     dwell_s: float
+    compensation_s: float
     gave_up: dict[int, tuple[float, float]]
     """Rows whose stop test was never met, and where in XY (mm) the simulation left them."""
 
@@ -45,6 +47,7 @@ def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
         cutting_s=float(ledger.duration_s[is_cut].sum()),
         air_s=float(ledger.duration_s[air].sum()),
         dwell_s=float(ledger.duration_s[dwell].sum()),
+        compensation_s=float(ledger.compensation_s.sum()),
         gave_up={
             row: (float(rows.commanded_end[row, 0]), float(rows.commanded_end[row, 1]))
             for row in missed

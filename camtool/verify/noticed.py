@@ -12,13 +12,16 @@ from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
 from camtool.toolpath.cleared import CLEARED_MM, Reach, Through, rapids_through_stock
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verify.by_row import missed_ends
 from camtool.verify.case import Case
 from camtool.verify.cuts import CutMoves, rapids_in_stock
 from camtool.verify.holes import holes_of
 from camtool.verify.motion import Tally
 from camtool.verify.places import and_more, at_point, block_name
+from camtool.verify.rows import RowFigures
 
 AXES = "XYZ"
+UM_PER_MM = 1000.0
 
 CLEARED_COVERAGES = 2.0
 """A rapid may stick out of what is cleared by so many tolerances of the coverage: it and the cuts
@@ -29,12 +32,13 @@ TRAVEL_EPS_MM = 1e-6
 
 
 def motion_findings(
-    cuts: CutMoves, case: Case, tally: Tally, extents: Floats
+    cuts: CutMoves, case: Case, tally: Tally, extents: Floats, rows: RowFigures
 ) -> tuple[Finding, ...]:
     """All findings that need the motion or the machine; `extents` (3, 2) mm of the toolpath."""
     decoded, machine = cuts.toolpath, case.machine
     return (
         *_endless_arcs(decoded, machine, tally),
+        *_missed_ends(decoded, machine, tally, rows),
         *_out_of_travel(machine, extents),
         *_rapids_in_stock(decoded, case),
         *_many_reversals(machine, tally),
@@ -61,6 +65,26 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
         )
         if more:
             return
+
+
+def _missed_ends(
+    held: Toolpath, machine: Machine, tally: Tally, rows: RowFigures
+) -> Iterator[Finding]:
+    """Moves that end beside their programmed ends, but for arcs that never end."""
+    steps_mm = machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm
+    missed = missed_ends(rows, held, steps_mm, without=tuple(tally.gave_up))
+    if missed.count == 0:
+        return
+    yield Finding(
+        Code.END_NOT_REACHED,
+        Severity.WARNING,
+        f"the controller leaves {missed.count} moves beside their ends, "
+        f"up to {missed.most_mm * UM_PER_MM:.2f} µm",
+        where=f"{block_name(held, missed.row)}, end {at_point(held.end[missed.row])}",
+        measured=missed.most_mm * UM_PER_MM,
+        limit=0.0,
+        unit="um",
+    )
 
 
 def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:

@@ -7,17 +7,26 @@ from dataclasses import dataclass
 from camtool import __version__
 from camtool.findings import Finding
 from camtool.geometry.polylines import Floats
-from camtool.verify import report as record
+from camtool.verify import records as record
+from camtool.verify.by_row import (
+    contour_figures,
+    contour_name,
+    mean_error_mm,
+    missed_ends,
+    worst_rows,
+)
 from camtool.verify.case import Case
 from camtool.verify.circles import UNSEEN
 from camtool.verify.coverage import Coverage
 from camtool.verify.cuts import CutMoves
+from camtool.verify.depth import depth_error_mm
 from camtool.verify.dimensions import RowSlides, closure_mm, places_between, sizes
 from camtool.verify.figures import Figure
 from camtool.verify.motion import Tally
-from camtool.verify.report import Report, certain, number
+from camtool.verify.report import Report, certain, number, reported
 from camtool.verify.rows import RowFigures
 from camtool.verify.slides import SlidePass, largest
+from camtool.verify.trace import Trace
 
 UM = 1000.0
 """µm in a mm."""
@@ -35,10 +44,11 @@ class Result:
     rows: RowFigures
     tally: Tally
 
-    def report(self, extents: Floats, findings: tuple[Finding, ...]) -> Report:
-        """The report; `extents` (3, 2) mm of the decoded toolpath."""
+    def report(self, extents: Floats, findings: tuple[Finding, ...], trace: Trace) -> Report:
+        """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides."""
         case, tally = self.case, self.tally
         options = case.options
+        link_s = case.machine.link.seconds(options.size_bytes or 0, tally.time_s)
         slides = RowSlides(
             self.rows.low,
             self.rows.high,
@@ -52,18 +62,24 @@ class Result:
             blocks=_blocks(case),
             bytes=options.size_bytes,
             extents_mm=record.ExtentsMm(x=x, y=y, z=z),
-            time_s=certain(tally.time_s),
+            time_s=certain(tally.time_s + link_s),
             steps=_steps(tally),
             reversals=_reversals(tally),
             error_um=self._errors(),
             closure_um=number(closure_mm(self.cuts, slides, case.coverage_mm), UM),
             dimensions=self._dimensions(slides),
             circles=self._circles(),
-            findings=record.reported(findings),
+            findings=reported(findings),
             contours=self.cuts.contour_count,
-            time_split_s=_time_split(tally),
+            time_split_s=_time_split(tally, link_s),
             interpolator=_interpolator(case),
             camtool_version=__version__,
+            contour_errors=self._contours(),
+            bidirectional=self._both_ways(),
+            unreached=self._unreached(),
+            shape=self._shape(trace),
+            worst=self._worst(),
+            assumptions=assumptions(case),
         )
 
     def _errors(self) -> record.Errors:
@@ -93,7 +109,9 @@ class Result:
                 number(total.max, UM),
                 number(total.rms, UM),
                 number(total.p95, UM),
+                number(mean_error_mm(self.rows), UM),
             ),
+            depth_max=number(depth_error_mm(self.case, self.cuts), UM),
         )
 
     def _dimensions(self, slides: RowSlides) -> tuple[record.Dimension, ...]:
@@ -120,12 +138,103 @@ class Result:
                 D_um=number(figures.radial_mean_mm, UM),
                 direction="ccw" if circle.ccw else "cw",
                 z_mm=certain(circle.z_mm),
+                step_um=tuple(number(value, UM) for value in turned.step),
+                spike_um=tuple(number(value, UM) for value in turned.spike),
+                B_um=tuple(number(value, UM) for value in turned.value),
             )
-            for circle, figures in zip(
-                self.slides.circles, self.slides.circle_figures, strict=True
+            for circle, figures, turned in zip(
+                self.slides.circles,
+                self.slides.circle_figures,
+                self.slides.reversing,
+                strict=True,
             )
-            if figures is not UNSEEN
+            if figures is not UNSEEN and turned is not None
         )
+
+    def _both_ways(self) -> tuple[record.BothWaysReport, ...]:
+        return tuple(
+            record.BothWaysReport(
+                centre_mm=(certain(one.circle.centre_mm[0]), certain(one.circle.centre_mm[1])),
+                radius_mm=certain(one.circle.radius_mm),
+                Gb_um=number(one.circular_mm, UM),
+                D_um=number(one.radial_mean_mm, UM),
+            )
+            for one in self.slides.both_ways
+        )
+
+    def _contours(self) -> tuple[record.ContourReport, ...]:
+        return tuple(
+            record.ContourReport(
+                name=contour_name(self.wanted, one.contour),
+                max_um=certain(one.max_mm * UM),
+                rms_um=certain(one.rms_mm * UM),
+                mean_um=certain(one.mean_mm * UM),
+                at_mm=(certain(one.at_mm[0]), certain(one.at_mm[1])),
+                block=_block(self.case, one.row),
+            )
+            for one in contour_figures(self.rows, self.coverage.match)
+        )
+
+    def _worst(self) -> tuple[record.WorstReport, ...]:
+        rows = self.rows
+        return tuple(
+            record.WorstReport(
+                block=_block(self.case, row),
+                move=row + 1,
+                at_mm=(certain(rows.total_at[row, 0]), certain(rows.total_at[row, 1])),
+                total_um=certain(rows.total[row] * UM),
+                interpolation_um=number(rows.interpolation[row], UM),
+                mechanics_um=number(rows.mechanics[row], UM),
+                source=self._source(row),
+            )
+            for row in worst_rows(rows, self.case.options.worst).tolist()
+        )
+
+    def _source(self, row: int) -> str:
+        """Layer and entity of the wanted move that a decoded row follows."""
+        wanted = int(self.coverage.match.row[row])
+        return self.wanted.toolpath.text(wanted) if wanted >= 0 else ""
+
+    def _unreached(self) -> record.UnreachedReport:
+        axes = self.case.machine.axes
+        steps = axes.x.coded_step_mm, axes.y.coded_step_mm
+        missed = missed_ends(self.rows, self.cuts.toolpath, steps)
+        return record.UnreachedReport(missed.count, certain(missed.most_mm * UM))
+
+    def _shape(self, trace: Trace) -> record.ShapeReport | None:
+        diameter = self.case.options.tool_diameter_mm
+        if not diameter:
+            return None
+        from camtool.verify.shape import machined_shape  # loads shapely
+
+        shape = machined_shape(trace, self.wanted, diameter)
+        if shape is None:
+            return None
+        return record.ShapeReport(
+            tool_diameter_mm=certain(shape.diameter_mm),
+            overcut_mm2=certain(shape.overcut_mm2),
+            overcut_um=certain(shape.overcut_mm * UM),
+            undercut_mm2=certain(shape.undercut_mm2),
+            undercut_um=certain(shape.undercut_mm * UM),
+        )
+
+
+def assumptions(case: Case) -> tuple[str, ...]:
+    """What the times and figures take for granted."""
+    from camtool.simulation.models import model_of
+
+    link = case.machine.link
+    said = model_of(case.machine).assumptions(case.machine)
+    if link.baud is None:
+        return (*said, "the program is in the controller before it runs")
+    how = "block by block, before each is cut" if link.wait == "sequential" else "while it runs"
+    return (*said, f"the program comes at {link.baud:g} baud, {how}")
+
+
+def _block(case: Case, row: int) -> int | None:
+    """The block (from 1) that a row was read from."""
+    block = int(case.decoded.block[row])
+    return block + 1 if block >= 0 else None
 
 
 def _max_rms(figure: Figure) -> record.MaxRms:
@@ -151,9 +260,13 @@ def _steps(tally: Tally) -> record.Steps:
     return record.Steps(x, y, z, tally.iterations)
 
 
-def _time_split(tally: Tally) -> record.TimeSplit:
+def _time_split(tally: Tally, link_s: float) -> record.TimeSplit:
     return record.TimeSplit(
-        cutting=certain(tally.cutting_s), air=certain(tally.air_s), dwell=certain(tally.dwell_s)
+        cutting=certain(tally.cutting_s),
+        air=certain(tally.air_s),
+        dwell=certain(tally.dwell_s),
+        compensation=certain(tally.compensation_s),
+        link=certain(link_s),
     )
 
 

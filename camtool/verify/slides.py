@@ -18,6 +18,7 @@ import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
 from camtool.simulation.motion import Chunk, Ledger
+from camtool.verify.ballbar import BothWays, Pairs, Reversing, reversing
 from camtool.verify.circles import UNSEEN, CircleFigures, circle_figures
 from camtool.verify.compare import Target
 from camtool.verify.cuts import Bools
@@ -48,6 +49,9 @@ class SlidePass:
     def __init__(self, decoded: Target, goal: Goal, match: Match, trace: TraceSize) -> None:
         self.circles = goal.circles
         self.circle_figures: list[CircleFigures] = [UNSEEN] * len(goal.circles)
+        self.reversing: list[Reversing | None] = [None] * len(goal.circles)
+        self.both_ways: list[BothWays] = []
+        self._pairs = Pairs(goal.circles)
         self._cuts = decoded.cuts
         self._ledger = empty_ledger(len(match.contour))
         self._first, self._last = _rows_of_circles(match.circle, len(goal.circles))
@@ -98,7 +102,10 @@ class SlidePass:
         while self._closing and self._last[self._closing[0]] < row:
             circle = self._closing.pop(0)
             bins = self._sums.bins[self._slot[circle]]
-            self.circle_figures[circle] = circle_figures(bins, self.circles[circle].radius_mm)
+            one = self.circles[circle]
+            self.circle_figures[circle] = circle_figures(bins, one.radius_mm)
+            self.reversing[circle] = reversing(bins, one.ccw)
+            self.both_ways += self._pairs.add(circle, bins)
             from camtool.kernels.circle_bins import empty_bins
 
             bins[:] = empty_bins(1)[0]
@@ -147,15 +154,16 @@ def _task(decoded: Target, goal: Goal, match: Match, slot: Ints) -> Task:
     wanted = own if goal.target is decoded else move_table(goal.target.cuts)
     return Task(
         own=own.moves,
-        own_of=own.of_row,
         moves=wanted.moves,
         heights=wanted.heights,
         tree=tree_of(wanted.boxes),
-        only=wanted.ranges(match.only),
+        rows=np.column_stack(
+            [own.of_row, wanted.ranges(match.only), match.circle, slot[match.circle]]
+            if len(slot)
+            else [own.of_row, wanted.ranges(match.only), match.circle, match.circle]
+        ),
         window=_heights(decoded, goal.depth_mm),
-        circle=match.circle,
         centre=np.array([circle.centre_mm for circle in goal.circles]).reshape(-1, 2),
-        slot=slot,
         directions=bin_directions(),
     )
 
@@ -172,8 +180,7 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
         rows=empty_columns(rows),
         histograms=np.zeros((2, BINS, 4), dtype=np.int64),
         bins=empty_bins(slots),
-        trace=np.empty((room + rows + 1, 3)),
-        trace_row=np.empty(room + rows + 1, dtype=np.int64),
+        trace=np.empty((room + rows + 1, 4)),
         pen=new_pen(trace.stride, room),
         found=np.empty(moves, dtype=np.int64),
         memo=new_memo(),

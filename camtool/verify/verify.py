@@ -36,7 +36,8 @@ from camtool.verify.holes import hole_findings, holes_of
 from camtool.verify.match import Goal, carried_match, own_match
 from camtool.verify.motion import tally_of
 from camtool.verify.noticed import motion_findings
-from camtool.verify.report import Before, Planned, Report
+from camtool.verify.records import Before, Planned
+from camtool.verify.report import Report
 from camtool.verify.result import Result
 from camtool.verify.slides import SlidePass, Steps
 from camtool.verify.trace import Trace, trace_size
@@ -107,9 +108,11 @@ def judge(case: Case, motion: Iterable[Chunk] | Steps) -> Verification:
     rows = slides.rows
     tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
     extents = toolpath_extents(case.decoded)
-    findings = _all_findings(case, coverage, motion_findings(decoded.cuts, case, tally, extents))
+    noticed = motion_findings(decoded.cuts, case, tally, extents, rows)
+    findings = _all_findings(case, coverage, noticed)
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally)
-    return Verification(result.report(extents, findings), slides.trace(), findings)
+    trace = slides.trace()
+    return Verification(result.report(extents, findings, trace), trace, findings)
 
 
 def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from camtool.verify.records import ShapeReport
     from camtool.verify.report import Report
 
 DIMENSIONS_SHOWN = 12
@@ -45,7 +46,9 @@ def markdown(report: Report) -> str:
     parts += [f"- **{name}:** {value}" for name, value in _facts(report)]
     parts += ["", "| error by source | max µm | rms µm | p95 µm |", "|---|---:|---:|---:|"]
     parts += [f"| {' | '.join(row)} |" for row in _error_rows(report)]
-    parts += ["", *_dimension_table(report), *_circle_table(report), *_finding_list(report)]
+    parts += ["", *_dimension_table(report), *_circle_table(report), *_contour_table(report)]
+    parts += [*_worst_table(report), *_finding_list(report), ""]
+    parts += [f"- assumed: {_plain(words)}" for words in report.assumptions]
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -67,7 +70,10 @@ def _facts(report: Report) -> Iterator[tuple[str, str]]:
         program += f", {report.bytes} bytes"
     yield "program", program
     split = report.time_split_s
-    yield "time", f"{clock(report.time_s)} (cutting {clock(split.cutting)})"
+    parts = [f"cutting {clock(split.cutting)}"]
+    if split.link:
+        parts.append(f"line {clock(split.link)}")
+    yield "time", f"{clock(report.time_s)} ({', '.join(parts)})"
     yield "steps", f"X {steps.x}, Y {steps.y}, Z {steps.z}"
     total, cutting = report.reversals, report.reversals.cutting
     yield (
@@ -82,8 +88,38 @@ def _facts(report: Report) -> Iterator[tuple[str, str]]:
     error = report.error_um.total
     yield "error", f"{_um(error.max)} µm at most, rms {_um(error.rms)}, p95 {_um(error.p95)}"
     yield "by source", _error_sources(report)
+    if report.error_um.depth_max:
+        yield "depth", f"{_um(report.error_um.depth_max)} µm off at most"
     if report.closure_um is not None:
         yield "closure", f"{report.closure_um:.2f} µm"
+    if report.unreached is not None and report.unreached.moves:
+        far = report.unreached.max_um
+        yield "ends", f"{report.unreached.moves} moves end elsewhere, up to {far:.2f} µm away"
+    if report.shape is not None:
+        yield "shape", _shape(report.shape)
+
+
+def _shape(shape: ShapeReport) -> str:
+    """Over- and undercut of a round tool."""
+    over = f"overcut {shape.overcut_um:.2f} µm deep, {shape.overcut_mm2:.4f} mm²"
+    under = f"undercut {shape.undercut_um:.2f} µm, {shape.undercut_mm2:.4f} mm²"
+    return f"{over}; {under} (tool {shape.tool_diameter_mm:g} mm)"
+
+
+def worst(report: Report) -> str:
+    """The moves with the largest errors, one to a line; µm."""
+    lines = [
+        f"{_named(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
+        f" {_um(item.interpolation_um)}, mechanics {_um(item.mechanics_um)}"
+        f"  near ({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f}) mm"
+        + (f"  {_one_line(item.source)}" if item.source else "")
+        for item in report.worst
+    ]
+    return "\n".join(lines)
+
+
+def _named(block: int | None, move: int) -> str:
+    return f"block {block}" if block is not None else f"move {move}"
 
 
 def _before(report: Report) -> str:
@@ -142,6 +178,32 @@ def _circle_table(report: Report) -> Iterator[str]:
     yield from _rest(len(report.circles), "circles")
 
 
+def _contour_table(report: Report) -> Iterator[str]:
+    """The contours with the largest errors."""
+    if not report.contour_errors:
+        return
+    yield "| contour | max µm | rms µm | mean µm | where |"
+    yield "|---|---:|---:|---:|---|"
+    ordered = sorted(report.contour_errors, key=lambda item: -item.max_um)
+    for item in ordered[:DIMENSIONS_SHOWN]:
+        figures = f"{item.max_um:.2f} | {item.rms_um:.2f} | {_um(item.mean_um)}"
+        place = f"({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f})"
+        yield f"| {_plain(item.name)} | {figures} | {place} |"
+    yield from _rest(len(ordered), "contours")
+
+
+def _worst_table(report: Report) -> Iterator[str]:
+    if not report.worst:
+        return
+    yield "| worst moves | error µm | interpolation µm | mechanics µm | where |"
+    yield "|---|---:|---:|---:|---|"
+    for item in report.worst:
+        figures = f"{item.total_um:.2f} | {_um(item.interpolation_um)} | {_um(item.mechanics_um)}"
+        place = f"({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f})"
+        yield f"| {_named(item.block, item.move)} | {figures} | {place} |"
+    yield ""
+
+
 def _finding_list(report: Report) -> Iterator[str]:
     for item in report.findings:
         place = f" ({_plain(item.where)})" if item.where else ""
@@ -175,6 +237,10 @@ def _mm(value: float) -> str:
 
 def _percent(value: float | None) -> str:
     return "–" if value is None else f"{value:+.2f} %".replace("-", "−")
+
+
+def _one_line(words: str) -> str:
+    return "".join(sign if sign.isprintable() else " " for sign in " ".join(words.split()))
 
 
 def _plain(words: str) -> str:

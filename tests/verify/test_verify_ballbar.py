@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from camtool.verify.ballbar import both_ways, reversing
+from camtool.verify.ballbar import Pairs, reversing
 from camtool.verify.circles import Circle
 
 RADIUS = 5.0
@@ -81,10 +81,24 @@ def circle(ccw: bool, radius: float = RADIUS, x: float = 0.0) -> Circle:
 
 def test_both_ways_round() -> None:
     ways = [bins_of(travel(ccw)[1] * scale) for ccw, scale in ((True, 1.002), (False, 0.999))]
-    (both,) = both_ways([circle(True), circle(False)], ways)
+    pairs = Pairs([circle(True), circle(False)])
+    assert pairs.add(0, ways[0]) == []
+    (both,) = pairs.add(1, ways[1])
     assert both.circular_mm == pytest.approx(RADIUS * 0.003, rel=1e-3)
     assert both.radial_mean_mm == pytest.approx(RADIUS * 0.0005, rel=1e-2)
-    one_way = both_ways([circle(True), circle(True)], ways)
-    elsewhere = both_ways([circle(True), circle(False, x=1.0)], ways)
-    larger = both_ways([circle(True), circle(False, radius=6.0)], ways)
-    assert (one_way, elsewhere, larger) == ([], [], [])
+
+
+@pytest.mark.parametrize(
+    "other", [circle(True), circle(False, x=1.0), circle(False, radius=6.0)], ids=str
+)
+def test_circles_that_are_no_pair(other: Circle) -> None:
+    pairs = Pairs([circle(True), other])
+    bins = bins_of(travel(True)[1])
+    assert pairs.add(0, bins) == []
+    assert pairs.add(1, bins) == []
+
+
+def test_each_circle_has_one_partner() -> None:
+    bins = bins_of(travel(True)[1])
+    pairs = Pairs([circle(True), circle(True), circle(False)])
+    assert [len(pairs.add(index, bins)) for index in range(3)] == [0, 0, 1]
