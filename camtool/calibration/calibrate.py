@@ -12,15 +12,11 @@ import math
 from dataclasses import dataclass
 
 from camtool.calibration.measurements import Measurements
-from camtool.calibration.model import SQUARENESS, Model, Parameter, Reading, Way
+from camtool.calibration.model import SQUARENESS, Model, Parameter, Reading
 from camtool.calibration.readings import readings_of
 from camtool.calibration.solve import OUTLIER_SIGMAS, Solution, solve
 from camtool.errors import InputError
 from camtool.machine.model import Axis, Machine
-
-PASSES = 20
-"""How often circles are looked at again with the play that was found: which points wait behind a
-reversal depends on it, and settles at once in all but contrived cases."""
 
 NONE_LEFT_SIGMAS = 3.0
 """A play below zero by no more than so many standard uncertainties is none; beyond, a fault."""
@@ -103,11 +99,14 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
     below zero.
     """
     _same_target(measurements, machine)
-    readings, model, solution = _fitted(measurements, machine)
-    estimates = (
-        *_plain(model, solution, readings, machine),
-        *_mean_plays(model, solution, readings, machine),
-    )
+    readings = readings_of(measurements, machine)
+    if not readings:
+        raise InputError(
+            "nothing was measured yet", file=measurements.file, mend="fill in the lengths"
+        )
+    model = Model(readings)
+    solution = solve(model, model.start(machine))
+    estimates = (*_plain(model, solution, machine), *_mean_plays(model, solution, machine))
     for estimate in estimates:
         _no_negative_play(estimate, measurements.file)
     known = [reading.uncertainty_mm for reading in readings if reading.uncertainty_mm]
@@ -142,34 +141,10 @@ def _same_target(measurements: Measurements, machine: Machine) -> None:
         )
 
 
-def _fitted(measurements: Measurements, machine: Machine) -> tuple[list[Reading], Model, Solution]:
-    """The readings and their fit; again while the play that was found changes the readings."""
-
-    def said(way: Way) -> float:
-        axis: Axis = getattr(machine.axes, way.axis)
-        return axis.backlash_mm * axis.coded_step_mm / axis.real_step_mm - way.added_mm
-
-    readings = readings_of(measurements, machine, said)
-    if not readings:
-        raise InputError(
-            "nothing was measured yet", file=measurements.file, mend="fill in the lengths"
-        )
-    for _ in range(PASSES):
-        model = Model(readings)
-        solution = solve(model, readings, model.start(machine))
-        waits = model.waits(solution.values)
-        again = readings_of(measurements, machine, waits)
-        if again == readings:
-            break
-        readings = again
-    return readings, model, solution
-
-
-def _plain(
-    model: Model, solution: Solution, readings: list[Reading], machine: Machine
-) -> list[Estimate]:
+def _plain(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
     """The parameters that were estimated, in the machine's units."""
     start = model.start(machine)
+    depends = model.depends(solution.values)
     found = []
     for column, parameter in enumerate(model.parameters):
         if not solution.free[column]:
@@ -183,16 +158,15 @@ def _plain(
             axis: Axis = getattr(machine.axes, parameter.axis)
             coded, what = axis.coded_step_mm, "step"
             before, value, sure = axis.real_step_mm, value * coded, sure * coded
-        count = sum(model.depends(reading, column, solution.values) for reading in readings)
+        count = int(depends[:, column].sum())
         known = sure if math.isfinite(sure) else None
         found.append(Estimate(what, parameter.axis, parameter.region, before, value, known, count))
     return found
 
 
-def _mean_plays(
-    model: Model, solution: Solution, readings: list[Reading], machine: Machine
-) -> list[Estimate]:
+def _mean_plays(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
     """The play of axes that were measured in regions: the mean, if all regions were told."""
+    depends = model.depends(solution.values)
     found = []
     for axis in ("x", "y"):
         columns = [
@@ -201,10 +175,7 @@ def _mean_plays(
             if each.what == "play" and each.axis == axis and each.region
         ]
         if columns and all(solution.free[column] for column in columns):
-            count = sum(
-                any(model.depends(reading, column, solution.values) for column in columns)
-                for reading in readings
-            )
+            count = int(depends[:, columns].any(axis=1).sum())
             sure = solution.uncertainty(columns)
             said: Axis = getattr(machine.axes, axis)
             value = float(solution.values[columns].mean())

@@ -11,8 +11,8 @@ from their other end: cut backwards, what is said below of the first half holds 
         ┌────────────────┘  first, in +          ┐ ┌─┐ ┌─┐ ┌─┐ ┌┘   reached in +
     ────┘                   run-up              ─┘─┘ └─┘ └─┘ └─┘
 
-A square begins and ends with a hook beside a corner; circles are closed, and begin between the
-diameters that are measured. (Two joined lines: PIC thesis §5, L2353-2423; parallel-port thesis,
+A square begins and ends with a hook beside a corner; circles are closed, and begin
+where X reverses. (Two joined lines: PIC thesis §5, L2353-2423; parallel-port thesis,
 L1165; squares and circles: PIC thesis, L2457-2594; steps: ValCNC thesis, L1645.)
 """
 
@@ -55,8 +55,9 @@ SQUARES = (1.0, 0.6, 0.3)
 CIRCLES = (1.0, 2.0 / 3.0, 1.0 / 3.0)
 """Diameters of the circles, as parts of the first: 6, 4 and 2 as in the thesis, L2528-2594."""
 
-DIAMETERS = 8
-"""Diameters measured on each circle, evenly spread (the thesis's Tabla 15)."""
+ANGLES_DEG = (15.0, 35.0, 55.0, 75.0, 105.0, 125.0, 145.0, 165.0)
+"""Where the diameters of circles are measured: eight, as in the thesis's Tabla 15, but none along
+an axis, where the slides reverse and the line has a spike or a flat."""
 
 STEPS = 10
 """Steps of a ruler (ten "tramos": ValCNC thesis, L1645)."""
@@ -192,6 +193,7 @@ def _ruler(axis: str, corner: Point, end: float, grid: _Grid) -> tuple[Path, dic
         "nominal_mm": [_clean(k * pitch) for k in range(1, STEPS + 1)],
         "forward_mm": [0.0] * STEPS,
         "backward_mm": [0.0] * STEPS,
+        "rows_apart_mm": _clean(2 * tall),
     }
     return Path(f"STEPS_{axis.upper()}", _turned(axis, ways)), table
 
@@ -231,19 +233,18 @@ def _squares(cell: _Cell, grid: _Grid) -> Made:
 
 
 def _circles(cell: _Cell, grid: _Grid) -> Made:
-    """Circles about the cell's middle, each of two half circles, counterclockwise."""
+    """Circles about the cell's middle, each of two half circles, counterclockwise from +X."""
     x, y, most = _middle(cell, grid)
-    begin = math.radians(0.5 * 180.0 / DIAMETERS)
     for part in CIRCLES:
         radius = grid.down(part * most)
-        east, north = radius * math.cos(begin), radius * math.sin(begin)
-        halves = ((x + east, y + north, 1.0), (x - east, y - north, 1.0))
+        halves = ((_clean(x + radius), y, 1.0), (_clean(x - radius), y, 1.0))
         yield (
             Path("CIRCLES", halves, closed=True),
             {
                 "nominal_mm": _clean(2.0 * radius),
                 "direction": "ccw",
-                "diameters_mm": [0.0] * DIAMETERS,
+                "angles_deg": list(ANGLES_DEG),
+                "diameters_mm": [0.0] * len(ANGLES_DEG),
             },
         )
 

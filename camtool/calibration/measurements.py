@@ -175,7 +175,8 @@ class Circle(Coupon, frozen=True, kw_only=True):
 
 class Steps(Coupon, frozen=True, kw_only=True):
     """A ruler: the places after moves of `nominal_mm` from a zero that was reached in +.
-    `forward_mm` were reached in + too, `backward_mm` in −, at the same nominal places."""
+    `forward_mm` were reached in + too, `backward_mm` in −, at the same nominal places, in a row
+    that lies `rows_apart_mm` to the + side of the first."""
 
     kind = "steps"
 
@@ -183,6 +184,7 @@ class Steps(Coupon, frozen=True, kw_only=True):
     nominal_mm: tuple[Positive, ...]
     forward_mm: tuple[NotNegative, ...] | None = None
     backward_mm: tuple[float, ...] | None = None
+    rows_apart_mm: float = 0.0
 
     @property
     def axes(self) -> str:

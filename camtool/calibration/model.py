@@ -6,37 +6,48 @@ An axis that is commanded to X, reached in +, has its slide at k·X; reached in 
 
 k is the real over the coded step, B the play and C what the controller adds at each reversal,
 in its own mm: at a reversal the motor moves by C more, of which the mechanics lose B. (Slides
-engaged in + at the start; centred ones are shifted as a whole, and no distance changes.)
-The table shows x = slide_x + tan(g)·slide_y, y = slide_y: g is the squareness, by which the angle
-between +X and +Y falls short of 90°.
+engaged in + at the start; centred ones are shifted as a whole, and no distance changes.) The table
+shows x = slide_x + q·slide_y, y = slide_y: q is the tangent of the squareness, the angle by which
+the one between +X and +Y falls short of 90°.
 
 So between two places that are n commanded mm apart along an axis, the slide's way is
 
     d = k·n + m·(B − k·C),     m = [second reached in −] − [first reached in −]  ∈ {−1, 0, 1}
 
-and every kind of coupon is a choice of n and m:
+and most coupons are a choice of n and m:
 
 lines     the first line goes from a mark reached in + to the bridge, reached in +: n, m = 0; the
           second from the bridge back to a mark reached in −: n, m = −1. It is shorter by B − k·C.
-          (PIC thesis §5, L2353-2423; parallel-port thesis, L1165.)
+          (PIC thesis, L2353-2423; parallel-port thesis, L1165.)
 squares   edges reached from opposite sides: n = size, m = −1 on both axes. Diagonals are the
           distances of the corners, (Dx, Dy) and (−Dx, Dy) sheared: their difference is squareness.
-circles   a diameter at angle t from the X axis: n = D·cos t and D·sin t, seen along its direction;
-          m from which way each axis runs at either end. Just behind a reversal the slide waits
-          until the motor has come back by B − k·C: there its place is that of the reversal.
-          Diameters along an axis are its extremes: m = −1.
-steps     n and m = 0 forwards; n and m = 1 backwards, measured from the same zero.
+steps     n and m = 0 forwards; n and m = 1 backwards, measured from the same zero: along X, where
+          the rows are a apart in Y, with q·a beside it.
 closures  n = 0, m = 1.
 
-k and B enter the slides' ways linearly, tan(g) times slide_y is a product of two: the solver
-takes first derivatives and repeats, which is exact after one round where nothing is a product.
+Circles. In commanded mm, with e = B/k − C for each axis, a point that is run through in − on an
+axis is shifted by e there: a circle of radius r falls into four quarters with centres of their
+own, symmetric about (e_x, e_y)/2. Seen from there the quarter in the direction u has its centre at
+s = (±e_x, ±e_y)/2, + for axes that run in −. Behind a reversal the slide waits until the motor
+has come back by e: that cuts the quarter off at the extreme, r − e/2 from the middle. Hence
+
+    D(u) = 2·min( u·s + √(r² − (u×s)²), (r − e_a/2) / |u_a| ),
+
+a being the axis that has just reversed, and 2r − e along an axis itself, which is from extreme to
+extreme. What is seen on the table is sheared and stretched: along the direction t it is
+D(u) / |v| with v = ((cos t − q·sin t) / k_x, sin t / k_y) and u = v / |v|, because straight lines
+stay straight.
+
+Everything here works for complex numbers too, so that the solver can take derivatives without
+subtracting: the imaginary part of f(p + i·h) / h.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +55,16 @@ import numpy.typing as npt
 from camtool.machine.model import Axis, Machine
 
 Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+ALONG_AXIS = 1e-9
+"""A diameter lies along an axis when the sine of the angle between them is below this."""
+
+ROUNDING = 1e-12
+"""Derivatives below this part of the largest by the same parameter are rounding errors."""
+
+DERIVATIVE_STEP = 1e-30
+"""The imaginary part that derivatives are taken with: its square vanishes beside any number."""
 
 
 @dataclass(frozen=True)
@@ -63,109 +84,193 @@ SQUARENESS = Parameter("squareness", "")
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way of one axis between two places of a coupon: `nominal_mm` commanded, `turned` as m."""
+class Course:
+    """An axis as a coupon was cut: with what the controller added at reversals, in a region."""
 
     axis: str
-    nominal_mm: float
-    turned: int
     added_mm: float
     region: str = ""
 
 
+class Trial:
+    """Values of the parameters, real or complex, as the equations ask for them."""
+
+    def __init__(self, values: Sequence[Any], columns: dict[Parameter, int]) -> None:
+        self._values, self._columns = values, columns
+        self.tangent = values[columns[SQUARENESS]]
+
+    def scale(self, course: Course) -> Any:
+        """k of an axis."""
+        return self._values[self._columns[Parameter("scale", course.axis)]]
+
+    def lost(self, course: Course) -> Any:
+        """B − k·C of an axis, mm. Where its play was measured in regions, it is their mean in
+        all else."""
+        own = self._columns.get(Parameter("play", course.axis, course.region))
+        if own is not None:
+            play = self._values[own]
+        else:
+            each = [
+                self._values[column]
+                for parameter, column in self._columns.items()
+                if parameter.what == "play" and parameter.axis == course.axis
+            ]
+            play = sum(each) / len(each)
+        return play - self.scale(course) * course.added_mm
+
+
+class Measure(Protocol):
+    """What was measured on a coupon."""
+
+    @property
+    def courses(self) -> tuple[Course, ...]:
+        """The axes that it depends on."""
+
+    def predict(self, trial: Trial) -> Any:
+        """The length that should have been read, mm."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """The way of one axis between two places: n and m of the module's first equation. Along X,
+    `aside_mm` is how much further towards +Y the second place was read than the first one."""
+
+    course: Course
+    nominal_mm: float
+    turned: int
+    aside_mm: float = 0.0
+
+    @property
+    def courses(self) -> tuple[Course, ...]:
+        return (self.course,)
+
+    def predict(self, trial: Trial) -> Any:
+        own = trial.scale(self.course) * self.nominal_mm + self.turned * trial.lost(self.course)
+        return own + trial.tangent * self.aside_mm
+
+
+@dataclass(frozen=True)
+class Diagonal:
+    """The distance of two places, from the ways of X and Y between them."""
+
+    x: Way
+    y: Way
+
+    @property
+    def courses(self) -> tuple[Course, ...]:
+        return self.x.course, self.y.course
+
+    def predict(self, trial: Trial) -> Any:
+        up = self.y.predict(trial)
+        across = self.x.predict(trial) + trial.tangent * up
+        return (across * across + up * up) ** 0.5
+
+
+@dataclass(frozen=True)
+class Diameter:
+    """A diameter of a circle, at an angle from the X axis towards the Y axis."""
+
+    x: Course
+    y: Course
+    radius_mm: float
+    angle_rad: float
+    ccw: bool
+
+    @property
+    def courses(self) -> tuple[Course, ...]:
+        return self.x, self.y
+
+    def predict(self, trial: Trial) -> Any:
+        cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
+        v_x = (cosine - trial.tangent * sine) / trial.scale(self.x)
+        v_y = sine / trial.scale(self.y)
+        size = (v_x * v_x + v_y * v_y) ** 0.5
+        e_x = trial.lost(self.x) / trial.scale(self.x)
+        e_y = trial.lost(self.y) / trial.scale(self.y)
+        if abs(sine) < ALONG_AXIS:
+            return (2.0 * self.radius_mm - e_x) / size
+        if abs(cosine) < ALONG_AXIS:
+            return (2.0 * self.radius_mm - e_y) / size
+        return 2.0 * self._from_middle((v_x / size, v_y / size), (e_x, e_y)) / size
+
+    def _from_middle(self, u: tuple[Any, Any], e: tuple[Any, Any]) -> Any:
+        """The second equation of the module: half of D(u)."""
+        turn = 1.0 if self.ccw else -1.0
+        runs_back = -turn * u[1].real < 0.0, turn * u[0].real < 0.0
+        s_x, s_y = (
+            0.5 * part if back else -0.5 * part for part, back in zip(e, runs_back, strict=True)
+        )
+        aside = u[0] * s_y - u[1] * s_x
+        quarter = u[0] * s_x + u[1] * s_y + (self.radius_mm**2 - aside * aside) ** 0.5
+        reversed_axis = 0 if (u[0].real * u[1].real > 0.0) == self.ccw else 1
+        part = u[reversed_axis]
+        extreme = (self.radius_mm - 0.5 * e[reversed_axis]) / (part if part.real > 0.0 else -part)
+        return min(quarter, extreme, key=lambda distance: distance.real)
+
+
 @dataclass(frozen=True)
 class Reading:
-    """One measured length: the ways of the axes between its two ends, seen along `direction`
-    (radians from the X axis), or their length where that is None. `name` says which it is."""
+    """One measured length, mm, with its standard uncertainty where that is known. `coupon` and
+    `name` say which it is, `source` where its numbers come from."""
 
     coupon: str
     name: str
     measured_mm: float
     uncertainty_mm: float | None
-    ways: tuple[Way, ...]
-    direction: float | None = None
+    measure: Measure
     source: str = ""
 
 
 class Model:
-    """The parameters of a set of readings, and what the readings should be for values of them.
-
-    Where the play of an axis was measured in regions, its play elsewhere is their mean.
-    """
+    """The parameters of a set of readings, and what the readings should be for values of them."""
 
     def __init__(self, readings: Sequence[Reading]) -> None:
-        ways = [way for reading in readings for way in reading.ways]
-        axes = sorted({way.axis for way in ways})
-        self._regions = {axis: _regions(ways, axis) for axis in axes}
+        self.readings = tuple(readings)
+        courses = [course for reading in readings for course in reading.measure.courses]
+        axes = sorted({course.axis for course in courses})
         self.parameters: tuple[Parameter, ...] = (
             *(Parameter("scale", axis) for axis in axes),
-            *(Parameter("play", axis, name) for axis in axes for name in self._regions[axis]),
+            *(Parameter("play", axis, name) for axis in axes for name in _regions(courses, axis)),
             SQUARENESS,
         )
-        self._column = {parameter: k for k, parameter in enumerate(self.parameters)}
+        self._columns = {parameter: column for column, parameter in enumerate(self.parameters)}
 
     def start(self, machine: Machine) -> Floats:
         """(P,) what the machine's file says so far."""
-        axes = {"x": machine.axes.x, "y": machine.axes.y, "z": machine.axes.z}
-        return np.array([_said(parameter, axes, machine) for parameter in self.parameters])
+        return np.array([_said(parameter, machine) for parameter in self.parameters])
 
-    def lost_mm(self, values: Floats, way: Way) -> tuple[float, Floats]:
-        """B − k·C of a way, mm, and its derivatives (P,)."""
-        slope = np.zeros(len(values))
-        every = self._regions[way.axis]
-        names = (way.region,) if way.region in every else every
-        for name in names:
-            slope[self._column[Parameter("play", way.axis, name)]] = 1.0 / len(names)
-        slope[self._column[Parameter("scale", way.axis)]] = -way.added_mm
-        return float(slope @ values), slope
+    def predict(self, values: Floats) -> Floats:
+        """(n,) what the readings should be, mm, for values (P,) of the parameters."""
+        trial = Trial(values.tolist(), self._columns)
+        return np.array([reading.measure.predict(trial) for reading in self.readings])
 
-    def waits(self, values: Floats) -> Callable[[Way], float]:
-        """For `camtool.calibration.readings`: B/k − C of a way, in commanded mm."""
+    def slopes(self, values: Floats) -> Floats:
+        """(n, P) the derivatives of the predictions."""
+        columns = []
+        for column in range(len(values)):
+            stepped = values.astype(np.complex128)
+            stepped[column] += 1j * DERIVATIVE_STEP
+            trial = Trial(stepped.tolist(), self._columns)
+            predicted = [complex(reading.measure.predict(trial)) for reading in self.readings]
+            columns.append([value.imag / DERIVATIVE_STEP for value in predicted])
+        return np.array(columns).T
 
-        def wait(way: Way) -> float:
-            scale = float(values[self._column[Parameter("scale", way.axis)]])
-            return self.lost_mm(values, way)[0] / scale
-
-        return wait
-
-    def depends(self, reading: Reading, column: int, values: Floats) -> bool:
-        """Whether a reading says anything of a parameter."""
-        return bool(self.predict(values, reading)[1][column] != 0.0)
-
-    def predict(self, values: Floats, reading: Reading) -> tuple[float, Floats]:
-        """What the reading should be, mm, and its derivatives by the parameters (P,)."""
-        ways = {way.axis: self._way(values, way) for way in reading.ways}
-        if reading.direction is None and len(ways) == 1:
-            [(value, slope)] = ways.values()
-            return value, slope
-        (x, x_slope), (y, y_slope) = ways["x"], ways["y"]
-        tangent = values[self._column[SQUARENESS]]
-        x, x_slope = x + tangent * y, x_slope + tangent * y_slope
-        x_slope[self._column[SQUARENESS]] += y
-        if reading.direction is None:
-            along = (x / math.hypot(x, y), y / math.hypot(x, y))
-        else:
-            along = (math.cos(reading.direction), math.sin(reading.direction))
-        return along[0] * x + along[1] * y, along[0] * x_slope + along[1] * y_slope
-
-    def _way(self, values: Floats, way: Way) -> tuple[float, Floats]:
-        lost, slope = self.lost_mm(values, way)
-        slope = way.turned * slope
-        scale = self._column[Parameter("scale", way.axis)]
-        slope[scale] += way.nominal_mm
-        return values[scale] * way.nominal_mm + way.turned * lost, slope
+    def depends(self, values: Floats) -> Bools:
+        """(n, P) which readings say anything of which parameters."""
+        slopes = np.abs(self.slopes(values))
+        return np.asarray(slopes > ROUNDING * slopes.max(axis=0))
 
 
-def _regions(ways: Sequence[Way], axis: str) -> tuple[str, ...]:
+def _regions(courses: Sequence[Course], axis: str) -> Iterator[str]:
     """The named regions of an axis in their order; one without a name where there are none."""
-    named = dict.fromkeys(way.region for way in ways if way.axis == axis and way.region)
-    return tuple(named) or ("",)
+    named = dict.fromkeys(each.region for each in courses if each.axis == axis and each.region)
+    yield from named or ("",)
 
 
-def _said(parameter: Parameter, axes: Mapping[str, Axis], machine: Machine) -> float:
+def _said(parameter: Parameter, machine: Machine) -> float:
     if parameter == SQUARENESS:
         return math.tan(machine.mechanics.squareness_rad)
-    axis = axes[parameter.axis]
+    axis: Axis = getattr(machine.axes, parameter.axis)
     if parameter.what == "scale":
         return axis.real_step_mm / axis.coded_step_mm
     return axis.backlash_mm

@@ -18,7 +18,7 @@ HOW: dict[Kind, tuple[str, ...]] = {
         "and upper left to lower right; a corner is where its edges would meet.",
     ),
     "circles": (
-        "diameters_mm: at 0, 22.5, 45 ... 157.5 degrees from the X axis towards the Y axis.",
+        "diameters_mm: through the middle, at angles_deg from the X axis towards the Y axis.",
     ),
     "steps": (
         "forward_mm: from the first mark of the lower row (along Y: of the left one) to each of",

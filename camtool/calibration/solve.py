@@ -3,8 +3,9 @@
     minimise  Σ ((measured_i − predicted_i(p)) / u_i)²
 
 by Gauss-Newton: each round solves the linear problem about the last values, and one is enough
-where the model is linear. u_i is the standard uncertainty of a reading; where not all are known,
-all count alike. With A the weighted derivatives, s² = Σ residual² / (n − p) and
+where the equations are linear, as all are but diagonals and circles. u_i is the standard
+uncertainty of a reading; where not all are known, all count alike. With A the weighted
+derivatives and s² = Σ residual² / (n − p),
 
     covariance = s² (AᵀA)⁻¹,
 
@@ -24,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from camtool.calibration.model import Floats, Model, Parameter, Reading
+from camtool.calibration.model import Floats, Model, Parameter
 
 Bools = npt.NDArray[np.bool_]
 
@@ -79,26 +80,25 @@ class Solution:
         return float(np.sqrt(part.sum())) / len(columns)
 
 
-def solve(model: Model, readings: Sequence[Reading], start: Floats) -> Solution:
-    """The parameters that fit the readings best, from the values `start` (P,)."""
-    uncertain_mm = [reading.uncertainty_mm or np.nan for reading in readings]
+def solve(model: Model, start: Floats) -> Solution:
+    """The parameters that fit the model's readings best, from the values `start` (P,)."""
+    uncertain_mm = [reading.uncertainty_mm or np.nan for reading in model.readings]
     known = bool(np.isfinite(uncertain_mm).all())
-    weights = 1.0 / np.array(uncertain_mm) if known else np.ones(len(readings))
-    measured = np.array([reading.measured_mm for reading in readings])
+    weights = 1.0 / np.array(uncertain_mm) if known else np.ones(len(uncertain_mm))
+    measured = np.array([reading.measured_mm for reading in model.readings])
     values = start.copy()
-    _, slopes = _linear(model, readings, values)
-    free, held = _told_apart(model.parameters, slopes * weights[:, None])
+    free, held = _told_apart(model.parameters, model.slopes(values) * weights[:, None])
     for _ in range(ROUNDS):
-        predicted, slopes = _linear(model, readings, values)
-        matrix = slopes[:, free] * weights[:, None]
-        change = np.linalg.lstsq(matrix, (measured - predicted) * weights, rcond=None)[0]
+        matrix = model.slopes(values)[:, free] * weights[:, None]
+        residual = (measured - model.predict(values)) * weights
+        change = np.linalg.lstsq(matrix, residual, rcond=None)[0]
         values[free] += change
         if not len(change) or np.abs(change).max() < SETTLED:
             break
-    predicted, slopes = _linear(model, readings, values)
-    matrix = slopes[:, free] * weights[:, None]
+    predicted = model.predict(values)
+    matrix = model.slopes(values)[:, free] * weights[:, None]
     residual = (measured - predicted) * weights
-    freedom = len(readings) - int(free.sum())
+    freedom = len(measured) - int(free.sum())
     spread = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
     unit = np.fmax(spread, 1.0) if known else spread
     inverse = np.linalg.pinv(matrix)
@@ -107,12 +107,6 @@ def solve(model: Model, readings: Sequence[Reading], start: Floats) -> Solution:
     leverage = np.einsum("ij,ji->i", matrix, inverse)
     sigma = _sigma(residual, leverage, freedom, known=known) / weights
     return Solution(values, covariance, predicted, sigma, free, held, freedom, spread)
-
-
-def _linear(model: Model, readings: Sequence[Reading], values: Floats) -> tuple[Floats, Floats]:
-    """(n,) predictions and their derivatives (n, P)."""
-    rows = [model.predict(values, reading) for reading in readings]
-    return np.array([value for value, _ in rows]), np.array([slope for _, slope in rows])
 
 
 def _sigma(residual: Floats, leverage: Floats, freedom: int, *, known: bool) -> Floats:
