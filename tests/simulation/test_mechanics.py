@@ -104,6 +104,17 @@ def test_everything_equals_the_literal_loop(
         assert reversals.sum() > 100
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", [PLAIN, EVERYTHING])
+def test_a_long_wander_equals_the_literal_loop(settings: tuple[str, ...]) -> None:
+    machine, points = path_machine(*settings), wander(99, 200_000)
+    got, reversals = Mechanics(machine, points[0], ALL).follow(points, whole(points))
+    literal = LiteralMechanics(machine, points[0].tolist(), ALL, draws=100_000)
+    want = [literal.go(point)[0] for point in points.tolist()]
+    assert np.array_equal(got, np.array(want))
+    assert reversals[0].tolist() == [axis.reversals for axis in literal.axes]
+
+
 @pytest.mark.parametrize("settings", [EVERYTHING, PLAIN])
 @pytest.mark.parametrize("size", [1, 7, 64, 599])
 def test_blocks_change_no_bit(settings: tuple[str, ...], size: int) -> None:
