@@ -4,8 +4,8 @@ What it does with a program, in the order of the files:
 
 1. In the mode "blend", lines that lie on one line but for the tolerance are merged
    (`linuxcnc_moves`, `camtool.kernels.merge_lines`; G64 P says both tolerances).
-2. Corners: stops, bends that pass for straight, blends (`linuxcnc_corners`). Samples near a
-   blended corner carry the largest departure that the tolerance allows: a bound, no prediction.
+2. Corners: stops, bends that pass for straight, blends (`linuxcnc_corners`), as they come out at
+   the programmed feed. No blend leaves its corner by more than the tolerance.
 3. Speeds: limits of the axes, turning in arcs, corners, so many moves ahead
    (`camtool.kernels.lookahead`), trapezoids (`speed_plan`).
 
@@ -39,13 +39,24 @@ from camtool.simulation.row_chunks import RowTotals, row_chunks
 from camtool.simulation.speed_plan import SpeedPlan
 from camtool.toolpath.moves import Kind, Toolpath
 
+LEAST_WAY_MM = 1e-9
+"""What blends leave of a move is nothing when it is shorter."""
+
+LAST_PART = 0.5
+"""Of its acceleration: what the last move before a wait uses in the mode "blend"."""
+
+REST_PERIODS = 1.0
+"""Servo periods that coming to rest takes beyond the trapezoid (measured)."""
+
+PERIOD_EPS = 1e-6
+"""Periods: a time longer than a whole number of them by less is that number."""
+
 MODES = ("blend", "exact-path", "exact-stop")
 """What `[dialect]` may say of corners."""
 
 
 def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
     """The motion; see `camtool.simulation.models.ControllerModel`."""
-    controller = _controller(machine)
     path = held(toolpath, machine)
     ends = np.flatnonzero(path.kind == Kind.END)
     rows = int(ends[0]) + 1 if len(ends) else len(path)
@@ -53,10 +64,10 @@ def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chun
     path = _until(path, rows)
     rules = _rules(machine)
     path, chain = merged(path, rules.tolerance_mm if rules.mode == "blend" else 0.0)
-    moves = moves_of(path, chain, machine, controller.servo_period_s)
+    moves = moves_of(path, chain, machine, _controller(machine).servo_period_s)
     corners = corners_of(moves, rules)
     samples = LinuxcncSamples(path, machine, moves, corners)
-    seconds = _seconds(path, moves, corners, controller.lookahead_moves)
+    seconds = _seconds(path, machine, moves, corners)
     mechanics = Mechanics(machine, path.start, options.effects)
     return row_chunks(samples, RowTotals(seconds), mechanics, options.chunk_steps)
 
@@ -82,8 +93,7 @@ def assumptions(machine: Machine) -> tuple[str, ...]:
     """What the figures and times take for granted."""
     mode, tolerance_mm = _path_mode(machine)
     said = {
-        "blend": f"corners are rounded by as much as P {tolerance_mm:g} mm allows: a bound, "
-        "slow corners are sharper",
+        "blend": f"corners are blended within {tolerance_mm:g} mm (G64 P), as the speed needs",
         "exact-path": "no corner is rounded (G61)",
         "exact-stop": "the machine stops at each corner (G61.1)",
     }
@@ -161,15 +171,48 @@ class LinuxcncSamples:
         return np.column_stack(columns)
 
 
-def _seconds(path: Toolpath, moves: Moves, corners: Corners, lookahead: int) -> Floats:
-    """(N,) s of each row; the rows of a merged line share its time by their lengths."""
+def _seconds(path: Toolpath, machine: Machine, moves: Moves, corners: Corners) -> Floats:
+    """(N,) s of each row.
+
+    Blends are blocks of their own, half of each belongs to the row on either side; the rows of a
+    merged line share its time by their lengths. In the mode "blend" the last move before a wait
+    accelerates by half: it was kept ready for a blend that never came (`tcGetOverallMaxAccel`).
+    """
+    controller, mode = _controller(machine), _path_mode(machine)[0]
     seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
+    count = len(moves.length)
+    following = np.append(corners.reach[1:], 0.0)
+    plan = np.zeros((2 * count, 4))  # at even places the blend before a move, then the move
+    plan[0::2] = np.column_stack(
+        [corners.way, corners.speed, corners.acceleration, np.full(count, np.inf)]
+    )
+    own = np.maximum(moves.length - corners.reach - following, 0.0)
+    blended = corners.reach > 0.0
+    entry = np.where(blended, np.inf, corners.speed)
     lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
-    plan = SpeedPlan(moves.length, moves.speed, moves.acceleration * (1.0 - lost), corners.speed)
+    last = np.append(moves.waits[1:], np.ones(min(count, 1), dtype=np.bool_))
+    spared = np.where(last & (mode == "blend"), LAST_PART, 1.0)
+    acceleration = moves.acceleration * (1.0 - lost) * spared
+    plan[1::2] = np.column_stack([own, moves.speed, acceleration, entry])
+    lasting = np.flatnonzero(plan[:, 0] > LEAST_WAY_MM)
+    taken = np.zeros(2 * count + 1)
+    speeds = SpeedPlan(*plan[lasting].T)
+    taken[lasting] = _in_periods(speeds, controller.lookahead_moves, controller.servo_period_s)
+    whole = taken[1::2] + 0.5 * (taken[0:-1:2] + taken[2::2])
     moving = np.flatnonzero(moves.row_of >= 0)
     move = moves.row_of[moving]
-    part = move_lengths(path)[moving] / moves.length[move]
-    seconds[moving] = plan.seconds(lookahead)[move] * part
+    seconds[moving] = whole[move] * (move_lengths(path)[moving] / moves.length[move])
+    return seconds
+
+
+def _in_periods(plan: SpeedPlan, window: int, period_s: float) -> Floats:
+    """(N,) s of each block; from rest to rest it takes whole servo periods, and `REST_PERIODS`."""
+    seconds = plan.seconds(window)
+    from_rest = np.flatnonzero(plan.entries(window)[:-1] == 0.0)
+    if len(from_rest):
+        runs = np.add.reduceat(seconds, from_rest)
+        periods = np.ceil(runs / period_s - PERIOD_EPS) + REST_PERIODS
+        seconds[np.append(from_rest[1:], len(seconds)) - 1] += periods * period_s - runs
     return seconds
 
 

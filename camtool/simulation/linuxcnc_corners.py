@@ -13,10 +13,10 @@ leaves it by T:
 
     R = d tan θ,   T = R (1/sin θ − 1) = d (1 − sin θ)/cos θ,   v² ≤ √¾ a R
 
-T is the tolerance, or a quarter of the shorter move; d is at most half a line, the last two
-thirds of an arc, and its first third. That is the largest arc that the tolerance allows: at low
-speed LinuxCNC takes a smaller one, and where arcs meet lines theirs are bent a little. So what is
-simulated is a bound of what blending does.
+T is at most the tolerance and a quarter of the shorter move; d at most half a line, the last two
+thirds of an arc, and its first third. No blend is wider than its speed needs, v²/(√¾ a), or than
+as long a time at that speed as half the acceleration would need to reach it. Where arcs meet other
+moves LinuxCNC bends theirs a little, within the same tolerance.
 """
 
 from __future__ import annotations
@@ -56,15 +56,22 @@ LEAST_BEND_RAD = 1e-3
 class Corners:
     """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
     the part of the acceleration that a bend takes from the moves on both sides; `reach` (M,) mm:
-    how far from the corner a blend begins and ends, 0 without one; `inward` (M, 3) and `onward`
-    (M, 3): unit vectors to the blend's centre and along it; `theta` (M,) rad."""
+    how far from the corner a blend begins and ends, 0 without one; `acceleration` (M,) mm/s²
+    along blends; `inward` (M, 3) and `onward` (M, 3): unit vectors to the blend's centre and
+    along it; `theta` (M,) rad."""
 
     speed: Floats
     lost: Floats
     reach: Floats
+    acceleration: Floats
     inward: Floats
     onward: Floats
     theta: Floats
+
+    @property
+    def way(self) -> Floats:
+        """(M,) mm along the blends."""
+        return np.asarray(self.reach * np.tan(self.theta) * (np.pi - 2.0 * self.theta))
 
 
 @dataclass(frozen=True)
@@ -84,61 +91,76 @@ def corners_of(moves: Moves, rules: CornerRules) -> Corners:
     """What happens at the start of each move."""
     count = len(moves.length)
     before, after = np.roll(moves.end, 1, axis=0), moves.begin
-    turn, sum_ = after - before, after + before
-    back = np.linalg.norm(sum_, axis=1) < STRAIGHT_BACK_RAD
-    free = moves.joined & ~back & (rules.mode != "exact-stop")
+    turn, both = after - before, after + before
+    back = np.linalg.norm(both, axis=1) < STRAIGHT_BACK_RAD
+    free = ~moves.waits & moves.like & ~back & (rules.mode != "exact-stop")
     # A kink: the change of velocity within one period, as a part of what each axis can do.
     highest = np.minimum(np.roll(moves.speed, 1), moves.speed)
     jolt = highest / rules.period_s + moves.acceleration
     part = (np.abs(turn) * jolt[:, None] / rules.acceleration).max(axis=1, initial=0.0)
     part = np.where(moves.is_arc | np.roll(moves.is_arc, 1), part / TANGENT_RATIO, part)
     smooth = free & (part < rules.kink_ratio)
-    blended = free & ~smooth & (rules.mode == "blend")
-    speed = np.where(smooth, np.inf, 0.0)
-    lost = np.where(smooth, part, 0.0)
-    across = np.linalg.norm(turn, axis=1)
-    inward = turn / np.where(across > 0.0, across, 1.0)[:, None]
-    onward = sum_ / np.maximum(np.linalg.norm(sum_, axis=1), STRAIGHT_BACK_RAD)[:, None]
-    theta = 0.5 * np.arccos(np.clip(-(before * after).sum(axis=1), -1.0, 1.0))
-    reach = np.zeros(count)
-    on = np.flatnonzero(blended)
-    if len(on):
-        reach[on] = _reach(moves, on, theta[on], rules.tolerance_mm)
-        bent = _blend_speed(moves, on, reach[on], theta[on], rules)
-        kink = highest[on] * rules.kink_ratio / part[on]
-        by_kink = kink > bent
-        speed[on] = np.maximum(bent, kink)
-        lost[on[by_kink]] = rules.kink_ratio
-        reach[on[by_kink]] = 0.0
-    return Corners(speed, lost, reach, inward, onward, theta)
+    corners = Corners(
+        speed=np.where(smooth, np.inf, 0.0),
+        lost=np.where(smooth, part, 0.0),
+        reach=np.zeros(count),
+        acceleration=np.zeros(count),
+        inward=_unit(turn),
+        onward=_unit(both),
+        theta=0.5 * np.arccos(np.clip(-(before * after).sum(axis=1), -1.0, 1.0)),
+    )
+    on = np.flatnonzero(free & ~smooth & (rules.mode == "blend"))
+    _blend(corners, moves, on, rules)
+    # A bend that passes for straight at low speed, where that is faster than the blend.
+    kink = highest[on] * rules.kink_ratio / part[on]
+    faster = kink > corners.speed[on]
+    corners.speed[on] = np.maximum(corners.speed[on], kink)
+    corners.lost[on[faster]] = rules.kink_ratio
+    corners.reach[on[faster]] = 0.0
+    return corners
 
 
-def _reach(moves: Moves, on: Ints, theta: Floats, tolerance_mm: float) -> Floats:
-    """d at the corners `on`."""
+def _blend(corners: Corners, moves: Moves, on: Ints, rules: CornerRules) -> None:
+    """Fill in speed, reach and acceleration of the blends at the corners `on`.
+
+    In the plane of both tangents, with unit normal m, no axis exceeds its limit when the whole is
+    held to min(limit / √(1 − m²)).
+    """
+    theta = corners.theta[on]
+    normal = _unit(np.cross(moves.end[on - 1], moves.begin[on]))
+    with np.errstate(divide="ignore"):
+        share = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
+        whole = (rules.acceleration / share).min(axis=1, initial=np.inf)
+        rate = (rules.rate / share).min(axis=1, initial=np.inf)
+    across = NORMAL_RATIO * whole
+    reach = _most_reach(moves, on, theta, rules.tolerance_mm)
+    widest = reach * np.tan(theta)
+    wanted = np.maximum(moves.speed[on - 1], moves.speed[on])
+    planned = np.minimum(np.minimum(wanted, rate), np.sqrt(across * widest))
+    half = 0.5 * whole
+    by_time = np.minimum(np.sqrt(2.0 * half * reach), planned) / half * planned
+    turned = np.pi - 2.0 * theta
+    by_time /= np.maximum(turned, LEAST_BEND_RAD)
+    radius = np.maximum(planned**2 / across, np.minimum(by_time, widest))
+    lasting = radius * turned / (LEAST_PERIODS * rules.period_s)
+    corners.speed[on] = np.minimum(planned, lasting)
+    corners.reach[on] = radius / np.tan(theta)
+    corners.acceleration[on] = TANGENT_RATIO * whole
+
+
+def _most_reach(moves: Moves, on: Ints, theta: Floats, tolerance_mm: float) -> Floats:
+    """The largest d at the corners `on`; 0 where the moves hardly bend."""
     shorter = np.minimum(moves.length[on], moves.length[on - 1])
     leaves = np.minimum(tolerance_mm, TOLERANCE_PART * shorter)
-    by_tolerance = leaves * np.cos(theta) / (1.0 - np.sin(theta))
+    flat = np.pi - 2.0 * theta < LEAST_BEND_RAD
+    by_tolerance = leaves * np.cos(theta) / np.where(flat, 1.0, 1.0 - np.sin(theta))
     end_part = np.where(moves.is_arc[on - 1], ARC_END_PART, LINE_PART)
     start_part = np.where(moves.is_arc[on], ARC_START_PART, LINE_PART)
     by_length = np.minimum(end_part * moves.length[on - 1], start_part * moves.length[on])
-    flat = np.pi - 2.0 * theta < LEAST_BEND_RAD
     return np.asarray(np.where(flat, 0.0, np.minimum(by_tolerance, by_length)))
 
 
-def _blend_speed(
-    moves: Moves, on: Ints, reach: Floats, theta: Floats, rules: CornerRules
-) -> Floats:
-    """How fast the blends at the corners `on` are passed: in the plane of both tangents no axis
-    exceeds its limits whichever way the blend points."""
-    before, after = moves.end[on - 1], moves.begin[on]
-    normal = np.cross(before, after)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    share = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
-    with np.errstate(divide="ignore"):
-        acceleration = (rules.acceleration / share).min(axis=1)
-        rate = (rules.rate / share).min(axis=1)
-    radius = reach * np.tan(theta)
-    turning = np.sqrt(NORMAL_RATIO * acceleration * radius)
-    lasting = radius * (np.pi - 2.0 * theta) / (LEAST_PERIODS * rules.period_s)
-    wanted = np.maximum(moves.speed[on - 1], moves.speed[on])
-    return np.asarray(np.minimum(np.minimum(turning, lasting), np.minimum(wanted, rate)))
+def _unit(vectors: Floats) -> Floats:
+    """(M, 3) of length 1; vectors of none stay."""
+    length = np.linalg.norm(vectors, axis=1)
+    return np.asarray(vectors / np.where(length > 0.0, length, 1.0)[:, None])

@@ -5,9 +5,9 @@ radius r and sweep φ turns in XY, at no more than the slower axis v_xy, a_xy:
 
     v² ≤ a_xy · √¾ · r_e,   r_e² = (least r)² + (dr/dφ)²       (`arc`, ARC_FEED)
 
-and a helix lets Z keep its own limits. Then `tcFinalizeLength` (tc.c): what turning takes of the
-acceleration is lost to going faster, √(1 − (v²/(r_e a))²), at least one half; and no move takes
-less than `LEAST_PERIODS` of the servo.
+and a helix lets Z keep its own limits. Along an arc half of the acceleration is used, the rest is
+kept for turning (`tcGetTangentialMaxAccel`, tc.c); no move takes less than `LEAST_PERIODS` of the
+servo.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NORMAL_RATIO = np.sqrt(0.75)
 """How much of the acceleration a turn may take (BLEND_ACC_RATIO_NORMAL)."""
 
 TANGENT_RATIO = 0.5
-"""What is left along the way in a turn that takes all of that (BLEND_ACC_RATIO_TANGENTIAL)."""
+"""How much of it is used along the way of an arc (BLEND_ACC_RATIO_TANGENTIAL)."""
 
 LEAST_PERIODS = 1.02
 """Servo periods that the shortest move lasts (TP_MIN_SEGMENT_CYCLES, tp_types.h)."""
@@ -67,19 +67,20 @@ def merged(path: Toolpath, tolerance_mm: float) -> tuple[Toolpath, Ints]:
 @dataclass(frozen=True, eq=False)
 class Moves:
     """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
-    move. length mm, speed mm/s (as programmed, within the limits), highest mm/s (the limits
-    alone), acceleration mm/s² (along the way), each (M,); begin, end (M, 3): unit tangents;
-    is_arc (M,); joined (M,): nothing stops the machine between this move and the one before."""
+    move. length mm, speed mm/s (as programmed, within the limits), acceleration mm/s² (along the
+    way), each (M,); begin, end (M, 3): unit tangents;
+    is_arc (M,); waits (M,): the machine comes to rest before this move, whatever the corner;
+    like (M,): this move and the one before are both rapids or both at a feed."""
 
     row_of: Ints
     length: Floats
     speed: Floats
-    highest: Floats
     acceleration: Floats
     begin: Floats
     end: Floats
     is_arc: Bools
-    joined: Bools
+    waits: Bools
+    like: Bools
 
 
 def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> Moves:
@@ -87,7 +88,7 @@ def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> 
     rate = axis_limits(machine, "max_rate_mm_min") / 60.0
     acceleration = axis_limits(machine, "acceleration_mm_s2")
     row_length = move_lengths(path)
-    length = np.bincount(chain, row_length, minlength=len(path))
+    length: Floats = np.bincount(chain, row_length, minlength=len(path)).astype(np.float64)
     lasting = np.flatnonzero((length > 0.0) & (np.bincount(chain, minlength=len(path)) > 0))
     number = np.full(len(path), -1, dtype=np.int64)
     number[lasting] = np.arange(len(lasting))
@@ -95,7 +96,7 @@ def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> 
     rows, first = np.unique(row_of[row_of >= 0], return_index=True)
     lead = np.flatnonzero(row_of >= 0)[first]  # the first row of each move
     assert len(rows) == len(lead)
-    lengths: Floats = length[lasting]
+    lengths = length[lasting]
     begin, end = _tangents(path, lead)
     highest, along = _along(rate, begin), _along(acceleration, begin)
     arms = Arms(path, path.is_arc)
@@ -106,11 +107,11 @@ def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> 
     highest[on], along[on] = _arc_limits(arms, arm[on], lengths[on], (rate, acceleration))
     highest = np.minimum(highest, lengths / (LEAST_PERIODS * period_s))
     feed = np.where(path.is_feed, path.feed, np.inf)[lead] / 60.0
-    waits = np.cumsum(np.isin(path.kind, WAITS))[lead]
+    waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
     cuts = path.is_feed[lead]
-    joined = (np.diff(waits, prepend=-1) == 0) & (cuts == np.roll(cuts, 1))
+    like = cuts == np.roll(cuts, 1)
     speed = np.minimum(feed, highest)
-    return Moves(row_of, lengths, speed, highest, along, begin, end, arm >= 0, joined)
+    return Moves(row_of, lengths, speed, along, begin, end, arm >= 0, waits, like)
 
 
 def axis_limits(machine: Machine, key: str) -> Floats:
@@ -163,8 +164,7 @@ def _arc_limits(
     highest = length / np.maximum(rise / rate[2], level / planar)
     overall = length / np.maximum(rise / acceleration[2], level / a_xy)
     highest = np.minimum(highest, np.sqrt(NORMAL_RATIO * overall * radius))
-    taken = np.minimum(highest**2 / radius / overall, NORMAL_RATIO)
-    return highest, overall * np.maximum(np.sqrt(1.0 - taken**2), TANGENT_RATIO)
+    return highest, TANGENT_RATIO * overall
 
 
 def _along(limit: Floats, unit: Floats) -> Floats:
