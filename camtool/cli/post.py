@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camtool.cli.ahead import compiled_beside
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.finish import Asked, finish
 from camtool.cli.jobflags import JobFlags, job_options
@@ -17,7 +18,6 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say_first_run
 from camtool.cli.types import picture as picture_name
 
 if TYPE_CHECKING:
@@ -76,13 +76,18 @@ def post(
 
     from camtool.pipeline import post_drawing
 
-    say_first_run(quiet=quiet)
-    wanted = job.job(drawing)
-    read = drawing.read(source, target.machine, wanted)
-    with job.blamed():
-        posted = post_drawing(
-            read, wanted, target, check=not no_verify, compensate=compensate, gates=gates.gates()
-        )
+    with compiled_beside(target.machine.target.name, quiet=quiet):
+        wanted = job.job(drawing)
+        read = drawing.read(source, target.machine, wanted)
+        with job.blamed():
+            posted = post_drawing(
+                read,
+                wanted,
+                target,
+                check=not no_verify,
+                compensate=compensate,
+                gates=gates.gates(),
+            )
     return finish(
         posted,
         asked,

@@ -36,14 +36,22 @@ def one_line(text: str) -> str:
 
 
 def say_first_run(*, quiet: bool) -> None:
-    """A word before the long silence in which the kernels are compiled, once per installation.
+    """A word before the long silence of the first run."""
+    if first_run():
+        say("camtool: first run: compiling the kernels, once, for some 10 s", quiet=quiet)
 
-    Their compiled form lies beside them; where that folder cannot be written it lies elsewhere,
-    and then nothing is said.
+
+def first_run() -> bool:
+    """Whether no kernel has been compiled yet.
+
+    Their compiled form lies beside them or in NUMBA_CACHE_DIR; where their folder cannot be
+    written numba keeps it elsewhere, and then we cannot tell: False.
     """
     import camtool.kernels
 
     folder = Path(str(camtool.kernels.__file__)).parent
-    compiled = any((folder / "__pycache__").glob("*.nbi"))
-    if not compiled and os.access(folder, os.W_OK) and "NUMBA_CACHE_DIR" not in os.environ:
-        say("camtool: first run: compiling the kernels, which takes a while, once", quiet=quiet)
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given is None and not os.access(folder, os.W_OK):
+        return False
+    kept = Path(given) if given else folder / "__pycache__"
+    return not any(kept.rglob("*.nbi"))

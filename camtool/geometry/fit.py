@@ -12,7 +12,7 @@ of the curve on the chain move continuously from its first point to its last, so
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,7 @@ from camtool.geometry.curves import (
     SplineCurve,
 )
 from camtool.geometry.drawing import FitError
-from camtool.geometry.nodes import curve_nodes
+from camtool.geometry.nodes import Nodes, curve_nodes
 from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Floats
 from camtool.kernels.fit_limits import (
     ACCEPTED_SHARE,
@@ -55,6 +55,9 @@ __all__ = [
     "split_bulges",
 ]
 
+
+Judged = tuple[float, float, float]
+"""Of a chain its largest and its rms deviation from the curve, and the length of that, mm."""
 
 MAX_SIZE_MM = 1e100
 """The products of larger numbers would not be finite."""
@@ -146,39 +149,64 @@ def overall(fits: Iterable[Fit]) -> FitError:
 
 
 def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
-    """Rational pieces, all in one kernel."""
-    from camtool.kernels.fit_bezier import fit_pieces
+    """Rational pieces, about their origin."""
+    from camtool.kernels.bezier import curve_rows, points_at
 
     if not np.abs(pieces.control).max() <= MAX_SIZE_MM:
         raise GeometryError("a point or a tangent of a curve is not finite")
-    vertices, judged = fit_pieces(np.ascontiguousarray(pieces.control), tolerance_mm)
+    control = np.ascontiguousarray(pieces.control)
+
+    def nodes(fineness_mm: float, steps: int) -> Nodes:
+        rows, corner = curve_rows(control, steps, fineness_mm)
+        point, arrive, leave = (np.ascontiguousarray(rows[:, k : k + 2]) for k in (1, 3, 5))
+        return Nodes(rows[:, 0], point, arrive, leave, corner)
+
+    vertices, judged, _ = _fitted(nodes, lambda t: points_at(control, t), tolerance_mm)
     vertices[:, :2] += pieces.origin
     return _checked(vertices, judged, pieces.ends)
 
 
 def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
-    """The same steps as the kernel `fit_pieces` takes, for a curve given by functions."""
-    from camtool.kernels.fit_bezier import fit_nodes
-
-    target, steps, fineness = SEARCH_SHARE * tolerance_mm, MIN_STEPS, tolerance_mm
-    for attempt in range(ATTEMPTS):
-        nodes = curve_nodes(curve, fineness, steps)
-        if len(nodes) == 1:
-            return Fit(np.append(nodes.point[0], 0.0)[None, :], 0.0, 0.0)
-        share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
-        t = (nodes.t[:-1, None] + share * np.diff(nodes.t)[:, None]).ravel()
-        samples = curve.point(np.append(t, nodes.t[-1]))
-        columns = (nodes.point, nodes.arrive, nodes.leave, nodes.corner)
-        vertices, judged = fit_nodes(columns, samples, target, tolerance_mm)
-        if not judged[0] > ACCEPTED_SHARE * tolerance_mm or len(nodes) >= MAX_NODES:
-            break
-        steps, fineness = 2 * steps, REFINING * fineness
-        if attempt > 0:
-            target *= SEARCH_SHARE * tolerance_mm / judged[0]
+    """A curve given by functions."""
+    vertices, judged, nodes = _fitted(
+        lambda fineness_mm, steps: curve_nodes(curve, fineness_mm, steps),
+        curve.point,
+        tolerance_mm,
+    )
+    if len(nodes) == 1:
+        return Fit(vertices, *judged)
     return _checked(vertices, judged, nodes.point[[0, -1]])
 
 
-def _checked(vertices: Floats, judged: tuple[float, float, float], ends: Floats) -> Fit:
+def _fitted(
+    nodes_of: Callable[[float, int], Nodes], point_of: Callable[[Floats], Floats], tolerance: float
+) -> tuple[Floats, Judged, Nodes]:
+    """The chain (n, 3) within `tolerance`, its deviations, and the nodes it was chosen from.
+
+    A fit whose error turns out too large is done again over finer nodes, since errors peak
+    between them; if that is not enough, with less of the tolerance as well.
+    """
+    from camtool.kernels.fit_bezier import fit_nodes
+
+    target, steps, fineness = SEARCH_SHARE * tolerance, MIN_STEPS, tolerance
+    for attempt in range(ATTEMPTS):
+        nodes = nodes_of(fineness, steps)
+        if len(nodes) == 1:
+            return np.append(nodes.point[0], 0.0)[None, :], (0.0, 0.0, 0.0), nodes
+        share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
+        t = (nodes.t[:-1, None] + share * np.diff(nodes.t)[:, None]).ravel()
+        samples = point_of(np.append(t, nodes.t[-1]))
+        columns = (nodes.point, nodes.arrive, nodes.leave, nodes.corner)
+        vertices, judged = fit_nodes(columns, samples, target, tolerance)
+        if not judged[0] > ACCEPTED_SHARE * tolerance or len(nodes) >= MAX_NODES:
+            break
+        steps, fineness = 2 * steps, REFINING * fineness
+        if attempt > 0:
+            target *= SEARCH_SHARE * tolerance / judged[0]
+    return vertices, judged, nodes
+
+
+def _checked(vertices: Floats, judged: Judged, ends: Floats) -> Fit:
     if not (np.isfinite(vertices).all() and math.isfinite(judged[0] + judged[2])):
         raise GeometryError("a point or a tangent of a curve is not finite")
     vertices[-1, :2], vertices[0, :2] = ends[1], ends[0]

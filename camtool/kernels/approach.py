@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from camtool.kernels.compiled import kernel
 from camtool.kernels.heading import heading
 
 Ints = npt.NDArray[np.int64]
 
 
-@njit(cache=True)
+@kernel
 def expected_quadrants(x: int, y: int, clockwise: bool, end_x: int, end_y: int) -> int:
     """How many quadrants (0 … 4) the motion enters from (x, y) to the ray of the end.
 
@@ -38,7 +38,7 @@ def expected_quadrants(x: int, y: int, clockwise: bool, end_x: int, end_y: int) 
     return entered
 
 
-@njit(cache=True)
+@kernel
 def approach_start(x: int, y: int, end_x: int, end_y: int, low: int) -> Ints:
     """The tracker (6,): x, y, quadrants entered, samples seen, nearest sample, its squared
     distance (−1 while there is none); sample 0 is the start itself."""
@@ -46,7 +46,7 @@ def approach_start(x: int, y: int, end_x: int, end_y: int, low: int) -> Ints:
     return np.array([x, y, 0, 0, 0, square if low <= 0 else -1], dtype=np.int64)
 
 
-@njit(cache=True)
+@kernel
 def approach_scan(points: Ints, end: Ints, tracker: Ints, low: int, high: int) -> None:
     """Take the samples `points` (n, 2), which follow those seen before, into account.
 

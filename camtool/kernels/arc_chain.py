@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from camtool.kernels.biarc import Floats, Ints, distance_to_arc
+from camtool.kernels.compiled import inner
 from camtool.kernels.fit_limits import (
     FLAT_SHARE,
     MAX_LINES,
@@ -21,7 +21,7 @@ from camtool.kernels.fit_limits import (
 )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def lines_for(ax: float, ay: float, bx: float, by: float, bulge: float, off: float) -> int:
     """How many lines stand for an arc that is too flat to be written; 0 when it stays an arc.
 
@@ -37,7 +37,7 @@ def lines_for(ax: float, ay: float, bx: float, by: float, bulge: float, off: flo
     return int(min(math.ceil(math.sqrt(sagitta / off)), MAX_LINES))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def chain(point: Floats, ends: Ints, pairs: Floats, tolerance: float) -> tuple[Floats, Ints]:
     """Rows (n + 1, 3) of all spans and the number of the first row of each (s + 1,).
 
@@ -85,7 +85,7 @@ def chain(point: Floats, ends: Ints, pairs: Floats, tolerance: float) -> tuple[F
     return rows, first
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def common_bulge(one: Floats, two: Floats, end: Floats) -> float:
     """The bulge of the one arc or line that both segments lie on, or NaN."""
     if one[2] * two[2] < 0.0 or (one[2] == 0.0) != (two[2] == 0.0):
@@ -105,7 +105,7 @@ def common_bulge(one: Floats, two: Floats, end: Floats) -> float:
     return bulge
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def joined(rows: Floats, size: float) -> tuple[Floats, Ints]:
     """Neighbours on one circle or line become one; also where each old segment is now.
 
@@ -134,7 +134,7 @@ def joined(rows: Floats, size: float) -> tuple[Floats, Ints]:
     return out[:count], places
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def deviations(
     samples: Floats, owned: tuple[Ints, Ints], vertices: Floats, places: Ints
 ) -> Floats:
@@ -160,7 +160,7 @@ def deviations(
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def summary(samples: Floats, off: Floats) -> tuple[float, float, float]:
     """Largest deviation and rms, weighted by length, and length of the curve, mm.
 

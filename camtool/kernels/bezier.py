@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from camtool.kernels.biarc import Bools, Floats, biarc, distance_to_biarc
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.fit_limits import (
     ASIDE_FROM,
     ASIDE_TO,
@@ -31,7 +31,7 @@ GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 """A search for a least value by golden sections keeps this share of its bracket."""
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def evaluate(pieces: Floats, k: int, u: float) -> tuple[float, float, float, float]:
     """Position and derivative by u of piece k at u in 0..1: x, y, x', y'.
 
@@ -60,7 +60,7 @@ def evaluate(pieces: Floats, k: int, u: float) -> tuple[float, float, float, flo
     return x / w, y / w, share * (dx * w - x * dw), share * (dy * w - y * dw)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def points_at(pieces: Floats, t: Floats) -> Floats:
     """(n, 2) positions at parameters t (n,) in 0..m."""
     out = np.empty((len(t), 2))
@@ -70,14 +70,14 @@ def points_at(pieces: Floats, t: Floats) -> Floats:
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def speed(pieces: Floats, k: int, u: float) -> float:
     """The length of the derivative by u."""
     _, _, dx, dy = evaluate(pieces, k, u)
     return math.sqrt(dx * dx + dy * dy)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def aside(pieces: Floats, k: int, u: float, side: float, least: float) -> tuple[float, float]:
     """Unit tangent a little before (side −1) or after (+1) u, where the piece is faster than
     `least`."""
@@ -92,7 +92,7 @@ def aside(pieces: Floats, k: int, u: float, side: float, least: float) -> tuple[
     return 1.0, 0.0  # the curve stands still here: such nodes are merged
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def slowest(pieces: Floats, k: int, low: float, high: float) -> float:
     """The u between low and high where the piece moves slowest: golden section."""
     one, two = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
@@ -109,7 +109,7 @@ def slowest(pieces: Floats, k: int, low: float, high: float) -> float:
     return 0.5 * (low + high)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def first_steps(pieces: Floats, k: int, each: int) -> tuple[Floats, float]:
     """The u (≥ each + 1,) that piece k is cut at first, tips and cusps among them; its speed."""
     speeds = np.empty(each + 1)
@@ -132,7 +132,7 @@ def first_steps(pieces: Floats, k: int, each: int) -> tuple[Floats, float]:
     return out[:count], fastest
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def too_coarse(pieces: Floats, k: int, left: Floats, right: Floats, tolerance: float) -> bool:
     """Whether the step between two rows (u, x, y, arrive x, y, leave x, y) must be halved."""
     middle = 0.5 * (left[0] + right[0])
@@ -153,7 +153,7 @@ def too_coarse(pieces: Floats, k: int, left: Floats, right: Floats, tolerance: f
     return False
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def copied(rows: Floats, count: int, room: int) -> Floats:
     """The first `count` rows in a new array of `room` rows."""
     out = np.empty((room, rows.shape[1]))
@@ -163,7 +163,7 @@ def copied(rows: Floats, count: int, room: int) -> Floats:
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def piece_rows(pieces: Floats, k: int, each: int, tolerance: float, most: int) -> Floats:
     """Nodes (n, 7) of piece k: u, x, y, tangents before and after; begun with `each` steps.
 
@@ -194,7 +194,7 @@ def piece_rows(pieces: Floats, k: int, each: int, tolerance: float, most: int) -
     return out[:count]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def fill_row(pieces: Floats, k: int, u: float, least: float, row: Floats) -> None:
     """Write u, x, y, tangent before and tangent after into `row` (7,)."""
     x, y, dx, dy = evaluate(pieces, k, u)
@@ -208,7 +208,7 @@ def fill_row(pieces: Floats, k: int, u: float, least: float, row: Floats) -> Non
         row[5], row[6] = aside(pieces, k, u, 1.0, least)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def curve_rows(pieces: Floats, steps: int, tolerance: float) -> tuple[Floats, Bools]:
     """Nodes (n, 7) of all pieces, t in 0..m in place of u, and which of them are corners.
 

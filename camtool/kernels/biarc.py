@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -18,7 +19,7 @@ Bools = npt.NDArray[np.bool_]
 Pair = tuple[float, float, float, float]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def distance_to_arc(
     px: float, py: float, ax: float, ay: float, bx: float, by: float, bulge: float
 ) -> float:
@@ -46,7 +47,7 @@ def distance_to_arc(
     return abs(power) / below
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def half_angle(ax: float, ay: float, bx: float, by: float) -> float:
     """tan(α/2) = sin α / (1 + cos α) for the angle α from a to b; NaN when |α| > 90°.
 
@@ -63,7 +64,7 @@ def half_angle(ax: float, ay: float, bx: float, by: float) -> float:
     return min(max(bulge, -1.0), 1.0)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def biarc(start: Floats, leave: Floats, end: Floats, arrive: Floats) -> Pair:
     """Joint x, y and both bulges of the biarc with equal handles; all NaN where there is none.
 
@@ -89,7 +90,7 @@ def biarc(start: Floats, leave: Floats, end: Floats, arrive: Floats) -> Pair:
     return jx, jy, first, second
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def distance_to_biarc(px: float, py: float, start: Floats, end: Floats, pair: Pair) -> float:
     """Distance from p to the nearer of both arcs; infinite when there is no biarc."""
     jx, jy, first, second = pair
@@ -100,7 +101,7 @@ def distance_to_biarc(px: float, py: float, start: Floats, end: Floats, pair: Pa
     return min(one, two)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def step_errors(
     point: Floats, leave: Floats, arrive: Floats, rows: Ints, probes: Floats
 ) -> Floats:
@@ -117,7 +118,7 @@ def step_errors(
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def span_error(point: Floats, leave: Floats, arrive: Floats, low: int, high: int) -> float:
     """The largest distance of the nodes between from the biarc over nodes low..high."""
     start, end = point[low], point[high]
@@ -128,7 +129,7 @@ def span_error(point: Floats, leave: Floats, arrive: Floats, low: int, high: int
     return largest
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def span_holds(
     point: Floats, leave: Floats, arrive: Floats, low: int, high: int, target: float
 ) -> bool:
@@ -143,7 +144,7 @@ def span_holds(
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def arc_error(point: Floats, low: int, high: int, bulge: float) -> float:
     """The largest distance of the nodes between from the arc or line over nodes low..high."""
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]

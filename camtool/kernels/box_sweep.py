@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 
-@njit(cache=True)
+@kernel
 def touching(
     boxes: Floats, same: Ints, differ: Ints, asked: Bools, most: int
 ) -> tuple[Ints, Ints]:

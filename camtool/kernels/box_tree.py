@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 
@@ -22,7 +21,7 @@ DEPTH = 128
 """Room for a stack of nodes: far more than twice the levels of any tree."""
 
 
-@njit(cache=True)
+@kernel
 def tree_of(boxes: Floats) -> Floats:
     """(2L, 4) boxes of the nodes over `boxes` (K, 4); the L leaves are the last."""
     leaves = 1
@@ -67,7 +66,7 @@ def apart_square(tree: Floats, node: int, x: float, y: float) -> float:
     return float(dx * dx + dy * dy)
 
 
-@njit(cache=True)
+@inner
 def touch(one: Floats, i: int, other: Floats, j: int) -> bool:
     """Whether box i of one list and box j of another have a point in common."""
     return bool(

@@ -12,16 +12,15 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 
-@njit(cache=True)
+@kernel
 def near_pairs(cells: Ints, points: Floats, reach: float, most: int) -> tuple[Ints, Ints]:
     """Rows (J,), (J,) of all points (E, 2) within `reach` of each other, each pair once.
 
@@ -74,7 +73,7 @@ def _before(cells: Ints, i: int, group: int, column: int, row: int) -> bool:
     return bool(cells[i, 2] < row)
 
 
-@njit(cache=True)
+@inner
 def top(above: Ints, item: int) -> int:
     """The root of an item's set (union-find with path halving)."""
     while above[item] != item:
@@ -83,7 +82,7 @@ def top(above: Ints, item: int) -> int:
     return item
 
 
-@njit(cache=True)
+@kernel
 def clusters(count: int, one: Ints, other: Ints) -> Ints:
     """(count,) the least end of all ends that pairs connect with each end."""
     above = np.arange(count)
@@ -98,7 +97,7 @@ def clusters(count: int, one: Ints, other: Ints) -> Ints:
     return above
 
 
-@njit(cache=True)
+@kernel
 def join(one: Ints, other: Ints, mates: Ints, above: Ints, segments: Ints, arcs: Ints) -> int:
     """Joins pairs of free ends in their order into `mates`; how many.
 
@@ -123,13 +122,13 @@ def join(one: Ints, other: Ints, mates: Ints, above: Ints, segments: Ints, arcs:
     return joined
 
 
-@njit(cache=True)
+@inner
 def encloses(segments: int, arcs: int) -> bool:
     """False for a ring of so few segments that nothing lies inside."""
     return segments > 2 or (segments == 2 and arcs > 0)
 
 
-@njit(cache=True)
+@kernel
 def walk(mates: Ints, wanted: Bools) -> tuple[Ints, Ints, Bools]:
     """The chains of the wanted paths, each begun at its first path, which is not turned.
 
@@ -170,7 +169,7 @@ def first_end(mates: Ints, end: int) -> int:
     return end
 
 
-@njit(cache=True)
+@kernel
 def split_loops(
     starts: Ints, mates: Ints, node: Ints, points: Floats, reach: float, weights: Ints
 ) -> int:

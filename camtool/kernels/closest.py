@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from camtool.kernels.biarc import distance_to_arc
 from camtool.kernels.box_tree import DEPTH, apart_square, rows_under, tree_of
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-@njit(cache=True)
+@kernel
 def closest(
     start: Floats, end: Floats, bulge: Floats, boxes: Floats, path: Ints
 ) -> tuple[float, int, int]:

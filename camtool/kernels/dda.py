@@ -32,16 +32,15 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.heading import heading, rounded_radius
-from camtool.kernels.inner import inner
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel
 def dda_line_fill(
     a: int, b: int, registers: Floats, counters: Ints, out: Ints
 ) -> tuple[int, int, bool]:
@@ -74,7 +73,7 @@ def dda_line_fill(
     return filled, passes, x >= a and y >= b
 
 
-@njit(cache=True)
+@kernel
 def dda_arc_start(x: int, y: int, clockwise: bool) -> Ints:
     """The state (8,) at the start (x, y) ≠ (0, 0): x, y, sx, sy, R, Qg, Qs, whether x grows."""
     sx, sy = heading(x, y, clockwise)
@@ -98,7 +97,7 @@ def _arc_pass(
     return grow, shrink, in_grow, in_shrink
 
 
-@njit(cache=True)
+@kernel
 def dda_arc_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, int, bool]:
     """Run on from `state` into `out` (n, 2), one row per pass with a pulse.
 

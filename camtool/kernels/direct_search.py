@@ -36,10 +36,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.heading import heading
-from camtool.kernels.inner import inner
 
 Ints = npt.NDArray[np.int64]
 
@@ -73,14 +72,14 @@ def _advance(
     return x, y, error, sx, sy, delta_x, delta_y
 
 
-@njit(cache=True)
+@kernel
 def direct_search_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints:
     """The state (5,) at the start (x, y) ≠ (0, 0) of an arc."""
     sx, sy = heading(x, y, clockwise)
     return np.array([x, y, error, sx, sy], dtype=np.int64)
 
 
-@njit(cache=True)
+@kernel
 def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, bool]:
     """Run on from `state` into `out` (n, 2) until the end is met or `out` is full.
 
@@ -100,7 +99,7 @@ def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[
     return filled, met
 
 
-@njit(cache=True)
+@kernel
 def direct_search_path(
     x: int, y: int, clockwise: bool, first: int, count: int, error: int = 0
 ) -> Ints:
@@ -116,7 +115,7 @@ def direct_search_path(
     return out
 
 
-@njit(cache=True)
+@kernel
 def direct_search_nearest(
     x: int,
     y: int,
@@ -142,7 +141,7 @@ def direct_search_nearest(
     return best, least
 
 
-@njit(cache=True)
+@kernel
 def direct_search_hits(
     x: int, y: int, clockwise: bool, end_x: int, end_y: int, limit: int, error: int = 0
 ) -> int:

@@ -27,9 +27,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -51,7 +50,7 @@ TOUCH_MM = 1e-9
 off the ends of a neighbour behind a convex corner."""
 
 
-@njit(cache=True)
+@kernel
 def largest_discs(
     boundary: tuple[Floats, Ints, Floats],
     row: Ints,
@@ -89,7 +88,7 @@ def largest_discs(
         result[k, 3], partner[k] = _place(table, best, cx, cy), best
 
 
-@njit(cache=True)
+@kernel
 def frame(table: Floats, own: int, t: float) -> tuple[float, float, float, float]:
     """The point x, y of an element at the part t of it, and its inner normal there."""
     tx, ty, length = table[own, TX], table[own, TY], table[own, LENGTH]

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from camtool.kernels.compiled import inner, kernel
 
 
-@njit(cache=True)
+@inner
 def heading(x: int, y: int, clockwise: bool) -> tuple[int, int]:
     """Direction (±1, ±1) of the motion at (x, y) ≠ (0, 0) on an arc about (0, 0).
 
@@ -27,7 +27,7 @@ def heading(x: int, y: int, clockwise: bool) -> tuple[int, int]:
     return sx, sy
 
 
-@njit(cache=True)
+@kernel
 def rounded_radius(x: int, y: int) -> int:
     """√(x² + y²) to the nearest step."""
     return math.floor(math.sqrt(x * x + y * y) + 0.5)

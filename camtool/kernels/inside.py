@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.offset_curves import AX, AY, BX, BY, Floats
 from camtool.kernels.offset_near import least_below
 
@@ -24,7 +23,7 @@ OUT, HELD, ON_LINE = range(3)
 """What is said of a path: some of it is outside; inside; all of it is on the line itself."""
 
 
-@njit(cache=True)
+@kernel
 def insides(points: Floats, curves: Floats, bulge: Floats, tree: Floats) -> Bools:
     """(P,) true for the points (P, 2) within a closed path; on the line either may come out.
 
@@ -76,7 +75,7 @@ def _counts(curves: Floats, i: int, bulge: float, x: float, y: float) -> bool:
     return bool(crosses != (in_circle and on_left == (bulge < 0.0)))
 
 
-@njit(cache=True)
+@kernel
 def holds(
     points: Floats,
     begins: Ints,

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from camtool.kernels.compiled import kernel
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel
 def legs_fill(done: int, begin: Ints, way: Ints, step_mm: Floats, out: Floats) -> None:
     """Positions after the passes of legs, `out` (n, 3) mm, those of the first from `done` on.
 

@@ -10,15 +10,14 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-@njit(cache=True)
+@kernel
 def nearest_others(
     cells: Ints, points: Floats, size: float, least: float, reach: float
 ) -> tuple[Ints, Floats]:

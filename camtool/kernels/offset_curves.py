@@ -17,9 +17,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
 
@@ -27,7 +26,7 @@ AX, AY, BX, BY, TX, TY, UX, UY, BEND, LENGTH, SWEEP = range(11)
 """The columns of a row."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def curve_rows(start: Floats, end: Floats, bulge: Floats) -> Floats:
     """(K, 11) rows of the segments from `start` to `end` (K, 2) with their bulges (K,)."""
     rows = np.empty((len(bulge), 11))
@@ -49,7 +48,7 @@ def curve_rows(start: Floats, end: Floats, bulge: Floats) -> Floats:
     return rows
 
 
-@njit(cache=True)
+@kernel
 def curve_boxes(curves: Floats, margin: float) -> Floats:
     """(K, 4) xmin, ymin, xmax, ymax of boxes that hold each curve, and `margin` more all round.
 
@@ -91,7 +90,7 @@ def distance_to(curves: Floats, i: int, x: float, y: float) -> float:
     return math.sqrt(min(qx * qx + qy * qy, rx * rx + ry * ry))
 
 
-@njit(cache=True)
+@inner
 def along(curves: Floats, i: int, x: float, y: float) -> float:
     """Length along row i from its start to a point on its line or circle; negative before it.
 
@@ -112,7 +111,7 @@ def along(curves: Floats, i: int, x: float, y: float) -> float:
     return float(-chord if before else chord)
 
 
-@njit(cache=True)
+@inner
 def point_on(curves: Floats, i: int, t: float) -> tuple[float, float]:
     """The point of row i at the fraction t of its length.
 

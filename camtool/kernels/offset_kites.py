@@ -15,17 +15,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF, apart_square
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.offset_curves import Floats
 
 CX, CY, N1X, N1Y, N2X, N2Y, MX, MY, DEEP, FAR = range(10)
 """The columns of a kite."""
 
 
-@njit(cache=True)
+@kernel
 def kite_boxes(kites: Floats) -> Floats:
     """(J, 4) boxes xmin, ymin, xmax, ymax that hold the kites (J, 10)."""
     boxes = np.empty((len(kites), 4))
@@ -53,7 +52,7 @@ def depth_in(kites: Floats, i: int, x: float, y: float) -> float:
     return float(min(out, n1y * qx - n1x * qy, n2x * qy - n2y * qx))
 
 
-@njit(cache=True)
+@inner
 def deepest(
     kites: Floats, tree: Floats, point: tuple[float, float], best: float, enough: float
 ) -> float:

@@ -9,9 +9,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.offset_curves import SWEEP, TX, TY, Floats
 from camtool.kernels.offset_nodes import grouped
 
@@ -22,7 +21,7 @@ U_TURN_EPS_RAD = 1e-3
 """A turn at a node this near to a full right turn is taken as a full left one."""
 
 
-@njit(cache=True)
+@kernel
 def traced(
     elements: Floats, element: Ints, span: Floats, ends: tuple[Ints, Ints, int]
 ) -> tuple[Ints, Ints]:
@@ -107,7 +106,7 @@ def _tangent(elements: Floats, i: int, t: float) -> tuple[float, float]:
     return cosine * tx - sine * ty, cosine * ty + sine * tx
 
 
-@njit(cache=True)
+@kernel
 def written(
     slices: tuple[Ints, Floats, Ints, Ints],
     nodes: Floats,

@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF, touch
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.offset_curves import (
     AX,
     AY,
@@ -42,7 +41,7 @@ MOST_MEETINGS = 6
 """Two curves have four ends and two common points."""
 
 
-@njit(cache=True)
+@kernel
 def pairs_of(boxes: Floats, tree: Floats, others: Floats, other_tree: Floats, own: bool) -> Ints:
     """(J, 2) rows of `boxes` and of `others` that touch; a tree stands over each.
 
@@ -86,7 +85,7 @@ def _grown(rows: Numbers, room: Numbers) -> Numbers:
     return room
 
 
-@njit(cache=True)
+@kernel
 def meetings_of(a: Floats, b: Floats, pairs: Ints, eps: float) -> tuple[Ints, Floats]:
     """The rows (J, 2) of a and b, and the meetings (J, 4), of the pairs (P, 2) of rows."""
     room = len(pairs) + MOST_MEETINGS + 16
@@ -184,7 +183,7 @@ def _tangent(curves: Floats, i: int, length: float) -> tuple[float, float]:
     return cosine * tx - sine * ty, cosine * ty + sine * tx
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _common_points(
     a: Floats, b: Floats, i: int, j: int
 ) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -10,10 +10,9 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from camtool.kernels.box_tree import DEPTH, LEAF, apart_square
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.offset_curves import LENGTH, Floats, distance_to, point_on
 from camtool.kernels.offset_kites import deepest
 
@@ -71,7 +70,7 @@ def least_below(
     return best
 
 
-@njit(cache=True)
+@kernel
 def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats:
     """(P,) distance of each point (P, 2) from the nearest curve."""
     found = np.empty(len(points))
@@ -80,7 +79,7 @@ def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats:
     return found
 
 
-@njit(cache=True)
+@inner
 def gathered(
     curves: Floats, tree: Floats, point: tuple[float, float], reach: float, rows: Ints
 ) -> int:
@@ -139,7 +138,7 @@ def _too_near(
     return deepest(kites, kite_tree, point, short + spare, enough + spare) - spare
 
 
-@njit(cache=True)
+@kernel
 def trimmed_ends(elements: Floats, near: Near, limits: tuple[float, float]) -> Floats:
     """(K, 2) fractions between which each element may be far enough from the source.
 
@@ -172,7 +171,7 @@ def trimmed_ends(elements: Floats, near: Near, limits: tuple[float, float]) -> F
     return ends
 
 
-@njit(cache=True)
+@kernel
 def far_enough(
     elements: Floats, element: Ints, span: Floats, near: Near, limits: tuple[float, float]
 ) -> Bools:

@@ -10,9 +10,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.offset_curves import Floats, point_on
 
 Ints = npt.NDArray[np.int64]
@@ -23,7 +22,7 @@ MOST_MERGED = 64
 together, as where a circle of chords collapses, they chain up all the same."""
 
 
-@njit(cache=True)
+@kernel
 def merged(points: Floats, skew: Floats, order: Ints, eps: float) -> tuple[Ints, Ints]:
     """The node (P,) of each point (P, 2), and the first point (N,) of each node.
 
@@ -85,7 +84,7 @@ def grouped(keys: Ints, count: int) -> tuple[Ints, Ints]:
     return rows, begins
 
 
-@njit(cache=True)
+@kernel
 def in_order(keys: Ints, t: Floats, count: int) -> Ints:
     """Rows (R,) by their key below `count`, then by t (R,), then as they come (a shell sort)."""
     rows, begins = grouped(keys, count)
@@ -108,7 +107,7 @@ def _after(t: Floats, one: int, other: int) -> bool:
     return bool(t[one] > t[other] or (t[one] == t[other] and one > other))
 
 
-@njit(cache=True)
+@kernel
 def doubles_left(
     elements: Floats, element: Ints, middle_t: Floats, ends: tuple[Ints, Ints, int], eps: float
 ) -> Bools:
@@ -140,7 +139,7 @@ def doubles_left(
     return keep
 
 
-@njit(cache=True)
+@kernel
 def leading_on(from_node: Ints, to_node: Ints, count: int) -> Bools:
     """(S,) true for the slices that others lead to and lead on from, when all else is gone."""
     keep = np.ones(len(from_node), np.bool_)

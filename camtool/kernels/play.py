@@ -30,10 +30,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.deviates import deviate
-from camtool.kernels.inner import inner
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -74,7 +73,7 @@ def taken_along(slide: float, motor: float, low: float, high: float) -> float:
     return min(max(slide, motor + low), motor + high)
 
 
-@njit(cache=True)
+@kernel
 def play_fill(
     positions: Floats, offsets: Ints, axes: Floats, states: Floats, out: Floats, turns: Ints
 ) -> None:
@@ -104,7 +103,7 @@ def play_fill(
         states[axis, 2], states[axis, 3] = added, slide
 
 
-@njit(cache=True)
+@kernel
 def play_varied_fill(
     positions: Floats,
     offsets: Ints,

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from camtool.kernels.biarc import Floats, distance_to_arc
+from camtool.kernels.compiled import inner, kernel
 
 MIN_POINTS = 5
 """Points that an arc needs: four chords. Three always lie on a circle, four often do."""
@@ -43,7 +43,7 @@ FAIL, STRAIGHT, ARC = 0, 1, 2
 Judgement = tuple[int, float, float, float, float]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def lengths_agree(points: Floats, low: int, high: int) -> bool:
     """Whether the chords low..high − 1 are alike; the first and the last may be shorter."""
     least, most = np.inf, 0.0
@@ -55,7 +55,7 @@ def lengths_agree(points: Floats, low: int, high: int) -> bool:
     return most <= MAX_LENGTH_RATIO * least
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def is_straight(points: Floats, low: int, high: int, noise: float) -> bool:
     """Whether the points lie within `noise` of the chord from the first to the last."""
     ux, uy = points[high, 0] - points[low, 0], points[high, 1] - points[low, 1]
@@ -67,7 +67,7 @@ def is_straight(points: Floats, low: int, high: int, noise: float) -> bool:
     return length > 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def circle_of(points: Floats, low: int, high: int) -> tuple[float, float, float]:
     """Centre and radius of the least-squares circle; an infinite radius for points on a line."""
     count = high - low + 1
@@ -87,7 +87,7 @@ def circle_of(points: Floats, low: int, high: int) -> tuple[float, float, float]
     return mx + a, my + b, math.sqrt(a * a + b * b + (uu + vv) / count)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def judge(points: Floats, low: int, high: int, noise: float, tolerance: float) -> Judgement:
     """FAIL, STRAIGHT or ARC for the points low..high; of an arc centre, radius, signed sweep."""
     if not lengths_agree(points, low, high):
@@ -122,7 +122,7 @@ def judge(points: Floats, low: int, high: int, noise: float, tolerance: float) -
     return ARC, cx, cy, radius, sweep
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def longest_run(points: Floats, low: int, noise: float, tolerance: float) -> tuple[int, Judgement]:
     """The last point of the longest run from `low`, and what it is; `low` for none."""
     best, beyond, size = low, len(points), MIN_POINTS - 1
@@ -148,7 +148,7 @@ def longest_run(points: Floats, low: int, noise: float, tolerance: float) -> tup
     return best, judgement
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def find_runs(points: Floats, noise: float, tolerance: float) -> Floats:
     """(r, 6) runs of chords on one circle: first and last point, centre, radius, signed sweep.
 
@@ -175,7 +175,7 @@ def find_runs(points: Floats, noise: float, tolerance: float) -> Floats:
     return out[:count]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def furthest_off(points: Floats, arcs: Floats) -> float:
     """The largest distance of points (n, 2) from a chain of arcs (m, 3)."""
     largest = 0.0

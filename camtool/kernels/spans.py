@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from camtool.kernels.biarc import (
@@ -21,10 +20,11 @@ from camtool.kernels.biarc import (
     span_error,
     span_holds,
 )
+from camtool.kernels.compiled import inner
 from camtool.kernels.fit_limits import CANDIDATES, MAX_RADIUS_MM, SINGLE_TURN_RAD, SPAN_TURN_RAD
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def longest_span(
     point: Floats,
     leave: Floats,
@@ -54,7 +54,7 @@ def longest_span(
     return best
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def single_bulge(
     point: Floats, leave: Floats, arrive: Floats, low: int, high: int, target: float
 ) -> float:
@@ -82,7 +82,7 @@ def single_bulge(
     return bulge if arc_error(point, low, high, bulge) <= target else np.nan
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def longest_single(
     nodes: tuple[Floats, Floats, Floats],
     low: int,
@@ -110,7 +110,7 @@ def longest_single(
     return best, bulge
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def furthest_nodes(leave: Floats, arrive: Floats, corner: Bools) -> Ints:
     """(n,) the last node that a span from each node may reach: the next corner, or where the curve
     has turned by `SPAN_TURN_RAD`, to either side."""
@@ -130,7 +130,7 @@ def furthest_nodes(leave: Floats, arrive: Floats, corner: Bools) -> Ints:
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def furthest_state(
     nodes: tuple[Floats, Floats, Floats],
     limit: Ints,
@@ -161,7 +161,7 @@ def furthest_state(
     return best, whence, bulge
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def longest_spans(
     point: Floats, leave: Floats, arrive: Floats, corner: Bools, target: float
 ) -> tuple[Ints, Floats]:

@@ -17,21 +17,21 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from camtool.kernels.compiled import kernel
 from camtool.kernels.heading import heading
 
 Ints = npt.NDArray[np.int64]
 
 
-@njit(cache=True)
+@kernel
 def stairs_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints:
     """The state (5,) at the start (x, y) ≠ (0, 0) of an arc: x, y, D, sx, sy."""
     sx, sy = heading(x, y, clockwise)
     return np.array([x, y, error, sx, sy], dtype=np.int64)
 
 
-@njit(cache=True)
+@kernel
 def stairs_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, bool]:
     """Run on from `state` into `out` (n, 2) until the end is met or `out` is full.
 

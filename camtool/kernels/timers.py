@@ -26,9 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -150,7 +149,7 @@ def _run(rules: Rules, counters: Counters, row: int, k: int, issued: Issued) -> 
     return k
 
 
-@njit(cache=True)
+@kernel
 def timers_fill(
     moves: Moves, first: int, rules: Rules, counters: Counters, issued: Issued
 ) -> tuple[int, int]:

@@ -20,9 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -72,7 +71,7 @@ class Step(NamedTuple):
     row: int
 
 
-@njit(cache=True)
+@inner
 def gap(tour: Tour, one: int, other: int) -> float:
     """From the exit of a row to the entry of another one."""
     if other == tour.free:
@@ -88,7 +87,7 @@ def row_at(tour: Tour, position: int) -> int:
     return int(tour.row[tour.item[position]])
 
 
-@njit(cache=True)
+@inner
 def reverse(tour: Tour, low: int, high: int) -> None:
     """Reverse the positions low … high, and turn what lies there."""
     while low <= high:
@@ -102,7 +101,7 @@ def reverse(tour: Tour, low: int, high: int) -> None:
         high -= 1
 
 
-@njit(cache=True)
+@inner
 def turning(tour: Tour, low: int, high: int) -> float:
     """How much longer the inside of low … high gets when it is reversed; inf: it must not be."""
     if len(tour.after) > 0:
@@ -119,7 +118,7 @@ def turning(tour: Tour, low: int, high: int) -> float:
     return longer
 
 
-@njit(cache=True)
+@inner
 def may_swap(tour: Tour, low: int, high: int, other: int) -> bool:
     """Whether nothing in low … high must come before anything in high + 1 … other."""
     if len(tour.after) == 0:
@@ -139,7 +138,7 @@ def may_swap(tour: Tour, low: int, high: int, other: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@inner
 def gain_of_reversal(tour: Tour, low: int, high: int) -> float:
     """How much shorter the tour gets at both sides of a reversed part."""
     left, right = row_at(tour, low - 1), row_at(tour, high + 1)
@@ -152,7 +151,7 @@ def gain_of_reversal(tour: Tour, low: int, high: int) -> float:
     )
 
 
-@njit(cache=True)
+@inner
 def gain_of_swap(tour: Tour, low: int, high: int, other: int, flip: int) -> float:
     """How much shorter the tour gets at the sides of two parts that change places."""
     left, right = row_at(tour, low - 1), row_at(tour, other + 1)
@@ -193,7 +192,7 @@ def _reversed(tour: Tour, low: int, high: int, log: Ints, logged: int) -> int:
     return logged + 1
 
 
-@njit(cache=True)
+@inner
 def undo(tour: Tour, log: Ints, logged: int) -> None:
     """Take back what is written down, the last first."""
     for k in range(logged - 1, -1, -1):

@@ -2,8 +2,8 @@
 
     cost(s) = min over the rows r of the item before of  cost(r) + |exit r → entry s|.
 
-Rows r are tried in the order of their cost, and no more when the cost alone is not below what has
-been found: gaps are not negative. Equal costs go to the lower row.
+Rows r whose cost alone is not below what has been found are not tried: gaps are not negative. Of
+equal ways that of the cheaper row counts, and of equal rows the lower one.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from camtool.kernels.compiled import kernel
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-@njit(cache=True)
+@kernel
 def best_rows(ends: Floats, first: Ints, order: Ints, start: Floats, goal: Floats) -> Ints:
     """Rows (M,) for items (M,) in this order, from `start` (2,) to `goal` (2,), NaN for no goal.
 
@@ -30,15 +31,14 @@ def best_rows(ends: Floats, first: Ints, order: Ints, start: Floats, goal: Float
         cost[row] = math.hypot(ends[row, 0] - start[0], ends[row, 1] - start[1])
     for rank in range(1, count):
         low, high = first[order[rank - 1]], first[order[rank - 1] + 1]
-        cheapest = low + np.argsort(cost[low:high], kind="mergesort")
         for row in range(first[order[rank]], first[order[rank] + 1]):
             best = np.inf
-            for r in cheapest:
+            for r in range(low, high):
                 if cost[r] >= best:
-                    break
+                    continue
                 x, y = ends[row, 0] - ends[r, 2], ends[row, 1] - ends[r, 3]
                 length = cost[r] + math.sqrt(x * x + y * y)
-                if length < best:
+                if length < best or (length == best and cost[r] < cost[came_from[row]]):
                     best, came_from[row] = length, r
             cost[row] = best
     chosen, best = -1, np.inf

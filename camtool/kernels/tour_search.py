@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.tour import (
     Step,
     Tour,
@@ -207,7 +206,7 @@ def settled(tour: Tour) -> float:
     return float(kicked(tour, 0, 1))
 
 
-@njit(cache=True)
+@kernel
 def kicked(tour: Tour, kicks: int, seed: int) -> float:
     """How much shorter the tour is when no step gains any more, and after so many kicks."""
     items = len(tour.item) - 2

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.tour_tree import Tree, nearest_owners, nearest_row, switch
+from camtool.kernels.compiled import kernel
+from camtool.kernels.tour_tree import ANYWHERE, Tree, nearest_owners, nearest_row, switch
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -26,7 +26,7 @@ NEAR_QUARTER = 1
 a cluster, such as the strokes of a letter, would know of no other cluster."""
 
 
-@njit(cache=True)
+@kernel
 def nearest_first(
     tree: Tree,
     ends: Floats,
@@ -71,7 +71,7 @@ def nearest_first(
     return rows
 
 
-@njit(cache=True)
+@kernel
 def neighbours(tree: Tree, owner: Ints, count: int) -> tuple[Ints, Ints]:
     """Neighbours of item i: near[near_first[i] : near_first[i + 1]], by a tree of N places.
 
@@ -91,7 +91,7 @@ def neighbours(tree: Tree, owner: Ints, count: int) -> tuple[Ints, Ints]:
         places = place_first[i + 1] - place_first[i]
         most = max(NEAR_EACH, (NEAR + places - 1) // max(places, 1))
         for place in range(place_first[i], place_first[i + 1]):
-            for other in nearest_owners(tree, owner, place, most):
+            for other in nearest_owners(tree, owner, place, most, ANYWHERE):
                 if seen[other] != i:
                     seen[other] = i
                     near[total] = other

@@ -12,9 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -65,10 +64,10 @@ def tree_of(points: Floats) -> Tree:
             begin[2 * here + 2], size[2 * here + 2] = begin[here] + half, size[here] - half
     leaf = np.empty(count, np.int64)
     leaf[rows] = node
-    return Tree(points, rows, begin, size, box, size.copy(), leaf)
+    return Tree(np.ascontiguousarray(points), rows, begin, size, box, size.copy(), leaf)
 
 
-@njit(cache=True)
+@inner
 def switch(tree: Tree, row: int, change: int) -> None:
     """Switch a point off (−1) or on (+1); it must be the other way before."""
     node = tree.leaf[row]
@@ -99,7 +98,7 @@ def _halves_wait(
     return top + 2
 
 
-@njit(cache=True)
+@inner
 def nearest_row(tree: Tree, on: Ints, x: float, y: float) -> int:
     """The nearest point that is switched on, `on` (N,) 1 or 0; −1 when none is."""
     waiting, top, leaves = np.empty(DEEPEST, np.int64), 1, len(tree.size) // 2
@@ -123,8 +122,8 @@ def nearest_row(tree: Tree, on: Ints, x: float, y: float) -> int:
     return found
 
 
-@njit(cache=True)
-def nearest_owners(tree: Tree, owner: Ints, row: int, most: int, quarter: int = ANYWHERE) -> Ints:
+@inner
+def nearest_owners(tree: Tree, owner: Ints, row: int, most: int, quarter: int) -> Ints:
     """The owners nearest to a point, but its own: up to `most`, each once, nearest first.
 
     `quarter` 0 … 3: only those above and to the right of the point, and so on CCW.

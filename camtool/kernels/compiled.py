@@ -1,0 +1,139 @@
+"""Functions that numba compiles when they are first called, and not before.
+
+    @kernel   a loop that Python calls
+    @inner    what only compiled functions call; the ways in from Python and C, which take a good
+              part of the time of compiling, are left out
+
+numba itself is loaded with the first call. What it compiled is kept on disk, and a later run loads
+it without the hundred modules with which numba compiles (a third of a second). A number written
+into a call of another kernel is an int or a float like any other: numba alone would compile that
+kernel once more for each such number. A division by zero gives inf or NaN, as in numpy.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class Kernel:
+    """Stands for a function until it is called, and then for what numba made of it."""
+
+    def __init__(self, function: Callable[..., Any], *, inside: bool) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self.inside = inside
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run what was compiled; compile first when it was not."""
+        return self.entry(*arguments)
+
+    @functools.cached_property
+    def entry(self) -> Any:
+        """numba's form of the function for Python; of inner ones it is for tests, and not kept."""
+        return _plain(_njit(self.py_func)) if self.inside else self.dispatcher
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """numba's form of the function for other kernels, kept on disk."""
+        made = _plain(_njit(self.py_func, no_cpython_wrapper=self.inside))
+        made._cache = _kept(self.py_func)
+        return made
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes this for where a kernel calls it."""
+        return self.dispatcher._numba_type_
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function that Python calls."""
+    return cast(Function, Kernel(function, inside=False))
+
+
+def inner(function: Function) -> Function:
+    """Compile a function for the use of compiled ones."""
+    return cast(Function, Kernel(function, inside=True))
+
+
+def _njit(function: Callable[..., Any], **options: bool) -> Any:
+    import numba
+
+    # Options of numba's that its own types do not know.
+    njit: Any = numba.njit
+    return njit(error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+
+
+def _plain(made: Any) -> Any:
+    """Literal arguments of a call in a kernel are taken for what they are besides, numbers."""
+    from numba.core import types
+
+    unliteral: Any = types.unliteral
+    template = made.get_call_template
+
+    def of_plain(arguments: Any, named: Any) -> Any:
+        plain = {name: unliteral(kind) for name, kind in named.items()}
+        return template(tuple(unliteral(kind) for kind in arguments), plain)
+
+    made.get_call_template = of_plain
+    return made
+
+
+def _kept(function: Callable[..., Any]) -> Any:
+    """numba's cache on disk; what is there is loaded without all that compiling needs, and what
+    another process compiles now is waited for."""
+    from numba.core.caching import FunctionCache
+    from numba.core.runtime.nrt import rtsys
+
+    class Kept(cast(Any, FunctionCache)):  # type: ignore[misc]
+        turn = Turn()
+
+        def load_overload(self, signature: Any, target: Any) -> Any:
+            rtsys.initialize(target)
+            found = self._found(signature, target)
+            if found is None:
+                self.turn.end()
+                self._impl.locator.ensure_cache_path()
+                self.turn = Turn(Path(self.cache_path) / f"{self._impl.filename_base}.lock")
+                found = self._found(signature, target)
+                if found is not None:
+                    self.turn.end()
+            return found
+
+        def save_overload(self, signature: Any, made: Any) -> None:
+            super().save_overload(signature, made)
+            self.turn.end()
+
+        def _found(self, signature: Any, target: Any) -> Any:
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(signature, target)
+
+    return Kept(function)
+
+
+class Turn:
+    """While it lasts no other process compiles the same function: it waits for its own turn.
+
+    A kernel has its turn before those that it calls, so two processes never wait for each other.
+    It ends with the process at last. Where the system has no such locks both compile.
+    """
+
+    def __init__(self, file: Path | None = None) -> None:
+        self.file, self.lock = file, None
+        if file is not None and find_spec("fcntl"):
+            import fcntl
+
+            self.lock = file.open("wb")
+            fcntl.flock(self.lock, fcntl.LOCK_EX)
+
+    def end(self) -> None:
+        """Let the others go on."""
+        if self.file is not None and self.lock is not None:
+            self.file.unlink(missing_ok=True)
+            self.lock.close()
+            self.lock = None
