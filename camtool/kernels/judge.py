@@ -64,67 +64,50 @@ ROW_COLUMNS = 19
 """How many columns."""
 
 
+OWN, FIRST, LAST, CIRCLE, SLOT = range(5)
+"""Columns of `Task.rows`."""
+
+
 class Task(NamedTuple):
     """What N rows are judged by.
 
-    own (J, 17) moves of the rows that cut (`move_errors`), own_of (N,) which is a row's, −1 where
-    nothing is cut; moves (K, 17) wanted, heights (K, 2) and tree over them; only (N, 2) which of
-    them a row is compared with, window (N, 2) between which heights; circle (N,) that a row goes
-    round or −1, centre (C, 2) mm, slot (C,) of the bins; directions (721, 2) of `circle_bins`.
+    own (J, 16) moves of the rows that cut (`move_errors`), moves (K, 16) wanted with their
+    heights (K, 2) and the tree over them; rows (N, 5): which of `own` a row is, −1 where nothing
+    is cut, first and last of the moves that it is compared with, the circle that it goes round or
+    −1, and the bins of that; window (N, 2) between which heights moves are compared; centre (C, 2)
+    mm of circles; directions (721, 2) of `circle_bins`.
     """
 
     own: Floats
-    own_of: Ints
     moves: Floats
     heights: Floats
     tree: Floats
-    only: Ints
+    rows: Ints
     window: Floats
-    circle: Ints
     centre: Floats
-    slot: Ints
     directions: Floats
 
 
 class Sums(NamedTuple):
     """What is found: rows (N, 19); histograms (2, BINS, 4) of interpolation and total, every
-    fourth sample in each column; bins (S, 720, 9); trace (T, 3) x, y, error with trace_row (T,)
-    and its pen; found (K,) and memo, the list of near moves."""
+    fourth sample in each column; bins (S, 720, 9); trace (T, 4) x, y, error, row, and its pen;
+    found (K,) and memo, the list of near moves."""
 
     rows: Floats
     histograms: Ints
     bins: Floats
     trace: Floats
-    trace_row: Ints
     pen: Floats
     found: Ints
     memo: Floats
 
 
-class Bench(NamedTuple):
-    """Room for a block: x, y commanded, slide_x, slide_y mm, their errors, the sizes of these."""
+X, Y, SLIDE_X, SLIDE_Y, ERRORS, SIZE, SPOT = range(7)
+"""Rows of a bench (7, BLOCK), room for a block: commanded and slides mm, their errors, the sizes
+of these, and room for one point."""
 
-    x: Floats
-    y: Floats
-    slide_x: Floats
-    slide_y: Floats
-    errors: Floats
-    size: Floats
-    spot: Floats
-
-
-@wide
-def new_bench() -> Bench:
-    """Room for a block."""
-    return Bench(
-        np.empty(BLOCK),
-        np.empty(BLOCK),
-        np.empty(BLOCK),
-        np.empty(BLOCK),
-        np.empty(BLOCK),
-        np.empty(BLOCK),
-        np.empty((3, 1)),
-    )
+BENCH_ROWS = 7
+"""How many rows."""
 
 
 @wide
@@ -200,20 +183,21 @@ def _total(figures: Floats, errors: Floats, x: Floats, y: Floats, size: Floats) 
 
 
 @wide
-def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Bench) -> None:
+def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> None:
     """Judge the first `count` samples of the bench, all of one row."""
     if count == 0:
         return
-    x, y = bench.x[:count], bench.y[:count]
-    slide_x, slide_y = bench.slide_x[:count], bench.slide_y[:count]
-    errors, size = bench.errors[:count], bench.size[:count]
+    x, y = bench[X, :count], bench[Y, :count]
+    slide_x, slide_y = bench[SLIDE_X, :count], bench[SLIDE_Y, :count]
+    errors, size = bench[ERRORS, :count], bench[SIZE, :count]
     figures = sums.rows[row]
     _extents(figures, slide_x, slide_y)
     last = count - 1
     figures[SAMPLES] += count
     figures[END_X], figures[END_Y] = slide_x[last], slide_y[last]
     figures[COMMANDED_X], figures[COMMANDED_Y] = x[last], y[last]
-    own, largest = task.own_of[row], 0.0
+    about, largest = task.rows[row], 0.0
+    own = about[OWN]
     if own >= 0:
         for k in range(len(errors)):
             errors[k] = np.inf
@@ -221,31 +205,30 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Bench) -> N
         _inner(figures, errors, size)
         _count_sizes(size, sums.histograms[0])
         _lag(figures, x, y, slide_x, slide_y)
-        only = task.only[row, 0], task.only[row, 1], task.window[row, 0], task.window[row, 1]
+        only = about[FIRST], about[LAST], task.window[row, 0], task.window[row, 1]
         moves = task.moves, task.heights, task.tree
-        nearest_errors((slide_x, slide_y), only, moves, sums.found, sums.memo, bench.spot, errors)
+        nearest_errors((slide_x, slide_y), only, moves, sums.found, sums.memo, bench[SPOT], errors)
         if sums.memo[COUNT] > 0.0:
             largest = _total(figures, errors, slide_x, slide_y, size)
             _count_sizes(size, sums.histograms[1])
-        circle = task.circle[row]
-        if circle >= 0:
-            bins = sums.bins[task.slot[circle]]
-            fill_bins(slide_x, slide_y, task.centre[circle], task.directions, bins)
-    trace_block(row, slide_x, slide_y, size, largest, sums.pen, sums.trace, sums.trace_row)
+        if about[CIRCLE] >= 0:
+            bins = sums.bins[about[SLOT]]
+            fill_bins(slide_x, slide_y, task.centre[about[CIRCLE]], task.directions, bins)
+    trace_block(row, slide_x, slide_y, size, largest, sums.pen, sums.trace)
 
 
 @njit(cache=True)
 def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> None:
     """Judge K samples in order: row (K,), commanded and slide (K, 3) mm, whose Z is not looked at;
     any number of rows."""
-    bench = new_bench()
+    bench = np.empty((BENCH_ROWS, BLOCK))
     done = 0
     while done < len(row):
         count = 0
         while count < BLOCK and done + count < len(row) and row[done + count] == row[done]:
             k = done + count
-            bench.x[count], bench.y[count] = commanded[k, 0], commanded[k, 1]
-            bench.slide_x[count], bench.slide_y[count] = slide[k, 0], slide[k, 1]
+            bench[X, count], bench[Y, count] = commanded[k, 0], commanded[k, 1]
+            bench[SLIDE_X, count], bench[SLIDE_Y, count] = slide[k, 0], slide[k, 1]
             count += 1
         judge_block(row[done], count, task, sums, bench)
         done += count

@@ -27,7 +27,7 @@ from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
 from camtool.kernels.direct_search import direct_search_fill, direct_search_start
 from camtool.kernels.heading import rounded_radius
 from camtool.kernels.inner import inner
-from camtool.kernels.judge import BLOCK, Bench, Sums, Task, judge_block, new_bench
+from camtool.kernels.judge import BENCH_ROWS, BLOCK, SLIDE_X, Sums, Task, X, judge_block
 from camtool.kernels.play_blocks import TURNING, play_block, way_of
 from camtool.kernels.stairs import stairs_fill, stairs_start
 
@@ -69,53 +69,58 @@ RUN_AHEAD = 1 << 12
 
 
 @inner
-def _room(count: int) -> Ints:
-    """(count, 2) whose columns are whole."""
-    return np.empty((2, count), np.int64).T
-
-
-@inner
-def _start(leg: Ints, method: int, rounded: bool) -> Ints:
-    """The state (8,) at the start of an arc."""
+def _start(leg: Ints, method: int, rounded: bool, state: Ints) -> None:
+    """Set the state (8,) to the start of a leg; that of a line is where its counters are."""
+    for k in range(len(state)):
+        state[k] = 0
+    if leg[KIND] != ARC:
+        return
     x, y, clockwise = leg[A], leg[B], leg[CW] != 0
-    state = np.zeros(8, np.int64)
     error = x * x + y * y - rounded_radius(x, y) ** 2 if rounded else 0
     if method == DSM:
-        state[:5] = direct_search_start(x, y, clockwise, error)
+        begun = direct_search_start(x, y, clockwise, error)
     elif method == STAIRS:
-        state[:5] = stairs_start(x, y, clockwise, error)
+        begun = stairs_start(x, y, clockwise, error)
     else:
-        state[:] = dda_arc_start(x, y, clockwise)
-    return state
+        begun = dda_arc_start(x, y, clockwise)
+    for k in range(len(begun)):
+        state[k] = begun[k]
 
 
 @inner
-def _fill(leg: Ints, method: int, state: Ints, out: Ints) -> tuple[int, int, bool]:
+def _fill(
+    leg: Ints, method: int, state: Ints, registers: Floats, out: Ints
+) -> tuple[int, int, bool]:
     """Rows filled, passes run, whether the last one is the end."""
-    if method == DDA:
+    if leg[KIND] != ARC:
+        filled, passes, met = dda_line_fill(leg[A], leg[B], registers, state, out)
+    elif method == DDA:
         filled, passes, met = dda_arc_fill(state, leg[END_X], leg[END_Y], out)
-        return filled, passes, met
-    if method == DSM:
+    elif method == DSM:
         filled, met = direct_search_fill(state, leg[END_X], leg[END_Y], out)
+        passes = filled
     else:
         filled, met = stairs_fill(state, leg[END_X], leg[END_Y], out)
-    return filled, filled, met
+        passes = filled
+    return filled, passes, met
 
 
 @inner
 def _run_ahead(
-    leg: Ints, method: int, state: Ints, entered: int, window: tuple[int, int]
+    leg: Ints, method: int, before: Ints, entered: int, window: tuple[int, int]
 ) -> tuple[int, bool]:
-    """How many positions there are from `state` to the end, and True; or to the nearest approach
-    to it in the quadrants `window`, and False. `entered` quadrants lie behind."""
+    """How many positions there are from the state `before` to the end, and True; or to the
+    nearest approach to it in the quadrants `window`, and False. `entered` quadrants lie behind."""
     low, high = window
-    end = np.array([leg[END_X], leg[END_Y]])
-    square = (state[0] - end[0]) ** 2 + (state[1] - end[1]) ** 2
-    tracker = np.array([state[0], state[1], entered, 0, 0, square if entered >= low else -1])
-    ahead = state.copy()
-    buffer = _room(min(RUN_AHEAD, 8 * (max(abs(leg[A]), abs(leg[B])) + 1)))
+    end, registers = np.array([leg[END_X], leg[END_Y]]), np.zeros(2)
+    square = (before[0] - end[0]) ** 2 + (before[1] - end[1]) ** 2
+    tracker = np.array([before[0], before[1], entered, 0, 0, square if entered >= low else -1])
+    state = np.empty(len(before), np.int64)
+    for k in range(len(before)):
+        state[k] = before[k]
+    buffer = np.empty((2, min(RUN_AHEAD, 8 * (max(abs(leg[A]), abs(leg[B])) + 1))), np.int64).T
     while True:
-        filled, _, met = _fill(leg, method, ahead, buffer)
+        filled, _, met = _fill(leg, method, state, registers, buffer)
         approach_scan(buffer[:filled], end, tracker, low, high)
         if tracker[2] > high:
             return tracker[4], False
@@ -130,145 +135,55 @@ def _is_near(low: int, high: int, end: int) -> bool:
 
 
 @inner
-def _passed(leg: Ints, x: int, y: int, path: Ints) -> tuple[int, bool]:
-    """How many quadrants the positions `path` (n, 2) enter that follow (x, y), and whether they
-    may be near the end. A coordinate that runs one way becomes 0 once at most."""
-    way_x, way_y = way_of(x, path[:, 0]), way_of(y, path[:, 1])
-    if way_x != TURNING and way_y != TURNING:
-        to_x, to_y = path[-1, 0], path[-1, 1]
+def _passed(leg: Ints, x: int, y: int, path_x: Ints, path_y: Ints) -> tuple[int, bool]:
+    """How many quadrants the positions (n,) enter that follow (x, y), and whether they may be
+    near the end. A coordinate that runs one way becomes 0 once at most."""
+    if way_of(x, path_x) != TURNING and way_of(y, path_y) != TURNING:
+        to_x, to_y = path_x[-1], path_y[-1]
         entered = int(x != 0 and x * to_x <= 0) + int(y != 0 and y * to_y <= 0)
         return entered, _is_near(x, to_x, leg[END_X]) and _is_near(y, to_y, leg[END_Y])
     entered, near = 0, False
-    for k in range(len(path)):
-        if (path[k, 0] == 0 and x != 0) or (path[k, 1] == 0 and y != 0):
+    for k in range(len(path_x)):
+        if (path_x[k] == 0 and x != 0) or (path_y[k] == 0 and y != 0):
             entered += 1
-        x, y = path[k, 0], path[k, 1]
+        x, y = path_x[k], path_y[k]
         near = near or (_is_near(x, x, leg[END_X]) and _is_near(y, y, leg[END_Y]))
     return entered, near
 
 
 @inner
-def _take(
+def _follow(
     leg: Ints,
-    path: Ints,
-    at: Ints,
+    axis: int,
+    steps: Ints,
+    at: int,
     step_mm: float,
     mechanics: tuple[Floats, Floats],
     counts: Ints,
-    task: Task,
-    sums: Sums,
-    bench: Bench,
+    bench: Floats,
 ) -> None:
-    """Let the slides follow `path` (n, 2) from `at` (2,) steps on, count, and judge."""
+    """Let the slide of X or Y follow `steps` (n,), absolute steps, from `at` on, and count."""
+    commanded, slide = bench[X + axis, : len(steps)], bench[SLIDE_X + axis, : len(steps)]
+    for k in range(len(steps)):
+        commanded[k] = steps[k] * step_mm
+    way = way_of(at, steps)
     axes, states = mechanics
-    count = len(path)
-    for axis in range(2):
-        steps = path[:, axis]
-        origin, sign = leg[ORIGIN_X + axis], leg[SIGN_X + axis]
-        commanded = (bench.x if axis == 0 else bench.y)[:count]
-        slide = (bench.slide_x if axis == 0 else bench.slide_y)[:count]
-        for k in range(len(steps)):
-            steps[k] = origin + sign * steps[k]
-            commanded[k] = steps[k] * step_mm
-        way = way_of(at[axis], steps)
-        counts[REVERSALS + axis] += play_block(way, commanded, axes[axis], states[axis], slide)
-        way_on = abs(steps[-1] - at[axis])
-        if way == TURNING:
-            way_on = abs(steps[0] - at[axis])
-            for k in range(1, len(steps)):
-                way_on += abs(steps[k] - steps[k - 1])
-        counts[STEPS + axis] += way_on
-        at[axis] = steps[-1]
-    counts[SAMPLES] += count
-    judge_block(leg[ROW], count, task, sums, bench)
+    counts[REVERSALS + axis] += play_block(way, commanded, axes[axis], states[axis], slide)
+    way_on = abs(steps[-1] - at)
+    if way == TURNING:
+        way_on = abs(steps[0] - at)
+        for k in range(1, len(steps)):
+            way_on += abs(steps[k] - steps[k - 1])
+    counts[STEPS + axis] += way_on
 
 
 @inner
-def _judge_line(
-    leg: Ints,
-    step_mm: float,
-    mechanics: tuple[Floats, Floats],
-    counts: Ints,
-    task: Task,
-    sums: Sums,
-    bench: Bench,
-) -> None:
-    registers, counters = np.zeros(2), np.zeros(2, np.int64)
-    at = leg[FROM_X : FROM_Y + 1].copy()
-    deep = leg[KIND] == DEPTH
-    buffer, done = _room(BLOCK), False
-    while not done:
-        filled, passes, done = dda_line_fill(leg[A], leg[B], registers, counters, buffer)
-        counts[PASSES] += passes
-        if deep:
-            buffer[:filled, 0], buffer[:filled, 1] = leg[FROM_X], leg[FROM_Y]
-        if filled > 0:
-            path = buffer if filled == BLOCK else _first(buffer, filled)
-            _take(leg, path, at, step_mm, mechanics, counts, task, sums, bench)
-    counts[ENDED] = 1
-    if deep:
-        state = mechanics[1][2]
-        counts[STEPS + 2] = leg[A]
-        if state[1] != leg[CW]:
-            state[1] = leg[CW]
-            counts[REVERSALS + 2] = 1
-
-
-@inner
-def _first(buffer: Ints, count: int) -> Ints:
-    """The first rows of a buffer, in one whose columns are whole."""
-    path = _room(count)
-    path[:, 0] = buffer[:count, 0]
-    path[:, 1] = buffer[:count, 1]
-    return path
-
-
-@inner
-def _judge_arc(
-    leg: Ints,
-    how: tuple[int, bool],
-    step_mm: float,
-    mechanics: tuple[Floats, Floats],
-    counts: Ints,
-    task: Task,
-    sums: Sums,
-    bench: Bench,
-) -> None:
-    method, rounded = how
-    x, y = leg[A], leg[B]
-    if x == 0 and y == 0:
-        return
-    expected = expected_quadrants(x, y, leg[CW] != 0, leg[END_X], leg[END_Y])
-    low, high = expected - 1, expected + 1
-    apart = abs(math.hypot(x, y) - math.hypot(leg[END_X], leg[END_Y]))
-    careful = method == DDA or apart > NEAR_RADIUS or max(abs(x), abs(y)) < LEAST_RADIUS
-    state = _start(leg, method, rounded)
-    at = leg[FROM_X : FROM_Y + 1].copy()
-    entered, left, met = 0, -1, False
-    whole = _room(BLOCK)
-    while left != 0 and not (left < 0 and met):
-        if careful and left < 0:
-            left, met = _run_ahead(leg, method, state, entered, (low, high))
-            counts[ENDED] = int(met)
-            continue
-        buffer = whole if left < 0 or left >= BLOCK else _room(left)
-        before = state.copy()
-        filled, passes, met = _fill(leg, method, state, buffer)
-        path = buffer if filled == len(buffer) else _first(buffer, filled)
-        if left < 0:
-            more, near = _passed(leg, before[0], before[1], path)
-            if entered + more > high or (near and entered + more >= low and not met):
-                state[:], careful, met = before, True, False
-                continue
-            entered += more
-            counts[ENDED] = int(met)
-        else:
-            left -= filled
-        counts[PASSES] += passes
-        _take(leg, path, at, step_mm, mechanics, counts, task, sums, bench)
-    # The controller takes itself to stand on the end that it was given.
-    mechanics[1][0, 0] = (leg[ORIGIN_X] + leg[END_X]) * step_mm
-    mechanics[1][1, 0] = (leg[ORIGIN_Y] + leg[END_Y]) * step_mm
+def _deepen(leg: Ints, state: Floats, counts: Ints) -> None:
+    """Count a leg of Z, whose `state` (6,) need not say where the slide is."""
+    counts[STEPS + 2] = leg[A]
+    if state[1] != leg[CW]:
+        state[1] = leg[CW]
+        counts[REVERSALS + 2] = 1
 
 
 @njit(cache=True)
@@ -286,10 +201,63 @@ def judge_legs(
     `how`: the method of arcs, and whether their error starts as that against the rounded radius;
     `mechanics`: axes (3, 5) and states (3, 6) of `camtool.kernels.play`, which go on.
     """
-    bench = new_bench()
-    for k in range(len(legs)):
-        leg = legs[k]
-        if leg[KIND] == ARC:
-            _judge_arc(leg, how, step_mm, mechanics, counts[k], task, sums, bench)
-        else:
-            _judge_line(leg, step_mm, mechanics, counts[k], task, sums, bench)
+    method, rounded = how
+    bench, whole = np.empty((BENCH_ROWS, BLOCK)), np.empty((2, BLOCK), np.int64).T
+    state, before, registers = np.zeros(8, np.int64), np.zeros(8, np.int64), np.zeros(2)
+    for number in range(len(legs)):
+        leg, count = legs[number], counts[number]
+        arc, x, y = leg[KIND] == ARC, leg[A], leg[B]
+        if arc and x == 0 and y == 0:
+            continue
+        _start(leg, method, rounded, state)
+        registers[0] = registers[1] = 0.0
+        at_x, at_y = leg[FROM_X], leg[FROM_Y]
+        careful, low, high = False, 0, 0
+        if arc:
+            expected = expected_quadrants(x, y, leg[CW] != 0, leg[END_X], leg[END_Y])
+            low, high = expected - 1, expected + 1
+            apart = abs(math.hypot(x, y) - math.hypot(leg[END_X], leg[END_Y]))
+            careful = method == DDA or apart > NEAR_RADIUS or max(abs(x), abs(y)) < LEAST_RADIUS
+        entered, left, met = 0, -1, False
+        while left != 0 and not (left < 0 and met):
+            if careful and left < 0:
+                left, met = _run_ahead(leg, method, state, entered, (low, high))
+                count[ENDED] = int(met)
+                continue
+            for k in range(len(state)):
+                before[k] = state[k]
+            buffer = whole if left < 0 or left >= BLOCK else np.empty((2, left), np.int64).T
+            filled, passes, met = _fill(leg, method, state, registers, buffer)
+            path_x, path_y = buffer[:, 0][:filled], buffer[:, 1][:filled]
+            if left >= 0:
+                left -= filled
+            elif arc:
+                more, near = _passed(leg, before[0], before[1], path_x, path_y)
+                if entered + more > high or (near and entered + more >= low and not met):
+                    for k in range(len(state)):
+                        state[k] = before[k]
+                    careful, met = True, False
+                    continue
+                entered += more
+            count[PASSES] += passes
+            count[SAMPLES] += filled
+            if left < 0:
+                count[ENDED] = int(met)
+            if filled == 0:
+                continue
+            for k in range(len(path_x)):
+                path_x[k] = leg[ORIGIN_X] + leg[SIGN_X] * path_x[k]
+            for k in range(len(path_y)):
+                path_y[k] = leg[ORIGIN_Y] + leg[SIGN_Y] * path_y[k]
+            if leg[KIND] == DEPTH:
+                for k in range(len(path_x)):
+                    path_x[k], path_y[k] = at_x, at_y
+            _follow(leg, 0, path_x, at_x, step_mm, mechanics, count, bench)
+            _follow(leg, 1, path_y, at_y, step_mm, mechanics, count, bench)
+            at_x, at_y = path_x[-1], path_y[-1]
+            judge_block(leg[ROW], filled, task, sums, bench)
+        if leg[KIND] == DEPTH:
+            _deepen(leg, mechanics[1][2], count)
+        elif arc:  # the controller takes itself to stand on the end that it was given
+            mechanics[1][0, 0] = (leg[ORIGIN_X] + leg[END_X]) * step_mm
+            mechanics[1][1, 0] = (leg[ORIGIN_Y] + leg[END_Y]) * step_mm

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.kernels.box_tree import DEPTH, apart_square, rows_under
-from camtool.kernels.move_errors import lower_errors
+from camtool.kernels.move_errors import COLUMNS, lower_errors
 from camtool.kernels.wide import larger, wide
 
 Floats = npt.NDArray[np.float64]
@@ -38,11 +38,12 @@ SLACK = 1e-12
 SLACK_MM = 1e-12
 """See `SLACK`."""
 
-QX, QY, REACH, FIRST, LAST, Z_LOW, Z_HIGH, COUNT, USED = range(9)
+QX, QY, REACH, FIRST, LAST, Z_LOW, Z_HIGH, COUNT, LEAST, USED = range(10)
 """The memo of a list, float64: the point q, ρ (−1: there is no list), which moves first:last and
-heights it holds, how many moves are in it, and for how many points it was used."""
+heights it holds, how many moves are in it, how many of these are as near to q as any, and for how
+many points it was used."""
 
-MEMO = 9
+MEMO = 10
 """Numbers in a memo."""
 
 
@@ -55,10 +56,22 @@ def new_memo() -> Floats:
 
 @wide
 def _apart(move: Floats, x: float, y: float, spot: Floats) -> float:
-    """Distance of one point from a move; `spot` (3, 1) is room for it."""
-    spot[0, 0], spot[1, 0], spot[2, 0] = x, y, np.inf
-    lower_errors(move, spot[0], spot[1], spot[2])
-    return float(abs(spot[2, 0]))
+    """Distance of one point from a move; `spot` (3,) is room for it."""
+    spot[0], spot[1], spot[2] = x, y, np.inf
+    lower_errors(move, spot[:1], spot[1:2], spot[2:3])
+    return float(abs(spot[2]))
+
+
+@wide
+def _is_there(table: Floats, found: Ints, move: int) -> bool:
+    """Whether the move is one of those found: passes one below the other are the same in XY."""
+    for other in found:
+        k = 0
+        while k < COLUMNS and table[other, k] == table[move, k]:
+            k += 1
+        if k == COLUMNS:
+            return True
+    return False
 
 
 @wide
@@ -101,10 +114,15 @@ def _search(
             apart = _apart(table[k], x, y, spot)
             if limit < 0.0:
                 best = min(best, apart)
-            elif apart <= limit:
+            elif apart <= limit and not _is_there(table, found[:count], k):
                 found[count] = k
                 count += 1
     return best, count
+
+
+@wide
+def _looser(limit: float) -> float:
+    return limit * (1.0 + SLACK) + SLACK_MM
 
 
 @wide
@@ -120,7 +138,7 @@ def renew(
     reach = memo[REACH]
     if reach < 0.0:
         reach = FIRST_REACH_MM
-    elif memo[USED] * (memo[COUNT] - 1.0) > SEARCH_COST:
+    elif memo[USED] * (memo[COUNT] - memo[LEAST]) > SEARCH_COST:
         reach *= 0.5
     else:
         reach = min(2.0 * reach, MOST_REACH_MM)
@@ -128,12 +146,12 @@ def renew(
     if nearest == np.inf:  # nothing at this height: any height
         only = only[0], only[1], -np.inf, np.inf
         nearest, _ = _search(q, only, moves, -1.0, found, spot)
-    count = 0
+    count, least = 0, 0
     if nearest < np.inf:
-        limit = (nearest + 2.0 * reach) * (1.0 + SLACK) + SLACK_MM
-        _, count = _search(q, only, moves, limit, found, spot)
+        _, least = _search(q, only, moves, _looser(nearest), found, spot)
+        _, count = _search(q, only, moves, _looser(nearest + 2.0 * reach), found, spot)
     memo[QX], memo[QY], memo[REACH] = q[0], q[1], reach
-    memo[COUNT], memo[USED] = count, 0.0
+    memo[COUNT], memo[LEAST], memo[USED] = count, least, 0.0
 
 
 @wide

@@ -54,7 +54,8 @@ def play_block(way: int, positions: Floats, axis: Floats, state: Floats, out: Fl
         while positions[begin] == state[0]:
             begin += 1
         still = taken_along(state[3], (state[0] + state[2]) * scale, low, high)
-        out[:begin] = still
+        for k in range(begin):
+            out[k] = still
         state[1], state[3] = way, still
         state[2] += way * axis[3]
         reversals = 1
@@ -62,7 +63,8 @@ def play_block(way: int, positions: Floats, axis: Floats, state: Floats, out: Fl
     slide = taken_along(state[3], (positions[begin] + added) * scale, low, high)
     here, there = positions[begin:], out[begin:]
     if way == STILL:
-        there[:] = slide
+        for k in range(len(there)):
+            there[k] = slide
     elif way == RISING:
         for k in range(len(here)):
             there[k] = larger(slide, (here[k] + added) * scale + low)

@@ -12,7 +12,6 @@ import numpy.typing as npt
 from camtool.kernels.wide import larger, wide
 
 Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 (
     STRIDE,
@@ -44,37 +43,36 @@ def new_pen(stride: int, room: int) -> Floats:
 
 
 def unwritten(pen: Floats) -> Floats:
-    """(0 to 2, 3) points that the pen still holds."""
-    peak, last = pen[[PEAK_X, PEAK_Y, PEAK]], pen[[LAST_X, LAST_Y, LAST]]
+    """(0 to 2, 4) points that the pen still holds: x, y, error, row."""
+    peak, last = pen[[PEAK_X, PEAK_Y, PEAK, ROW]], pen[[LAST_X, LAST_Y, LAST, ROW]]
     held = [peak] if pen[IN_RUN] > 0.0 else []
     if pen[ROW] >= 0.0 and not (pen[LAST_IS_WRITTEN] > 0.0):
         held.append(last)
-    return np.array(held).reshape(-1, 3)
+    return np.array(held).reshape(-1, 4)
 
 
 @wide
-def _write(pen: Floats, x: float, y: float, error: float, trace: Floats, rows: Ints) -> None:
+def _write(pen: Floats, x: float, y: float, error: float, trace: Floats) -> None:
     at = int(pen[WRITTEN])
-    trace[at, 0], trace[at, 1], trace[at, 2] = x, y, error
-    rows[at] = int(pen[ROW])
+    trace[at, 0], trace[at, 1], trace[at, 2], trace[at, 3] = x, y, error, pen[ROW]
     pen[WRITTEN] += 1.0
 
 
 @wide
-def _end_run(pen: Floats, trace: Floats, rows: Ints) -> None:
+def _end_run(pen: Floats, trace: Floats) -> None:
     if pen[IN_RUN] > 0.0 and pen[WRITTEN] < pen[ROOM]:
-        _write(pen, pen[PEAK_X], pen[PEAK_Y], pen[PEAK], trace, rows)
+        _write(pen, pen[PEAK_X], pen[PEAK_Y], pen[PEAK], trace)
     elif pen[IN_RUN] > 0.0:
         pen[LAST_IS_WRITTEN] = 0.0
     pen[IN_RUN], pen[PEAK] = 0.0, -1.0
 
 
 @wide
-def end_row(pen: Floats, trace: Floats, rows: Ints) -> None:
+def end_row(pen: Floats, trace: Floats) -> None:
     """Write what the pen holds."""
-    _end_run(pen, trace, rows)
+    _end_run(pen, trace)
     if pen[ROW] >= 0.0 and pen[LAST_IS_WRITTEN] == 0.0:
-        _write(pen, pen[LAST_X], pen[LAST_Y], pen[LAST], trace, rows)
+        _write(pen, pen[LAST_X], pen[LAST_Y], pen[LAST], trace)
         pen[LAST_IS_WRITTEN] = 1.0
 
 
@@ -95,13 +93,12 @@ def trace_block(
     largest: float,
     pen: Floats,
     trace: Floats,
-    rows: Ints,
 ) -> None:
     """Take points x, y (n,) of one row; `error` (n,) of them and the `largest`, where that is
     above 0; else they have none. What is full of points takes only the ends of rows."""
     count = len(x)
     if pen[ROW] != row:
-        end_row(pen, trace, rows)
+        end_row(pen, trace)
         pen[ROW] = row
     low = 0
     while low < count:
@@ -120,5 +117,5 @@ def trace_block(
         pen[LAST_X], pen[LAST_Y] = x[high - 1], y[high - 1]
         pen[LAST] = error[high - 1] if largest > 0.0 else 0.0
         if pen[IN_RUN] >= pen[STRIDE]:
-            _end_run(pen, trace, rows)
+            _end_run(pen, trace)
         low = high

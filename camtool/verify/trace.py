@@ -52,13 +52,11 @@ def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
 def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
     """What the judge kept, and the start (1, 2) mm before it; of what is more than `most` points
     (more rows than points) the peaks again. `cutting` (N,) tells the rows that cut."""
-    from camtool.kernels.thin_trace import ROW, WRITTEN, unwritten
+    from camtool.kernels.thin_trace import WRITTEN, unwritten
 
     written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)
     kept = np.concatenate([sums.trace[:written], held])
-    last = np.full(len(held), int(sums.pen[ROW]), dtype=np.int64)
-    row = np.concatenate([sums.trace_row[:written], last])
-    count = len(kept)
+    row, count = kept[:, 3].astype(np.int64), len(kept)
     whole = Trace(
         np.concatenate([start, kept[:, :2]]),
         np.concatenate([[0.0], kept[:, 2]]),

@@ -22,7 +22,7 @@ def lower_errors_(move, x, y, best):
 
 @njit
 def nearest_errors_(x, y, only, moves, found, memo, out):
-    nearest_errors((x, y), only, moves, found, memo, np.empty((3, 1)), out)
+    nearest_errors((x, y), only, moves, found, memo, np.empty(3), out)
 
 
 @njit
@@ -36,5 +36,5 @@ def way_of_(before, positions):
 
 
 @njit
-def trace_block_(row, x, y, error, largest, pen, trace, rows):
-    trace_block(row, x, y, error, largest, pen, trace, rows)
+def trace_block_(row, x, y, error, largest, pen, trace):
+    trace_block(row, x, y, error, largest, pen, trace)
