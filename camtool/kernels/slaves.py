@@ -31,43 +31,48 @@ but for the rounding of floats. Compiled, because every tick depends on the one 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from camtool.kernels.inner import inner
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
-
-GAIN, TAU, FRICTION, KID, KPD, CHUNK, PHASE, HOME_SPEED = range(8)
-"""Columns of `Program.axes`."""
-
-PLACE, SPEED, BEGIN, DONE, DRIVE, SPEED_BEFORE = range(6)
-"""Columns of `State.motors`: counts, counts in a tick, moments in ticks, percent, for the text."""
-
-COUNT, UP, WRAPS, STAGE, LEFT, SHOWN, SEEN, SUM, REF, NEXT_REF, TARGET = range(11)
-"""Columns of `State.slaves`."""
-
-STILL, WAITING, CRUISING, SLOWING, HOMING, FOLLOWING = range(6)
-"""What a slave does, in its column STAGE; FOLLOWING is the text's way of running a line."""
-
-FIRST_ROW, SECOND_ROW, MOST_TICKS, PART_AXIS, PART_COUNT = 6, 7, 8, 9, 10
-"""Columns of `Program.lines` behind the amounts and the speeds of three axes."""
-
-HOME_AMOUNT = -1
-"""The amount of an axis that goes home."""
-
-TURN = 1024
-"""Counts that an encoder shows; the program takes 1023 for each."""
-
-TABLE_COUNTS = 1000
-"""The last counts of a line, which run by the table."""
-
-NEVER = 1 << 40
-"""More counts than any motion has."""
+from camtool.kernels.slave_loops import listed_loop, next_stage, start_line, text_loop, to_go_of
+from camtool.kernels.slave_record import (
+    BEGIN,
+    COUNT,
+    DONE,
+    DRIVE,
+    FIRST_ROW,
+    FRICTION,
+    GAIN,
+    HOME_SPEED,
+    HOMING,
+    LEFT,
+    MOST_TICKS,
+    NEXT_REF,
+    PART_AXIS,
+    PART_COUNT,
+    PHASE,
+    PLACE,
+    REF,
+    SECOND_ROW,
+    SHOWN,
+    SPEED,
+    STAGE,
+    STILL,
+    TABLE_COUNTS,
+    TARGET,
+    TAU,
+    TURN,
+    UP,
+    WAITING,
+    WRAPS,
+    Account,
+    Floats,
+    Ints,
+    Program,
+    State,
+)
 
 MOMENT_EPS = 1e-12
 """A moment within a tick is found when a step of the search is shorter than this part of it."""
@@ -77,148 +82,6 @@ SEARCHES = 80
 
 REST_COUNTS = 1e-6
 """A motor without drive that would coast for less than this stands."""
-
-
-class Program(NamedTuple):
-    """What the slaves are told, and what they are.
-
-    lines (L, 11): amount of each axis (chunks; counts when `text`; `HOME_AMOUNT`; 0), its speed
-    with sign, the row of its samples, the row of those from where an axis (its number) has passed
-    a count on, the ticks after which it is given up, that axis and that count. pauses (L,) ticks
-    behind each, at least 1; axes (3, 8); table (1001,); lag: ticks by which Y begins after X;
-    text: the chapters' way instead of the listing's.
-    """
-
-    lines: Ints
-    pauses: Floats
-    axes: Floats
-    table: Ints
-    lag: float
-    text: bool
-
-
-class State(NamedTuple):
-    """Where everything stands between two calls: motors (3, 6), slaves (3, 11); clock (3,): tick,
-    line, row of the line before; begin (2,) of the line and of its second row, in ticks."""
-
-    motors: Floats
-    slaves: Ints
-    clock: Ints
-    begin: Floats
-
-
-class Account(NamedTuple):
-    """What rows did so far: ticks (N,) that they took, loops (N,) of the slaves, ended (N,)."""
-
-    ticks: Floats
-    loops: Ints
-    ended: npt.NDArray[np.bool_]
-
-
-@inner
-def _int32(value: int) -> int:
-    """As it stands in a signed int of 32 bits."""
-    return ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
-
-
-@inner
-def _listed_loop(motor: Floats, slave: Ints, axis: Floats, table: Ints) -> None:
-    """The interrupt of the listing: L5496-5584."""
-    shown = (slave[COUNT] + np.int64(axis[PHASE])) % TURN
-    change = shown - slave[SHOWN] if slave[UP] == 1 else slave[SHOWN] - shown
-    slave[SHOWN] = shown
-    if change >= 0:
-        slave[SEEN] = change
-    if slave[STAGE] == SLOWING:
-        left = int(axis[CHUNK]) - _seen_way(slave, axis, slave[UP])
-        fast = table[min(max(left, 0), TABLE_COUNTS)]
-        slave[REF] = fast if slave[NEXT_REF] >= 0 else -fast
-    speed, ref = slave[SEEN], slave[REF]
-    kid, kpd = np.int64(axis[KID]), np.int64(axis[KPD])
-    slave[SUM] = _int32(slave[SUM] + (abs(ref) - speed) * kid)
-    drive = _int32(np.int64(motor[DRIVE]) + slave[SUM] - speed * kpd)
-    drive = 0 if drive < 0 else min(drive // 1000, 100)
-    motor[DRIVE] = drive if ref > 0 else -drive if ref < 0 else 0
-
-
-@inner
-def _text_loop(motor: Floats, slave: Ints, axis: Floats, top: int) -> None:
-    """Equations 4.15-4.18 and 4.27: the reference by the way that is left, and the loop in its
-    velocity form. Nothing drives an axis that has arrived."""
-    speed = float(slave[COUNT] - slave[SHOWN])
-    slave[SHOWN] = slave[COUNT]
-    if slave[STAGE] == FOLLOWING:
-        left = float(slave[TARGET] - slave[COUNT])
-        most = float(abs(slave[REF]))
-        ref = min(most, top * math.sqrt(abs(left) / TABLE_COUNTS))
-        ref = math.copysign(ref if abs(left) < TABLE_COUNTS else most, left)
-        change = axis[KID] * (ref - speed) - axis[KPD] * (speed - motor[SPEED_BEFORE])
-        motor[DRIVE] = min(max(motor[DRIVE] + change / 1000.0, -100.0), 100.0)
-    motor[SPEED_BEFORE] = speed
-
-
-@inner
-def _seen_way(slave: Ints, axis: Floats, up: int) -> int:
-    """Posi of the main loop, when the counter's direction is `up`."""
-    shown = (slave[COUNT] + np.int64(axis[PHASE])) % TURN
-    return int((shown if up == 1 else TURN - 1 - shown) + (TURN - 1) * slave[WRAPS])
-
-
-@inner
-def _to_go(slave: Ints, axis: Floats, sense: int) -> int:
-    """Counts in the direction `sense` until the loop that the slave is in ends.
-
-    Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches
-    T in the turn k' = ⌈T / 1023⌉ − 1, or in the present one, at c' = max(T − 1023 k', 0).
-    """
-    stage = slave[STAGE]
-    if stage == FOLLOWING:
-        left = slave[TARGET] - slave[COUNT]
-        left = left if slave[NEXT_REF] >= 0 else -left
-        ahead = sense == (1 if slave[NEXT_REF] >= 0 else -1)
-        return int(left) if left <= 0 or ahead else NEVER
-    if stage != CRUISING and stage != SLOWING:
-        return NEVER
-    wanted = int(axis[CHUNK])
-    if stage == CRUISING:
-        wanted += 1 if slave[LEFT] > 1 else -TABLE_COUNTS
-    up = int(slave[UP]) if sense == 0 else int(sense > 0)
-    wraps = int(slave[WRAPS])
-    here = _seen_way(slave, axis, up) - (TURN - 1) * wraps
-    turn = max(wraps, (wanted + TURN - 2) // (TURN - 1) - 1)
-    way = (turn - wraps) * TURN + max(wanted - (TURN - 1) * turn, 0) - here
-    # The direction is that of the last count: a motor that turns back must count first.
-    return way if up == int(slave[UP]) else max(way, 1)
-
-
-@inner
-def _next_stage(motor: Floats, slave: Ints, moment: float) -> None:
-    """The count that the slave waited for has come."""
-    if slave[STAGE] == CRUISING and slave[LEFT] > 1:
-        slave[LEFT] -= 1
-        slave[WRAPS] = 0
-    elif slave[STAGE] == CRUISING:
-        slave[STAGE] = SLOWING
-    else:
-        slave[STAGE], slave[REF], slave[SEEN], slave[WRAPS] = STILL, 0, 0, 0
-        motor[DONE], motor[DRIVE] = moment, 0.0
-
-
-@inner
-def _start(motor: Floats, slave: Ints, text: bool) -> None:
-    """The master's word to go. The text's distances add up, so that what an axis went too far is
-    taken back by its next line; the listing's begin where the axis is."""
-    slave[WRAPS], slave[REF] = 0, slave[NEXT_REF]
-    amount = slave[LEFT]
-    motor[DONE] = motor[BEGIN]
-    if amount == HOME_AMOUNT:
-        slave[STAGE] = HOMING
-    elif text:
-        slave[STAGE] = FOLLOWING
-        slave[TARGET] += amount if slave[NEXT_REF] >= 0 else -amount
-        slave[NEXT_REF] = -1 if slave[TARGET] < slave[COUNT] else 1
-    else:
-        slave[STAGE] = CRUISING
 
 
 @inner
@@ -295,7 +158,7 @@ def _advance(motor: Floats, slave: Ints, axis: Floats, tick: int, text: bool) ->
         if slave[STAGE] == WAITING:
             until = min(motor[BEGIN] - tick, 1.0)
             if until <= at:
-                _start(motor, slave, text)
+                start_line(motor, slave, text)
                 continue
         if slave[STAGE] == HOMING:
             at = _home(motor, slave, axis, at, tick)
@@ -303,9 +166,9 @@ def _advance(motor: Floats, slave: Ints, axis: Floats, tick: int, text: bool) ->
         speed, drive = motor[SPEED], motor[DRIVE]
         pushed = drive if speed != 0.0 else drive if abs(drive) > axis[FRICTION] else 0.0
         sense = int(np.sign(speed if speed != 0.0 else pushed))
-        to_go = _to_go(slave, axis, sense)
+        to_go = to_go_of(slave, axis, sense)
         if to_go <= 0:
-            _next_stage(motor, slave, tick + at)
+            next_stage(motor, slave, tick + at)
             continue
         if sense == 0:
             at = until
@@ -317,7 +180,7 @@ def _advance(motor: Floats, slave: Ints, axis: Floats, tick: int, text: bool) ->
             ticks, turns = min(ticks, back), back <= ticks
         took, reached = _glide(motor, slave, axis, aim, (sense, ticks, to_go))
         if reached:
-            _next_stage(motor, slave, tick + at + took)
+            next_stage(motor, slave, tick + at + took)
             at += took
         else:
             at = at + ticks if turns else until
@@ -405,9 +268,9 @@ def slaves_fill(
             if slave[STAGE] == HOMING:
                 motor[DRIVE] = 0.0
             elif program.text:
-                _text_loop(motor, slave, axis, top)
+                text_loop(motor, slave, axis, top)
             else:
-                _listed_loop(motor, slave, axis, program.table)
+                listed_loop(motor, slave, axis, program.table)
             _advance(motor, slave, axis, tick, program.text)
         tick += 1
         row[filled] = _row(program, state, line, tick)

@@ -137,7 +137,8 @@ class _Run:
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
-        from camtool.kernels.slaves import SECOND_ROW, slaves_fill
+        from camtool.kernels.slave_record import SECOND_ROW
+        from camtool.kernels.slaves import slaves_fill
 
         complete, finished = 0, False
         while not finished:

@@ -25,7 +25,7 @@ from camtool.simulation.motion import Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
 
 if TYPE_CHECKING:
-    from camtool.kernels.slaves import Account, Program, State
+    from camtool.kernels.slave_record import Account, Program, State
 
 TICK_S = 0.005
 """The slaves' timer: (65536 − 53036) · 2 / 5 MHz (L2757)."""
@@ -265,7 +265,7 @@ def _link(header: np.ndarray, first: Ints, rows: int, router: MatlabRouterContro
 
 def program_of(lines: Lines, machine: Machine) -> Program:
     """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
-    from camtool.kernels.slaves import TABLE_COUNTS, Program
+    from camtool.kernels.slave_record import TABLE_COUNTS, Program
 
     router = router_of(machine)
     text = router.slaves == "text"
@@ -293,7 +293,7 @@ def program_of(lines: Lines, machine: Machine) -> Program:
 
 def state_of(start_mm: Floats, machine: Machine) -> State:
     """All motors at rest at a place."""
-    from camtool.kernels.slaves import COUNT, PLACE, SHOWN, TARGET, TURN, State
+    from camtool.kernels.slave_record import COUNT, PLACE, SHOWN, TARGET, TURN, State
 
     router = router_of(machine)
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
@@ -308,7 +308,7 @@ def state_of(start_mm: Floats, machine: Machine) -> State:
 
 def account_of(rows: int) -> Account:
     """Nothing done yet."""
-    from camtool.kernels.slaves import Account
+    from camtool.kernels.slave_record import Account
 
     zeros = np.zeros(rows)
     return Account(zeros, zeros.astype(np.int64), np.ones(rows, dtype=np.bool_))

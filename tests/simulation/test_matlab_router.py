@@ -386,6 +386,40 @@ def test_gains_of_the_listing_are_whole() -> None:
         router_of(load_target("pic-mmh").machine)
 
 
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "slaves=none",
+        "plant_gain=[0, 1, 1]",
+        "plant_gain=[1e300, 1, 1]",
+        "time_constant_s=[0, 1, 1]",
+        "friction_percent=[61, 0, 0]",
+        "kid=[-1, 28, 28]",
+        "table_counts=1024",
+        "chunk_counts=[100, 5120, 5120]",
+        "home_counts=[0, 550, 500]",
+        "home_phase_counts=[1024, 0, 0]",
+        "turnaround_s=0.004",
+        "start_lag_s=0.006",
+        "number_pause_s=-1",
+        "speed=1",
+    ],
+)
+def test_bad_values_are_refused(setting: str) -> None:
+    with pytest.raises(MachineError, match=r"controller"):
+        router(setting)
+
+
+def test_the_ends_of_the_ranges_are_bounded_too() -> None:
+    """The strongest and quickest motor, and the weakest and slowest, which never arrives."""
+    wild = router("plant_gain=[1000, 1000, 1000]", "time_constant_s=[1e-6, 1e-6, 1e-6]")
+    assert np.isfinite(places(motion(line(20.0, 10.0), wild))).all()
+    weak = router("plant_gain=[0.001, 1, 1]", "time_constant_s=[60, 1, 1]")
+    chunks = motion(line(1.0), weak)
+    assert unended(chunks) == [0]
+    assert seconds(chunks, 1)[0] == pytest.approx(720 + 4 / 3.75 + 2, abs=0.1)
+
+
 def test_what_is_said_of_the_model() -> None:
     machine = router("friction_percent=[1, 0, 0]", "slaves=text")
     assert any("dry friction" in text for text in assumptions(machine))

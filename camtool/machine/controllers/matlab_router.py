@@ -8,13 +8,14 @@ from msgspec import Meta
 
 from camtool.machine.controllers.base import SlideStart
 
-Positive = Annotated[float, Meta(gt=0.0)]
-NotNegative = Annotated[float, Meta(ge=0.0)]
+PlantGain = Annotated[float, Meta(gt=0.0, le=1000.0)]
+Seconds = Annotated[float, Meta(ge=1e-6, le=60.0)]
+Pause = Annotated[float, Meta(ge=0.0, le=10.0)]
 Percent = Annotated[float, Meta(ge=0.0, le=60.0)]
 Gain = Annotated[float, Meta(ge=0.0, le=100_000.0)]
 Speed = Annotated[int, Meta(ge=1, le=1023)]
 Phase = Annotated[int, Meta(ge=0, le=1023)]
-Chunk = Annotated[int, Meta(ge=1024, le=32767)]
+Chunk = Annotated[int, Meta(ge=2048, le=32767)]
 Gap = Annotated[float, Meta(ge=0.005, le=10.0)]
 
 
@@ -38,8 +39,8 @@ class MatlabRouterController(SlideStart, frozen=True, tag_field="model", tag="ma
     """
 
     slaves: Literal["listing", "text"] = "listing"
-    plant_gain: tuple[Positive, Positive, Positive] = (8.896, 5.599, 9.767)
-    time_constant_s: tuple[Positive, Positive, Positive] = (0.0610, 0.0616, 0.0620)
+    plant_gain: tuple[PlantGain, PlantGain, PlantGain] = (8.896, 5.599, 9.767)
+    time_constant_s: tuple[Seconds, Seconds, Seconds] = (0.0610, 0.0616, 0.0620)
     friction_percent: tuple[Percent, Percent, Percent] = (0.0, 0.0, 0.0)
     kid: tuple[Gain, Gain, Gain] | None = None
     kpd: tuple[Gain, Gain, Gain] | None = None
@@ -50,5 +51,5 @@ class MatlabRouterController(SlideStart, frozen=True, tag_field="model", tag="ma
     pause_s: Gap = 0.15
     turnaround_s: Gap = 0.0062
     start_lag_s: Annotated[float, Meta(ge=0.0, le=0.005)] = 0.0004
-    header_pause_s: NotNegative = 0.01
-    number_pause_s: NotNegative = 0.001
+    header_pause_s: Pause = 0.01
+    number_pause_s: Pause = 0.001
