@@ -26,7 +26,8 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     the thesis's syntax has it ("syntax": G01 in XY) or on every feed move ("everywhere");
     `full_circles` as two "halves" or as one block ("whole"); `program_end`; `rapids` above the
     stock go "straight" to their end, or along X and then along Y ("one-axis"), which the timers
-    do exactly; `z_up`: the sign of Z away from the work; `spindle_stops`: M05 stops it;
+    do exactly; `slants`: lines of X and Y in one block ("whole"), or in as many as these timers
+    do exactly ("split"); `z_up`: the sign of Z away from the work; `spindle_stops`: M05 stops it;
     `arc_spread_mm`: the radii at an arc's start and end may differ by this much.
     """
 
@@ -36,6 +37,7 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     full_circles: Literal["halves", "whole"] = "halves"
     program_end: Literal["M30", "M02"] = "M30"
     rapids: Literal["straight", "one-axis"] = "straight"
+    slants: Literal["whole", "split"] = "whole"
     z_up: Literal["+", "-"] = "+"
     spindle_stops: bool = True
     arc_spread_mm: Annotated[float, Meta(gt=0.0)] = 0.005

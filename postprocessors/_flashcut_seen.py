@@ -35,8 +35,7 @@ def timer_findings(path: Toolpath, machine: Machine) -> tuple[Finding, ...]:
         return ()
     worst = int(extra.argmax())
     most_um = float(extra[worst]) * 1000.0 * (y_mm if steps[worst].argmin() else x_mm)
-    exact_um = 1000.0 * min(x_mm, y_mm) * controller.half_period_ms
-    slanted_rapids = bool((path.kind[rows[extra > 0]] == Kind.RAPID).any())
+    rapids = bool((path.kind[rows[extra > 0]] == Kind.RAPID).any())
     stays = controller.goes_on_from == "programmed"
     return (
         Finding(
@@ -45,9 +44,9 @@ def timer_findings(path: Toolpath, machine: Machine) -> tuple[Finding, ...]:
             f"{count} straight moves of both axes make their shorter one too long, by up to "
             f"{extra[worst]} steps ({most_um:.1f} µm), because each axis has a timer of its own"
             + ("; it stays in all that follows" if stays else "")
-            + ". What lowers it: longer half periods (controller.half_period_ms), moves whose "
-            f"shorter side is below {exact_um:.0f} µm, or moves along one axis at a time"
-            + (" (for rapids: dialect.rapids=one-axis)" if slanted_rapids else ""),
+            + ". What lowers it: longer half periods (controller.half_period_ms), lines in pieces "
+            "(dialect.slants=split)"
+            + (", rapids along one axis at a time (dialect.rapids=one-axis)" if rapids else ""),
             where=f"block {int(path.block[rows[worst]]) + 1}",
             measured=most_um,
             limit=0.0,

@@ -19,6 +19,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 
 from ._flashcut_options import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from ._flashcut_slants import split_slants
 from ._gcode_checks import feed_units, place
 from ._gcode_format import Ints, NumberStyle, say_units
 from ._gcode_options import feed_decimals
@@ -45,6 +46,8 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     check_plain(toolpath, machine)
     feeds, feed_note = feed_units(toolpath, machine)
     lowered, split_note = split_z(toolpath, machine)
+    if dialect.slants == "split":
+        lowered = split_slants(lowered.toolpath, machine).after(lowered)
     rules = ArcRules(dialect.decimals, dialect.full_circles, MOST_MM)
     rows = plain_rows(lowered.toolpath, rules)
     of_row = lowered.row[rows.row]
