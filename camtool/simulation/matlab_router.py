@@ -24,13 +24,11 @@ import numpy as np
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
-from camtool.simulation.matlab_router_lines import (
+from camtool.simulation.matlab_router_lines import Lines, block_of, lines_of
+from camtool.simulation.matlab_router_program import (
     SIGNS,
     TICK_S,
-    Lines,
     account_of,
-    block_of,
-    lines_of,
     program_of,
     router_of,
     state_of,
@@ -125,7 +123,7 @@ class _Run:
         ends = np.flatnonzero(path.kind == Kind.END)
         self._rows = int(ends[0]) + 1 if len(ends) else len(path)
         self._lines: Lines = lines_of(path, self._rows, machine)
-        self._program = program_of(self._lines, machine)
+        self._program = program_of(self._lines.orders, self._lines.pauses_s, machine)
         self._state = state_of(path.start, machine)
         self._account = account_of(self._rows)
         self._mechanics = Mechanics(machine, path.start, options.effects)

@@ -13,28 +13,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camtool.errors import MachineError, ProgramError
+from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import MatlabRouterController
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Floats, Ints
+from camtool.simulation.matlab_router_program import SIGNS, TICKS_PER_S, router_of
+from camtool.simulation.motion import Bools, Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
-
-if TYPE_CHECKING:
-    from camtool.kernels.slave_record import Account, Program, State
-
-TICK_S = 0.005
-"""The slaves' timer: (65536 − 53036) · 2 / 5 MHz (L2757)."""
-
-TICKS_PER_S = 200
-"""The same, the other way round."""
-
-SIGNS = np.array([1, 1, -1])
-"""Home is at the low ends of X and Y and at the top of Z: all distances are away from it."""
 
 UNITS_PER_MM = 10
 """The program counts in tenths of a millimetre (L3202-3204)."""
@@ -57,17 +45,8 @@ PAIR_COUNTS = 10
 PAIR_TOLERANCE = 1e-4
 """A sum of squares of speeds that is a whole number within this comes from a program."""
 
-IDENTIFIED = 70.0
-"""The drive at which gains were measured (L2704): whatever the friction, that speed stays."""
-
 ON_HOME_COUNTS = 0.5
 """A place within so many counts of home is home."""
-
-TEXT_KID = (17.549, 28.152, 16.2)
-"""Table 4.1, L2872-2880, in thousandths; the table's order is Y, X, Z."""
-
-TEXT_KPD = (98.125, 159.124, 92.64)
-"""The same."""
 
 TEXT_FACTORS = ((10.0, 1), (100.0, 10), (1100.0, 100), (math.inf, 1000))
 """Equation 4.49 (L3077-3097): a distance up to so many tenths of a millimetre goes in so many
@@ -85,17 +64,6 @@ class Lines:
     orders: Ints
     pauses_s: Floats
     extra_s: Floats
-
-
-def router_of(machine: Machine) -> MatlabRouterController:
-    """The machine's controller, which must be this one; MachineError when it is not."""
-    if not isinstance(machine.controller, MatlabRouterController):
-        raise MachineError(
-            f"{machine.target.name} needs the controller matlab-router",
-            where="table [controller], key model",
-            mend='write model = "matlab-router"',
-        )
-    return machine.controller
 
 
 def block_of(toolpath: Toolpath, row: int) -> str:
@@ -118,7 +86,7 @@ def lines_of(path: Toolpath, rows: int, machine: Machine) -> Lines:
     homes = _homing(path, way_mm, machine)
     first = np.flatnonzero((way_mm != 0.0).any(axis=1))
     second = first.copy()
-    tail = _tails(path, first)
+    tail = _tails(path, way_mm, first)
     way = way_mm[first]
     way[np.flatnonzero(tail) - 1] += way[tail]
     second[np.flatnonzero(tail) - 1] = first[tail]
@@ -152,7 +120,7 @@ def _check(path: Toolpath, rows: int) -> None:
             raise ProgramError(message, where=block_of(path, int((bad & running).argmax())))
 
 
-def _homing(path: Toolpath, way_mm: Floats, machine: Machine) -> np.ndarray:
+def _homing(path: Toolpath, way_mm: Floats, machine: Machine) -> Bools:
     """(R,) rows that go home: those that say so, and rapids that end there on all that moves."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     off = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
@@ -162,12 +130,14 @@ def _homing(path: Toolpath, way_mm: Floats, machine: Machine) -> np.ndarray:
     return np.asarray(said | ((kind == Kind.RAPID) & there & (way_mm <= 0.0).all(axis=1)))
 
 
-def _tails(path: Toolpath, first: Ints) -> np.ndarray:
-    """(L,) rows that are the rest of the line before them: of the same line of the program."""
-    block, straight = path.block[first], path.kind[first] == Kind.LINE
+def _tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
+    """(L,) of the rows `first` those that are the rest of the line before them: where one axis of
+    a line of the program goes on alone."""
+    block, way = path.block[first], way_mm[first]
+    flat = (path.kind[first] == Kind.LINE) & (way[:, 2] == 0.0)
     tail = np.zeros(len(first), dtype=np.bool_)
-    tail[1:] = (block[1:] == block[:-1]) & (block[1:] >= 0) & straight[1:] & straight[:-1]
-    tail[1:] &= np.diff(first) == 1
+    tail[1:] = (block[1:] == block[:-1]) & (block[1:] >= 0) & flat[1:] & flat[:-1]
+    tail[1:] &= (np.diff(first) == 1) & ((way[1:] != 0.0).sum(axis=1) == 1)
     tail[2:] &= ~tail[1:-1]
     return tail
 
@@ -243,7 +213,7 @@ def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: Machine) -> Ints
     return np.asarray(np.ceil(most).astype(np.int64))
 
 
-def _pauses(header: np.ndarray, router: MatlabRouterController) -> Floats:
+def _pauses(header: Bools, router: MatlabRouterController) -> Floats:
     """(L,) s behind each line."""
     pauses = np.where(header, router.pause_s, router.turnaround_s)
     last = ~header & np.append(header[1:], True)
@@ -253,7 +223,7 @@ def _pauses(header: np.ndarray, router: MatlabRouterController) -> Floats:
     return np.where(last, np.maximum(settle, router.turnaround_s), pauses)
 
 
-def _link(header: np.ndarray, first: Ints, rows: int, router: MatlabRouterController) -> Floats:
+def _link(header: Bools, first: Ints, rows: int, router: MatlabRouterController) -> Floats:
     """(R,) s of the numbers of each job, at the first row of its way home."""
     extra = np.zeros(rows)
     opens = np.flatnonzero(header & ~np.concatenate([[False], header[:-1]]))
@@ -261,54 +231,3 @@ def _link(header: np.ndarray, first: Ints, rows: int, router: MatlabRouterContro
     pause = NUMBERS_OF_HEADER * router.header_pause_s
     extra[first[opens]] = pause + lines * NUMBERS_OF_LINE * router.number_pause_s
     return extra
-
-
-def program_of(lines: Lines, machine: Machine) -> Program:
-    """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
-    from camtool.kernels.slave_record import TABLE_COUNTS, Program
-
-    router = router_of(machine)
-    text = router.slaves == "text"
-    axes = np.zeros((3, 8))
-    friction = np.array(router.friction_percent)
-    axes[:, 0] = np.array(router.plant_gain) * IDENTIFIED / (IDENTIFIED - friction)
-    axes[:, 1] = np.array(router.time_constant_s) * TICKS_PER_S
-    axes[:, 2] = router.friction_percent
-    axes[:, 3] = router.kid or (TEXT_KID if text else (28.0,) * 3)
-    axes[:, 4] = router.kpd or (TEXT_KPD if text else (159.0,) * 3)
-    axes[:, 5] = router.chunk_counts
-    axes[:, 6] = 0 if text else router.home_phase_counts
-    axes[:, 7] = router.home_counts
-    if not text and (axes[:, 3:5] % 1.0).any():
-        raise MachineError(
-            "the gains of the listing are whole thousandths",
-            where="table [controller], keys kid and kpd",
-            mend='round them, or say slaves = "text"',
-        )
-    share = np.arange(TABLE_COUNTS + 1) / TABLE_COUNTS
-    table = np.rint(router.table_counts * np.sqrt(share)).astype(np.int64)
-    lag = router.start_lag_s * TICKS_PER_S
-    return Program(lines.orders, lines.pauses_s * TICKS_PER_S, axes, table, lag, text)
-
-
-def state_of(start_mm: Floats, machine: Machine) -> State:
-    """All motors at rest at a place."""
-    from camtool.kernels.slave_record import COUNT, PLACE, SHOWN, TARGET, TURN, State
-
-    router = router_of(machine)
-    coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    place = np.rint((start_mm - np.array(machine.controller.machine_zero_mm)) * SIGNS / coded)
-    motors, slaves = np.zeros((3, 6)), np.zeros((3, 11), dtype=np.int64)
-    motors[:, PLACE] = place
-    slaves[:, COUNT] = slaves[:, TARGET] = slaves[:, SHOWN] = place
-    if router.slaves == "listing":
-        slaves[:, SHOWN] = (slaves[:, COUNT] + np.array(router.home_phase_counts)) % TURN
-    return State(motors, slaves, np.zeros(3, dtype=np.int64), np.zeros(2))
-
-
-def account_of(rows: int) -> Account:
-    """Nothing done yet."""
-    from camtool.kernels.slave_record import Account
-
-    zeros = np.zeros(rows)
-    return Account(zeros, zeros.astype(np.int64), np.ones(rows, dtype=np.bool_))

@@ -15,7 +15,8 @@ from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
 from camtool.simulation.matlab_router import assumptions, held, spacing_mm
-from camtool.simulation.matlab_router_lines import TEXT_KID, TEXT_KPD, lines_of, router_of
+from camtool.simulation.matlab_router_lines import lines_of
+from camtool.simulation.matlab_router_program import TEXT_KID, TEXT_KPD, router_of
 from camtool.simulation.motion import Chunk
 from camtool.simulation.options import IDEAL, Options
 from camtool.simulation.simulate import simulate
