@@ -1,0 +1,265 @@
+"""LinuxCNC from the program to the slides, and against LinuxCNC itself."""
+
+import math
+
+import numpy as np
+import pytest
+from camtool_postprocessors.linuxcnc import POST
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camtool.errors import MachineError, ProgramError
+from camtool.kernels.merge_lines import merge_lines
+from camtool.machine.model import Machine
+from camtool.simulation.options import CHUNK_STEPS, Options
+from camtool.simulation.simulate import simulate
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+from tests.oracles.gcode_machines import linuxcnc_machine
+from tests.oracles.linuxcnc_run import MEASURED, Measured, merge, off_line
+from tests.oracles.motion_rows import RowMotion, rows_of
+
+PERIOD = 0.001
+V, A = 30.48, 508.0
+
+
+def run(path: Toolpath, machine: Machine, chunk_steps: int = CHUNK_STEPS) -> list[RowMotion]:
+    return rows_of(simulate(path, machine, Options(chunk_steps=chunk_steps)))
+
+
+def total(path: Toolpath, machine: Machine) -> float:
+    return sum(row.duration_s for row in run(path, machine))
+
+
+def in_mode(mode: str, tolerance_mm: float = 0.01, *settings: str) -> Machine:
+    said = (f"dialect.path={mode}", f"dialect.blend_tolerance_mm={tolerance_mm or 0.01}")
+    return linuxcnc_machine(*said, *settings)
+
+
+def from_rest(d: float, v: float, a: float) -> float:
+    """A trapezoid or triangle, in whole periods, and one to come to rest."""
+    peak = min(v, math.sqrt(a * d))
+    seconds = d / peak + peak / a if peak == v else 2.0 * math.sqrt(d / a)
+    return (math.ceil(seconds / PERIOD - 1e-6) + 1) * PERIOD
+
+
+@pytest.mark.parametrize("case", MEASURED, ids=lambda case: case.name)
+def test_linuxcnc_itself(case: Measured) -> None:
+    """Times within three periods or 1.1 %, corners of lines within 0.2 µm (the trace was
+    sampled)."""
+    machine = in_mode(case.mode, case.tolerance_mm)
+    path = POST.read(f"G21 G17 G90 G94\n{case.program}M2\n".encode(), machine)
+    rows = run(path, machine)
+    seconds = sum(row.duration_s for row in rows)
+    assert abs(seconds - PERIOD * case.periods) < max(0.0065, 0.011 * seconds)
+    left = [
+        1000.0 * float(np.linalg.norm(row.commanded[-1] - end))
+        for row, end in zip(rows, path.end, strict=True)
+        if len(row.commanded)
+    ]
+    for found, wanted in zip(left, case.corners_um, strict=False):
+        assert found == pytest.approx(wanted, abs=0.2)
+
+
+def test_one_trapezoid_and_one_triangle() -> None:
+    long = ToolpathBuilder().line(10.0, 0.0, 0.0, feed=600.0).finish()
+    short = ToolpathBuilder().rapid(0.5, 0.0, 0.0).finish()
+    machine = in_mode("exact-path")
+    assert total(long, machine) == pytest.approx(from_rest(10.0, 10.0, A))
+    assert total(short, machine) == pytest.approx(from_rest(0.5, V, A))
+
+
+def test_a_rectangle_with_stops() -> None:
+    builder = ToolpathBuilder()
+    for x, y in ((40.0, 0.0), (40.0, 20.0), (0.0, 20.0), (0.0, 0.0)):
+        builder.line(x, y, 0.0, feed=600.0)
+    sides = [row.duration_s for row in run(builder.finish(), in_mode("exact-stop"))]
+    assert sides == pytest.approx([from_rest(d, 10.0, A) for d in (40, 20, 40, 20)])
+
+
+@pytest.mark.parametrize("radius", [0.2, 0.5, 2.0])
+def test_turning_bounds_the_speed_of_a_circle(radius: float) -> None:
+    """v² = √¾ a r, half of the acceleration along the way."""
+    builder = ToolpathBuilder((radius, 0.0, 0.0))
+    builder.arc(radius, 0.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=1828.8)
+    v = min(V, math.sqrt(math.sqrt(0.75) * A * radius))
+    wanted = from_rest(2.0 * math.pi * radius, v, 0.5 * A)
+    assert total(builder.finish(), in_mode("exact-path")) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("turn_deg", [60.0, 90.0, 120.0, 170.0])
+def test_a_blend_is_an_arc_that_touches_both_lines(turn_deg: float) -> None:
+    """All samples lie on the lines or on the circle of R = d tan θ, and T is the tolerance."""
+    turn = math.radians(turn_deg)
+    end = (10.0 + 10.0 * math.cos(turn), 10.0 * math.sin(turn), 0.0)
+    path = ToolpathBuilder().line(10.0, 0.0, 0.0, feed=1800.0).line(*end, feed=1800.0).finish()
+    tolerance = 0.2
+    rows = run(path, in_mode("blend", tolerance))
+    theta = 0.5 * (math.pi - turn)
+    d = tolerance * math.cos(theta) / (1.0 - math.sin(theta))
+    radius = d * math.tan(theta)
+    inward = np.array([-math.sin(0.5 * turn), math.cos(0.5 * turn), 0.0])
+    centre = np.array([10.0, 0.0, 0.0]) + radius / math.sin(theta) * inward
+    assert np.linalg.norm(rows[0].commanded[-1] - (10.0, 0.0, 0.0)) == pytest.approx(tolerance)
+    points = np.concatenate([row.commanded for row in rows])
+    off = [min(off_line((0, 0, 0), (10, 0, 0), p), off_line((10, 0, 0), end, p)) for p in points]
+    on_blend = np.array(off) > 1e-9
+    assert on_blend.sum() > 10
+    ring = np.linalg.norm(points[on_blend] - centre, axis=1)
+    assert np.abs(ring - radius).max() < 1e-9
+    assert max(off) < tolerance
+
+
+def test_a_slight_bend_is_blended_as_wide_as_its_speed_needs() -> None:
+    """20°, at 30 mm/s: R = v² / (a/2) / turn, narrower than 0.2 mm would allow."""
+    turn = math.radians(20.0)
+    path = ToolpathBuilder().line(10.0, 0.0, 0.0, feed=1800.0)
+    path.line(10.0 + 10.0 * math.cos(turn), 10.0 * math.sin(turn), 0.0, feed=1800.0)
+    row, _ = run(path.finish(), in_mode("blend", 0.2))
+    radius = 30.0**2 / (0.5 * A) / turn
+    wanted = radius * (1.0 / math.sin(0.5 * (math.pi - turn)) - 1.0)
+    assert math.dist(row.commanded[-1], (10.0, 0.0, 0.0)) == pytest.approx(wanted)
+    assert wanted < 0.16
+
+
+def test_blends_take_no_more_than_half_a_line() -> None:
+    """The tolerance is more than what moves of 0.28 mm can give."""
+    builder = ToolpathBuilder()
+    for k in range(1, 9):
+        builder.line(0.2 * k, 0.2 * (k % 2), 0.0, feed=1800.0)
+    path = builder.finish()
+    rows = run(path, in_mode("blend", 0.06))
+    ends = np.array([row.commanded[-1] for row in rows])
+    left = np.linalg.norm(ends - path.end, axis=1).tolist()
+    side = 0.2 * math.sqrt(2.0)
+    assert left[:-1] == pytest.approx([0.5 * side * (math.sqrt(2.0) - 1.0)] * 7)
+    assert left[-1] == 0.0
+
+
+@pytest.mark.parametrize("mode", ["exact-path", "exact-stop"])
+def test_exact_modes_stay_on_the_path(mode: str) -> None:
+    builder = ToolpathBuilder().line(1.0, 0.0, -1.0, feed=100.0)
+    builder.arc(0.0, 1.0, -1.0, centre=(0.0, 0.0), ccw=True, feed=100.0)
+    path = builder.line(0.0, 3.0, 0.0, feed=100.0).finish()
+    line, arc, last = run(path, in_mode(mode))
+    assert (line.commanded[:, 1] == 0.0).all()
+    assert np.abs(np.hypot(arc.commanded[:, 0], arc.commanded[:, 1]) - 1.0).max() < 1e-12
+    assert (last.commanded[-1] == path.end[-1]).all()
+
+
+def test_no_blend_between_rapids_and_feeds_or_across_waits() -> None:
+    builder = ToolpathBuilder().rapid(5.0, 0.0, 0.0).line(5.0, 5.0, 0.0, feed=600.0)
+    builder.event(Kind.DWELL, 0.5).line(0.0, 5.0, 0.0, feed=600.0)
+    path = builder.message("a comment").line(0.0, 0.0, 0.0, feed=600.0).finish()
+    rows = run(path, in_mode("blend", 0.1))
+    left = [float(np.linalg.norm(rows[k].commanded[-1] - path.end[k])) for k in (0, 1, 3, 5)]
+    assert left == pytest.approx([0.0, 0.0, 0.1, 0.0])
+    assert rows[2].duration_s == 0.5
+
+
+def test_straight_back_is_a_stop() -> None:
+    path = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=600.0).line(0.0, 0.0, 0.0, feed=600.0)
+    rows = run(path.finish(), in_mode("blend", 0.1))
+    assert (rows[0].commanded[-1] == (5.0, 0.0, 0.0)).all()
+    assert rows[0].duration_s == pytest.approx(from_rest(5.0, 10.0, A))
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0005, 0.3))
+def test_lines_are_merged_as_the_list_does(seed: int, tolerance: float) -> None:
+    rng = np.random.default_rng(seed)
+    count = 80
+    way = np.column_stack(
+        [rng.uniform(0.0, 1.0, count + 1), rng.normal(0.0, 0.05, (count + 1, 2))]
+    )
+    way[rng.random(count + 1) < 0.1] = 0.0
+    points = np.round(np.cumsum(way, axis=0), 3)
+    apart = rng.random(count) < 0.05
+    chain, moved = np.empty(count, dtype=np.int64), np.empty((count, 3))
+    merge_lines(points, apart, tolerance, chain, moved)
+    listed = [tuple(point) for point in points.tolist()]
+    assert chain.tolist() == merge(listed, apart.tolist(), tolerance)
+    for number in range(int(chain[-1]) + 1):
+        rows = np.flatnonzero(chain == number)
+        base, end = listed[rows[0]], listed[rows[-1] + 1]
+        assert (moved[rows[-1]] == end).all()
+        if base == end:
+            continue
+        along = [0.0]
+        for row in rows:
+            assert off_line(base, end, tuple(moved[row])) < 1e-12
+            assert off_line(base, end, listed[row + 1]) <= tolerance
+            along.append(math.dist(base, moved[row]))
+        assert (np.diff(along) >= -1e-12).all()
+
+
+def test_a_chain_takes_a_hundred_and_one_points() -> None:
+    points = np.zeros((300, 3))
+    points[:, 0] = np.arange(300)
+    chain, moved = np.empty(299, dtype=np.int64), np.empty((299, 3))
+    merge_lines(points, np.zeros(299, dtype=np.bool_), 0.01, chain, moved)
+    assert np.bincount(chain).tolist() == [101, 101, 97]
+
+
+def test_merged_lines_leave_the_path_within_the_tolerance() -> None:
+    builder = ToolpathBuilder()
+    for k in range(1, 40):
+        builder.line(0.1 * k, 0.008 * (k % 2), 0.0, feed=600.0)
+    path = builder.finish()
+    points = np.concatenate([row.commanded for row in run(path, in_mode("blend", 0.01))])
+    assert 0.0 < np.ptp(points[:, 1]) <= 0.01
+    sharp = np.concatenate([row.commanded for row in run(path, in_mode("exact-path"))])
+    assert np.ptp(sharp[:, 1]) == pytest.approx(0.008)
+    assert total(path, in_mode("blend", 0.01)) < 0.3 * total(path, in_mode("exact-path"))
+
+
+def test_chunks_change_nothing() -> None:
+    case = next(case for case in MEASURED if case.name == "arcs")
+    machine = in_mode("blend", 0.05, "axes.x.backlash_mm=0.05")
+    path = POST.read(case.program.encode(), machine)
+    whole = run(path, machine)
+    for one, other in zip(whole, run(path, machine, chunk_steps=13), strict=True):
+        assert (one.commanded == other.commanded).all()
+        assert (one.slide == other.slide).all()
+        assert one.steps.tolist() == other.steps.tolist()
+        assert other.duration_s == pytest.approx(one.duration_s)
+
+
+def test_backlash_is_compensated_at_reversals() -> None:
+    machine = in_mode("exact-path", 0.01, "axes.x.backlash_mm=0.1", "axes.x.compensation_mm=0.1")
+    path = ToolpathBuilder().rapid(2.0, 0.0, 0.0).rapid(0.0, 0.0, 0.0).finish()
+    out, back = run(path, machine)
+    assert out.slide[-1, 0] == pytest.approx(2.0)
+    assert back.slide[-1, 0] == pytest.approx(0.0, abs=1e-12)
+    assert back.reversals.tolist() == [1, 0, 0]
+    assert back.compensation_s == 0.0
+
+
+def test_counts_homing_and_the_end() -> None:
+    builder = ToolpathBuilder().rapid(1.0, 2.0, 3.0).moved_to(0.0, 0.0, 3.0).event(Kind.HOME_XY)
+    path = builder.event(Kind.END).rapid(9.0, 9.0, 9.0).finish()
+    rows = run(path, in_mode("exact-path"))
+    assert len(rows) == 3
+    assert [row.steps.tolist() for row in rows] == [[200, 400, 600], [200, 400, 0], [0, 0, 0]]
+    assert (rows[1].commanded[-1] == (0.0, 0.0, 3.0)).all()
+
+
+def test_rows_that_do_not_move() -> None:
+    builder = ToolpathBuilder().line(0.0, 0.0, 0.0, feed=100.0)
+    builder.arc(0.0, 0.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=100.0)
+    for path in (builder.finish(), ToolpathBuilder().finish()):
+        assert total(path, in_mode("blend")) == 0.0
+
+
+def test_what_cannot_be_followed() -> None:
+    far = ToolpathBuilder().rapid(1e10, 0.0, 0.0).finish()
+    with pytest.raises(ProgramError, match="count"):
+        simulate(far, in_mode("blend"))
+    still = ToolpathBuilder().line(1.0, 0.0, 0.0, feed=float("inf")).finish()
+    with pytest.raises(ProgramError, match="without a feed"):
+        simulate(still, in_mode("blend"))
+
+
+def test_the_path_mode_must_be_said() -> None:
+    path = ToolpathBuilder().rapid(1.0, 0.0, 0.0).finish()
+    with pytest.raises(MachineError, match="how it meets corners"):
+        simulate(path, in_mode("round"))
