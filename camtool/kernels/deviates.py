@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner
 
 GAMMA = np.uint64(0x9E3779B97F4A7C15)
 """2⁶⁴ divided by the golden ratio, odd: what the counter of SplitMix64 goes on by."""
