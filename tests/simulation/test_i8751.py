@@ -286,6 +286,10 @@ def test_the_longest_record_and_many_short_ones() -> None:
     chunks = list(simulate(moves, machine()))
     assert len(chunks) < 20
     assert sum(int(chunk.ledger.steps[:, 0].sum()) for chunk in chunks) == count
+    last = np.concatenate(
+        [chunk.commanded[np.diff(chunk.row, append=-1) != 0] for chunk in chunks]
+    )
+    assert last == pytest.approx(moves.end)
 
 
 def test_the_page_names_every_option() -> None:

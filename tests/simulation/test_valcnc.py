@@ -349,13 +349,14 @@ def test_the_size_of_chunks_does_not_matter(size: int) -> None:
     assert all(len(chunk.row) <= size for chunk in chunks)
 
 
-def test_a_long_arc_is_made_a_block_of_pieces_at_a_time() -> None:
-    """55,000 pieces in more than three blocks: the slow loop makes the same."""
-    made = machine("controller.arc_segment_mm=0.001")
-    (row,) = run(arc((8.75, 0), (8.75, 0), (0, 0), ccw=False), made)
-    twin = Valcnc((STEP_MM,) * 3, segment_mm=0.001)
-    twin.at, twin.coordinate = (219, 0, 0), (8.75, 0.0, 0.0)
-    assert steps_of(row) == twin.arc((8.75, 0.0), -8.75, 0.0, ccw=False, full=True)
+@pytest.mark.parametrize("counting", ["coordinates", "differences"])
+def test_a_long_arc_is_made_a_block_of_pieces_at_a_time(counting: str) -> None:
+    """25,000 pieces in two blocks: the slow loop makes the same."""
+    made = machine("controller.arc_segment_mm=0.05", f"controller.counting={counting}")
+    (row,) = run(arc((200, 0), (200, 0), (0, 0), ccw=False), made)
+    twin = Valcnc((STEP_MM,) * 3, segment_mm=0.05, differences=counting == "differences")
+    twin.at, twin.coordinate = (5000, 0, 0), (200.0, 0.0, 0.0)
+    assert steps_of(row) == twin.arc((200.0, 0.0), -200.0, 0.0, ccw=False, full=True)
 
 
 def test_effects_can_be_left_out() -> None:

@@ -118,7 +118,7 @@ class PulseTimes:
         """(N,) s for runs of pulses."""
         if self._firmware.high_byte == "256":
             return self._burst_s(pulses)
-        bursts = np.maximum(pulses - 1, 0) // BURST_PULSES
+        bursts = pulses // BURST_PULSES
         burst_s = self._burst_s(np.array([BURST_PULSES]))
         return np.asarray(bursts * burst_s + self._burst_s(pulses - BURST_PULSES * bursts))
 
