@@ -19,7 +19,8 @@ from camtool.errors import InputError
 from camtool.machine.model import Axis, Machine
 
 NONE_LEFT_SIGMAS = 3.0
-"""A play below zero by no more than so many standard uncertainties is none; beyond, a fault."""
+"""A play below zero by no more than so many standard uncertainties, or than a step, is none;
+beyond, a fault of the measurements."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
     solution = solve(model, model.start(machine))
     estimates = (*_plain(model, solution, machine), *_mean_plays(model, solution, machine))
     for estimate in estimates:
-        _no_negative_play(estimate, measurements.file)
+        _no_negative_play(estimate, machine, measurements.file)
     known = [reading.uncertainty_mm for reading in readings if reading.uncertainty_mm]
     residuals = [r.measured_mm - p for r, p in zip(readings, solution.predicted, strict=True)]
     freedom = solution.freedom
@@ -184,17 +185,19 @@ def _mean_plays(model: Model, solution: Solution, machine: Machine) -> list[Esti
     return found
 
 
-def _no_negative_play(estimate: Estimate, file: str) -> None:
-    if estimate.what != "play" or estimate.value >= 0.0:
+def _no_negative_play(estimate: Estimate, machine: Machine, file: str) -> None:
+    """InputError for a play below zero by more than a step and more than its uncertainty."""
+    if estimate.what != "play":
         return
-    if estimate.uncertainty and -estimate.value < NONE_LEFT_SIGMAS * estimate.uncertainty:
-        return
-    raise InputError(
-        f"{estimate.name} comes out as {estimate.value:.4g} mm, which no machine has",
-        file=file,
-        mend="was the line that falls short given as the first one, or the compensation that was "
-        "active not said (compensation_mm)?",
-    )
+    axis: Axis = getattr(machine.axes, estimate.axis)
+    slack_mm = max(axis.coded_step_mm, NONE_LEFT_SIGMAS * (estimate.uncertainty or 0.0))
+    if estimate.value < -slack_mm:
+        raise InputError(
+            f"{estimate.name} comes out as {estimate.value:.4g} mm, which no machine has",
+            file=file,
+            mend="were the two lines (or rows) exchanged, or was compensation_mm not what the "
+            "controller added while cutting?",
+        )
 
 
 def _norm(values: list[float]) -> float:

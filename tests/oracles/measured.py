@@ -17,7 +17,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.options import ALL
 
-CHORD_RAD = 0.0005
+CHORD_RAD = 0.002
 
 
 def readings(sheet: Sheet, machine: Machine, *, backwards: bool = False) -> list[dict[str, Any]]:
@@ -34,7 +34,8 @@ def _cut(path: Path, mechanics: Mechanics, backwards: bool) -> tuple[np.ndarray,
     vertices = list(path.vertices)
     if backwards and not path.closed:
         vertices = vertices[::-1]
-    ring = [*vertices, vertices[0]] if path.closed else vertices
+    # A circle is read on its second time round: how the tool came to its start is forgotten.
+    ring = [*vertices, *vertices, vertices[0]] if path.closed else vertices
     runs = [np.array([ring[0][:2]])]
     for (x1, y1, bulge), (x2, y2, _) in pairwise(ring):
         runs.append(_dense(complex(x1, y1), complex(x2, y2), bulge))
@@ -60,7 +61,7 @@ def _read(
 ) -> dict[str, Any]:
     corners = slide[at]
     if kind == "circles":
-        return {"diameters_mm": _diameters(slide, table["angles_deg"])}
+        return {"diameters_mm": _diameters(slide[at[2] :], table["angles_deg"])}
     if kind == "squares":
         return _square(corners, back)
     axis = "xy".index(table["axis"])
