@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
+from camtool.machine.controllers import FlashcutController, SlideStart
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
 from camtool.simulation import flashcut
@@ -306,6 +307,14 @@ def test_held_are_the_lengths_that_the_program_says() -> None:
     path = ToolpathBuilder().line(0.1234, 0.0567, feed=3.0).event(Kind.HOME_XY).finish()
     held = flashcut.held(path, machine("controller.machine_zero_mm=[1.0, 2.0, 3.0]"))
     assert held.end.tolist() == [[0.1234, 0.0567, 0.0], [1.0, 2.0, 0.0]]
+
+
+def test_the_page_names_every_option() -> None:
+    page = TARGET.parents[1] / "docs" / "controllers" / "flashcut.md"
+    text = page.read_text(encoding="utf-8")
+    own = set(FlashcutController.__struct_fields__) - set(SlideStart.__struct_fields__)
+    assert len(own) == 7
+    assert [name for name in sorted(own) if f"controller.{name}" not in text] == []
 
 
 def test_the_assumptions_name_the_fastest_feed() -> None:

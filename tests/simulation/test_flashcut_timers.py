@@ -2,11 +2,14 @@
 
 import itertools
 import random
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from camtool.kernels.timers import XY, Counters, Issued, Moves, Rules, timers_fill
+from camtool.machine.controllers import FlashcutController
+from camtool.machine.controllers.flashcut_timers import steps_too_many
 from tests.oracles.flashcut_run import Pc
 
 STEP = 0.0019
@@ -55,7 +58,7 @@ def literally(ways: list[tuple[int, int]], p: int, late: bool) -> Pc:
 @pytest.mark.parametrize("late", [False, True])
 @pytest.mark.parametrize("p", range(1, 8))
 def test_every_short_move(p: int, late: bool) -> None:
-    ways = list(itertools.product(range(-9, 10), repeat=2))
+    ways = [(nx, ny) for nx in range(-9, 10) for ny in range(-9, 10)]
     ran, wanted = Ran(ways, p, late), literally(ways, p, late)
     assert ran.at == wanted.seen
     assert ran.ms.tolist() == [max(abs(nx), abs(ny)) * (p + 1) for nx, ny in ways]
@@ -95,6 +98,28 @@ def test_the_shorter_axis_by_its_formula(late: bool) -> None:
         straight = Ran([(n, m) for n, m in ways if n > m], p, late).steps
         assert turned[:, [1, 0, 2]].tolist() == straight.tolist()
     assert over > 50 < exact
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("p", [*range(1, 12), 20, 31])
+def test_every_move_of_up_to_40_steps(p: int, late: bool) -> None:
+    ways = list(itertools.product(range(-40, 41), range(41)))
+    assert Ran(ways, p, late).at == literally(ways, p, late).seen
+
+
+@pytest.mark.parametrize("clock", ["whole-ms", "late-longer"])
+def test_steps_too_many_are_those_that_the_timers_make(
+    clock: Literal["whole-ms", "late-longer"],
+) -> None:
+    ways = [(n, m) for n in range(60) for m in range(n + 1)]
+    longer, shorter = np.array(ways).T
+    controller = FlashcutController(clock=clock)
+    for p in (1, 3, 20, 41):
+        extra = steps_too_many(longer, shorter, np.full(len(ways), p), controller)
+        made = Ran(ways, p, clock == "late-longer").steps
+        assert (made[:, 1] - shorter).tolist() == extra.tolist()
+        assert made[:, 0].tolist() == longer.tolist()
 
 
 def test_a_diagonal_in_both_readings() -> None:
