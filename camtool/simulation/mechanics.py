@@ -45,11 +45,11 @@ class _Varied:
     def at(self, commanded_mm: Floats) -> Floats:
         """The play (K, 3) mm at each position (K, 3) mm."""
         plays = np.tile(self.plays, (len(commanded_mm), 1))
-        table = commanded_mm[:, :2] - self.zero[:2]
+        x, y = commanded_mm[:, 0] - self.zero[0], commanded_mm[:, 1] - self.zero[1]
         for axis, cells in enumerate(self.cells):
             if cells is not None:
-                column = np.searchsorted(cells.x_mm[1:-1], table[:, 0], side="right")
-                row = np.searchsorted(cells.y_mm[1:-1], table[:, 1], side="right")
+                column = np.searchsorted(cells.x_mm[1:-1], x, side="right")
+                row = np.searchsorted(cells.y_mm[1:-1], y, side="right")
                 plays[:, axis] = np.array(cells.play_mm)[row, column]
         return plays
 
