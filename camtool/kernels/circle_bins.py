@@ -13,6 +13,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from camtool.kernels.inner import inner
 from camtool.kernels.wide import larger, smaller, wide
 
 Floats = npt.NDArray[np.float64]
@@ -26,7 +27,7 @@ BIN_COLUMNS = 9
 
 def bin_directions() -> Floats:
     """(721, 2) the directions between which the bins lie."""
-    angle = np.arange(ANGLE_BINS + 1) * (2.0 * np.pi / ANGLE_BINS)
+    angle = np.arange(ANGLE_BINS + 1) % ANGLE_BINS * (2.0 * np.pi / ANGLE_BINS)
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
@@ -37,7 +38,7 @@ def empty_bins(count: int) -> Floats:
     return bins
 
 
-@wide
+@inner
 def _bin_of(x: float, y: float, directions: Floats) -> int:
     """The bin of a point: by its angle, and on the edge of two bins by the cross products."""
     turn = math.atan2(y, x) / (2.0 * math.pi)
@@ -50,7 +51,7 @@ def _bin_of(x: float, y: float, directions: Floats) -> int:
     return which
 
 
-@wide
+@inner
 def _stay(x: Floats, y: Floats, centre: Floats, one: Floats, next_: Floats) -> int:
     """How many of the points from the first on lie between the two directions: at least one."""
     cx, cy = centre[0], centre[1]

@@ -53,10 +53,11 @@ def play_block(way: int, positions: Floats, axis: Floats, state: Floats, out: Fl
     if way != STILL and way != state[1]:
         while positions[begin] == state[0]:
             begin += 1
-        still = taken_along(state[3], (state[0] + state[2]) * scale, low, high)
+        if begin > 0:
+            state[3] = taken_along(state[3], (state[0] + state[2]) * scale, low, high)
         for k in range(begin):
-            out[k] = still
-        state[1], state[3] = way, still
+            out[k] = state[3]
+        state[1] = way
         state[2] += way * axis[3]
         reversals = 1
     added = state[2]

@@ -39,6 +39,7 @@ from camtool.verify.noticed import motion_findings
 from camtool.verify.records import Before, Planned
 from camtool.verify.report import Report
 from camtool.verify.result import Result
+from camtool.verify.rows import RowFigures
 from camtool.verify.slides import SlidePass, Steps
 from camtool.verify.trace import Trace, trace_size
 
@@ -47,11 +48,13 @@ __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The report, all findings that are in it, and the slides' path for pictures."""
+    """The report, all findings that are in it, the slides' path for pictures, and what became of
+    each row."""
 
     report: Report
     trace: Trace
     findings: tuple[Finding, ...]
+    rows: RowFigures
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
         """The same with these findings, in the report too."""
@@ -112,7 +115,7 @@ def judge(case: Case, motion: Iterable[Chunk] | Steps) -> Verification:
     findings = _all_findings(case, coverage, noticed)
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally)
     trace = slides.trace()
-    return Verification(result.report(extents, findings, trace), trace, findings)
+    return Verification(result.report(extents, findings, trace), trace, findings, rows)
 
 
 def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:
