@@ -83,21 +83,18 @@ def fill_bins(x: Floats, y: Floats, centre: Floats, directions: Floats, bins: Fl
         done += stay
 
 
-@wide
+@inner
 def _add(x: Floats, y: Floats, centre: Floats, one: Floats) -> None:
     """Put points into one bin."""
     cx, cy = centre[0], centre[1]
-    sum_x, sum_y, least, largest = 0.0, 0.0, np.inf, -np.inf
+    least, largest = np.inf, -np.inf
     for k in range(len(x)):
-        px, py = x[k] - cx, y[k] - cy
-        square = px * px + py * py
-        sum_x += px
-        sum_y += py
+        square = (x[k] - cx) * (x[k] - cx) + (y[k] - cy) * (y[k] - cy)
         least = smaller(least, square)
         largest = larger(largest, square)
     one[0] += len(x)
-    one[1] += sum_x
-    one[2] += sum_y
+    one[1] += _sum(x, cx)
+    one[2] += _sum(y, cy)
     if least < one[3]:
         _place(x, y, centre, least, one[3:6])
     if largest > one[6]:
@@ -105,6 +102,14 @@ def _add(x: Floats, y: Floats, centre: Floats, one: Floats) -> None:
 
 
 @wide
+def _sum(x: Floats, centre: float) -> float:
+    total = 0.0
+    for k in range(len(x)):
+        total += x[k] - centre
+    return total
+
+
+@inner
 def _place(x: Floats, y: Floats, centre: Floats, square: float, out: Floats) -> None:
     """The first point with this square of its distance."""
     for k in range(len(x)):
