@@ -134,13 +134,26 @@ class ModalReader:
             self._absolute = modes["distance"] == G.ABSOLUTE
         if "arc distance" in modes:
             self._absolute_centres = modes["arc distance"] == G.ABSOLUTE_CENTRES
-        if modes.get("path") == G.BLEND:  # P is its tolerance, Q that of merging lines
-            numbers.pop("P", None)
-            numbers.pop("Q", None)
+        if "path" in modes:
+            self._set_path_mode(block, modes["path"], numbers)
         if modes.get("tool length") == G.TOOL_LENGTH:  # H tells of which tool
             numbers.pop("H", None)
         if "work frame" in modes:
             self._set_frame(block, modes["work frame"])
+
+    def _set_path_mode(self, block: Block, code: int, numbers: dict[str, float]) -> None:
+        """G61, G61.1 and G64 with P, its tolerance, and Q, that of merging lines (P where it is
+        not said): a block that says other than the machine file is noted."""
+        blends = code == G.BLEND
+        corner = numbers.pop("P", 0.0) * self._mm if blends else 0.0
+        merging = numbers.pop("Q", None) if blends else None
+        lines = corner if merging is None else merging * self._mm
+        if self._rules.path_mode is None:
+            return
+        mode, tolerance = self._rules.path_mode
+        fits = math.isclose(corner, tolerance) and math.isclose(lines, tolerance)
+        if code != mode or not fits:
+            self._notes.corners.append(block.index)
 
     def _set_frame(self, block: Block, frame: int) -> None:
         """G54 to G59: whichever comes before the first move has its zero at part zero."""

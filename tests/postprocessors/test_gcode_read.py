@@ -379,3 +379,27 @@ def test_a_circle_may_say_its_centre_alone_in_linuxcnc() -> None:
     for bad in (b"G21 F100 G3 R2\nM2\n", b"G21 F100 G3\nM2\n", b"G21 F100 G1 I2\nM2\n"):
         with pytest.raises(ProgramError):
             linuxcnc.post.read(bad, linuxcnc.machine)
+
+
+@pytest.mark.parametrize(
+    ("said", "settings", "noted"),
+    [
+        ("G64 P0.01", (), False),
+        ("G64 P0.01 Q0.01", (), False),
+        ("G64 P0.01 Q0", (), True),
+        ("G64 P0.02", (), True),
+        ("G64", (), True),
+        ("G61", (), True),
+        ("G20 G64 P0.001", ("dialect.blend_tolerance_mm=0.0254",), False),
+        ("G61", ("dialect.path=exact-path",), False),
+        ("G61.1", ("dialect.path=exact-path",), True),
+        ("G61.1", ("dialect.path=exact-stop",), False),
+        ("G64 P0.01", ("dialect.path=exact-stop",), True),
+    ],
+)
+def test_other_corners_than_those_simulated_are_noted(
+    said: str, settings: tuple[str, ...], noted: bool
+) -> None:
+    path = read(f"{said}\nG0 X1\nM2\n", "linuxcnc", *settings)
+    codes = [(finding.code, finding.where) for finding in path.findings]
+    assert codes == ([(Code.EXECUTED_OTHERWISE, "block 1")] if noted else [])
