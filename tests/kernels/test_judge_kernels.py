@@ -1,0 +1,158 @@
+"""The kernels of the judge against plain loops."""
+
+import math
+
+import numpy as np
+import pytest
+
+from camtool.kernels.box_tree import tree_of
+from camtool.kernels.circle_bins import ANGLE_BINS, bin_directions, empty_bins
+from camtool.kernels.near_moves import COUNT, new_memo
+from camtool.kernels.thin_trace import WRITTEN, new_pen, unwritten
+from tests.oracles.kernel_doors import fill_bins_, lower_errors_, nearest_errors_, trace_block_
+from tests.oracles.near_moves import Arc, Line, Move, nearest, random_move
+
+EPS = 1e-12
+
+
+def test_errors_are_those_of_a_loop_with_angles() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        move = random_move(rng)
+        x, y = rng.uniform(-1.5, 1.5, (2, 37))
+        best = np.full(37, np.inf)
+        lower_errors_(np.array(move.row(), dtype=np.float64), x, y, best)
+        wanted = [move.error(*point) for point in zip(x.tolist(), y.tolist(), strict=True)]
+        assert np.abs(best) == pytest.approx(np.abs(wanted), abs=EPS)
+        side = np.abs(wanted) > EPS
+        assert np.array_equal(np.sign(best[side]), np.sign(np.array(wanted)[side]))
+
+
+@pytest.mark.parametrize("sweep", [math.pi / 2, math.pi, 1.5 * math.pi, 2 * math.pi])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_every_place_about_an_arc_on_a_lattice(sweep: float, sense: float) -> None:
+    """Points on the centre, the arc, its ends, the edges of its wedge and beyond them."""
+    move = Arc((0.0, 0.0), 2.0, 0.0, sense * sweep)
+    points = [(float(x), float(y)) for x in range(-4, 5) for y in range(-4, 5)]
+    x, y = np.array(points).T.copy()
+    best = np.full(len(points), np.inf)
+    lower_errors_(np.array(move.row()), x, y, best)
+    ends = (math.dist(p, move.place(0.0)) for p in points)
+    others = (math.dist(p, move.place(1.0)) for p in points)
+    for point, error, one, other in zip(points, best.tolist(), ends, others, strict=True):
+        choices = [abs(move.error(*point)), one, other]
+        # On the edge of the wedge the angle is told by rounding; the distance there is that of
+        # the end either way.
+        assert min(abs(abs(error) - choice) for choice in choices) < 1e-9
+        assert abs(error) <= min(one, other) + 1e-9
+
+
+def test_what_is_nearer_already_stays() -> None:
+    best = np.array([0.1, -5.0])
+    lower_errors_(
+        np.array(Line((0, 0), (4, 0)).row(), float), np.ones(2), np.array([0.3, 2]), best
+    )
+    assert best.tolist() == [0.1, 2.0]
+
+
+def walk(rng: np.random.Generator, count: int, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points that follow each other, with jumps."""
+    steps = rng.normal(0.0, size, (count, 2))
+    steps[rng.integers(0, count, 3)] += rng.normal(0.0, 0.7, (3, 2))
+    path = np.cumsum(steps, axis=0)
+    return np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-4, 0.01, 0.3])
+@pytest.mark.parametrize("count", [1, 2, 60])
+def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
+    rng = np.random.default_rng(count)
+    found, memo = np.empty(count, dtype=np.int64), new_memo()
+    moves: list[Move] = [random_move(rng) for _ in range(count)]
+    moves[-1] = moves[0]  # twice the same
+    table = np.array([move.row() for move in moves], dtype=np.float64)
+    tree = tree_of(np.array([move.box() for move in moves], dtype=np.float64))
+    low = rng.uniform(-1.0, 0.0, count)
+    heights = np.column_stack([low, low + rng.uniform(0.0, 0.3, count)])
+    for _ in range(25):
+        first, last = sorted(rng.integers(0, count + 1, 2).tolist())
+        window = sorted(rng.uniform(-1.2, 0.5, 2).tolist())
+        x, y = walk(rng, 40, size)
+        out = np.empty(40)
+        only = (first, last, *window)
+        nearest_errors_(x, y, only, (table, heights, tree), found, memo, out)
+        high = [
+            k
+            for k in range(first, last)
+            if heights[k, 0] <= window[1] and heights[k, 1] >= window[0]
+        ]
+        some = [moves[k] for k in (high or range(first, last))]
+        assert (memo[COUNT] == 0) == (not some)
+        wanted = [nearest(some, *point) for point in zip(x.tolist(), y.tolist(), strict=True)]
+        assert np.abs(out) == pytest.approx(np.abs(wanted), abs=EPS)
+
+
+def test_the_bins_of_a_circle_are_those_of_a_loop() -> None:
+    rng = np.random.default_rng(1)
+    directions = bin_directions()
+    for size in (0.5, 0.01):
+        bins, wanted = empty_bins(1)[0], empty_bins(1)[0]
+        for _ in range(30):
+            turn = np.cumsum(rng.normal(0.0, size, 50)) + rng.uniform(0.0, 6.28)
+            radius = rng.uniform(0.5, 1.5, 50)
+            x, y = 2.0 + radius * np.cos(turn), -1.0 + radius * np.sin(turn)
+            fill_bins_(x, y, np.array([2.0, -1.0]), directions, bins)
+            for px, py in zip(x - 2.0, y + 1.0, strict=True):
+                which = int(math.atan2(py, px) % (2.0 * math.pi) / (2.0 * math.pi) * ANGLE_BINS)
+                one, square = wanted[which], px * px + py * py
+                one[:3] += 1.0, px, py
+                if square < one[3]:
+                    one[3:6] = square, px, py
+                if square > one[6]:
+                    one[6:9] = square, px, py
+        seen = wanted[:, 0] > 0
+        assert np.array_equal(bins[:, 0], wanted[:, 0])
+        assert bins[seen] == pytest.approx(wanted[seen], abs=1e-12)
+
+
+def thinned(rows: list[list[tuple[float, float, float]]], stride: int) -> list[tuple[float, ...]]:
+    """Of `stride` points (x, y, error) of a row each the largest, first of equals, and the last."""
+    kept = []
+    for number, row in enumerate(rows):
+        which = set()
+        for low in range(0, len(row), stride):
+            run = range(low, min(low + stride, len(row)))
+            which.add(max(run, key=lambda k: (row[k][2], -k)))
+        if row:
+            which.add(len(row) - 1)
+        kept += [(*row[k], float(number)) for k in sorted(which)]
+    return kept
+
+
+@pytest.mark.parametrize("stride", [1, 2, 3, 7, 100])
+def test_the_trace_is_that_of_a_loop(stride: int) -> None:
+    rng = np.random.default_rng(stride)
+    for _ in range(30):
+        rows = [rng.integers(0, 4, (int(rng.integers(0, 30)), 3)) / 8.0 for _ in range(6)]
+        pen, trace = new_pen(stride, 1000), np.empty((1200, 4))
+        for number, row in enumerate(rows):
+            if number == 2:
+                row[:, 2] = 0.0  # nothing is cut
+            for part in np.array_split(row, 4):
+                if len(part):
+                    x, y, error = (np.ascontiguousarray(column) for column in part.T)
+                    largest = float(error.max())
+                    trace_block_(number, x, y, error, largest, pen, trace)
+        got = np.concatenate([trace[: int(pen[WRITTEN])], unwritten(pen)])
+        wanted = thinned([[tuple(point) for point in row.tolist()] for row in rows], stride)
+        assert got.tolist() == [list(point) for point in wanted]
+
+
+def test_a_full_trace_keeps_the_ends_of_rows() -> None:
+    pen, trace = new_pen(1, 3), np.empty((20, 4))
+    for number in range(4):
+        x = np.arange(3.0)
+        trace_block_(number, x, x, x + 1.0, 3.0, pen, trace)
+    got = np.concatenate([trace[: int(pen[WRITTEN])], unwritten(pen)])
+    assert got[:, 3].tolist() == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+    assert got[3:, 0].tolist() == [2.0, 2.0, 2.0]
