@@ -233,15 +233,17 @@ KINDS: tuple[type[Coupon], ...] = (Lines, Square, Circle, Steps, Closure)
 
 
 class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The file without its coupons, whose tables are known by name only."""
+
     target: str = ""
     uncertainty_mm: Positive | None = None
     compensation_mm: Added = Added()
     regions: RegionsOf = RegionsOf()
-    lines: list[dict[str, Any]] = []
-    squares: list[dict[str, Any]] = []
-    circles: list[dict[str, Any]] = []
-    steps: list[dict[str, Any]] = []
-    closures: list[dict[str, Any]] = []
+    lines: tuple[()] = ()
+    squares: tuple[()] = ()
+    circles: tuple[()] = ()
+    steps: tuple[()] = ()
+    closures: tuple[()] = ()
 
 
 class Measurements(msgspec.Struct, frozen=True):
@@ -260,12 +262,13 @@ def read_measurements(path: Path) -> Measurements:
     file = str(path)
     try:
         table = read_table(path)
+        tables = {kind.kind: _tables(table.pop(kind.kind, []), kind.kind, file) for kind in KINDS}
         head = convert(table, _Head, file)
     except MachineError as error:
         raise _as_input(error, file, error.where) from None
     coupons = []
     for kind in KINDS:
-        for number, values in enumerate(getattr(head, kind.kind), start=1):
+        for number, values in enumerate(tables[kind.kind], start=1):
             name = f"{kind.kind} {number}"
             coupons.append((name, _coupon(values, kind, file, name)))
     if not coupons:
@@ -283,6 +286,15 @@ def read_measurements(path: Path) -> Measurements:
         head.regions,
         tuple(coupons),
     )
+
+
+def _tables(value: Any, kind: str, file: str) -> list[dict[str, Any]]:
+    """The tables of a kind of coupon."""
+    if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
+        raise InputError(
+            "is no array of tables", file=file, where=f"key {kind}", mend=f"write [[{kind}]]"
+        )
+    return value
 
 
 def _check_regions(regions: RegionsOf, coupons: list[tuple[str, Coupon]], file: str) -> None:
