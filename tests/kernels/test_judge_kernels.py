@@ -116,7 +116,7 @@ def test_the_bins_of_a_circle_are_those_of_a_loop() -> None:
 
 
 def thinned(rows: list[list[tuple[float, float, float]]], stride: int) -> list[tuple[float, ...]]:
-    """Of `stride` points (x, y, error) of a row each the largest, first of equals, and the last."""
+    """Of `stride` points (x, y, error) of a row the largest (first of equals), and the last."""
     kept = []
     for number, row in enumerate(rows):
         which = set()
