@@ -13,7 +13,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner
 from camtool.kernels.wide import larger, smaller, wide
 
 Floats = npt.NDArray[np.float64]

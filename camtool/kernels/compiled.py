@@ -25,10 +25,13 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 class Kernel:
     """Stands for a function until it is called, and then for what numba made of it."""
 
-    def __init__(self, function: Callable[..., Any], *, inside: bool) -> None:
+    def __init__(
+        self, function: Callable[..., Any], *, inside: bool, loose: frozenset[str] = frozenset()
+    ) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
         self.inside = inside
+        self.loose = loose
 
     def __call__(self, *arguments: Any) -> Any:
         """Run what was compiled; compile first when it was not."""
@@ -37,12 +40,12 @@ class Kernel:
     @functools.cached_property
     def entry(self) -> Any:
         """numba's form of the function for Python; of inner ones it is for tests, and not kept."""
-        return _plain(_njit(self.py_func)) if self.inside else self.dispatcher
+        return self._made(no_cpython_wrapper=False) if self.inside else self.dispatcher
 
     @functools.cached_property
     def dispatcher(self) -> Any:
         """numba's form of the function for other kernels, kept on disk."""
-        made = _plain(_njit(self.py_func, no_cpython_wrapper=self.inside))
+        made = self._made(no_cpython_wrapper=self.inside)
         made._cache = _kept(self.py_func)
         return made
 
@@ -50,6 +53,15 @@ class Kernel:
     def _numba_type_(self) -> Any:
         """What numba takes this for where a kernel calls it."""
         return self.dispatcher._numba_type_
+
+    def _made(self, **options: Any) -> Any:
+        import numba
+
+        # Options of numba's that its own types do not know.
+        njit: Any = numba.njit
+        loose = set(self.loose) or False
+        make = njit(error_model="numpy", no_cfunc_wrapper=True, fastmath=loose, **options)
+        return _plain(make(self.py_func))
 
 
 def kernel(function: Function) -> Function:
@@ -62,12 +74,13 @@ def inner(function: Function) -> Function:
     return cast(Function, Kernel(function, inside=True))
 
 
-def _njit(function: Callable[..., Any], **options: bool) -> Any:
-    import numba
+def loose_inner(*promises: str) -> Callable[[Function], Function]:
+    """As `inner`, with promises about its numbers (LLVM's fast-math flags)."""
 
-    # Options of numba's that its own types do not know.
-    njit: Any = numba.njit
-    return njit(error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+    def made(function: Function) -> Function:
+        return cast(Function, Kernel(function, inside=True, loose=frozenset(promises)))
+
+    return made
 
 
 def _plain(made: Any) -> Any:

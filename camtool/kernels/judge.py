@@ -21,9 +21,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from camtool.kernels.circle_bins import fill_bins
+from camtool.kernels.compiled import kernel
 from camtool.kernels.error_bins import BEFORE_FIRST, BINS, SHIFT
 from camtool.kernels.move_errors import lower_errors
 from camtool.kernels.near_moves import COUNT, nearest_errors
@@ -217,7 +217,7 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> 
     trace_block(row, slide_x, slide_y, size, largest, sums.pen, sums.trace)
 
 
-@njit(cache=True)
+@kernel
 def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> None:
     """Judge K samples in order: row (K,), commanded and slide (K, 3) mm, whose Z is not looked at;
     any number of rows."""

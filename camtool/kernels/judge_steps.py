@@ -20,13 +20,12 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from camtool.kernels.approach import approach_scan, expected_quadrants
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
 from camtool.kernels.direct_search import direct_search_fill, direct_search_start
 from camtool.kernels.heading import rounded_radius
-from camtool.kernels.inner import inner
 from camtool.kernels.judge import BENCH_ROWS, BLOCK, SLIDE_X, Sums, Task, X, judge_block
 from camtool.kernels.play_blocks import TURNING, play_block, way_of
 from camtool.kernels.stairs import stairs_fill, stairs_start
@@ -186,7 +185,7 @@ def _deepen(leg: Ints, state: Floats, counts: Ints) -> None:
         counts[REVERSALS + 2] = 1
 
 
-@njit(cache=True)
+@kernel
 def judge_legs(
     legs: Ints,
     how: tuple[int, bool],

@@ -18,12 +18,13 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from camtool.kernels.compiled import kernel
 
 Floats = npt.NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel
 def entry_speeds(gain: Floats, limit: Floats, window: int, entry: Floats) -> None:
     """Squares of the speeds at the starts of N blocks, `entry` (N,).
 

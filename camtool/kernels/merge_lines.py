@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -51,7 +50,7 @@ def _joins(points: Floats, base: int, new: int, tolerance: float) -> bool:
     return True
 
 
-@njit(cache=True)
+@kernel
 def merge_lines(
     points: Floats, apart: Bools, tolerance: float, chain: Ints, moved: Floats
 ) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner
 from camtool.kernels.play import taken_along, turned
 from camtool.kernels.wide import larger, smaller
 

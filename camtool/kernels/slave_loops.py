@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner
 from camtool.kernels.slave_record import (
     BEGIN,
     CHUNK,

@@ -33,9 +33,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from camtool.kernels.inner import inner
+from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.slave_loops import listed_loop, next_stage, start_line, text_loop, to_go_of
 from camtool.kernels.slave_record import (
     BEGIN,
@@ -247,7 +246,7 @@ def _given_up(state: State, tick: int) -> None:
             motor[DONE], motor[DRIVE] = tick, 0.0
 
 
-@njit(cache=True)
+@kernel
 def slaves_fill(
     program: Program, state: State, account: Account, out: Ints, row: Ints
 ) -> tuple[int, bool]:

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from camtool.kernels.compiled import kernel
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -28,7 +29,7 @@ def steps_taken(way: Ints, events: Ints) -> Ints:
     return np.asarray(np.sign(way) * taken)
 
 
-@njit(cache=True)
+@kernel
 def step_lines_fill(
     blocks: tuple[Ints, Ints], first: tuple[int, int], step_mm: Floats, out: Floats
 ) -> None:

@@ -20,7 +20,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from camtool.kernels.compiled import kernel
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -29,7 +30,7 @@ CHORD_GUARD = 1e-9
 """Part of an arc's diameter: a chord longer by less is a diameter."""
 
 
-@njit(cache=True)
+@kernel
 def arc_angles(turn: Ints, ends: Floats, offset: Floats, computed: bool, out: Floats) -> int:
     """Fill `out` (N, 5): centre x and y, R, θ and signed α of each arc; 0 in other rows.
 

@@ -9,21 +9,16 @@ an array, which needs no look at their signs.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+from camtool.kernels.compiled import loose_inner
 
-_LOOSE = {"nnan", "nsz", "reassoc"}
-
-
-def wide(function: Function) -> Function:
-    """As `camtool.kernels.inner`, for loops over errors: sums may be taken in any order."""
-    options = {"cache": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return cast(Function, cast(Any, njit)(**options, fastmath=_LOOSE)(function))
+wide = loose_inner("nnan", "nsz", "reassoc")
+"""As `camtool.kernels.compiled.inner`, for loops over errors: sums may be taken in any order."""
 
 
 def _of_two(name: str) -> Callable[[float, float], float]:
