@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.float64]
 
 
 def split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:
-    """Lines of X and Y in pieces; PostError when they would be too many."""
+    """Lines of X and Y in pieces; PostError when they would be too many. XY and Z are apart."""
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
         return Lowered(toolpath, np.arange(len(toolpath)))
@@ -38,7 +38,7 @@ def split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:
     steps = np.column_stack([to_steps(way[:, axis], float(q_mm[axis])) for axis in (0, 1)])
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
     exact = np.maximum(half_periods_ms(feed, float(q_mm.max()), controller) - 1.0, 1.0)
-    slanted = (toolpath.kind == Kind.LINE) & (toolpath.end[:, 2] == begin[:, 2])
+    slanted = toolpath.kind == Kind.LINE
     pieces = np.where(slanted, np.ceil(np.abs(steps).min(axis=1) / exact), 1.0)
     count = np.maximum(pieces, 1.0)
     if count.sum() > MAX_PARTS:

@@ -14,7 +14,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import FlashcutController, SlideStart
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
-from camtool.simulation import flashcut
+from camtool.simulation import flashcut, flashcut_moves
 from camtool.simulation.options import IDEAL, Effects, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
@@ -132,6 +132,31 @@ def test_compensation_takes_the_time_of_its_steps() -> None:
     assert back.duration_s == pytest.approx((526 + 348 + 161) * 0.082)
     bare = rows_of(simulate(path, machine(), Options(effects=Effects(compensation=False))))
     assert sum(one.compensation_s for one in bare) == 0.0
+
+
+def test_compensation_of_a_z_with_steps_of_its_own() -> None:
+    path = ToolpathBuilder().line(z=-0.38, feed=5.7).finish()
+    (found,) = rows(
+        path,
+        "controller.half_period_ms=3",
+        "axes.z.coded_step_mm=0.0038",
+        "axes.z.compensation_mm=0.038",
+    )
+    assert found.compensation_s == pytest.approx(10 * 0.040)  # 3.8 µm at F5.7
+    assert found.duration_s == pytest.approx(110 * 0.040)
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3, 4])
+def test_arcs_of_whole_chords_have_no_further_one(quarters: int) -> None:
+    rng = np.random.default_rng(quarters)
+    path = ToolpathBuilder()
+    for x, y in rng.uniform(-9.0, 9.0, (500, 2)).tolist():
+        here, spoke = complex(*path.position[:2]), complex(x, y)
+        centre = here - spoke
+        end = here if quarters == 4 else centre + spoke * 1j**quarters
+        path.arc(end.real, end.imag, centre=(centre.real, centre.imag), ccw=True, feed=3.0)
+    table = flashcut_moves.MoveTable.of(path.finish(), machine())
+    assert set(table.chords.tolist()) == {18 * quarters}
 
 
 @pytest.mark.parametrize("parts", [1, 2])
