@@ -111,7 +111,8 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
     for estimate in estimates:
         _no_negative_play(estimate, machine, measurements.file)
     known = [reading.uncertainty_mm for reading in readings if reading.uncertainty_mm]
-    residuals = [r.measured_mm - p for r, p in zip(readings, solution.predicted, strict=True)]
+    predicted = solution.predicted.tolist()
+    residuals = [r.measured_mm - p for r, p in zip(readings, predicted, strict=True)]
     freedom = solution.freedom
     return Calibration(
         target=machine.target.name,
@@ -119,9 +120,9 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
         estimates=estimates,
         not_estimated=tuple(NotEstimated(str(each.parameter), each.why) for each in solution.held),
         fitted=tuple(
-            Fitted(reading, float(predicted), _sigmas(residual, float(sigma)))
-            for reading, predicted, residual, sigma in zip(
-                readings, solution.predicted, residuals, solution.sigma, strict=True
+            Fitted(reading, expected, _sigmas(residual, sigma))
+            for reading, expected, residual, sigma in zip(
+                readings, predicted, residuals, solution.sigma.tolist(), strict=True
             )
         ),
         freedom=freedom,

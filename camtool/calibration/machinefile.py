@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from camtool.calibration.calibrate import Calibration, Estimate
-from camtool.calibration.measurements import Measurements, Regions
+from camtool.calibration.measurements import Measurements
+from camtool.calibration.records import Regions
 from camtool.machine.model import Machine
 
 Table = dict[str, Any]

@@ -5,17 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from camtool.calibration.measurements import (
-    Added,
-    Circle,
-    Closure,
-    Coupon,
-    Lines,
-    Measurements,
-    Square,
-    Steps,
-)
+from camtool.calibration.measurements import Measurements
 from camtool.calibration.model import Course, Diagonal, Diameter, Measure, Reading, Way
+from camtool.calibration.records import Added, Circle, Closure, Coupon, Lines, Square, Steps
 from camtool.machine.model import Axis, Machine
 
 

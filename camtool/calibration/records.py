@@ -1,0 +1,229 @@
+"""The kinds of coupon as a file of measurements may say them: types, signs, sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+from msgspec import Meta
+
+Positive = Annotated[float, Meta(gt=0.0)]
+NotNegative = Annotated[float, Meta(ge=0.0)]
+Pair = tuple[Positive, Positive]
+Flat = Literal["x", "y"]
+Any3 = Literal["x", "y", "z"]
+
+MOST_TIMES = 2.0
+"""A length that comes out more than so many times as long as its nominal one, or shorter than
+this part of it, is no measurement of it but a slip: a wrong unit, a lost digit."""
+
+
+class Added(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the controller added at each reversal while it cut, mm; None: as the machine says."""
+
+    x: NotNegative | None = None
+    y: NotNegative | None = None
+    z: NotNegative | None = None
+
+
+class Regions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The cells of the table in which the play of an axis was measured, as a machine's play map
+    has them: edges in table coordinates, `names[j][i]` the region of coupons in a cell."""
+
+    x_mm: tuple[float, ...]
+    y_mm: tuple[float, ...]
+    names: tuple[tuple[str, ...], ...]
+
+    @property
+    def every(self) -> frozenset[str]:
+        """The names of all cells."""
+        return frozenset(name for row in self.names for name in row)
+
+
+class RegionsOf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The cells of each axis, where there are any."""
+
+    x: Regions | None = None
+    y: Regions | None = None
+
+
+class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What every coupon may say beside its lengths; `region` names the part of the table that it
+    lies in."""
+
+    kind: ClassVar[str]
+
+    source: str = ""
+    region: str = ""
+    uncertainty_mm: Positive | None = None
+    compensation_mm: Added | None = None
+
+    @property
+    def axes(self) -> str:
+        """The axes whose play it may tell."""
+        return "xy"
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        """(key, measured, nominal) of each length that must be near a nominal one, mm."""
+        return iter(())
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        """(key, what is wrong, mend) of what the types cannot say."""
+        return iter(())
+
+
+class Lines(Coupon, frozen=True, kw_only=True):
+    """Two parallel lines along an axis, joined at one end. `first_mm` is the line that was cut
+    in +, `second_mm` the other one, or `shorter_by_mm` how much it falls short of the first."""
+
+    kind = "lines"
+
+    axis: Flat
+    nominal_mm: Positive
+    first_mm: NotNegative | None = None
+    second_mm: NotNegative | None = None
+    shorter_by_mm: float | None = None
+
+    @property
+    def axes(self) -> str:
+        return self.axis
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        if self.first_mm:
+            yield "first_mm", self.first_mm, self.nominal_mm
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        if self.second_mm is not None and self.shorter_by_mm is not None:
+            yield "shorter_by_mm", "says what second_mm says", "leave one of them out"
+        for key, value in (("second_mm", self.second_mm), ("shorter_by_mm", self.shorter_by_mm)):
+            if value is not None and abs(value) > MOST_TIMES * self.nominal_mm:
+                yield key, f"is {value:g} on a line of {self.nominal_mm:g} mm", "write it in mm"
+        yield from _all_zero(self, ("first_mm", "second_mm", "shorter_by_mm"))
+
+
+class Square(Coupon, frozen=True, kw_only=True):
+    """A rectangle whose opposite edges were reached from opposite sides. `diagonals_mm`: from
+    the lower left to the upper right corner, and from the upper left to the lower right one."""
+
+    kind = "squares"
+
+    nominal_mm: Pair
+    dx_mm: NotNegative | None = None
+    dy_mm: NotNegative | None = None
+    diagonals_mm: tuple[NotNegative, NotNegative] | None = None
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        width, height = self.nominal_mm
+        if self.dx_mm:
+            yield "dx_mm", self.dx_mm, width
+        if self.dy_mm:
+            yield "dy_mm", self.dy_mm, height
+        for diagonal in filter(None, self.diagonals_mm or ()):
+            yield "diagonals_mm", diagonal, (width**2 + height**2) ** 0.5
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        yield from _all_zero(self, ("dx_mm", "dy_mm", "diagonals_mm"))
+
+
+class Circle(Coupon, frozen=True, kw_only=True):
+    """A whole circle, cut `direction`. `diameters_mm` are those at `angles_deg` from the X axis
+    towards the Y axis, or evenly spread over half a turn from the X axis on."""
+
+    kind = "circles"
+
+    nominal_mm: Positive
+    direction: Literal["cw", "ccw"]
+    diameters_mm: tuple[NotNegative, ...]
+    angles_deg: tuple[Annotated[float, Meta(ge=-360.0, le=360.0)], ...] | None = None
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """The angles of the diameters, degrees."""
+        count = len(self.diameters_mm)
+        return self.angles_deg or tuple(180.0 * k / count for k in range(count))
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        for diameter in filter(None, self.diameters_mm):
+            yield "diameters_mm", diameter, self.nominal_mm
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        if self.angles_deg is not None and len(self.angles_deg) != len(self.diameters_mm):
+            yield (
+                "angles_deg",
+                f"has {len(self.angles_deg)} angles for {len(self.diameters_mm)} diameters",
+                "give each diameter its angle, or leave it out for evenly spread ones",
+            )
+        yield from _all_zero(self, ("diameters_mm",))
+
+
+class Steps(Coupon, frozen=True, kw_only=True):
+    """A ruler: the places after moves of `nominal_mm` from a zero that was reached in +.
+    `forward_mm` were reached in + too, `backward_mm` in −, at the same nominal places, in a row
+    that lies `rows_apart_mm` to the + side of the first."""
+
+    kind = "steps"
+
+    axis: Any3
+    nominal_mm: tuple[Positive, ...]
+    forward_mm: tuple[NotNegative, ...] | None = None
+    backward_mm: tuple[float, ...] | None = None
+    rows_apart_mm: float = 0.0
+
+    @property
+    def axes(self) -> str:
+        return self.axis
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        for measured, nominal in zip(self.forward_mm or (), self.nominal_mm, strict=False):
+            if measured:
+                yield "forward_mm", measured, nominal
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        for key, values in (("forward_mm", self.forward_mm), ("backward_mm", self.backward_mm)):
+            if values is not None and len(values) != len(self.nominal_mm):
+                yield (
+                    key,
+                    f"has {len(values)} readings for {len(self.nominal_mm)} nominal places",
+                    "give one for each; 0.0 is one not taken",
+                )
+            for value in values or ():
+                if abs(value) > MOST_TIMES * max(self.nominal_mm):
+                    yield key, f"{value:g} is far beyond the ruler", "write it in mm"
+        yield from _all_zero(self, ("forward_mm", "backward_mm"))
+
+
+class Closure(Coupon, frozen=True, kw_only=True):
+    """A contour that should close, begun in + on both axes and ended in −: how far its end lies
+    from its start, mm, positive towards +. `nominal_mm` is its size, against slips."""
+
+    kind = "closures"
+
+    nominal_mm: Pair
+    gap_x_mm: float | None = None
+    gap_y_mm: float | None = None
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        gaps = (("gap_x_mm", self.gap_x_mm), ("gap_y_mm", self.gap_y_mm))
+        for (key, gap), size in zip(gaps, self.nominal_mm, strict=True):
+            if gap is not None and abs(gap) > size:
+                yield key, f"is {gap:g} on a contour of {size:g} mm", "write it in mm"
+        if self.gap_x_mm is None and self.gap_y_mm is None:
+            yield "gap_x_mm", "nothing was measured", "fill in what was measured"
+
+
+KINDS: tuple[type[Coupon], ...] = (Lines, Square, Circle, Steps, Closure)
+"""The tables of a file, in order."""
+
+
+def _all_zero(coupon: Coupon, keys: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
+    """A coupon on which nothing was measured: 0.0 is a reading that is still to be filled in,
+    but for `shorter_by_mm`, where it is a result like any other."""
+    for key in keys:
+        value = getattr(coupon, key)
+        if value is None:
+            continue
+        readings = value if isinstance(value, tuple) else (value,)
+        if any(readings) or key == "shorter_by_mm":
+            return
+    yield keys[0], "nothing was measured", "fill in what was measured, or leave the table out"
