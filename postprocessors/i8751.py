@@ -33,5 +33,11 @@ class I8751Post:
 
         return read_program(data, machine)
 
+    def line_bytes(self, data: bytes, machine: Machine) -> int:
+        """The bytes of the packets, whatever the form of the file."""
+        from ._i8751_lines import packet_count
+
+        return packet_count(data, machine)
+
 
 POST = I8751Post()

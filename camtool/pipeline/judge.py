@@ -102,7 +102,7 @@ def post_drawing(
     verification = _judged(
         program.data,
         decoded,
-        target.machine,
+        target,
         Goal(goal, plan.placed, sent),
         VerifyOptions(source=drawing.file, tool_diameter_mm=_tool_mm(job)),
     )
@@ -150,7 +150,7 @@ def verify_program(
         tool_diameter_mm=_tool_mm(job or Job()),
         worst=WORST_LISTED if judging.worst is None else judging.worst,
     )
-    found = _judged(data, decoded, target.machine, goal, options)
+    found = _judged(data, decoded, target, goal, options)
     beyond = _beyond(found, judging.gates)
     return decoded, found.with_findings((*found.findings, *beyond)) if beyond else found
 
@@ -186,7 +186,7 @@ def convert_program(
     if not check:
         return Posted(wanted, program, again, None, findings)
     options = VerifyOptions(source=file)
-    judged = _judged(program.data, again, target.machine, Goal(wanted), options)
+    judged = _judged(program.data, again, target, Goal(wanted), options)
     findings = _merged(findings, judged.findings)
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
@@ -250,15 +250,17 @@ def _tool_mm(job: Job) -> float | None:
 
 
 def _judged(
-    data: bytes, decoded: Toolpath, machine: Machine, goal: Goal, options: VerifyOptions
+    data: bytes, decoded: Toolpath, target: LoadedTarget, goal: Goal, options: VerifyOptions
 ) -> Verification:
     """Simulated, and compared with what was wanted and drawn."""
     from camtool.verify.verify import verify
 
-    sized = replace(options, size_bytes=len(data))
+    line_bytes = getattr(target.post, "line_bytes", None)
+    sent = len(data) if line_bytes is None else line_bytes(data, target.machine)
+    sized = replace(options, size_bytes=len(data), line_bytes=sent)
     return verify(
         decoded,
-        machine,
+        target.machine,
         wanted=goal.wanted,
         drawing=goal.drawing,
         options=sized,

@@ -29,7 +29,11 @@ class Program:
 
 
 class PostProcessor(Protocol):
-    """One dialect. `read` shares no code with `write`, so a fault in one shows in the other."""
+    """One dialect. `read` shares no code with `write`, so a fault in one shows in the other.
+
+    Where a program's file is not what goes over the line to the machine (a listing, a dump), a
+    post has besides `line_bytes(data, machine) -> int`: how many bytes do.
+    """
 
     name: str
 

@@ -42,7 +42,8 @@ class VerifyOptions:
 
     `interpolator` None: as the machine does. `effects`: the parts of the mechanics that act.
     `worst`: so many moves with the largest errors are listed. `coverage_mm` None: `COVERAGE_MM`,
-    `COVERAGE_STEPS` or `COVERAGE_RESOLUTIONS`. `blocks` None: counted from the decoded toolpath
+    `COVERAGE_STEPS` or `COVERAGE_RESOLUTIONS`. `size_bytes` is
+    that of the file, `line_bytes` of what goes over the line to the machine. `blocks` None: counted from the decoded toolpath
     where it was read. `tool_diameter_mm`: rapids below the stock top may run where the tool has
     cleared the way before; None, when nobody knows it: nowhere.
     """
@@ -52,6 +53,7 @@ class VerifyOptions:
     tool_diameter_mm: float | None = None
     source: str = ""
     size_bytes: int | None = None
+    line_bytes: int | None = None
     blocks: int | None = None
     coverage_mm: float | None = None
     sample_mm: float = SAMPLE_MM

@@ -48,7 +48,7 @@ class Result:
         """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides."""
         case, tally = self.case, self.tally
         options = case.options
-        link_s = case.machine.link.seconds(options.size_bytes or 0, tally.time_s)
+        link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
         slides = RowSlides(
             self.rows.low,
             self.rows.high,

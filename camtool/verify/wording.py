@@ -54,8 +54,11 @@ def markdown(report: Report) -> str:
 
 def _facts(report: Report) -> Iterator[tuple[str, str]]:
     steps, extents = report.steps, report.extents_mm
-    exact = report.interpolator == "path"
-    how = "followed exactly" if exact else f"arcs by {report.interpolator}"
+    how = report.interpolator
+    if how in ("dsm", "dda", "stairs"):
+        how = f"arcs by {how}"
+    elif how == "path":
+        how = "followed exactly"
     yield "target", f"{report.target} ({how})"
     if report.dimensions:
         x, y = report.dimensions[:2]

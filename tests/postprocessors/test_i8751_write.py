@@ -252,3 +252,12 @@ def test_dialects_that_are_none(setting: str, message: str) -> None:
 def test_the_steps_must_be_said_by_the_user() -> None:
     with pytest.raises(MachineError, match="coded_step_mm"):
         load_target("i8751")
+
+
+@pytest.mark.parametrize("form", ["packets", "hex", "listing"])
+def test_the_line_carries_packets_whatever_the_file_is(form: str) -> None:
+    target = loaded(f"dialect.format={form}")
+    data = write(line(300, 700, 0), f"dialect.format={form}").data
+    wanted = len(write(line(300, 700, 0)).data)
+    assert target.post.line_bytes(data, target.machine) == wanted
+    assert (len(data) == wanted) == (form == "packets")

@@ -96,15 +96,15 @@ def test_play_of_z_makes_cuts_shallower() -> None:
 
 def test_the_line_adds_its_time() -> None:
     toolpath = two_squares()
-    free = verify(toolpath, pic_mmh(), options=VerifyOptions(size_bytes=960)).report
+    free = verify(toolpath, pic_mmh(), options=VerifyOptions(line_bytes=960)).report
     assert free.time_split_s.link == 0.0
     slow = pic_mmh("link.baud=9600")
-    sent = verify(toolpath, slow, options=VerifyOptions(size_bytes=960)).report
+    sent = verify(toolpath, slow, options=VerifyOptions(line_bytes=960)).report
     assert sent.time_split_s.link == pytest.approx(1.0)
     assert sent.time_s == pytest.approx(free.time_s + 1.0)
     assert any("9600 baud" in words for words in sent.assumptions)
     streamed = pic_mmh("link.baud=9600", "link.wait=streamed")
-    meanwhile = verify(toolpath, streamed, options=VerifyOptions(size_bytes=960)).report
+    meanwhile = verify(toolpath, streamed, options=VerifyOptions(line_bytes=960)).report
     assert meanwhile.time_s == free.time_s
 
 
