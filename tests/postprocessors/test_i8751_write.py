@@ -256,8 +256,8 @@ def test_the_steps_must_be_said_by_the_user() -> None:
 
 @pytest.mark.parametrize("form", ["packets", "hex", "listing"])
 def test_the_line_carries_packets_whatever_the_file_is(form: str) -> None:
-    target = loaded(f"dialect.format={form}")
-    data = write(line(300, 700, 0), f"dialect.format={form}").data
+    target = loaded(f"format={form}")
+    data = write(line(300, 700, 0), f"format={form}").data
     wanted = len(write(line(300, 700, 0)).data)
     assert target.post.line_bytes(data, target.machine) == wanted
     assert (len(data) == wanted) == (form == "packets")
