@@ -171,6 +171,23 @@ def test_the_buffer_bounds_the_speed_on_short_chords() -> None:
     assert 0.9 * slow < found < fast
 
 
+def test_fourteen_blocks_must_suffice_to_stop() -> None:
+    """Many lines of 0.1 mm straight on: each is entered at v² = 2 a · 1.4 mm."""
+    builder = ToolpathBuilder()
+    for k in range(1, 201):
+        builder.line(0.1 * k, 0.0, 0.0, feed=500.0)
+    entry = math.sqrt(2.0 * 10.0 * 14 * 0.1)
+    peak = math.sqrt(entry**2 + 10.0 * 0.1)
+    found = seconds(builder.finish(), grbl_machine())[100]
+    assert found == pytest.approx(2.0 * (peak - entry) / 10.0)
+
+
+def test_a_row_that_ends_with_a_chunk_is_not_in_the_next() -> None:
+    path = ToolpathBuilder().rapid(0.04, 0.0, 0.0).rapid(0.0, 0.0, 0.0).finish()
+    assert [row.parts for row in run(path, grbl_machine(), chunk_steps=10)] == [1, 1]
+    assert [row.parts for row in run(path, grbl_machine(), chunk_steps=6)] == [2, 3]
+
+
 @pytest.mark.parametrize("tolerance", [0.002, 0.02])
 def test_chords_lie_inside_by_their_sagitta_and_the_drift(tolerance: float) -> None:
     """r (1 − cos(θ/2)), and what twelve turns by the short series lose: a turn shortens the

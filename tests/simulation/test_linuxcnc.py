@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
+from camtool.simulation.linuxcnc_moves import merged
 from camtool.simulation.motion import Floats
 from camtool.simulation.options import CHUNK_STEPS, Options
 from camtool.simulation.simulate import simulate
@@ -156,6 +157,48 @@ def test_no_blend_between_rapids_and_feeds_or_across_waits() -> None:
     left = [float(np.linalg.norm(rows[k].commanded[-1] - path.end[k])) for k in (0, 1, 3, 5)]
     assert left == pytest.approx([0.0, 0.0, 0.1, 0.0])
     assert rows[2].duration_s == 0.5
+
+
+def _bend(turn: float, *, arc: bool) -> Toolpath:
+    """10 mm at 10 mm/s, then at an angle 10 mm more, straight or on an arc of 10 mm."""
+    builder = ToolpathBuilder().line(10.0, 0.0, 0.0, feed=600.0)
+    cos, sin = math.cos(turn), math.sin(turn)
+    if not arc:
+        return builder.line(10.0 + 10.0 * cos, 10.0 * sin, 0.0, feed=600.0).finish()
+    centre = (10.0 - 10.0 * sin, 10.0 * cos)
+    end = (centre[0] + 10.0 * cos, centre[1] + 10.0 * sin)
+    return builder.arc(*end, 0.0, centre=centre, ccw=True, feed=600.0).finish()
+
+
+@pytest.mark.parametrize("arc", [False, True])
+def test_a_small_bend_is_no_corner(arc: bool) -> None:
+    """A tenth of the acceleration in a period, (v/T + a) · turn < a/10; half beside an arc."""
+    limit = 0.1 * A / (10.0 / PERIOD + A) * (0.5 if arc else 1.0)
+    machine = in_mode("exact-path")
+    passed, stopped = (run(_bend(share * limit, arc=arc), machine) for share in (0.95, 1.05))
+    assert passed[0].duration_s < stopped[0].duration_s - 0.005
+    assert stopped[0].duration_s == pytest.approx(from_rest(10.0, 10.0, A))
+
+
+@pytest.mark.parametrize(
+    "kind", [Kind.DWELL, Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF, Kind.TOOL_CHANGE]
+)
+def test_events_bring_the_machine_to_rest(kind: Kind) -> None:
+    path = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=600.0).event(kind, 0.0)
+    found = [row.duration_s for row in run(path.line(10.0, 0.0, 0.0, feed=600.0).finish(),
+                                           in_mode("exact-path"))]  # fmt: skip
+    assert found == pytest.approx([from_rest(5.0, 10.0, A), 0.0, from_rest(5.0, 10.0, A)])
+
+
+def test_what_is_merged() -> None:
+    """Not across feeds, arcs, rapids or events; moves of no length do not part lines."""
+    builder = ToolpathBuilder().rapid(0.5, 0.0, 0.0).line(1.0, 0.0, 0.0, feed=100.0)
+    builder.line(1.0, 0.0, 0.0, feed=100.0).line(2.0, 0.0, 0.0, feed=100.0)
+    builder.line(3.0, 0.0, 0.0, feed=200.0).message("here").line(4.0, 0.0, 0.0, feed=200.0)
+    builder.arc(4.2, 0.0, 0.0, centre=(4.1, -5.0), ccw=False, feed=200.0)
+    path = builder.line(5.0, 0.0, 0.0, feed=200.0).line(6.0, 0.0, 0.0, feed=200.0).finish()
+    assert merged(path, 0.01)[1].tolist() == [0, 1, 1, 1, 2, 3, 4, 5, 6, 6]
+    assert merged(path, 0.0)[1].tolist() == list(range(10))
 
 
 def test_straight_back_is_a_stop() -> None:
