@@ -98,6 +98,8 @@ def test_random_lines(seed: int) -> None:
     for slave in slaves:
         slave.phase = luck.randrange(1024)
         slave.posAnt = slave.conv
+        # Chunks that end where the counter wraps, and where an axis is that still runs back.
+        slave.chunk = luck.choice([slave.chunk, 5114, 5115, 5116, 6138, 3800])
         slave.kid, slave.kpd = luck.choice([(28, 159), (17, 98), (60, 40)])
     orders = []
     for _ in range(5):
