@@ -89,9 +89,9 @@ class Task(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """What is found: rows (N, 19); histograms (2, BINS, 4) of interpolation and total, every
-    fourth sample in each column; bins (S, 720, 9); trace (T, 4) x, y, error, row, and its pen;
-    found (K,) and memo, the list of near moves."""
+    """What is found: rows (N, 19); histograms (2, 4 BINS) of interpolation and total, every
+    fourth sample in the same place of its four; bins (S, 720, 9); trace (T, 4) x, y, error, row,
+    and its pen; found (K,) and memo, the list of near moves."""
 
     rows: Floats
     histograms: Ints
@@ -123,14 +123,15 @@ def _extents(figures: Floats, x: Floats, y: Floats) -> None:
 
 
 @wide
-def _count_sizes(size: Floats, histogram: Ints) -> None:
-    """`histogram` (BINS, 4): four samples take turns, so that none waits for the one before."""
-    bits = size.view(np.int64)
+def _count_sizes(size: Floats, room: Floats, histogram: Ints) -> None:
+    """`histogram` (4 BINS,): four samples take turns, so that none waits for the one before.
+    `room` (n,) is overwritten."""
+    bits, places = size.view(np.int64), room.view(np.int64)
     for k in range(len(bits)):
-        place = (bits[k] >> SHIFT) - BEFORE_FIRST
-        place = place if place > 0 else 0
-        place = place if place < BINS else BINS - 1
-        histogram[place, k & 3] += 1
+        bin_ = min(max((bits[k] >> SHIFT) - BEFORE_FIRST, 0), BINS - 1)
+        places[k] = 4 * bin_ + (k & 3)
+    for k in range(len(places)):
+        histogram[np.uint64(places[k])] += 1
 
 
 @wide
@@ -199,18 +200,16 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> 
     about, largest = task.rows[row], 0.0
     own = about[OWN]
     if own >= 0:
-        for k in range(len(errors)):
-            errors[k] = np.inf
-        lower_errors(task.own[own], x, y, errors)
+        lower_errors(task.own[own], x, y, errors, True)
         _inner(figures, errors, size)
-        _count_sizes(size, sums.histograms[0])
+        _count_sizes(size, errors, sums.histograms[0])
         _lag(figures, x, y, slide_x, slide_y)
         only = about[FIRST], about[LAST], task.window[row, 0], task.window[row, 1]
         moves = task.moves, task.heights, task.tree
         nearest_errors((slide_x, slide_y), only, moves, sums.found, sums.memo, bench[SPOT], errors)
         if sums.memo[COUNT] > 0.0:
             largest = _total(figures, errors, slide_x, slide_y, size)
-            _count_sizes(size, sums.histograms[1])
+            _count_sizes(size, errors, sums.histograms[1])
         if about[CIRCLE] >= 0:
             bins = sums.bins[about[SLOT]]
             fill_bins(slide_x, slide_y, task.centre[about[CIRCLE]], task.directions, bins)

@@ -134,10 +134,13 @@ def _is_near(low: int, high: int, end: int) -> bool:
 
 
 @inner
-def _passed(leg: Ints, x: int, y: int, path_x: Ints, path_y: Ints) -> tuple[int, bool]:
+def _passed(
+    leg: Ints, x: int, y: int, path: tuple[Ints, Ints], ways: tuple[int, int]
+) -> tuple[int, bool]:
     """How many quadrants the positions (n,) enter that follow (x, y), and whether they may be
     near the end. A coordinate that runs one way becomes 0 once at most."""
-    if way_of(x, path_x) != TURNING and way_of(y, path_y) != TURNING:
+    path_x, path_y = path
+    if ways[0] != TURNING and ways[1] != TURNING:
         to_x, to_y = path_x[-1], path_y[-1]
         entered = int(x != 0 and x * to_x <= 0) + int(y != 0 and y * to_y <= 0)
         return entered, _is_near(x, to_x, leg[END_X]) and _is_near(y, to_y, leg[END_Y])
@@ -154,6 +157,7 @@ def _passed(leg: Ints, x: int, y: int, path_x: Ints, path_y: Ints) -> tuple[int,
 def _follow(
     leg: Ints,
     axis: int,
+    way: int,
     steps: Ints,
     at: int,
     step_mm: float,
@@ -161,11 +165,12 @@ def _follow(
     counts: Ints,
     bench: Floats,
 ) -> None:
-    """Let the slide of X or Y follow `steps` (n,), absolute steps, from `at` on, and count."""
+    """Let the slide of X or Y follow `steps` (n,) about the origin of the leg, which run `way`
+    from `at` on, and count."""
     commanded, slide = bench[X + axis, : len(steps)], bench[SLIDE_X + axis, : len(steps)]
+    origin = leg[ORIGIN_X + axis]
     for k in range(len(steps)):
-        commanded[k] = steps[k] * step_mm
-    way = way_of(at, steps)
+        commanded[k] = (origin + steps[k]) * step_mm
     axes, states = mechanics
     counts[REVERSALS + axis] += play_block(way, commanded, axes[axis], states[axis], slide)
     way_on = abs(steps[-1] - at)
@@ -174,6 +179,18 @@ def _follow(
         for k in range(1, len(steps)):
             way_on += abs(steps[k] - steps[k - 1])
     counts[STEPS + axis] += way_on
+
+
+@inner
+def _turn_round(leg: Ints, path_x: Ints, path_y: Ints) -> None:
+    """Give the positions of a line their signs; a line of Z leaves X and Y where they are."""
+    sign_x, sign_y = leg[SIGN_X], leg[SIGN_Y]
+    if leg[KIND] == DEPTH:
+        sign_x = sign_y = 0
+    for k in range(len(path_x)):
+        path_x[k] *= sign_x
+    for k in range(len(path_y)):
+        path_y[k] *= sign_y
 
 
 @inner
@@ -210,7 +227,7 @@ def judge_legs(
             continue
         _start(leg, method, rounded, state)
         registers[0] = registers[1] = 0.0
-        at_x, at_y = leg[FROM_X], leg[FROM_Y]
+        at_x, at_y = leg[FROM_X] - leg[ORIGIN_X], leg[FROM_Y] - leg[ORIGIN_Y]
         careful, low, high = False, 0, 0
         if arc:
             expected = expected_quadrants(x, y, leg[CW] != 0, leg[END_X], leg[END_Y])
@@ -228,10 +245,13 @@ def judge_legs(
             buffer = whole if left < 0 or left >= BLOCK else np.empty((2, left), np.int64).T
             filled, passes, met = _fill(leg, method, state, registers, buffer)
             path_x, path_y = buffer[:, 0][:filled], buffer[:, 1][:filled]
+            if not arc:
+                _turn_round(leg, path_x, path_y)
+            way_x, way_y = way_of(at_x, path_x), way_of(at_y, path_y)
             if left >= 0:
                 left -= filled
             elif arc:
-                more, near = _passed(leg, before[0], before[1], path_x, path_y)
+                more, near = _passed(leg, at_x, at_y, (path_x, path_y), (way_x, way_y))
                 if entered + more > high or (near and entered + more >= low and not met):
                     for k in range(len(state)):
                         state[k] = before[k]
@@ -244,15 +264,8 @@ def judge_legs(
                 count[ENDED] = int(met)
             if filled == 0:
                 continue
-            for k in range(len(path_x)):
-                path_x[k] = leg[ORIGIN_X] + leg[SIGN_X] * path_x[k]
-            for k in range(len(path_y)):
-                path_y[k] = leg[ORIGIN_Y] + leg[SIGN_Y] * path_y[k]
-            if leg[KIND] == DEPTH:
-                for k in range(len(path_x)):
-                    path_x[k], path_y[k] = at_x, at_y
-            _follow(leg, 0, path_x, at_x, step_mm, mechanics, count, bench)
-            _follow(leg, 1, path_y, at_y, step_mm, mechanics, count, bench)
+            _follow(leg, 0, way_x, path_x, at_x, step_mm, mechanics, count, bench)
+            _follow(leg, 1, way_y, path_y, at_y, step_mm, mechanics, count, bench)
             at_x, at_y = path_x[-1], path_y[-1]
             judge_block(leg[ROW], filled, task, sums, bench)
         if leg[KIND] == DEPTH:

@@ -37,7 +37,7 @@ AX, AY, BX, BY, DX, DY, OVER, CX, CY, RADIUS, TURN, UX, UY, VX, VY, WIDE = range
 
 
 @wide
-def _to_line(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
+def _to_line(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> None:
     ax, ay, dx, dy, over = move[AX], move[AY], move[DX], move[DY], move[OVER]
     for k in range(len(x)):
         px, py = x[k] - ax, y[k] - ay
@@ -45,7 +45,8 @@ def _to_line(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
         t = smaller(larger(t, 0.0), 1.0)
         off_x, off_y = px - t * dx, py - t * dy
         apart = math.sqrt(off_x * off_x + off_y * off_y)
-        best[k] = math.copysign(apart, dx * py - dy * px) if apart < abs(best[k]) else best[k]
+        error = math.copysign(apart, dx * py - dy * px)
+        best[k] = error if first or apart < abs(best[k]) else best[k]
 
 
 @wide
@@ -68,16 +69,16 @@ def _depth(from_start: float, from_end: float, above_half: bool) -> float:
 
 
 @wide
-def _to_circle(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
+def _to_circle(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> None:
     cx, cy, radius, turn = move[CX], move[CY], move[RADIUS], move[TURN]
     for k in range(len(x)):
         px, py = x[k] - cx, y[k] - cy
         error = turn * (radius - math.sqrt(px * px + py * py))
-        best[k] = error if abs(error) < abs(best[k]) else best[k]
+        best[k] = error if first or abs(error) < abs(best[k]) else best[k]
 
 
 @wide
-def _to_arc(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
+def _to_arc(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> None:
     ax, ay, bx, by = move[AX], move[AY], move[BX], move[BY]
     cx, cy, radius, turn = move[CX], move[CY], move[RADIUS], move[TURN]
     ux, uy, vx, vy = move[UX], move[UY], move[VX], move[VY]
@@ -90,15 +91,16 @@ def _to_arc(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
         end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
         inside = _depth(ux * py - uy * px, px * vy - py * vx, above_half) >= 0.0
         error = inward if inside else end
-        best[k] = error if abs(error) < abs(best[k]) else best[k]
+        best[k] = error if first or abs(error) < abs(best[k]) else best[k]
 
 
 @wide
-def lower_errors(move: Floats, x: Floats, y: Floats, best: Floats) -> None:
-    """Lower `best` (n,) to the errors of the points x, y (n,) against `move`."""
+def lower_errors(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> None:
+    """Lower `best` (n,) to the errors of the points x, y (n,) against `move`; set it to them when
+    this is the `first` move."""
     if move[RADIUS] == 0.0:
-        _to_line(move, x, y, best)
+        _to_line(move, x, y, best, first)
     elif move[WIDE] == FULL or _all_in_wedge(move, x, y):
-        _to_circle(move, x, y, best)
+        _to_circle(move, x, y, best, first)
     else:
-        _to_arc(move, x, y, best)
+        _to_arc(move, x, y, best, first)

@@ -57,8 +57,8 @@ def new_memo() -> Floats:
 @wide
 def _apart(move: Floats, x: float, y: float, spot: Floats) -> float:
     """Distance of one point from a move; `spot` (3,) is room for it."""
-    spot[0], spot[1], spot[2] = x, y, np.inf
-    lower_errors(move, spot[:1], spot[1:2], spot[2:3])
+    spot[0], spot[1] = x, y
+    lower_errors(move, spot[:1], spot[1:2], spot[2:3], True)
     return float(abs(spot[2]))
 
 
@@ -195,9 +195,10 @@ def nearest_errors(
             run, same = max(1, _within(memo, x[done:], y[done:])), True
         here_x, here_y = x[done : done + run], y[done : done + run]
         here = out[done : done + run]
-        for k in range(len(here)):
-            here[k] = np.inf
+        if memo[COUNT] == 0.0:
+            for k in range(len(here)):
+                here[k] = np.inf
         for k in range(int(memo[COUNT])):
-            lower_errors(moves[0][found[k]], here_x, here_y, here)
+            lower_errors(moves[0][found[k]], here_x, here_y, here, k == 0)
         memo[USED] += run
         done += run

@@ -57,7 +57,7 @@ def legs_of(toolpath: Toolpath, places: Ints, centres: Ints) -> Ints:
     flat[:, columns.CW] = toolpath.kind == Kind.ARC_CW
     deep[:, columns.KIND] = columns.DEPTH
     deep[:, [columns.FROM_X, columns.FROM_Y]] = places[1:, :2]  # XY first, then Z
-    deep[:, [columns.SIGN_X, columns.SIGN_Y]] = 1
+    deep[:, [columns.ORIGIN_X, columns.ORIGIN_Y]] = places[1:, :2]
     deep[:, columns.A] = np.abs(way[:, 2])
     deep[:, columns.CW] = np.sign(way[:, 2])
     both = np.stack([flat, deep], axis=1).reshape(-1, columns.LEG_COLUMNS)

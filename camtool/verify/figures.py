@@ -54,7 +54,8 @@ class Figure:
         cls, largest: Floats, squares: Floats, counts: Ints, histogram: Ints | None
     ) -> Figure:
         """The figure of what was judged row by row: the largest error (N,) mm of each row or NaN,
-        sums of squares (N,) mm², counts (N,); `histogram` (BINS, L) of all, its columns added."""
+        sums of squares (N,) mm², counts (N,); `histogram` (L · BINS,) of all, L numbers for each
+        bin."""
         made = cls()
         made.count = int(counts.sum())
         if made.count:
@@ -62,7 +63,7 @@ class Figure:
             made._max = float(largest[made.row])
             made._squares = float(squares.sum())
         if histogram is not None:
-            made._histogram = histogram.sum(axis=1)
+            made._histogram = histogram.reshape(BINS, -1).sum(axis=1)
         return made
 
     @property

@@ -178,7 +178,7 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
     room = 2 * trace.most + rows
     return Sums(
         rows=empty_columns(rows),
-        histograms=np.zeros((2, BINS, 4), dtype=np.int64),
+        histograms=np.zeros((2, 4 * BINS), dtype=np.int64),
         bins=empty_bins(slots),
         trace=np.empty((room + rows + 1, 4)),
         pen=new_pen(trace.stride, room),

@@ -17,7 +17,7 @@ def fill_bins_(x, y, centre, directions, bins):
 
 @njit
 def lower_errors_(move, x, y, best):
-    lower_errors(move, x, y, best)
+    lower_errors(move, x, y, best, False)
 
 
 @njit
