@@ -1,4 +1,4 @@
-"""The parallel-port machine's PC at the edges: what moves nothing, what ends nowhere, bad input."""
+"""The parallel-port machine's PC at the edges: moves that are none, limits, bad input."""
 
 import math
 from pathlib import Path
