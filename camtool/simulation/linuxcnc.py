@@ -84,9 +84,9 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
 
 
 def interpolation(machine: Machine, options: Options) -> str:
-    """The mode of corners."""
+    """Blends, or the path alone."""
     mode, _ = _path_mode(machine)
-    return mode
+    return "blend" if mode == "blend" else "path"
 
 
 def assumptions(machine: Machine) -> tuple[str, ...]:

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors.linuxcnc import POST
 from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
+from camtool.machine.registry import load_target
 from camtool.simulation.linuxcnc_moves import merged
 from camtool.simulation.motion import Floats
 from camtool.simulation.options import CHUNK_STEPS, Options
@@ -27,6 +27,11 @@ V, A = 30.48, 508.0
 
 def run(path: Toolpath, machine: Machine, chunk_steps: int = CHUNK_STEPS) -> list[RowMotion]:
     return rows_of(simulate(path, machine, Options(chunk_steps=chunk_steps)))
+
+
+def read(program: str, machine: Machine) -> Toolpath:
+    path: Toolpath = load_target("linuxcnc").post.read(program.encode(), machine)
+    return path
 
 
 def total(path: Toolpath, machine: Machine) -> float:
@@ -50,7 +55,9 @@ def test_linuxcnc_itself(case: Measured) -> None:
     """Times within three periods or 1.1 %, corners of lines within 0.2 µm (the trace was
     sampled)."""
     machine = in_mode(case.mode, case.tolerance_mm)
-    path = POST.read(f"G21 G17 G90 G94\n{case.program}M2\n".encode(), machine)
+    path = load_target("linuxcnc").post.read(
+        f"G21 G17 G90 G94\n{case.program}M2\n".encode(), machine
+    )
     rows = run(path, machine)
     seconds = sum(row.duration_s for row in rows)
     assert abs(seconds - PERIOD * case.periods) < max(0.0065, 0.011 * seconds)
@@ -216,7 +223,7 @@ def test_lines_are_merged_as_the_list_does(seed: int, tolerance: float) -> None:
         [rng.uniform(0.0, 1.0, count + 1), rng.normal(0.0, 0.05, (count + 1, 2))]
     )
     way[rng.random(count + 1) < 0.1] = 0.0
-    points = np.round(np.cumsum(way, axis=0), 3)
+    points: Floats = np.round(np.cumsum(way, axis=0), 3).astype(np.float64)
     apart = rng.random(count) < 0.05
     chain, moved = np.empty(count, dtype=np.int64), np.empty((count, 3))
     merge_lines(points, apart, tolerance, chain, moved)
@@ -237,7 +244,7 @@ def test_lines_are_merged_as_the_list_does(seed: int, tolerance: float) -> None:
 
 
 def test_a_chain_takes_a_hundred_and_one_points() -> None:
-    points = np.zeros((300, 3))
+    points: Floats = np.zeros((300, 3))
     points[:, 0] = np.arange(300)
     chain, moved = np.empty(299, dtype=np.int64), np.empty((299, 3))
     merge_lines(points, np.zeros(299, dtype=np.bool_), 0.01, chain, moved)
@@ -259,7 +266,7 @@ def test_merged_lines_leave_the_path_within_the_tolerance() -> None:
 def test_chunks_change_nothing() -> None:
     case = next(case for case in MEASURED if case.name == "arcs")
     machine = in_mode("blend", 0.05, "axes.x.backlash_mm=0.05")
-    path = POST.read(case.program.encode(), machine)
+    path = read(case.program, machine)
     whole = run(path, machine)
     for one, other in zip(whole, run(path, machine, chunk_steps=13), strict=True):
         assert (one.commanded == other.commanded).all()
