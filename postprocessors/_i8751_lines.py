@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import msgspec
+import numpy as np
 
 from camtool.machine.model import Machine
 
+from ._i8751_bytes import packet_bytes
 from ._i8751_options import dialect_of
-from ._i8751_read import read_program
-from ._i8751_write import write_program
+from ._i8751_read import decoded_records
+from ._i8751_records import Records
 
 
 def packet_count(data: bytes, machine: Machine) -> int:
     """The length of the program as packets; ProgramError as its reader has it."""
-    if dialect_of(machine).format == "packets":
+    dialect = dialect_of(machine)
+    if dialect.format == "packets":
         return len(data)
-    as_packets = msgspec.structs.replace(machine, dialect={**machine.dialect, "format": "packets"})
-    return len(write_program(read_program(data, machine), as_packets).data)
+    decoded = decoded_records(data, machine)
+    rows = np.zeros(len(decoded.steps), dtype=np.int64)
+    return len(packet_bytes(Records(decoded.steps, decoded.waits, rows, (), -1), dialect))

@@ -31,16 +31,19 @@ Ints = npt.NDArray[np.int64]
 
 def read_program(data: bytes, machine: Machine) -> Toolpath:
     """The moves of a program; ProgramError naming record and byte, or line and column."""
+    return _toolpath(decoded_records(data, machine), machine, dialect_of(machine))
+
+
+def decoded_records(data: bytes, machine: Machine) -> Decoded:
+    """The records of a program in any of its three forms; ProgramError as `read_program`."""
     dialect = dialect_of(machine)
     if not data:
         raise ProgramError("the program is empty", mend="give a file of i8751 packets")
     if dialect.format == "listing":
-        decoded = ListingReader(machine, dialect).read(data)
-    elif dialect.format == "hex":
-        decoded = read_dump(data, dialect)
-    else:
-        decoded = _read_packets(data, dialect)
-    return _toolpath(decoded, machine, dialect)
+        return ListingReader(machine, dialect).read(data)
+    if dialect.format == "hex":
+        return read_dump(data, dialect)
+    return _read_packets(data, dialect)
 
 
 def _read_packets(data: bytes, dialect: Dialect) -> Decoded:
