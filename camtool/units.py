@@ -10,6 +10,9 @@ import re
 
 from camtool.errors import OptionError
 
+UM_PER_MM = 1000.0
+"""Micrometres in a millimetre."""
+
 MM_PER_UNIT: dict[str, float] = {
     "mm": 1.0,
     "um": 0.001,

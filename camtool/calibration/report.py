@@ -7,9 +7,7 @@ from typing import Any
 
 from camtool.calibration.calibrate import Calibration, Estimate, Fitted
 from camtool.machine.model import Axis, Machine
-
-UM = 1000.0
-"""Micrometres of a millimetre."""
+from camtool.units import UM_PER_MM
 
 
 def to_text(calibration: Calibration, machine: Machine) -> str:
@@ -75,7 +73,7 @@ def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[
 def outliers(calibration: Calibration) -> list[str]:
     """One line for each reading that stands out."""
     return [
-        f"{each.reading.coupon}, {each.reading.name}: {each.residual_mm * UM:+.1f} µm off, "
+        f"{each.reading.coupon}, {each.reading.name}: {each.residual_mm * UM_PER_MM:+.1f} µm off, "
         f"{abs(each.sigmas or 0.0):.1f} standard deviations"
         for each in calibration.fitted
         if each.outlier
@@ -114,7 +112,7 @@ def _row(each: Estimate) -> tuple[str, ...]:
 def _fit(each: Fitted) -> tuple[str, ...]:
     mark = "outlier" if each.outlier else ""
     measured, predicted = f"{each.reading.measured_mm:.4f}", f"{each.predicted_mm:.4f}"
-    residual = f"{each.residual_mm * UM:+.1f} µm"
+    residual = f"{each.residual_mm * UM_PER_MM:+.1f} µm"
     return each.reading.coupon, each.reading.name, measured, predicted, residual, mark
 
 
@@ -122,11 +120,11 @@ def _spread(calibration: Calibration) -> str:
     if calibration.spread_mm is None:
         return "as many readings as numbers: nothing tells how well they fit"
     text = (
-        f"residuals {calibration.spread_mm * UM:.1f} µm (standard deviation, "
+        f"residuals {calibration.spread_mm * UM_PER_MM:.1f} µm (standard deviation, "
         f"{calibration.freedom} degrees of freedom)"
     )
     if calibration.uncertainty_mm is not None:
-        text += f"; instrument {calibration.uncertainty_mm * UM:.1f} µm"
+        text += f"; instrument {calibration.uncertainty_mm * UM_PER_MM:.1f} µm"
     return text
 
 
@@ -135,7 +133,7 @@ def _unit(each: Estimate) -> str:
 
 
 def _um(mm: float | None) -> float | None:
-    return None if mm is None else mm * UM
+    return None if mm is None else mm * UM_PER_MM
 
 
 def _columns(rows: list[tuple[str, ...]]) -> Iterator[str]:

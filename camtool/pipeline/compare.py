@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from camtool.pipeline.judge import Judging, verify_program
+from camtool.units import UM_PER_MM
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -106,11 +107,11 @@ def _window(wanted: Toolpath, variants: Sequence[Variant]) -> Floats:
         for variant in variants
     )
     error_um = max(variant.verification.report.error_um.total.max or 0.0 for variant in variants)
-    half = max(WINDOW_STEPS * step, WINDOW_ERRORS * error_um / 1000.0)
+    half = max(WINDOW_STEPS * step, WINDOW_ERRORS * error_um / UM_PER_MM)
     whole = toolpath_extents(wanted)[:2]
     size = float((whole[:, 1] - whole[:, 0]).max())
     if size <= 2.0 * half * WHOLE:
-        pad = max(0.05 * size, error_um / 1000.0, step)
+        pad = max(0.05 * size, error_um / UM_PER_MM, step)
         return np.asarray(whole + np.array([-pad, pad]))
     x, y = worst_place(variants)
     return np.array([[x - half, x + half], [y - half, y + half]])

@@ -17,11 +17,10 @@ from camtool.preview.colours import BINS, bin_colours
 from camtool.preview.scene import Scene
 from camtool.preview.svg import Look, PathData, element
 from camtool.preview.view import View
+from camtool.units import UM_PER_MM
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
-
-UM_PER_MM = 1000.0
 
 LEAST_TOP_UM = 1e-3
 """The colour map ends here when no error is larger."""

@@ -41,11 +41,11 @@ class VerifyOptions:
     """How to judge, and what the report says of the program.
 
     `interpolator` None: as the machine does. `effects`: the parts of the mechanics that act.
-    `worst`: so many moves with the largest errors are listed. `coverage_mm` None: `COVERAGE_MM`,
-    `COVERAGE_STEPS` or `COVERAGE_RESOLUTIONS`. `size_bytes` is
-    that of the file, `line_bytes` of what goes over the line to the machine. `blocks` None: counted from the decoded toolpath
-    where it was read. `tool_diameter_mm`: rapids below the stock top may run where the tool has
-    cleared the way before; None, when nobody knows it: nowhere.
+    `worst`: so many moves with the largest errors are listed. `size_bytes` is that of the file,
+    `line_bytes` of what goes over the line to the machine. `blocks` None: counted from the decoded
+    toolpath where it was read. `coverage_mm` None: `COVERAGE_MM`, `COVERAGE_STEPS` or
+    `COVERAGE_RESOLUTIONS`. `tool_diameter_mm`: rapids below the stock top may run where the tool
+    has cleared the way before; None, when nobody knows it: nowhere.
     """
 
     interpolator: Interpolator | None = None

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from camtool.findings import Code, Finding, Severity
+from camtool.units import UM_PER_MM
 from camtool.verify.report import Report
 from camtool.verify.wording import clock
-
-UM_PER_MM = 1000.0
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
 from camtool.toolpath.cleared import CLEARED_MM, Reach, Through, rapids_through_stock
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.units import UM_PER_MM
 from camtool.verify.by_row import missed_ends
 from camtool.verify.case import Case
 from camtool.verify.cuts import CutMoves, rapids_in_stock
@@ -21,8 +22,6 @@ from camtool.verify.places import and_more, at_point, block_name
 from camtool.verify.rows import RowFigures
 
 AXES = "XYZ"
-UM_PER_MM = 1000.0
-
 CLEARED_COVERAGES = 2.0
 """A rapid may stick out of what is cleared by so many tolerances of the coverage: it and the cuts
 beside it are rounded each on its own."""

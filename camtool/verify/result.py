@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from camtool import __version__
 from camtool.findings import Finding
 from camtool.geometry.polylines import Floats
+from camtool.units import UM_PER_MM
 from camtool.verify import records as record
 from camtool.verify.by_row import (
     contour_figures,
@@ -27,9 +28,6 @@ from camtool.verify.report import Report, certain, number, reported
 from camtool.verify.rows import RowFigures
 from camtool.verify.slides import SlidePass, largest
 from camtool.verify.trace import Trace
-
-UM = 1000.0
-"""µm in a mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +64,7 @@ class Result:
             steps=_steps(tally),
             reversals=_reversals(tally),
             error_um=self._errors(),
-            closure_um=number(closure_mm(self.cuts, slides, case.coverage_mm), UM),
+            closure_um=number(closure_mm(self.cuts, slides, case.coverage_mm), UM_PER_MM),
             dimensions=self._dimensions(slides),
             circles=self._circles(),
             findings=reported(findings),
@@ -86,7 +84,9 @@ class Result:
         slides, drawing = self.slides, self.case.drawing
         fit = record.MaxRms()
         if drawing is not None:
-            fit = record.MaxRms(number(drawing.fit.max_mm, UM), number(drawing.fit.rms_mm, UM))
+            fit = record.MaxRms(
+                number(drawing.fit.max_mm, UM_PER_MM), number(drawing.fit.rms_mm, UM_PER_MM)
+            )
         inside, step = slides.interpolation(), self.case.step_mm
         is_arc = self.cuts.toolpath.is_arc
         lines_mm = largest(self.rows.interpolation, ~is_arc)
@@ -96,22 +96,22 @@ class Result:
             fit=fit,
             rounding=_max_rms(self.coverage.rounding),
             interpolation=record.InterpolationFigures(
-                max=number(inside.max, UM),
-                rms=number(inside.rms, UM),
-                p95=number(inside.p95, UM),
-                lines_max=number(lines_mm, UM),
-                arcs_max=number(arcs_mm, UM),
+                max=number(inside.max, UM_PER_MM),
+                rms=number(inside.rms, UM_PER_MM),
+                p95=number(inside.p95, UM_PER_MM),
+                lines_max=number(lines_mm, UM_PER_MM),
+                arcs_max=number(arcs_mm, UM_PER_MM),
                 lines_steps=number(lines_mm / step),
                 arcs_steps=number(arcs_mm / step),
             ),
             mechanics=_max_rms(slides.mechanics()),
             total=record.ErrorFigures(
-                number(total.max, UM),
-                number(total.rms, UM),
-                number(total.p95, UM),
-                number(mean_error_mm(self.rows), UM),
+                number(total.max, UM_PER_MM),
+                number(total.rms, UM_PER_MM),
+                number(total.p95, UM_PER_MM),
+                number(mean_error_mm(self.rows), UM_PER_MM),
             ),
-            depth_max=number(depth_error_mm(self.case, self.cuts), UM),
+            depth_max=number(depth_error_mm(self.case, self.cuts), UM_PER_MM),
         )
 
     def _dimensions(self, slides: RowSlides) -> tuple[record.Dimension, ...]:
@@ -132,15 +132,15 @@ class Result:
             record.CircleReport(
                 centre_mm=(certain(circle.centre_mm[0]), certain(circle.centre_mm[1])),
                 radius_mm=certain(circle.radius_mm),
-                G_um=number(figures.circular_mm, UM),
-                Fmax_um=number(figures.radial_max_mm, UM),
-                Fmin_um=number(figures.radial_min_mm, UM),
-                D_um=number(figures.radial_mean_mm, UM),
+                G_um=number(figures.circular_mm, UM_PER_MM),
+                Fmax_um=number(figures.radial_max_mm, UM_PER_MM),
+                Fmin_um=number(figures.radial_min_mm, UM_PER_MM),
+                D_um=number(figures.radial_mean_mm, UM_PER_MM),
                 direction="ccw" if circle.ccw else "cw",
                 z_mm=certain(circle.z_mm),
-                step_um=tuple(number(value, UM) for value in turned.step),
-                spike_um=tuple(number(value, UM) for value in turned.spike),
-                B_um=tuple(number(value, UM) for value in turned.value),
+                step_um=tuple(number(value, UM_PER_MM) for value in turned.step),
+                spike_um=tuple(number(value, UM_PER_MM) for value in turned.spike),
+                B_um=tuple(number(value, UM_PER_MM) for value in turned.value),
             )
             for circle, figures, turned in zip(
                 self.slides.circles,
@@ -156,8 +156,8 @@ class Result:
             record.BothWaysReport(
                 centre_mm=(certain(one.circle.centre_mm[0]), certain(one.circle.centre_mm[1])),
                 radius_mm=certain(one.circle.radius_mm),
-                Gb_um=number(one.circular_mm, UM),
-                D_um=number(one.radial_mean_mm, UM),
+                Gb_um=number(one.circular_mm, UM_PER_MM),
+                D_um=number(one.radial_mean_mm, UM_PER_MM),
             )
             for one in self.slides.both_ways
         )
@@ -166,9 +166,9 @@ class Result:
         return tuple(
             record.ContourReport(
                 name=contour_name(self.wanted, one.contour),
-                max_um=certain(one.max_mm * UM),
-                rms_um=certain(one.rms_mm * UM),
-                mean_um=certain(one.mean_mm * UM),
+                max_um=certain(one.max_mm * UM_PER_MM),
+                rms_um=certain(one.rms_mm * UM_PER_MM),
+                mean_um=certain(one.mean_mm * UM_PER_MM),
                 at_mm=(certain(one.at_mm[0]), certain(one.at_mm[1])),
                 block=_block(self.case, one.row),
             )
@@ -182,9 +182,9 @@ class Result:
                 block=_block(self.case, row),
                 move=row + 1,
                 at_mm=(certain(rows.total_at[row, 0]), certain(rows.total_at[row, 1])),
-                total_um=certain(rows.total[row] * UM),
-                interpolation_um=number(rows.interpolation[row], UM),
-                mechanics_um=number(rows.mechanics[row], UM),
+                total_um=certain(rows.total[row] * UM_PER_MM),
+                interpolation_um=number(rows.interpolation[row], UM_PER_MM),
+                mechanics_um=number(rows.mechanics[row], UM_PER_MM),
                 source=self._source(row),
             )
             for row in worst_rows(rows, self.case.options.worst).tolist()
@@ -199,7 +199,7 @@ class Result:
         axes = self.case.machine.axes
         steps = axes.x.coded_step_mm, axes.y.coded_step_mm
         missed = missed_ends(self.rows, self.cuts.toolpath, steps)
-        return record.UnreachedReport(missed.count, certain(missed.most_mm * UM))
+        return record.UnreachedReport(missed.count, certain(missed.most_mm * UM_PER_MM))
 
     def _shape(self, trace: Trace) -> record.ShapeReport | None:
         diameter = self.case.options.tool_diameter_mm
@@ -213,9 +213,9 @@ class Result:
         return record.ShapeReport(
             tool_diameter_mm=certain(shape.diameter_mm),
             overcut_mm2=certain(shape.overcut_mm2),
-            overcut_um=certain(shape.overcut_mm * UM),
+            overcut_um=certain(shape.overcut_mm * UM_PER_MM),
             undercut_mm2=certain(shape.undercut_mm2),
-            undercut_um=certain(shape.undercut_mm * UM),
+            undercut_um=certain(shape.undercut_mm * UM_PER_MM),
         )
 
 
@@ -238,7 +238,7 @@ def _block(case: Case, row: int) -> int | None:
 
 
 def _max_rms(figure: Figure) -> record.MaxRms:
-    return record.MaxRms(number(figure.max, UM), number(figure.rms, UM))
+    return record.MaxRms(number(figure.max, UM_PER_MM), number(figure.rms, UM_PER_MM))
 
 
 def _interpolator(case: Case) -> str:

@@ -29,12 +29,10 @@ from camtool.planning.reversing.approach import flat, least_turn_mm
 from camtool.planning.reversing.mirror import Division, drawn_error_mm
 from camtool.planning.reversing.residual import Residual, residuals
 from camtool.planning.reversing.turns import Parts, Turns, no_turns, parts_of, turns_of
+from camtool.units import UM_PER_MM
 
 LEAST_TURN_MM = 1e-6
 """How far back an axis must come for a reversal, where no machine says how fine its steps are."""
-
-UM = 1000.0
-"""µm in a mm."""
 
 
 def reversals_of(cut: Polyline | Run, machine: Machine | None = None) -> tuple[int, int]:
@@ -214,7 +212,7 @@ def _told(counts: _Counts) -> Iterator[Finding]:
             Severity.INFO,
             f"{before.reversals} reversals while cutting become {after.reversals}: {before.runs}"
             f" runs are cut as {after.runs}; what play leaves over is at most"
-            f" {after.error_mm * UM:.3g} µm, not {before.error_mm * UM:.3g} µm",
+            f" {after.error_mm * UM_PER_MM:.3g} µm, not {before.error_mm * UM_PER_MM:.3g} µm",
             measured=float(after.reversals),
             limit=float(before.reversals),
         )
