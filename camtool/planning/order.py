@@ -119,13 +119,16 @@ def best_order(
     if len(choices) == 0:
         return np.empty(0, dtype=np.int64)
     from camtool.kernels.tour_rows import best_rows
-    from camtool.kernels.tour_search import kicked, settled
-    from camtool.kernels.tour_start import nearest_first
-    from camtool.kernels.tour_tree import tree_of
 
     start = np.array(from_point, dtype=np.float64)
     goal = np.array((np.nan, np.nan) if to_point is None else to_point, dtype=np.float64)
     ends, first = np.column_stack([choices.entry, choices.exit]), choices.first
+    if len(choices) == 1 and not len(before):
+        return best_rows(ends, first, np.zeros(1, dtype=np.int64), start, goal)
+    from camtool.kernels.tour_search import kicked, settled
+    from camtool.kernels.tour_start import nearest_first
+    from camtool.kernels.tour_tree import tree_of
+
     after_first, after = _followers(before, len(choices))
     waits = np.bincount(after, minlength=len(choices))
     tree = tree_of(choices.entry)
