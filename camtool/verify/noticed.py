@@ -37,7 +37,7 @@ def motion_findings(
     decoded, machine = cuts.toolpath, case.machine
     return (
         *_endless_arcs(decoded, machine, tally),
-        *_missed_ends(decoded, machine, tally, rows),
+        *_missed_ends(decoded, case, tally, rows),
         *_out_of_travel(machine, extents),
         *_rapids_in_stock(decoded, case),
         *_many_reversals(machine, tally),
@@ -66,17 +66,17 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
             return
 
 
-def _missed_ends(
-    held: Toolpath, machine: Machine, tally: Tally, rows: RowFigures
-) -> Iterator[Finding]:
-    """Moves that end beside their programmed ends, but for arcs that never end."""
-    steps_mm = machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm
+def _missed_ends(held: Toolpath, case: Case, tally: Tally, rows: RowFigures) -> Iterator[Finding]:
+    """Moves that end beside their programmed ends, but for arcs that never end; a remark when
+    all are within what the part is compared by, as where corners are blended."""
+    axes = case.machine.axes
+    steps_mm = axes.x.coded_step_mm, axes.y.coded_step_mm
     missed = missed_ends(rows, held, steps_mm, without=tuple(tally.gave_up))
     if missed.count == 0:
         return
     yield Finding(
         Code.END_NOT_REACHED,
-        Severity.WARNING,
+        Severity.WARNING if missed.most_mm > case.coverage_mm else Severity.INFO,
         f"the controller leaves {missed.count} moves beside their ends, "
         f"up to {missed.most_mm * UM_PER_MM:.2f} µm",
         where=f"{block_name(held, missed.row)}, end {at_point(held.end[missed.row])}",
