@@ -160,8 +160,8 @@ def _within(memo: Floats, x: Floats, y: Floats) -> int:
     qx, qy, square = memo[QX], memo[QY], memo[REACH] * memo[REACH]
     farthest = 0.0
     for k in range(len(x)):
-        apart = (x[k] - qx) ** 2 + (y[k] - qy) ** 2
-        farthest = larger(farthest, apart)
+        off_x, off_y = x[k] - qx, y[k] - qy
+        farthest = larger(farthest, off_x * off_x + off_y * off_y)
     if farthest <= square:
         return len(x)
     k = 0
@@ -195,10 +195,12 @@ def nearest_errors(
             run, same = max(1, _within(memo, x[done:], y[done:])), True
         here_x, here_y = x[done : done + run], y[done : done + run]
         here = out[done : done + run]
-        if memo[COUNT] == 0.0:
+        if memo[COUNT] > 0.0:
+            lower_errors(moves[0][found[0]], here_x, here_y, here, True)
+        else:
             for k in range(len(here)):
                 here[k] = np.inf
-        for k in range(int(memo[COUNT])):
-            lower_errors(moves[0][found[k]], here_x, here_y, here, k == 0)
+        for k in range(1, int(memo[COUNT])):
+            lower_errors(moves[0][found[k]], here_x, here_y, here, False)
         memo[USED] += run
         done += run
