@@ -1,19 +1,20 @@
 """The drawings that calibration needs, and what is measured on each.
 
-Every coupon is one open line with run-ups, so that the side from which each of its edges is
-reached follows from the drawing alone, wherever the tool came from. All of them look the same
-from their other end: cut backwards, what is said below of the first half holds of the second.
+The side from which each edge is reached must follow from the drawing, wherever the tool came
+from. Lines and rulers are closed, so that they are cut the way they are drawn; begun in the middle
+of their longest line, they reach every mark behind a run-up.
 
     lines                                       steps
 
-        ┌────  run-up                            ┌─┐ ┌─┐ ┌─┐ ┌──┐   reached in −
-        └────────────────┐  second, in −         ┘ └─┘ └─┘ └─┘  │
-        ┌────────────────┘  first, in +          ┐ ┌─┐ ┌─┐ ┌─┐ ┌┘   reached in +
-    ────┘                   run-up              ─┘─┘ └─┘ └─┘ └─┘
+    ┌────┐                                      ┌───┐ ┌─┐ ┌─┐ ┌─┐ ┌──┐
+    │    └────────────────┐  second, in −       │   └─┘ └─┘ └─┘ └─┘  │   reached in −
+    │    ┌────────────────┘  first, in +        │   ┌─┐ ┌─┐ ┌─┐ ┌─┐ ┌┘   reached in +
+    └────┘                   run-up             └───┘ └─┘ └─┘ └─┘ └─┘
 
-A square begins and ends with a hook beside a corner; circles are closed, and begin
-where X reverses. (Two joined lines: PIC thesis §5, L2353-2423; parallel-port thesis,
-L1165; squares and circles: PIC thesis, L2457-2594; steps: ValCNC thesis, L1645.)
+Squares are open, with a hook beside a corner at either end: cut from either one, opposite edges
+are reached from opposite sides. Circles are closed, and begin where X reverses. (Two joined lines:
+PIC thesis, L2353-2423; parallel-port thesis, L1165; squares and circles: PIC thesis, L2457-2594;
+steps: ValCNC thesis, L1645.)
 """
 
 from __future__ import annotations
@@ -40,8 +41,9 @@ MARGIN_UNITS = 2
 RUN_UP_UNITS = 4
 """Units of that grid that a run-up takes at least."""
 
-RUN_UP_PLAYS = 2.0
-"""A run-up is at least so many times as long as the machine's play and its compensation."""
+RUN_UP_PLAYS = 3.0
+"""A run-up is at least so many times as long as the machine's play and its compensation. More than
+two: half of the longest line of a coupon, in whose middle the tool begins, then takes them up."""
 
 GAP_UNITS = 3
 """Units of that grid between the two lines of a coupon, and the height of a ruler's steps."""
@@ -168,7 +170,7 @@ def _two_lines(axis: str, corner: Point, end: float, grid: _Grid) -> tuple[Path,
         (along, across + 3 * gap),
     ]
     table = {"axis": axis, "nominal_mm": _clean(length), "first_mm": 0.0, "second_mm": 0.0}
-    return Path(f"LINES_{axis.upper()}", _turned(axis, ways)), table
+    return Path(f"LINES_{axis.upper()}", _turned(axis, ways), closed=True), table
 
 
 def _steps(cell: _Cell, grid: _Grid) -> Made:
@@ -195,7 +197,7 @@ def _ruler(axis: str, corner: Point, end: float, grid: _Grid) -> tuple[Path, dic
         "backward_mm": [0.0] * STEPS,
         "rows_apart_mm": _clean(2 * tall),
     }
-    return Path(f"STEPS_{axis.upper()}", _turned(axis, ways)), table
+    return Path(f"STEPS_{axis.upper()}", _turned(axis, ways), closed=True), table
 
 
 def _wave(marks: Sequence[float], levels: Point) -> list[Point]:
@@ -302,7 +304,8 @@ def _grid(side: float, machine: Machine | None) -> _Grid:
     if finest > 0.0:
         unit = finest * max(1, math.floor(unit / finest + SAME))
     lost = max((max(axis.backlash_mm, axis.compensation_mm) for axis in axes), default=0.0)
-    return _Grid(unit, unit * max(RUN_UP_UNITS, math.ceil(RUN_UP_PLAYS * lost / unit - SAME)))
+    run_up = unit * max(RUN_UP_UNITS, math.ceil(RUN_UP_PLAYS * lost / unit - SAME))
+    return _Grid(unit, run_up)
 
 
 def _on_grid(value: float, unit: float, how: Callable[[float], float]) -> float:

@@ -10,8 +10,8 @@ from camtool.machine.model import Machine
 
 HOW: dict[Kind, tuple[str, ...]] = {
     "lines": (
-        "first_mm: the line that was cut first (nearer to part zero), from its end mark to the",
-        "bridge; second_mm: the other line. shorter_by_mm may stand in place of second_mm.",
+        "first_mm: the line beside the mark on the side of part zero, from there to the bridge;",
+        "second_mm: the other line. shorter_by_mm may stand in place of second_mm.",
     ),
     "squares": (
         "dx_mm, dy_mm: between opposite edges. diagonals_mm: lower left to upper right corner,",
@@ -34,6 +34,7 @@ def skeleton(sheet: Sheet, machine: Machine | None) -> str:
     lines = [
         f"# Measurements of the {sheet.kind} coupon, {width:g} by {height:g} mm.",
         "# Lengths in mm, 0.0: not measured. Then: camtool calibrate THIS-FILE -o my-machine.toml",
+        "# Cut: camtool post coupon.dxf --kind engrave --start longest-line --gap 0",
         *(f"# {line}" for line in HOW[sheet.kind]),
         "",
         f"target = {json.dumps(machine.target.dialect)}" if machine else '# target = "pic-mmh"',

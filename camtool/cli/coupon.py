@@ -88,7 +88,7 @@ def coupon(
     circles  three of them: the same, from eight diameters each
     steps    a ruler along each axis, forwards and backwards: step scale and play
 
-    Cut them on the line: camtool post coupon.dxf --kind engrave.
+    Cut them: camtool post coupon.dxf --kind engrave --start longest-line --gap 0.
     """
     from camtool.calibration import drawings
     from camtool.calibration.coupons import sheet

@@ -99,7 +99,7 @@ TELLS_SQUARENESS = {"squares", "circles"}
 
 @pytest.mark.parametrize(
     ("kind", "backwards"),
-    [(kind, way) for kind in KINDS for way in (False, True) if not (kind == "circles" and way)],
+    [*((kind, False) for kind in KINDS), ("squares", True)],
 )
 @settings(max_examples=15)
 @given(machine=FAULTS)

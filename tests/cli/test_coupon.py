@@ -12,7 +12,7 @@ from camtool.calibration.coupons import KINDS
 from camtool.machine.registry import load_target, target_names
 from tests.cli.conftest import Run
 
-ENGRAVE = ("--kind", "engrave", "--gap", "0")
+ENGRAVE = ("--kind", "engrave", "--start", "longest-line", "--gap", "0")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -44,11 +44,17 @@ def test_lines_are_cut_as_they_are_drawn(camtool: Run, tmp_path: Path, target: s
     path = loaded.post.read((tmp_path / "p").read_bytes(), loaded.machine)
     for table in tomllib.loads(file.read_text())["lines"]:
         axis = "xy".index(table["axis"])
+        other = path.end[:, 1 - axis]
         way = np.diff(path.end[:, axis], prepend=0.0)
-        long = np.flatnonzero(np.isclose(np.abs(way), table["nominal_mm"], atol=1e-3))
-        assert way[long].tolist() == pytest.approx(
-            [table["nominal_mm"], -table["nominal_mm"]], abs=1e-3
-        )
+        # The line on the side of part zero goes towards +, the other one back: whole or in halves.
+        nominal = table["nominal_mm"]
+        share = np.abs(way)[:, None] / np.array([nominal, 0.5 * nominal])
+        long = np.flatnonzero(np.isclose(share, 1.0, atol=1e-3).any(axis=1))
+        there = [row for row in long if way[row] > 0.0 and other[row] == other[row - 1]]
+        back = [row for row in long if way[row] < 0.0 and other[row] == other[row - 1]]
+        assert sum(way[there]) == pytest.approx(nominal, abs=2e-3)
+        assert sum(way[back]) == pytest.approx(-nominal, abs=2e-3)
+        assert max(other[there]) < min(other[back])
 
 
 def test_svg_stdout_and_size(camtool: Run, tmp_path: Path) -> None:

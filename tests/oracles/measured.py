@@ -24,7 +24,7 @@ def readings(sheet: Sheet, machine: Machine, *, backwards: bool = False) -> list
     """The tables of the sheet, filled in; `backwards`: open paths are cut from their other end."""
     mechanics = Mechanics(machine, np.zeros(3), ALL)
     return [
-        {**table, **_read(kind, path, table, *_cut(path, mechanics, backwards), backwards)}
+        {**table, **_read(kind, path, table, *_cut(path, mechanics, backwards))}
         for path, (kind, table) in zip(sheet.paths, sheet.tables, strict=True)
     ]
 
@@ -34,7 +34,7 @@ def _cut(path: Path, mechanics: Mechanics, backwards: bool) -> tuple[np.ndarray,
     vertices = list(path.vertices)
     if backwards and not path.closed:
         vertices = vertices[::-1]
-    # A circle is read on its second time round: how the tool came to its start is forgotten.
+    # What is closed goes round twice: how the tool came to the start of a circle is forgotten.
     ring = [*vertices, *vertices, vertices[0]] if path.closed else vertices
     runs = [np.array([ring[0][:2]])]
     for (x1, y1, bulge), (x2, y2, _) in pairwise(ring):
@@ -57,19 +57,18 @@ def _dense(start: complex, end: complex, bulge: float) -> np.ndarray:
 
 
 def _read(
-    kind: str, path: Path, table: dict[str, Any], slide: np.ndarray, at: np.ndarray, back: bool
+    kind: str, path: Path, table: dict[str, Any], slide: np.ndarray, at: np.ndarray
 ) -> dict[str, Any]:
     corners = slide[at]
     if kind == "circles":
         return {"diameters_mm": _diameters(slide[at[2] :], table["angles_deg"])}
     if kind == "squares":
-        return _square(corners, back)
+        return _square(corners)
     axis = "xy".index(table["axis"])
     if kind == "lines":
         lower = abs(corners[3, axis] - corners[2, axis])
         upper = abs(corners[4, axis] - corners[5, axis])
-        first, second = (upper, lower) if back else (lower, upper)
-        return {"first_mm": first, "second_mm": second}
+        return {"first_mm": lower, "second_mm": upper}
     marks = len(table["nominal_mm"]) + 1
     strokes = [corners[k : k + 2] for k in range(1, 1 + 2 * marks, 2)]
     others = [corners[k : k + 2] for k in range(3 + 2 * marks, 3 + 4 * marks, 2)][::-1]
@@ -77,11 +76,9 @@ def _read(
     low = strokes[1][:, across].mean()  # the microscope's table moves by what its scale says
     lower = [_at(stroke, low, axis) for stroke in strokes]
     upper = [_at(stroke, low + table["rows_apart_mm"], axis) for stroke in others]
-    forward, backward = (upper, lower) if back else (lower, upper)
     return {
-        "forward_mm": [place - forward[0] for place in forward[1:]],
-        "backward_mm": [place - forward[0] for place in backward[1:]],
-        "rows_apart_mm": -table["rows_apart_mm"] if back else table["rows_apart_mm"],
+        "forward_mm": [place - lower[0] for place in lower[1:]],
+        "backward_mm": [place - lower[0] for place in upper[1:]],
     }
 
 
@@ -91,7 +88,7 @@ def _at(stroke: np.ndarray, level: float, axis: int) -> float:
     return float(a[axis] + (b - a)[axis] * (level - a[across]) / (b - a)[across])
 
 
-def _square(corners: np.ndarray, back: bool) -> dict[str, Any]:
+def _square(corners: np.ndarray) -> dict[str, Any]:
     """Corners are where edges cross; each edge is the straight line through two of its places."""
     right, top = (corners[1], corners[2]), (corners[2], corners[3])
     left, bottom = (corners[3], corners[4]), (corners[4], corners[5])
