@@ -52,11 +52,12 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
     for number, (row, place) in enumerate(tally.gave_up.items()):
         more = and_more(number, len(tally.gave_up), "arcs")
         missed = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
+        noun = "arc" if decoded.is_arc[row] else "move"
         apart = f", passing it {missed:.1f} steps away" if math.isfinite(missed) else ""
         yield Finding(
             Code.ARC_MISSES_END,
             Severity.ERROR,
-            f"the arc does not stop at its end{apart}: the real machine would run on{more}",
+            f"the {noun} does not stop at its end{apart}: the real machine would run on{more}",
             where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
             measured=float(missed) if math.isfinite(missed) else None,
             limit=0.0,
