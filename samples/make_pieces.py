@@ -1,0 +1,92 @@
+"""Writes the pieces that the theses measured, as far as their text says how large they were.
+
+    python samples/make_pieces.py [FOLDER]
+
+Each is a drawing of a few lines; its name begins with the target that it was cut on, and where
+the numbers come from is said in docs/validation.md. Where a piece lay on the table is ours. All
+lengths are mm.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from dxf_writer import dxf
+from make_samples import rounded, straight
+from shapes import Layer, Line, Polyline, Shape, Sheet
+
+APART = 0.2
+"""Between two parallel lines: the theses do not say."""
+
+OUTLINES = {
+    "puma-5": (4.86, 4.96),
+    "puma-1.2": (1.17, 1.19),
+    "puma-1": (0.97, 0.99),
+    "gmm-5": (5.0, 4.997),
+    "gmm-1.2": (1.21, 1.08),
+}
+"""Overall sizes of logos whose shapes are in lost figures: rounded rectangles stand for them."""
+
+
+def two_lines(length: float, axis: int) -> Shape:
+    """Two parallel lines along an axis, joined at their far ends, the first one in +."""
+    corners = [(0.0, 0.0), (length, 0.0), (length, APART), (0.0, APART)]
+    return straight([(a, b) if axis == 0 else (b, a) for a, b in corners], closed=False)
+
+
+def clockwise(centre: tuple[float, float], radius: float) -> Shape:
+    """A circle from its left end over the top."""
+    (x, y), half = centre, -1.0
+    return Polyline([(x - radius, y, half), (x + radius, y, half)])
+
+
+def rectangle(width: float, height: float) -> Shape:
+    """From (0, 0) counter-clockwise; of negative sizes, first along -X and -Y: so all four edges
+    are come to across the play."""
+    return straight([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
+
+
+def outline(width: float, height: float) -> Shape:
+    """A rectangle with corners of a quarter of its shorter side."""
+    return rounded(0.0, 0.0, width, height, 0.25 * min(width, height))
+
+
+DIAGONALS: list[Shape] = [Line((0.0, 0.0), (10.0, 5.0)), Line((10.0, 0.0), (0.0, 5.0))]
+"""Of the rectangle: cut more slowly, on a layer of their own."""
+
+
+def pieces() -> dict[str, list[Shape]]:
+    """Name, shapes."""
+    middle = (3.0, 3.0)
+    found: dict[str, list[Shape]] = {
+        "pic-mmh-lines-x": [two_lines(2.5, 0)],
+        "pic-mmh-lines-y": [two_lines(1.2, 1)],
+        "pic-mmh-square": [rectangle(-2.5, -2.5)],
+        "pic-mmh-circles": [clockwise(middle, radius) for radius in (3.0, 2.0, 1.0)],
+        "flashcut-lines-x": [two_lines(10.0, 0)],
+        "flashcut-lines-y": [two_lines(10.0, 1)],
+        "flashcut-10x10": [rectangle(10.0, 10.0)],
+        "flashcut-10x5": [rectangle(10.0, 5.0)],
+        "flashcut-3x10": [rectangle(3.0, 10.0)],
+        "flashcut-diagonals": [rectangle(10.0, 5.0)],
+        "flashcut-circle": [clockwise((5.0, 5.0), 5.0)],
+    }
+    for name, size in OUTLINES.items():
+        found[f"pic-mmh-{name}"] = [outline(*size)]
+    return found
+
+
+def main(folder: Path) -> None:
+    """Write all pieces into the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, shapes in pieces().items():
+        layers = [Layer("CUT", 5, "#0000ff", shapes)]
+        if name == "flashcut-diagonals":
+            layers.append(Layer("SLOW", 1, "#ff0000", DIAGONALS))
+        text = dxf(Sheet(name, (10.0, 10.0), layers, {}))
+        (folder / f"{name}.dxf").write_text(text, encoding="ascii", newline="\n")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "pieces")
