@@ -1,4 +1,4 @@
-"""The tables of docs/validation.md: written by tests (`--bless`), and compared with what comes out.
+"""The tables of docs/validation.md: written by tests (`--bless`), compared with what comes out.
 
 A table stands between `<!-- NAME -->` and `<!-- end -->`. Words of its cells must be the same;
 numbers may differ by two of their last place, which another computer's sines may turn over.
@@ -54,7 +54,7 @@ def _near(one: str, other: str) -> bool:
 
 
 def _table(heads: Sequence[str], rows: Rows) -> str:
-    """Markdown; columns whose head ends in a unit or a size are numbers."""
+    """Markdown; columns of numbers to the right."""
     cells = [list(heads), ["---:" if _right(rows, k) else "---" for k in range(len(heads))]]
     lines = ["| " + " | ".join(row) + " |" for row in [*cells, *rows]]
     return "\n".join(lines) + "\n"

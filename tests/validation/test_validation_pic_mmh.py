@@ -39,8 +39,8 @@ REGIONS = {
 SQUARES = {"Dx": (2.489, 2.484, 2.497), "Dy": (2.519, 2.497, 2.494)}
 """Tabla 14, L2457-2479: squares X, Y and Z."""
 CORNERS = ((2.9, 2.9), (6.2, 4.9), (9.6, 6.9))
-"""Upper right corners: the left edges lie in H1, H2, H3, the lower ones in V1, V2, V2, for there is
-no room for them in V3."""
+"""Upper right corners: the left edges lie in H1, H2, H3, the lower ones in V1, V2, V2, for there
+is no room for them in V3."""
 
 DIAMETERS = {
     3.0: (5.950, 5.980, 6.001, 6.003, 5.961, 5.926, 5.904, 5.940),  # Tabla 15, L2528-2594

@@ -1,0 +1,113 @@
+"""What the theses on ValCNC and on the Matlab router measured, or said of their pieces."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+
+from camtool.calibration.calibrate import calibrate
+from camtool.calibration.measurements import Measurements, read_measurements
+from camtool.calibration.records import Steps
+from camtool.importers.read import read_drawing
+from camtool.machine.registry import load_target
+from camtool.pipeline import post_drawing
+from camtool.planning.job import job_of
+from camtool.simulation.simulate import simulate
+from camtool.toolpath.builder import ToolpathBuilder
+from tests.oracles.motion_rows import rows_of
+from tests.validation.page import check, mm, signed
+from tests.validation.pieces import ROOT, UM
+
+MEASURED = ROOT / "samples" / "measured" / "valcnc-steps.toml"
+"""Tablas 14 to 16, L1649-1682: ten moves of 8 mm in +."""
+TURNS = 8.0 * np.arange(1, 11)
+
+
+def readings() -> dict[str, np.ndarray]:
+    said = tomllib.loads(MEASURED.read_text(encoding="utf-8"))["steps"]
+    return {table["axis"]: np.array(table["forward_mm"]) for table in said}
+
+
+def ten_turns(axis: str, *settings: str) -> np.ndarray:
+    """(10,) mm: where a program of ten moves of 8 mm leads the slide."""
+    target = load_target("valcnc", settings=settings)
+    path = ToolpathBuilder()
+    for place in TURNS:
+        path.rapid(**{axis: float(place)})
+    program = target.post.write(path.finish(), target.machine)
+    decoded = target.post.read(program.data, target.machine)
+    rows = rows_of(simulate(decoded, target.machine))
+    return np.array([row.slide[-1, "xyz".index(axis)] for row in rows if len(row.slide)])
+
+
+def step_by_five(axis: str) -> float:
+    """What the first five turns say of the step."""
+    said = read_measurements(MEASURED)
+    ((name, coupon),) = [each for each in said.coupons if getattr(each[1], "axis", "") == axis]
+    assert isinstance(coupon, Steps)
+    half = Steps(axis=coupon.axis, nominal_mm=coupon.nominal_mm[:5],
+                 forward_mm=coupon.forward_mm[:5])  # fmt: skip
+    some = Measurements(
+        said.file, said.target, None, said.compensation_mm, said.regions, ((name, half),)
+    )
+    estimate = calibrate(some, load_target("valcnc").machine).estimate("step", axis)
+    assert estimate is not None
+    return estimate.value
+
+
+def test_valcnc(bless: bool) -> None:
+    rows = []
+    for axis, read in readings().items():
+        shipped = ten_turns(axis)
+        ideal = ten_turns(axis, f"axes.{axis}.real_step_mm=0.04")
+        half = ten_turns(axis, f"axes.{axis}.real_step_mm={step_by_five(axis)!r}")
+        assert ideal == pytest.approx(TURNS)
+        later = (read - half)[5:]
+        # The first half tells the second: at least four times better than without.
+        assert 4.0 * np.abs(later).max() < np.abs(read - ideal).max()
+        rows.append(
+            [
+                axis.upper(),
+                mm(read[-1], 2),
+                mm(ideal[-1], 2),
+                mm(shipped[-1], 2),
+                signed(float(np.abs(read - ideal).max()) * UM, 0).lstrip("+"),
+                signed(float(np.abs(read - shipped).max()) * UM, 0).lstrip("+"),
+                signed(float(np.abs(later).max()) * UM, 0).lstrip("+"),
+            ]
+        )
+    heads = ["axis", "after ten turns, mm", "nominal lead", "as shipped", "most off, µm: nominal"]
+    more = ["as shipped", "turns 6 to 10 by turns 1 to 5"]
+    check("valcnc", [*heads, *more], rows, bless)
+
+
+def test_router(bless: bool) -> None:
+    """A closed figure "termina en el mismo punto" (L3886-3892); nothing was measured."""
+    rows = []
+    drawing = read_drawing(ROOT / "samples" / "star.csv")
+    for friction in (0, 10, 30):
+        set_to = f"controller.friction_percent=[{friction}, {friction}, {friction}]"
+        target = load_target("matlab-router", settings=[set_to])
+        posted = post_drawing(drawing, job_of(), target)
+        assert posted.verification is not None
+        assert posted.decoded is not None
+        report = posted.verification.report
+        motion = rows_of(simulate(posted.decoded, target.machine))
+        down = posted.decoded.is_feed & (posted.decoded.end[:, 2] < 0.0)
+        cut = [row.slide for row, on in zip(motion, down, strict=True) if on and len(row.slide)]
+        wanted = posted.decoded.end[down, :2][[0, -1]]
+        begin, end = cut[0][-1, :2], cut[-1][-1, :2]
+        missed = (end - begin) - (wanted[1] - wanted[0])
+        rows.append(
+            [
+                f"{friction} %",
+                mm(report.error_um.total.max / UM, 2),
+                mm(report.error_um.total.rms / UM, 2),
+                mm(math.hypot(*missed), 2),
+            ]
+        )
+    heads = ["friction", "largest error, mm", "rms", "end beside its place from the start, mm"]
+    check("router", heads, rows, bless)
