@@ -17,7 +17,7 @@ from camtool.machine.controllers import (
     ValcncController,
 )
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Chunk
+from camtool.simulation.motion import Chunk, Ledger
 from camtool.simulation.options import Options
 from camtool.toolpath.moves import Toolpath
 
@@ -53,6 +53,28 @@ _MODULES: dict[type, str] = {
     GrblController: "grbl",
     LinuxcncController: "linuxcnc",
 }
+
+
+class StepsOnTheWay(Protocol):
+    """A controller that is run and judged in one go, row by row, without chunks."""
+
+    @property
+    def rows(self) -> int:
+        """How many rows it runs."""
+
+    def judge(self, low: int, high: int, task: Any, sums: Any) -> Ledger:
+        """Run the rows low:high, which follow those run before, and judge them by the task and
+        sums of `camtool.kernels.judge`."""
+
+
+def steps_on_the_way(
+    toolpath: Toolpath, machine: Machine, options: Options
+) -> StepsOnTheWay | None:
+    """The same motion as that of `run`, for models whose module has `judged_steps`; None for
+    others, and where that needs chunks."""
+    made = getattr(model_of(machine), "judged_steps", None)
+    steps: StepsOnTheWay | None = made and made(toolpath, machine, options)
+    return steps
 
 
 def model_of(machine: Machine) -> ControllerModel:

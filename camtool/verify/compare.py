@@ -38,11 +38,6 @@ ANY_CONTOUR = -1
 """A group of points that may be compared with the moves of every contour."""
 
 
-def distance_each(points: Floats, segments: Segments) -> Floats:
-    """(J,) mm from each point (J, 2) to the segment of the same row, exact."""
-    return SegmentTable(segments).distances(points, np.arange(len(points)))
-
-
 class SegmentTable:
     """What distances need of each segment, in columns."""
 
@@ -152,16 +147,6 @@ class Target:
         low, high = cuts.z.T
         length = segment_lengths(cuts.segments)
         self._slope = (high - low) / np.where(length > 0.0, length, 1.0)
-
-    def own(self, points: Floats, rows: Ints) -> Floats:
-        """(J,) mm from points (J, 2) to the moves of their own toolpath rows (J,), which cut."""
-        first = self.cuts.first[rows]
-        found = self.table.distances(points, first)
-        second = np.flatnonzero(self.cuts.first[rows + 1] - first > 1)
-        if len(second):
-            other = self.table.distances(points[second], first[second] + 1)
-            found[second] = np.minimum(found[second], other)
-        return found
 
     def nearest(self, points: Floats, groups: Groups) -> Found:
         """The nearest move of each point (J, 2), and how far it is, exact."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats, Ints
+from camtool.geometry.polylines import Ints
 from camtool.verify.circles import Circle
 from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
 from camtool.verify.cuts import Bools, CutMoves, Samples
@@ -35,15 +35,13 @@ class Match:
 
     `row` (N,) the wanted row nearest to its middle, −1 for rows that do not cut; `contour` (N,)
     likewise; `only` (N,) that contour when the slides may be compared with it alone, else
-    ANY_CONTOUR; `circle` (N,) index of the full circle that the row follows, −1; `apart_mm` (N,)
-    largest distance of the row's samples.
+    ANY_CONTOUR; `circle` (N,) index of the full circle that the row follows, −1.
     """
 
     row: Ints
     contour: Ints
     only: Ints
     circle: Ints
-    apart_mm: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +60,7 @@ def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     count = len(cuts.contour)
     row = np.where(cuts.is_cut, np.arange(count), -1)
     circle = _circle_of_row(circles, count)
-    return Match(row, cuts.contour, cuts.contour, circle, np.zeros(count))
+    return Match(row, cuts.contour, cuts.contour, circle)
 
 
 def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
@@ -180,7 +178,6 @@ def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, go
         contour=np.full(count, -1, dtype=np.int64),
         only=np.full(count, ANY_CONTOUR, dtype=np.int64),
         circle=np.full(count, -1, dtype=np.int64),
-        apart_mm=np.zeros(count),
     )
     if len(rows) == 0 or len(wanted.contour) == 0:
         return match
@@ -196,7 +193,6 @@ def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, go
     match.contour[row] = np.where(known, belongs[begin], nearest[middle])
     match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))
     match.circle[row] = _unanimous(circle, offsets)
-    match.apart_mm[row] = np.maximum.reduceat(found.distance, begin)
     return match
 
 

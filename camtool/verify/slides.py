@@ -12,12 +12,13 @@ import heapq
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
-from camtool.simulation.motion import Chunk, Ledger
+from camtool.simulation.models import StepsOnTheWay
+from camtool.simulation.motion import Chunk
 from camtool.verify.ballbar import BothWays, Pairs, Reversing, reversing
 from camtool.verify.circles import UNSEEN, CircleFigures, circle_figures
 from camtool.verify.compare import Target
@@ -30,17 +31,6 @@ from camtool.verify.trace import Trace, TraceSize, trace_of
 
 if TYPE_CHECKING:
     from camtool.kernels.judge import Sums, Task
-
-
-class Steps(Protocol):
-    """A controller that is run and judged on the way."""
-
-    @property
-    def rows(self) -> int:
-        """How many rows it runs."""
-
-    def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
-        """Run the rows low:high, which follow those run before."""
 
 
 class SlidePass:
@@ -82,7 +72,7 @@ class SlidePass:
                 self._sums,
             )
 
-    def run(self, steps: Steps) -> None:
+    def run(self, steps: StepsOnTheWay) -> None:
         """All rows of a controller that is run on the way."""
         for low, high in pairwise(self._bounds(0, steps.rows)):
             self._close(low)

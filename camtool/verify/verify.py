@@ -20,7 +20,7 @@ import msgspec
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
-from camtool.simulation.models import model_of
+from camtool.simulation.models import StepsOnTheWay, model_of, steps_on_the_way
 from camtool.simulation.motion import Chunk
 from camtool.simulation.simulate import check_options, simulate
 from camtool.toolpath.bent import Bent
@@ -40,7 +40,7 @@ from camtool.verify.records import Before, Planned
 from camtool.verify.report import Report
 from camtool.verify.result import Result
 from camtool.verify.rows import RowFigures
-from camtool.verify.slides import SlidePass, Steps
+from camtool.verify.slides import SlidePass
 from camtool.verify.trace import Trace, trace_size
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
@@ -82,12 +82,11 @@ def verify(
     """
     case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent)
     check_options(machine, case.simulation)
-    on_the_way = getattr(model_of(machine), "judged_steps", None)
-    steps: Steps | None = on_the_way and on_the_way(decoded, machine, case.simulation)
+    steps = steps_on_the_way(decoded, machine, case.simulation)
     return judge(case, steps or simulate(decoded, machine, case.simulation))
 
 
-def judge(case: Case, motion: Iterable[Chunk] | Steps) -> Verification:
+def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     """Judge a case by the chunks of its motion, whoever made them, or by a controller that is run
     on the way."""
     # Without Z on either side, all feed moves are taken to cut.

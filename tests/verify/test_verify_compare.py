@@ -10,12 +10,17 @@ from hypothesis import strategies as st
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Segments
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verify.compare import ANY_CONTOUR, Groups, SegmentTable, Target, distance_each
+from camtool.verify.compare import ANY_CONTOUR, Groups, SegmentTable, Target
 from camtool.verify.cuts import cut_moves
 from camtool.verify.runs import run_offsets
-from tests.oracles.dense_moves import circle, cut, dense_distance, points_of, square
+from tests.oracles.dense_moves import cut, dense_distance
 
 DENSE = 4000
+
+
+def distance_each(points: np.ndarray, segments: Segments) -> np.ndarray:
+    """From each point to the segment of the same row."""
+    return SegmentTable(segments).distances(points, np.arange(len(points)))
 
 
 def arc_or_line(
@@ -156,17 +161,3 @@ def test_where_nothing_may_be_compared_the_distance_is_infinite() -> None:
     assert (found.segment == -1).all()
     none = Target(cut_moves(ToolpathBuilder().finish(), flat_cuts=True))
     assert np.isinf(none.nearest(np.zeros((10, 2)), groups).distance).all()
-
-
-def test_own_distances_are_those_to_the_points_own_row() -> None:
-    b = circle(square(ToolpathBuilder(), 0, 0, 1), 2.0, 2.0, 1.0)
-    toolpath = b.finish()
-    target = Target(cut_moves(toolpath, flat_cuts=False))
-    rng = np.random.default_rng(0)
-    points = rng.uniform(-1, 4, (150, 2))
-    rows = rng.choice(target.cuts.rows, 150)
-    found = target.own(points, rows)
-    moves = list(toolpath)
-    for point, row, distance in zip(points, rows, found, strict=True):
-        cloud = np.array(points_of(moves[row], DENSE))
-        assert distance == pytest.approx(dense_distance(point, cloud), abs=2e-3)

@@ -1,0 +1,259 @@
+"""One run of a toolpath on the PIC18F8720, row by row: see `camtool.simulation.pic_mmh`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.errors import MachineError, ProgramError
+from camtool.kernels.lattice import to_steps
+from camtool.machine.model import Machine, pic_mmh_controller
+from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach, line_filler
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, one_row
+from camtool.simulation.options import Options
+from camtool.simulation.pic_mmh_legs import JudgedSteps, legs_of, positions
+from camtool.toolpath.moves import Kind, Toolpath
+
+MAX_STEPS = 1 << 30
+"""Positions beyond this many steps (150 m at 140 nm) are refused: squares must fit 64 bits."""
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """A part of a row that one interpolator makes: `samples` positions of `fill`; the position of
+    the axes `columns` is origin + sign · filled; an output every `period_s`."""
+
+    fill: Filler
+    samples: int
+    columns: tuple[int, ...]
+    origin: tuple[int, ...]
+    sign: tuple[int, ...]
+    period_s: float
+    ended: bool = True
+
+
+class PicMmh:
+    """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
+
+    def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
+        self._toolpath, self._options = toolpath, options
+        self._controller = pic_mmh_controller(machine)
+        if machine.limits.rapid_step_rate_hz is None:
+            raise MachineError(
+                "key is missing: this controller times its rapids by it",
+                where="table [limits], key rapid_step_rate_hz",
+                mend="use --set limits.rapid_step_rate_hz=HZ",
+            )
+        self._rapid_period_s = 1.0 / machine.limits.rapid_step_rate_hz
+        self._coded_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+        if self._coded_mm[0] != self._coded_mm[1]:
+            raise MachineError(
+                f"steps of X and Y differ ({self._coded_mm[0]} and {self._coded_mm[1]} mm)",
+                where="table [axes], key coded_step_mm",
+                mend="the controller interpolates with one step size; "
+                "say the difference in real_step_mm",
+            )
+        self._ends = self._steps(toolpath.end, range(3))
+        self._centres = self._arc_centres()
+        home_mm = np.array([self._controller.machine_zero_mm], dtype=np.float64)
+        self._home: Ints = self._steps(home_mm, range(3), named=False)[0]
+        self._position: Ints = self._steps(toolpath.start[None, :], range(3), named=False)[0]
+        self._mechanics = Mechanics(machine, self._position * self._coded_mm, options.effects)
+        self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
+
+    def run(self) -> Iterator[Chunk]:
+        """The chunks of all rows up to the end of the program."""
+        for row, number in enumerate(self._toolpath.kind.tolist()):
+            kind = Kind(number)
+            still, moved = self._still(row, kind, self._position), False
+            for chunk in self._moving(row, kind):
+                moved = True
+                yield chunk
+            if not moved:
+                yield still
+            if kind == Kind.END:
+                return
+
+    def judged_steps(self) -> JudgedSteps | None:
+        """All rows up to the end of the program as legs."""
+        if not self._mechanics.plain:
+            return None
+        toolpath = self._toolpath
+        ends = np.flatnonzero(toolpath.kind == Kind.END)
+        rows = int(ends[0]) + 1 if len(ends) else len(toolpath)
+        places = positions(toolpath, self._position, self._ends, self._home)
+        for row in np.flatnonzero(self._suspect(places)[:rows]).tolist():
+            self._check(row, places[row])
+        feeds = toolpath.is_feed[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            feed_s = 60.0 * self._coded_mm[None, [0, 2]] / toolpath.feed[:, None]
+        waits = toolpath.kind[:rows] == Kind.DWELL
+        legs = legs_of(toolpath, places, self._centres)
+        return JudgedSteps(
+            legs=legs,
+            periods_s=np.where(feeds, feed_s, self._rapid_period_s),
+            still_s=np.where(waits, toolpath.value[:rows], 0.0),
+            how=(
+                self._options.interpolator or self._controller.arcs,
+                self._controller.initial_error == "rounded-radius",
+                self._controller.time_base == "event",
+                float(self._coded_mm[0]),
+            ),
+            mechanics=self._mechanics,
+        )
+
+    def _suspect(self, places: Ints) -> Bools:
+        """(N,) true for the rows that `_check` has to look at."""
+        kind, feed = self._toolpath.kind, self._toolpath.feed
+        with np.errstate(invalid="ignore"):
+            no_feed = self._toolpath.is_feed & ~((feed > 0.0) & np.isfinite(feed))
+        away = (kind == Kind.SET_ZERO) & places[:-1].any(axis=1)
+        return np.asarray(no_feed | away | (kind == Kind.DWELL))
+
+    def _check(self, row: int, position: Ints) -> None:
+        """ProgramError for a row that cannot be followed from `position` (3,) steps."""
+        kind = Kind(int(self._toolpath.kind[row]))
+        if kind <= Kind.ARC_CCW:
+            self._period(row, kind, 0)
+        self._still(row, kind, position)
+
+    def _moving(self, row: int, kind: Kind) -> Iterator[Chunk]:
+        """Chunks of a row's motion; the controller then stands at the end that it was given."""
+        if kind in (Kind.HOME_XY, Kind.HOME_Z):
+            target = self._position.copy()
+            axes = [0, 1] if kind == Kind.HOME_XY else [2]
+            target[axes] = self._home[axes]
+        elif kind <= Kind.ARC_CCW:
+            target = self._ends[row]
+        else:
+            return
+        if kind in (Kind.ARC_CW, Kind.ARC_CCW):
+            yield from self._emit(row, self._arc(row, kind, target))
+            self._position = np.array([target[0], target[1], self._position[2]])
+            self._mechanics.place(self._position * self._coded_mm)
+        else:
+            yield from self._emit(row, self._line((0, 1), target, self._period(row, kind, 0)))
+        if target[2] != self._position[2]:
+            yield from self._emit(row, self._line((2,), target, self._period(row, kind, 2)))
+
+    def _period(self, row: int, kind: Kind, axis: int) -> float:
+        """Seconds between two outputs of a row on an axis."""
+        if kind not in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
+            return self._rapid_period_s
+        feed = float(self._toolpath.feed[row])
+        if not (math.isfinite(feed) and feed > 0.0):
+            raise ProgramError(
+                "a move at a feed without a feed above 0",
+                where=self._place(row),
+                mend="give it one (F)",
+            )
+        return 60.0 * float(self._coded_mm[axis]) / feed
+
+    def _line(self, axes: tuple[int, ...], target: Ints, period_s: float) -> _Leg:
+        """A DDA line of one or two axes from here to `target`."""
+        way = [int(target[axis] - self._position[axis]) for axis in axes]
+        a, b = abs(way[0]), abs(way[1]) if len(way) > 1 else 0
+        return _Leg(
+            fill=line_filler(a, b),
+            samples=a + b,
+            columns=axes,
+            origin=tuple(int(self._position[axis]) for axis in axes),
+            sign=tuple(-1 if part < 0 else 1 for part in way),
+            period_s=period_s,
+        )
+
+    def _arc(self, row: int, kind: Kind, target: Ints) -> _Leg:
+        """The arc of a row, about its rounded centre, as far as it will go."""
+        centre_x, centre_y = self._centres[row].tolist()
+        x, y = int(self._position[0]) - centre_x, int(self._position[1]) - centre_y
+        arc = Arc(x, y, kind == Kind.ARC_CW, int(target[0]) - centre_x, int(target[1]) - centre_y)
+        period_s = self._period(row, kind, 0)
+        origin, sign = (centre_x, centre_y), (1, 1)
+        if x == 0 and y == 0:
+            return _Leg(line_filler(0, 0), 0, (0, 1), origin, sign, period_s, ended=False)
+        method = self._options.interpolator or self._controller.arcs
+        rounded = self._controller.initial_error == "rounded-radius"
+        samples, met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
+        fill = arc_filler(arc, method, rounded=rounded)
+        return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=met)
+
+    def _emit(self, row: int, leg: _Leg) -> Iterator[Chunk]:
+        """The samples of a leg in chunks; an empty one when it has none and never ends."""
+        left, done = leg.samples, leg.samples == 0
+        if done and not leg.ended:
+            yield one_row(row, NO_SAMPLES, NO_SAMPLES, ended=False)
+        while not done:
+            filled, passes, done = leg.fill(self._buffer[:left])
+            left -= filled
+            done = done or left == 0
+            steps = np.empty((filled, 3), dtype=np.int64)
+            steps[:] = self._position
+            for index, column in enumerate(leg.columns):
+                steps[:, column] = (
+                    leg.origin[index] + leg.sign[index] * self._buffer[:filled, index]
+                )
+            yield self._chunk(row, leg, steps, passes, leg.ended or not done)
+
+    def _chunk(self, row: int, leg: _Leg, steps: Ints, passes: int, ended: bool) -> Chunk:
+        travelled = np.abs(np.diff(steps, axis=0, prepend=self._position[None, :])).sum(axis=0)
+        self._position = steps[-1]
+        commanded = steps * self._coded_mm
+        slide, reversals = self._mechanics.follow(commanded, np.array([0, len(steps)]))
+        by_event = self._controller.time_base == "event"
+        periods = len(steps) if by_event else passes
+        added = int(reversals[0] @ self._mechanics.compensation_steps)
+        return one_row(
+            row,
+            commanded,
+            slide,
+            duration_s=(periods + added) * leg.period_s,
+            compensation_s=added * leg.period_s,
+            iterations=passes,
+            steps=travelled,
+            reversals=reversals[0],
+            ended=ended,
+        )
+
+    def _still(self, row: int, kind: Kind, position: Ints) -> Chunk:
+        """A chunk of a row without motion; ProgramError for an event that cannot be followed."""
+        seconds = 0.0
+        if kind == Kind.DWELL:
+            seconds = float(self._toolpath.value[row])
+            if not (math.isfinite(seconds) and seconds >= 0.0):
+                raise ProgramError("a dwell without its seconds", where=self._place(row))
+        elif kind == Kind.SET_ZERO and position.any():
+            raise ProgramError(
+                "part zero is set away from part zero",
+                where=self._place(row),
+                mend="set it once, before any move",
+            )
+        return one_row(row, NO_SAMPLES, NO_SAMPLES, duration_s=seconds)
+
+    def _arc_centres(self) -> Ints:
+        """(N, 2) steps; 0 where the row is no arc."""
+        toolpath = self._toolpath
+        bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
+        if bad.any():
+            raise ProgramError("an arc without a centre", where=self._place(int(bad.argmax())))
+        return self._steps(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), range(2))
+
+    def _steps(self, points: Floats, axes: range, *, named: bool = True) -> Ints:
+        """(N, len(axes)) steps of points in mm; ProgramError beyond `MAX_STEPS`."""
+        coded_mm = self._coded_mm[list(axes)]
+        far = (np.abs(points) > MAX_STEPS * coded_mm).any(axis=1)
+        if far.any():
+            raise ProgramError(
+                "a position is beyond all that the controller can count",
+                where=self._place(int(far.argmax())) if named else None,
+            )
+        columns = [to_steps(points[:, axis], float(coded_mm[axis])) for axis in axes]
+        return np.column_stack(columns)
+
+    def _place(self, row: int) -> str:
+        """The block (from 1) that a row was read from, or the row when it was planned."""
+        block = int(self._toolpath.block[row])
+        return f"block {block + 1}" if block >= 0 else f"move {row}"
