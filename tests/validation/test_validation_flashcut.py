@@ -71,7 +71,7 @@ def test_no_play_and_no_scale_explain_one_axis() -> None:
 
 
 def test_the_coded_step_explains_about_half_of_what_is_missing() -> None:
-    """−0.160 mm were measured on average, −0.081 are predicted: 1.88 for 1.9 µm (L1674)."""
+    """−0.160 mm were measured on average, −0.084 are predicted: 1.88 for 1.9 µm (L1674)."""
     pairs = [
         (nominal, measured, rectangle(name).size[axis])
         for name, (*sizes, _) in RECTANGLES.items()
@@ -79,7 +79,8 @@ def test_the_coded_step_explains_about_half_of_what_is_missing() -> None:
     ]
     nominal, measured, predicted = np.array(pairs).T
     assert (measured - nominal).mean() == pytest.approx(-0.160, abs=0.001)
-    assert (predicted - nominal).mean() == pytest.approx(-0.084, abs=0.005)
+    assert (predicted - nominal).mean() == pytest.approx(-0.084, abs=0.001)
+    assert (measured > predicted - 0.2).all()
     assert (measured < predicted + 0.003).all()
 
 
