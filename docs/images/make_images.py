@@ -1,6 +1,6 @@
-"""Draws the pictures of docs/toolpaths.md anew:  python docs/images/make_images.py
+"""Draws the pictures of the pages anew:  python docs/images/make_images.py
 
-The page itself says how each is made (its lines "camtool preview … -o docs/images/NAME"); only the
+The pages themselves say how each is made (its lines "camtool … docs/images/NAME"); only the
 stages of an offset have no command, and are drawn here.
 """
 
@@ -23,14 +23,15 @@ from camtool.preview.render import render
 from camtool.preview.scene import Scene
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("docs/toolpaths.md", "docs/reversals.md")
+PAGES = ("docs/toolpaths.md", "docs/reversals.md", "docs/verifying.md")
 DISTANCE_MM = 1.6
 
 
 def commands() -> list[list[str]]:
     """The commands of the pages that make pictures, without the name of the program."""
     text = "".join((ROOT / page).read_text(encoding="utf-8") for page in PAGES)
-    lines = re.findall(r"^camtool (.*-o docs/images/.*)$", text.replace("\\\n", " "), re.MULTILINE)
+    makes = r"^camtool (.*(?:-o|--preview) docs/images/.*)$"
+    lines = re.findall(makes, text.replace("\\\n", " "), re.MULTILINE)
     return [shlex.split(line) for line in lines]
 
 
