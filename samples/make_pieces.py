@@ -63,6 +63,7 @@ def pieces() -> dict[str, list[Shape]]:
         "pic-mmh-lines-x": [two_lines(2.5, 0)],
         "pic-mmh-lines-y": [two_lines(1.2, 1)],
         "pic-mmh-square": [rectangle(-2.5, -2.5)],
+        "pic-mmh-square-up": [rectangle(2.5, 2.5)],
         "pic-mmh-circles": [clockwise(middle, radius) for radius in (3.0, 2.0, 1.0)],
         "flashcut-lines-x": [two_lines(10.0, 0)],
         "flashcut-lines-y": [two_lines(10.0, 1)],

@@ -50,7 +50,7 @@ def _near(one: str, other: str) -> bool:
     if not places:
         return one == other  # counts and lines of a thesis
     apart = abs(float(one.replace("−", "-")) - float(other.replace("−", "-")))
-    return apart * 10**places < LAST_PLACES + 0.5
+    return bool(apart < (LAST_PLACES + 0.5) * 0.1**places)
 
 
 def _table(heads: Sequence[str], rows: Rows) -> str:

@@ -103,6 +103,13 @@ def square(*settings: str, at: tuple[float, float] = CORNERS[1]) -> tuple[float,
     return float(across), float(np.median(top[:, 1]) - np.median(bottom[:, 1]))
 
 
+def square_begun_below(*settings: str) -> tuple[float, float]:
+    """(Dx, Dy) mm where the lower edge is come to in +, as it lies: Y shows no play."""
+    bottom, right, top, left = piece("pic-mmh-square-up", *FIRST, *settings).cuts
+    across = np.median(right[:, 0]) - np.median(left[:, 0])
+    return float(across), float(np.median(top[:, 1]) - np.median(bottom[:, 1]))
+
+
 def circles(*settings: str) -> Piece:
     return piece("pic-mmh-circles", *settings, at=CENTRE)
 

@@ -27,6 +27,7 @@ from tests.validation.pic_mmh_parts import (
     rms,
     settings_of,
     square,
+    square_begun_below,
 )
 from tests.validation.pieces import UM
 
@@ -63,6 +64,11 @@ def test_hypotheses(bless: bool) -> None:
             off = off[:3]  # where on the table the logos were cut is not known
         cells = [f"{rms(each):.1f} ({signed(float(each.mean()) * UM)})" for each in off]
         rows.append([name, *cells, *["–"] * (5 - len(cells))])
+        if settings == EVEN:
+            below = square_begun_below(*EVEN)
+            off = [np.array(read) - below[k] for k, read in enumerate(SQUARES.values())]
+            cells = [f"{rms(each):.1f} ({signed(float(each.mean()) * UM)})" for each in off]
+            rows.append(["… squares begun below", *cells, "–", "–", "–"])
     heads = ["", "squares X", "squares Y", "circles", "logos X", "logos Y"]
     check("pic-hypotheses", heads, rows, bless)
 
@@ -115,6 +121,7 @@ def test_play_by_the_circles_is_nearer_to_what_the_controller_adds() -> None:
     for axis, by_lines, added in (("x", 0.1925, 0.204), ("y", 0.1685, 0.178)):
         play = found.estimate("play", axis)
         assert play is not None
+        assert play.uncertainty is not None
         assert play.uncertainty == pytest.approx(0.0056, abs=0.0001)
         assert abs(play.value - added) < 1.2 * play.uncertainty < abs(play.value - by_lines)
     lean = found.estimate("squareness")

@@ -28,7 +28,7 @@ ITERATIONS = {"stairs": 240, "dda": 188, "dsm": 168}
 ERRORS_NM = {"stairs": 140.0, "dda": 140.0, "dsm": 70.0}
 MICROSECONDS = {"stairs": 3.2, "dda": 6.8, "dsm": 8.6}
 """Tabla 7, L1438-1458: a full circle; time of an iteration on the PIC."""
-GRADES = {
+GRADES: dict[Interpolator, tuple[float, ...]] = {
     "dda": (8.0, 9.0, 8.8, 7.0, 84.4),
     "stairs": (6.0, 9.0, 5.7, 10.0, 72.1),
     "dsm": (9.0, 9.5, 10.0, 5.0, 90.5),

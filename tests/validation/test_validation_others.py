@@ -48,6 +48,7 @@ def step_by_five(axis: str) -> float:
     said = read_measurements(MEASURED)
     ((name, coupon),) = [each for each in said.coupons if getattr(each[1], "axis", "") == axis]
     assert isinstance(coupon, Steps)
+    assert coupon.forward_mm is not None
     half = Steps(axis=coupon.axis, nominal_mm=coupon.nominal_mm[:5],
                  forward_mm=coupon.forward_mm[:5])  # fmt: skip
     some = Measurements(
@@ -95,6 +96,9 @@ def test_router(bless: bool) -> None:
         assert posted.verification is not None
         assert posted.decoded is not None
         report = posted.verification.report
+        error = report.error_um.total
+        assert error.max is not None
+        assert error.rms is not None
         motion = rows_of(simulate(posted.decoded, target.machine))
         down = posted.decoded.is_feed & (posted.decoded.end[:, 2] < 0.0)
         cut = [row.slide for row, on in zip(motion, down, strict=True) if on and len(row.slide)]
@@ -104,8 +108,8 @@ def test_router(bless: bool) -> None:
         rows.append(
             [
                 f"{friction} %",
-                mm(report.error_um.total.max / UM, 2),
-                mm(report.error_um.total.rms / UM, 2),
+                mm(error.max / UM, 2),
+                mm(error.rms / UM, 2),
                 mm(math.hypot(*missed), 2),
             ]
         )

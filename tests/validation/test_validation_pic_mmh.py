@@ -124,7 +124,10 @@ def test_circles(bless: bool) -> None:
 def test_steps_at_the_ends_of_the_axes(bless: bool) -> None:
     """Report order is 0°, 90°, 180°, 270°; the thesis's is left, right, upper, lower."""
     plain, by_region = (
-        {one.radius_mm: np.abs(one.step_um)[[2, 0, 1, 3]] for one in made.report.circles}
+        {
+            one.radius_mm: np.abs(np.array(one.step_um, dtype=float))[[2, 0, 1, 3]]
+            for one in made.report.circles
+        }
         for made in (circles(), circles(*MAP))
     )
     rows = [
