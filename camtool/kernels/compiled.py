@@ -1,8 +1,8 @@
 """Functions that numba compiles when they are first called, and not before.
 
     @kernel   a loop that Python calls
-    @inner    what only compiled functions call; the ways in from Python and C, which take a good
-              part of the time of compiling, are left out
+    @inner    what only compiled functions call: it is compiled as a part of those alone
+              (`camtool.kernels.inlined`)
 
 numba itself is loaded with the first call. What it compiled is kept on disk, and a later run loads
 it without the hundred modules with which numba compiles (a third of a second). A number written
@@ -44,8 +44,12 @@ class Kernel:
 
     @functools.cached_property
     def dispatcher(self) -> Any:
-        """numba's form of the function for other kernels, kept on disk."""
-        made = self._made(no_cpython_wrapper=self.inside)
+        """numba's form of the function for other kernels; what Python calls is kept on disk."""
+        if self.inside:
+            from camtool.kernels.inlined import InlinedCompiler
+
+            return self._made(no_cpython_wrapper=True, pipeline_class=InlinedCompiler)
+        made = self._made(no_cpython_wrapper=False)
         made._cache = _kept(self.py_func)
         return made
 
