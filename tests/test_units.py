@@ -89,7 +89,7 @@ def test_bad_angles(text: str) -> None:
         parse_angle(text)
 
 
-@pytest.mark.parametrize("text", ["soon", "3mm", "3deg", "nan", "3h"])
+@pytest.mark.parametrize("text", ["soon", "3mm", "3deg", "nan", "3d"])
 def test_bad_times(text: str) -> None:
     with pytest.raises(OptionError):
         parse_time(text)

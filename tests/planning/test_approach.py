@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import scaled
-from camtool.kernels.play import play_fill, play_limits
 from camtool.machine.controllers import PathController, PicMmhController
 from camtool.machine.model import Machine
 from camtool.planning.items import Run
@@ -22,6 +21,8 @@ from camtool.planning.reversing.approach import (
 )
 from camtool.planning.reversing.residual import residuals
 from camtool.planning.reversing.reversals import reversals_of
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.options import ALL
 from camtool.simulation.simulate import simulate
 from camtool.verify.cuts import cut_moves
 from tests.planning.reversal_parts import run_of, square, toolpath, with_play
@@ -138,12 +139,11 @@ def test_residual_errors_are_those_of_the_play_operator(
     )
     residual = residuals(changed)[0]
     first = 1 if direction == "+" else -1
-    low, high = play_limits(0.2, play, first)
     way = np.concatenate([np.arange(2000), np.arange(2000, -2000, -1), np.arange(-2000, 0)])
-    out = np.empty(len(way))
-    state = np.array([0.0, first, 0.0, 0.0, 0.0, 0.0])
-    play_fill(way, np.array([step, low, high, compensation_steps]), state, out)
-    error = out - way * step
+    commanded = np.column_stack([way * step, np.zeros((len(way), 2))])
+    mechanics = Mechanics(changed, np.zeros(3), ALL)
+    slide, _ = mechanics.follow(commanded, np.array([0, len(way)]))
+    error = (slide - commanded)[:, 0]
     assert error[1900] == pytest.approx(residual.plus_mm, abs=1e-12) or first < 0
     assert error[5900] == pytest.approx(residual.minus_mm, abs=1e-12)
     assert error[-1] == pytest.approx(residual.plus_mm, abs=1e-12)
