@@ -24,7 +24,21 @@ e (2R − e) ≤ R − e inside and e (2R + e) ≤ R + e − 1 outside; both fai
 Exact, because every number is an integer: D and both Δ are carried along in int64, as the
 firmware carries them, and no square or root is ever taken; 2·|x| + 1 and |D| stay far below 2⁶³
 for every radius that a program can say. Compiled, because each iteration depends on the one
-before (the tie rules make no closed form) and one part takes tens of millions of them.
+before and one part takes tens of millions of them.
+
+Most of a long arc needs no iterations. C = x² + y² − D never changes. While M, the coordinate of
+smaller size, runs and 2·M² ≤ C, so that the circle of C is no steeper than one to one, put
+A = C − M²; the other one, N, is best in size in its own line of the lattice when it is
+
+    n = round(√A),      that is   n² − n < A ≤ n² + n,      −n ≤ D = n² − A < n.
+
+From one M to the next √A changes by at most 1, and so does n: the best N is always among the two
+that an iteration may give N while M steps. It beats a step of N alone, with which |D| ≥ n towards
+the centre and ≥ n + 1 away from it, where the best of the next line has |D| no greater than its
+own n; ties, see above, do not decide. So a start with −|N| ≤ D < |N| gives N = ± round(√(C − M²))
+for each M that follows, up to the diagonal or the axis: many at once, and no number waits for
+the one before. A root is told from n + ½ as long as n is below 2²⁴ (1/(8 n) is how far they are
+apart at least, and a root and a sum of float64 round less than 2⁻²⁸ away); larger ones iterate.
 
 `error` is the D that the controller starts with: 0, or x² + y² − round(R)² (the thesis leaves
 the choice open). Iteration 0 is the start itself, iteration k the position after k passes.
@@ -34,6 +48,8 @@ A state is an int64 array (x, y, D, sx, sy), changed in place by `direct_search_
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -41,6 +57,12 @@ from camtool.kernels.compiled import inner, kernel
 from camtool.kernels.heading import heading
 
 Ints = npt.NDArray[np.int64]
+
+MOST_SQUARE = 1 << 48
+"""Squares of the radius in steps from which on the closed form is not used."""
+
+LEAST_RUN = 8
+"""Fewer positions than these are iterated."""
 
 
 @inner
@@ -79,6 +101,38 @@ def direct_search_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints
     return np.array([x, y, error, sx, sy], dtype=np.int64)
 
 
+@inner
+def _run_length(m: int, n: int, way: int, error: int, room: int) -> int:
+    """How many positions, up to `room`, the closed form gives from M, N on while M runs `way`."""
+    invariant = m * m + n * n - error
+    if error < -abs(n) or error >= abs(n) or invariant >= MOST_SQUARE or 2 * m * m > invariant:
+        return 0
+    if m * way < 0:
+        return min(room, abs(m))
+    return min(room, int(math.sqrt(0.5 * invariant)) - 1 - abs(m))
+
+
+@inner
+def _run(m: int, n: int, way: int, error: int, out_m: Ints, out_n: Ints) -> None:
+    """The positions that follow M, N while M runs `way`, by the closed form."""
+    invariant = float(m * m + n * n - error)
+    sign = 1.0 if n > 0 else -1.0
+    for k in range(len(out_m)):
+        out_m[k] = m + way * (k + 1)
+    for k in range(len(out_m)):
+        here = float(out_m[k])
+        out_n[k] = int(sign * math.floor(math.sqrt(invariant - here * here) + 0.5))
+
+
+@inner
+def _meets(m: int, n: int, way: int, end_m: int, end_n: int, out_n: Ints) -> int:
+    """How many of the positions of a run there are up to the end, or −1: M passes it once."""
+    at = (end_m - m) * way - 1
+    if 0 <= at < len(out_n) and out_n[at] == end_n:
+        return at + 1
+    return -1
+
+
 @kernel
 def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, bool]:
     """Run on from `state` into `out` (n, 2) until the end is met or `out` is full.
@@ -87,14 +141,36 @@ def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[
     stands where the rows end, so that the next call goes on.
     """
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
-    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
     filled, met = 0, False
     while filled < len(out) and not met:
-        x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
-        out[filled, 0] = x
-        out[filled, 1] = y
-        filled += 1
-        met = x == end_x and y == end_y
+        by_x = abs(x) < abs(y)
+        m, n, way = (x, y, sx) if by_x else (y, x, sy)
+        run = _run_length(m, n, way, error, len(out) - filled)
+        if run >= LEAST_RUN:
+            m_out = out[filled : filled + run, 0 if by_x else 1]
+            n_out = out[filled : filled + run, 1 if by_x else 0]
+            _run(m, n, way, error, m_out, n_out)
+            end_m, end_n = (end_x, end_y) if by_x else (end_y, end_x)
+            upto = _meets(m, n, way, end_m, end_n, n_out)
+            met = upto > 0
+            run = upto if met else run
+            error += m_out[run - 1] ** 2 + n_out[run - 1] ** 2 - m * m - n * n
+            filled += run
+            x, y = out[filled - 1, 0], out[filled - 1, 1]
+            if by_x and x == 0:
+                sy = -sy
+            elif y == 0 and not by_x:
+                sx = -sx
+            continue
+        delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
+        for _ in range(min(LEAST_RUN, len(out) - filled)):
+            x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
+            out[filled, 0] = x
+            out[filled, 1] = y
+            filled += 1
+            met = x == end_x and y == end_y
+            if met:
+                break
     state[0], state[1], state[2], state[3], state[4] = x, y, error, sx, sy
     return filled, met
 

@@ -88,6 +88,69 @@ def test_filling_goes_on_where_it_stopped(size: int) -> None:
     assert np.array_equal(np.concatenate(parts), whole)
 
 
+def filled(
+    start: tuple[int, int],
+    clockwise: bool,
+    error: int,
+    end: tuple[int, int],
+    limits: tuple[int, int],
+) -> tuple[np.ndarray, bool]:
+    """Positions of the compiled fill up to the end, or so many; in buffers of some size."""
+    most, size = limits
+    state = direct_search_start(*start, clockwise, error)
+    buffer, parts, met = np.empty((2, size), dtype=np.int64).T, [], False
+    while not met and sum(map(len, parts)) < most:
+        count, met = direct_search_fill(state, *end, buffer)
+        parts.append(buffer[:count].copy())
+    return np.concatenate(parts), met
+
+
+NOWHERE = (10**9, 10**9)
+
+
+@pytest.mark.parametrize("clockwise", [True, False])
+def test_runs_of_the_closed_form_equal_the_iterations(clockwise: bool) -> None:
+    """Every small start; the path that is compared with is itself that of the literal loop."""
+    for x in range(-40, 41):
+        for y in range(-40, 41):
+            size = math.hypot(x, y)
+            if size == 0.0:
+                continue
+            for error in {0, x * x + y * y - round(size) ** 2}:
+                count = int(6 * size) + 12
+                got, _ = filled((x, y), clockwise, error, NOWHERE, (count, 512))
+                wanted = direct_search_path(x, y, clockwise, 0, len(got), error)
+                assert np.array_equal(got, wanted), (x, y, error)
+
+
+def test_runs_of_large_radii_equal_the_iterations() -> None:
+    rng = np.random.default_rng(24)
+    for radius in (70, 900, 33_333, 714_285, 16_777_215, 16_777_217, 40_000_000):
+        for axis in (0, 1, 2, 3, None):
+            angle = rng.uniform(0.0, 2.0 * math.pi) if axis is None else axis * math.pi / 2
+            x, y = round(radius * math.cos(angle)), round(radius * math.sin(angle))
+            got, _ = filled((x, y), bool(axis), 0, NOWHERE, (min(6 * radius, 200_000), 777))
+            assert np.array_equal(got, direct_search_path(x, y, bool(axis), 0, len(got)))
+
+
+def test_runs_end_where_the_stop_test_ends_them() -> None:
+    rng = np.random.default_rng(25)
+    missed = 0
+    for number in range(400):
+        radius, angle = 10.0 ** rng.uniform(1.0, 3.5), rng.uniform(0.0, 6.28)
+        x, y = round(radius * math.cos(angle)), round(radius * math.sin(angle))
+        count, clockwise = int(6 * radius), bool(number % 2)
+        path = direct_search_path(x, y, clockwise, 0, count)
+        end = path[rng.integers(count)] + (rng.integers(-1, 2, 2) if number % 3 else 0)
+        hit = direct_search_hits(x, y, clockwise, int(end[0]), int(end[1]), count)
+        size = int(rng.choice([1, 7, 64, 512]))
+        got, met = filled((x, y), clockwise, 0, (int(end[0]), int(end[1])), (count, size))
+        assert (met and len(got) == hit) if hit > 0 else (not met or len(got) > count)
+        assert np.array_equal(got[:count], path[: len(got)])
+        missed += hit < 0
+    assert 0 < missed < 400
+
+
 def test_hits_and_nearest_agree_with_the_path() -> None:
     rng = np.random.default_rng(22)
     missed = 0
