@@ -21,7 +21,8 @@ step of an interpolator's last rounding is none."""
 @dataclass(frozen=True)
 class ContourFigures:
     """The total error of one wanted contour, mm: the largest with its place and toolpath row, root
-    of the mean square, and mean with sign (+ to the left of the way)."""
+    of the mean square, and mean with sign (+ to the left of the way); and the largest errors of
+    interpolation and mechanics on it."""
 
     contour: int
     row: int
@@ -29,6 +30,8 @@ class ContourFigures:
     max_mm: float
     rms_mm: float
     mean_mm: float
+    interpolation_mm: float
+    mechanics_mm: float
 
 
 def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
@@ -41,6 +44,9 @@ def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
     samples = np.bincount(of, rows.known[known], count)
     squares = np.bincount(of, rows.total_squares[known], count)
     sums = np.bincount(of, rows.total_sum[known], count)
+    inner, lag = np.zeros((2, count))
+    np.maximum.at(inner, of, rows.interpolation[known])
+    np.maximum.at(lag, of, rows.mechanics[known])
     order = known[np.lexsort((known, -rows.total[known], of))]
     first = order[np.flatnonzero(np.diff(match.contour[order], prepend=-1))]
     for row in first.tolist():
@@ -52,6 +58,8 @@ def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
             max_mm=float(rows.total[row]),
             rms_mm=float(np.sqrt(squares[contour] / samples[contour])),
             mean_mm=float(sums[contour] / samples[contour]),
+            interpolation_mm=float(inner[contour]),
+            mechanics_mm=float(lag[contour]),
         )
 
 

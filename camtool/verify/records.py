@@ -142,8 +142,8 @@ class BothWaysReport(msgspec.Struct, frozen=True):
 
 
 class ContourReport(msgspec.Struct, frozen=True):
-    """The total error of one contour, µm, and where it is largest; `block` from 1, None when no
-    program was read."""
+    """The total error of one contour, µm, and where it is largest; its largest errors by source;
+    `block` from 1, None when no program was read."""
 
     name: str
     max_um: float
@@ -151,6 +151,8 @@ class ContourReport(msgspec.Struct, frozen=True):
     mean_um: float
     at_mm: tuple[float, float]
     block: int | None
+    interpolation_um: float
+    mechanics_um: float
 
 
 class WorstReport(msgspec.Struct, frozen=True):

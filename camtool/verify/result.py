@@ -171,6 +171,8 @@ class Result:
                 mean_um=certain(one.mean_mm * UM_PER_MM),
                 at_mm=(certain(one.at_mm[0]), certain(one.at_mm[1])),
                 block=_block(self.case, one.row),
+                interpolation_um=certain(one.interpolation_mm * UM_PER_MM),
+                mechanics_um=certain(one.mechanics_mm * UM_PER_MM),
             )
             for one in contour_figures(self.rows, self.coverage.match)
         )

@@ -185,11 +185,12 @@ def _contour_table(report: Report) -> Iterator[str]:
     """The contours with the largest errors."""
     if not report.contour_errors:
         return
-    yield "| contour | max µm | rms µm | mean µm | where |"
-    yield "|---|---:|---:|---:|---|"
+    yield "| contour | max µm | rms µm | mean µm | interpolation µm | mechanics µm | where |"
+    yield "|---|---:|---:|---:|---:|---:|---|"
     ordered = sorted(report.contour_errors, key=lambda item: -item.max_um)
     for item in ordered[:DIMENSIONS_SHOWN]:
-        figures = f"{item.max_um:.2f} | {item.rms_um:.2f} | {_um(item.mean_um)}"
+        errors = (item.max_um, item.rms_um, item.mean_um, item.interpolation_um, item.mechanics_um)
+        figures = " | ".join(_um(error) for error in errors)
         place = f"({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f})"
         yield f"| {_plain(item.name)} | {figures} | {place} |"
     yield from _rest(len(ordered), "contours")

@@ -29,6 +29,8 @@ def test_each_contour_has_its_own_figures() -> None:
     first, second = found.contour_errors
     assert (first.name, second.name) == ("contour 1", "contour 2")
     assert (first.max_um, second.max_um) == pytest.approx((1.0, 2.0), abs=1e-6)
+    assert (first.mechanics_um, second.mechanics_um) == pytest.approx((1.0, 2.0), abs=1e-6)
+    assert (first.interpolation_um, second.interpolation_um) == pytest.approx((0.0, 0.0), abs=0.2)
     # Upright sides are off by it, level ones not at all but near their corners.
     assert first.rms_um == pytest.approx(1.0 / np.sqrt(2.0), rel=0.01)
     assert second.rms_um == pytest.approx(2.0 / np.sqrt(2.0), rel=0.01)

@@ -50,7 +50,7 @@ WANTED_KEYS = {
     "circles.0": "centre_mm radius_mm G_um Fmax_um Fmin_um",
     "findings.0": "code severity message where",
     "time_split_s": "cutting air dwell compensation link",
-    "contour_errors.0": "name max_um rms_um mean_um at_mm block",
+    "contour_errors.0": "name max_um rms_um mean_um at_mm block interpolation_um mechanics_um",
     "worst.0": "block move at_mm total_um interpolation_um mechanics_um source",
     "unreached": "moves max_um",
 }
