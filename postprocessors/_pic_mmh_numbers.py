@@ -15,7 +15,8 @@ import numpy as np
 
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
-from camtool.machine.model import Machine, pic_mmh_controller
+from camtool.machine.controllers import PicMmhController
+from camtool.machine.model import Machine, controller_of
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ._pic_mmh_format import Bools, Floats, Grid, Ints
@@ -111,9 +112,10 @@ def _check_arcs(toolpath: Toolpath, machine: Machine) -> None:
     rows = toolpath.is_arc
     if not rows.any():
         return
-    if pic_mmh_controller(machine).arcs != "dsm":
+    arcs = controller_of(machine, PicMmhController).arcs
+    if arcs != "dsm":
         raise PostError(
-            f"arcs are written for direct search, not for {pic_mmh_controller(machine).arcs!r}",
+            f"arcs are written for direct search, not for {arcs!r}",
             mend="use --set controller.arcs=dsm",
         )
     if machine.axes.x.coded_step_mm != machine.axes.y.coded_step_mm:

@@ -15,7 +15,8 @@ import numpy as np
 
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.machine.model import Machine, pic_mmh_controller
+from camtool.machine.controllers import PicMmhController
+from camtool.machine.model import Machine, controller_of
 from camtool.toolpath.lower import helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from camtool.toolpath.program import Program
@@ -202,7 +203,7 @@ class _Writer:
         ex, ey, _ = self._numbers.end_steps[row]
         x, y = self._steps[0] - cx, self._steps[1] - cy
         error = 0
-        if pic_mmh_controller(self._machine).initial_error == "rounded-radius":
+        if controller_of(self._machine, PicMmhController).initial_error == "rounded-radius":
             error = x * x + y * y - round(math.hypot(x, y)) ** 2
         return Arc(
             start=(x, y),

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import msgspec
 from msgspec import Meta
 
 from camtool.errors import MachineError
-from camtool.machine.controllers import Controller, PicMmhController
+from camtool.machine.controllers import Controller, SlideStart
 from camtool.machine.mechanics import MechanicsOptions, PlayMap
+
+_Controller = TypeVar("_Controller", bound=SlideStart)
 
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
@@ -175,12 +177,13 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         yield from (axis.max_rate_mm_min for axis in axes if axis.max_rate_mm_min is not None)
 
 
-def pic_mmh_controller(machine: Machine) -> PicMmhController:
-    """The machine's controller, which must be the PIC18F8720; MachineError when it is not."""
-    if not isinstance(machine.controller, PicMmhController):
+def controller_of(machine: Machine, kind: type[_Controller]) -> _Controller:
+    """The machine's controller, which must be of this kind; MachineError when it is not."""
+    if not isinstance(machine.controller, kind):
+        wanted = kind.__struct_config__.tag
         raise MachineError(
-            f"{machine.target.name} needs the controller pic-mmh",
+            f"{machine.target.name} needs the controller {wanted}",
             where="table [controller], key model",
-            mend='write model = "pic-mmh"',
+            mend=f'write model = "{wanted}"',
         )
     return machine.controller

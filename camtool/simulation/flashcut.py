@@ -27,10 +27,9 @@ import numpy as np
 from camtool.kernels.lattice import HALF_STEP_GUARD
 from camtool.kernels.timers import Counters, Issued, Rules, timers_fill
 from camtool.machine.controllers import FlashcutController
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.flashcut_moves import (
     MoveTable,
-    flashcut_controller,
     followed,
 )
 from camtool.simulation.mechanics import Mechanics
@@ -66,7 +65,7 @@ def interpolation(machine: Machine, options: Options) -> str:
 
 def assumptions(machine: Machine) -> tuple[str, ...]:
     """What times and figures take for granted."""
-    controller = flashcut_controller(machine)
+    controller = controller_of(machine, FlashcutController)
     parts, shortest = controller.half_periods_per_step, controller.half_period_ms
     fastest_s = parts * (shortest + 1) / 1000.0
     step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
@@ -97,7 +96,7 @@ class FlashcutRun:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
-        controller = flashcut_controller(machine)
+        controller = controller_of(machine, FlashcutController)
         path = followed(to_its_end(toolpath), machine)
         check_rows(path, len(path))
         self._rows = len(path)

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from camtool.errors import MachineError, ProgramError
+from camtool.errors import ProgramError
 from camtool.kernels.timers import HOME_X, HOME_Y, HOME_Z, XY, Moves, Z
 from camtool.machine.controllers import FlashcutController
 from camtool.machine.controllers.flashcut_timers import half_periods_ms
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.motion import Floats, Ints
 from camtool.simulation.path import check_positions, placed
 from camtool.toolpath.moves import Kind, Toolpath
@@ -28,17 +28,6 @@ that no displacement between two of them has more."""
 
 CHORD_GUARD = 1e-9
 """Part of a chord: an arc longer than whole chords by less has no further one."""
-
-
-def flashcut_controller(machine: Machine) -> FlashcutController:
-    """The machine's controller, which must be this PC; MachineError when it is not."""
-    if not isinstance(machine.controller, FlashcutController):
-        raise MachineError(
-            f"{machine.target.name} needs the controller flashcut",
-            where="table [controller], key model",
-            mend='write model = "flashcut"',
-        )
-    return machine.controller
 
 
 def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
@@ -65,7 +54,7 @@ def half_periods(toolpath: Toolpath, machine: Machine, step_mm: float) -> Ints:
     ProgramError for feeds whose half period the controller cannot count.
     """
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    wanted = half_periods_ms(feed, step_mm, flashcut_controller(machine))
+    wanted = half_periods_ms(feed, step_mm, controller_of(machine, FlashcutController))
     slow = wanted >= MOST_LONG
     if slow.any():
         raise ProgramError(
@@ -92,7 +81,7 @@ class MoveTable:
     def of(cls, toolpath: Toolpath, machine: Machine) -> MoveTable:
         """The table of a toolpath that `followed` gave."""
         kind, starts, sweeps = toolpath.kind, toolpath.starts, toolpath.sweeps()
-        per_turn = flashcut_controller(machine).chords_per_turn
+        per_turn = controller_of(machine, FlashcutController).chords_per_turn
         homes_xy, homes_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
         rises = homes_z | (toolpath.is_motion & (toolpath.end[:, 2] != starts[:, 2]))
         along = toolpath.is_motion & ((toolpath.end[:, :2] != starts[:, :2]).any(axis=1) | ~rises)

@@ -24,7 +24,7 @@ import numpy as np
 from camtool.errors import MachineError
 from camtool.kernels.step_lines import step_lines_fill, steps_taken
 from camtool.machine.controllers import GrblController
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.grbl_blocks import Blocks, blocks_of, speeds_of
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Floats, Ints
@@ -124,7 +124,6 @@ class GrblSamples:
 
 def _controller(machine: Machine) -> GrblController:
     """The machine's controller; MachineError for a compensation that grbl does not do."""
-    assert isinstance(machine.controller, GrblController)
     for name, axis in zip("xyz", machine.axes, strict=True):
         if axis.compensation_mm > 0.0:
             raise MachineError(
@@ -132,7 +131,7 @@ def _controller(machine: Machine) -> GrblController:
                 where=f"table [axes.{name}], key compensation_mm",
                 mend="leave it out",
             )
-    return machine.controller
+    return controller_of(machine, GrblController)
 
 
 def _dwell_s(seconds: float) -> float:

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.errors import MachineError, ProgramError
+from camtool.errors import ProgramError
 from camtool.machine.controllers import GrblController
 from camtool.machine.model import Machine
 from camtool.simulation.grbl_chords import Singles, targets_of
-from camtool.simulation.motion import Floats, Ints
-from camtool.simulation.speed_plan import SpeedPlan
+from camtool.simulation.motion import Ints
+from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
 from camtool.toolpath.moves import Kind, Toolpath
 
 MAX_STEPS = 1 << 29
@@ -95,9 +95,9 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: Machine) -> SpeedPlan:
     way = blocks.way * step_mm
     length = np.sqrt((way**2).sum(axis=1))
     unit = way / length[:, None]
-    rate = _limits(machine, "max_rate_mm_min") / 60.0
-    acceleration = _limits(machine, "acceleration_mm_s2")
-    highest = _along(rate, unit)
+    rate = axis_limits(machine, "max_rate_mm_min") / 60.0
+    acceleration = axis_limits(machine, "acceleration_mm_s2")
+    highest = allowed_along(rate, unit)
     feed = np.where(path.is_feed, path.feed, np.inf)[blocks.row] / 60.0
     speed = np.maximum(np.minimum(feed, highest), LEAST_SPEED_MM_S)
     turn = np.zeros_like(unit)
@@ -106,35 +106,14 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: Machine) -> SpeedPlan:
     cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
     half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        allowed = _along(acceleration, turn / np.where(across > 0.0, across, 1.0)[:, None])
+        allowed = allowed_along(acceleration, turn / np.where(across > 0.0, across, 1.0)[:, None])
         square = allowed * controller.junction_deviation_mm * half_sine / (1.0 - half_sine)
     corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
     corner[(cosine > STRAIGHT_COS) | _from_rest(blocks, path)] = 0.0
-    return SpeedPlan(length, speed, _along(acceleration, unit), corner)
+    return SpeedPlan(length, speed, allowed_along(acceleration, unit), corner)
 
 
 def _from_rest(blocks: Blocks, path: Toolpath) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """(B,) true for blocks before which the machine stands."""
     waits = np.cumsum(np.isin(path.kind, WAITS))[blocks.row]
     return np.asarray(np.diff(waits, prepend=-1) > 0)
-
-
-def _along(limit: Floats, unit: Floats) -> Floats:
-    """(B,) what the three limits (3,) allow along unit vectors (B, 3)."""
-    with np.errstate(divide="ignore"):
-        return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))
-
-
-def _limits(machine: Machine, key: str) -> Floats:
-    """(3,) a limit of each axis; MachineError where one is not said."""
-    values = []
-    for name, axis in zip("xyz", machine.axes, strict=True):
-        value: float | None = getattr(axis, key)
-        if value is None:
-            raise MachineError(
-                f"the planner of {machine.target.name} needs the {key} of each axis",
-                where=f"table [axes.{name}], key {key}",
-                mend="say it: it is one of the controller's settings",
-            )
-        values.append(value)
-    return np.array(values)

@@ -27,16 +27,16 @@ import numpy as np
 from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import LinuxcncController
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.linuxcnc_corners import CornerRules, Corners, corners_of
-from camtool.simulation.linuxcnc_moves import Moves, axis_limits, merged, moves_of
+from camtool.simulation.linuxcnc_moves import Moves, merged, moves_of
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Floats, Ints
 from camtool.simulation.options import Options
 from camtool.simulation.path import check_positions, check_rows, placed
 from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
 from camtool.simulation.row_chunks import RowTotals, row_chunks
-from camtool.simulation.speed_plan import SpeedPlan
+from camtool.simulation.speed_plan import SpeedPlan, axis_limits
 from camtool.toolpath.moves import Kind, Toolpath
 
 LEAST_WAY_MM = 1e-9
@@ -64,7 +64,9 @@ def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chun
     path = _until(path, rows)
     rules = _rules(machine)
     path, chain = merged(path, rules.tolerance_mm if rules.mode == "blend" else 0.0)
-    moves = moves_of(path, chain, machine, _controller(machine).servo_period_s)
+    moves = moves_of(
+        path, chain, machine, controller_of(machine, LinuxcncController).servo_period_s
+    )
     corners = corners_of(moves, rules)
     samples = LinuxcncSamples(path, machine, moves, corners)
     seconds = _seconds(path, machine, moves, corners)
@@ -178,7 +180,7 @@ def _seconds(path: Toolpath, machine: Machine, moves: Moves, corners: Corners) -
     merged line share its time by their lengths. In the mode "blend" the last move before a wait
     accelerates by half: it was kept ready for a blend that never came (`tcGetOverallMaxAccel`).
     """
-    controller, mode = _controller(machine), _path_mode(machine)[0]
+    controller, mode = controller_of(machine, LinuxcncController), _path_mode(machine)[0]
     seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
     count = len(moves.length)
     following = np.append(corners.reach[1:], 0.0)
@@ -217,7 +219,7 @@ def _in_periods(plan: SpeedPlan, window: int, period_s: float) -> Floats:
 
 
 def _rules(machine: Machine) -> CornerRules:
-    controller = _controller(machine)
+    controller = controller_of(machine, LinuxcncController)
     mode, tolerance_mm = _path_mode(machine)
     return CornerRules(
         mode=mode,
@@ -246,11 +248,6 @@ def _path_mode(machine: Machine) -> tuple[str, float]:
             mend="the P of G64, in mm",
         )
     return mode, float(tolerance) if mode == "blend" and tolerance is not None else 0.0
-
-
-def _controller(machine: Machine) -> LinuxcncController:
-    assert isinstance(machine.controller, LinuxcncController)
-    return machine.controller
 
 
 def _until(path: Toolpath, rows: int) -> Toolpath:

@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.errors import MachineError
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Bools, Floats, Ints
 from camtool.simulation.path_samples import move_lengths
+from camtool.simulation.speed_plan import allowed_along, axis_limits
 from camtool.toolpath.arms import Arms
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -98,7 +98,7 @@ def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> 
     assert len(rows) == len(lead)
     lengths = length[lasting]
     begin, end = _tangents(path, lead)
-    highest, along = _along(rate, begin), _along(acceleration, begin)
+    highest, along = allowed_along(rate, begin), allowed_along(acceleration, begin)
     arms = Arms(path, path.is_arc)
     arm_of_row = np.full(len(path), -1, dtype=np.int64)
     arm_of_row[arms.row] = np.arange(len(arms.row))
@@ -112,21 +112,6 @@ def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> 
     like = cuts == np.roll(cuts, 1)
     speed = np.minimum(feed, highest)
     return Moves(row_of, lengths, speed, along, begin, end, arm >= 0, waits, like)
-
-
-def axis_limits(machine: Machine, key: str) -> Floats:
-    """(3,) a limit of each axis; MachineError where one is not said."""
-    values = []
-    for name, axis in zip("xyz", machine.axes, strict=True):
-        value: float | None = getattr(axis, key)
-        if value is None:
-            raise MachineError(
-                f"the planner of {machine.target.name} needs the {key} of each axis",
-                where=f"table [axes.{name}], key {key}",
-                mend="say it: it is one of the controller's settings",
-            )
-        values.append(value)
-    return np.array(values)
 
 
 def _tangents(path: Toolpath, lead: Ints) -> tuple[Floats, Floats]:
@@ -165,9 +150,3 @@ def _arc_limits(
     overall = length / np.maximum(rise / acceleration[2], level / a_xy)
     highest = np.minimum(highest, np.sqrt(NORMAL_RATIO * overall * radius))
     return highest, TANGENT_RATIO * overall
-
-
-def _along(limit: Floats, unit: Floats) -> Floats:
-    """(M,) what the three limits (3,) allow along unit vectors (M, 3)."""
-    with np.errstate(divide="ignore"):
-        return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))

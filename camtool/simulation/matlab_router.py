@@ -23,19 +23,20 @@ import numpy as np
 
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Machine
+from camtool.machine.controllers import MatlabRouterController
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.matlab_router_lines import Lines, block_of, lines_of
 from camtool.simulation.matlab_router_program import (
     SIGNS,
     TICK_S,
     account_of,
     program_of,
-    router_of,
     state_of,
 )
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, Ledger
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ints, Ledger
 from camtool.simulation.options import Options
+from camtool.simulation.path import placed
 from camtool.toolpath.moves import Kind, Toolpath
 
 FARTHEST_UNITS = 32767
@@ -66,22 +67,10 @@ def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
             "a position is beyond all that the controller can count",
             where=block_of(toolpath, int(far.argmax())),
         )
-    end = _placed(toolpath, home)
+    end = placed(toolpath, home).end
     coded = [axis.coded_step_mm for axis in machine.axes]
     columns = [to_steps((end - home)[:, index], step) * step for index, step in enumerate(coded)]
     return replace(toolpath, end=home + np.column_stack(columns))
-
-
-def _placed(toolpath: Toolpath, home: Floats) -> Floats:
-    """(N, 3) ends with homing at `home`, and events where the moves before them ended."""
-    kind, count = toolpath.kind, len(toolpath)
-    end = toolpath.end.copy()
-    for axis, homing in ((0, Kind.HOME_XY), (1, Kind.HOME_XY), (2, Kind.HOME_Z)):
-        end[kind == homing, axis] = home[axis]
-        known = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
-        latest = np.maximum.accumulate(known)
-        end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
-    return end
 
 
 def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
@@ -100,7 +89,7 @@ def interpolation(machine: Machine, options: Options) -> str:
 
 def assumptions(machine: Machine) -> tuple[str, ...]:
     """What times and figures take for granted."""
-    router = router_of(machine)
+    router = controller_of(machine, MatlabRouterController)
     law = "slave X's program" if router.slaves == "listing" else "the program that the text tells"
     rub = "no" if not any(router.friction_percent) else "dry"
     return (

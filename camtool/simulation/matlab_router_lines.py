@@ -19,8 +19,8 @@ import numpy as np
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import MatlabRouterController
-from camtool.machine.model import Machine
-from camtool.simulation.matlab_router_program import SIGNS, TICKS_PER_S, router_of
+from camtool.machine.model import Machine, controller_of
+from camtool.simulation.matlab_router_program import SIGNS, TICKS_PER_S
 from camtool.simulation.motion import Bools, Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -79,7 +79,7 @@ def lines_of(path: Toolpath, rows: int, machine: Machine) -> Lines:
     zero set anew away from part zero.
     """
     _check(path, rows)
-    router = router_of(machine)
+    router = controller_of(machine, MatlabRouterController)
     way_mm = (path.end - path.starts)[:rows] * SIGNS if rows else np.zeros((0, 3))
     kind = path.kind[:rows]
     straight = kind == Kind.LINE
@@ -205,7 +205,7 @@ def _amounts(way_mm: Floats, router: MatlabRouterController, machine: Machine) -
 def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: Machine) -> Ints:
     """(L,) ticks after which a line is given up."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    router = router_of(machine)
+    router = controller_of(machine, MatlabRouterController)
     speed = np.where(amount < 0, np.array(router.home_counts), np.abs(ref))
     needed = np.abs(way_mm) / coded / np.maximum(speed, 1)
     needed = np.where(speed > 0, needed, 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from camtool.errors import MachineError
 from camtool.machine.controllers import MatlabRouterController
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.motion import Floats, Ints
 
 if TYPE_CHECKING:
@@ -33,22 +33,11 @@ IDENTIFIED = 70.0
 """The drive at which gains were measured (L2704): whatever the friction, that speed stays."""
 
 
-def router_of(machine: Machine) -> MatlabRouterController:
-    """The machine's controller, which must be this one; MachineError when it is not."""
-    if not isinstance(machine.controller, MatlabRouterController):
-        raise MachineError(
-            f"{machine.target.name} needs the controller matlab-router",
-            where="table [controller], key model",
-            mend='write model = "matlab-router"',
-        )
-    return machine.controller
-
-
 def program_of(orders: Ints, pauses_s: Floats, machine: Machine) -> Program:
     """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
     from camtool.kernels.slave_record import TABLE_COUNTS, Program
 
-    router = router_of(machine)
+    router = controller_of(machine, MatlabRouterController)
     text = router.slaves == "text"
     axes = np.zeros((3, 8))
     friction = np.array(router.friction_percent)
@@ -76,7 +65,7 @@ def state_of(start_mm: Floats, machine: Machine) -> State:
     """All motors at rest at a place."""
     from camtool.kernels.slave_record import COUNT, PLACE, SHOWN, TARGET, TURN, State
 
-    router = router_of(machine)
+    router = controller_of(machine, MatlabRouterController)
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     place = np.rint((start_mm - np.array(machine.controller.machine_zero_mm)) * SIGNS / coded)
     motors, slaves = np.zeros((3, 6)), np.zeros((3, 11), dtype=np.int64)

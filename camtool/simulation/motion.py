@@ -33,6 +33,20 @@ class Ledger:
     ended: Bools
 
 
+def still_ledger(rows: Ints) -> Ledger:
+    """The ledger of rows (R,) that did nothing; its columns may be written to."""
+    count = len(rows)
+    return Ledger(
+        row=rows,
+        duration_s=np.zeros(count),
+        compensation_s=np.zeros(count),
+        iterations=np.zeros(count, dtype=np.int64),
+        steps=np.zeros((count, 3), dtype=np.int64),
+        reversals=np.zeros((count, 3), dtype=np.int64),
+        ended=np.ones(count, dtype=np.bool_),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Chunk:
     """K samples in order, of one row of the toolpath or of several.

@@ -25,7 +25,8 @@ from dataclasses import replace
 import numpy as np
 
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Machine, pic_mmh_controller
+from camtool.machine.controllers import PicMmhController
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.motion import Chunk, Floats
 from camtool.simulation.options import Options
 from camtool.simulation.pic_mmh_legs import JudgedSteps
@@ -63,12 +64,12 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
 
 def interpolation(machine: Machine, options: Options) -> str:
     """How arcs are made: dsm, dda or stairs."""
-    return options.interpolator or pic_mmh_controller(machine).arcs
+    return options.interpolator or controller_of(machine, PicMmhController).arcs
 
 
 def assumptions(machine: Machine) -> tuple[str, ...]:
     """What the times take for granted."""
-    base = pic_mmh_controller(machine).time_base
+    base = controller_of(machine, PicMmhController).time_base
     return (
         f"each {base} of the interpolator takes one period of the feed (controller.time_base)",
         f"rapids run at {machine.limits.rapid_step_rate_hz:g} steps/s (limits.rapid_step_rate_hz)",

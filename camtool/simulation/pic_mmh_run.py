@@ -10,7 +10,8 @@ import numpy as np
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Machine, pic_mmh_controller
+from camtool.machine.controllers import PicMmhController
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach, line_filler
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, one_row
@@ -41,7 +42,7 @@ class PicMmh:
 
     def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
         self._toolpath, self._options = toolpath, options
-        self._controller = pic_mmh_controller(machine)
+        self._controller = controller_of(machine, PicMmhController)
         if machine.limits.rapid_step_rate_hz is None:
             raise MachineError(
                 "key is missing: this controller times its rapids by it",

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, Ledger
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, still_ledger
 
 
 class Samples(Protocol):
@@ -49,7 +49,7 @@ def row_chunks(
         whole = rows if high == total else last + int(high == first[last + 1])
         listed = np.arange(done, max(whole, last + 1))
         offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [len(row)]])
-        ledger = _still(listed)
+        ledger = still_ledger(listed)
         moved = row[offsets[:-1]] - listed[0]
         slide, ledger.reversals[moved] = mechanics.follow(commanded, offsets)
         ledger.steps[moved] = samples.steps(low + offsets)
@@ -64,20 +64,6 @@ def row_chunks(
         yield Chunk(row, commanded, slide, ledger)
         done = whole
     if total == 0 and rows:
-        ledger = _still(np.arange(rows))
+        ledger = still_ledger(np.arange(rows))
         ledger.duration_s[:] = totals.seconds
         yield Chunk(np.empty(0, np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
-
-
-def _still(rows: Ints) -> Ledger:
-    """A ledger in which nothing has happened."""
-    count = len(rows)
-    return Ledger(
-        row=rows,
-        duration_s=np.zeros(count),
-        compensation_s=np.zeros(count),
-        iterations=np.zeros(count, dtype=np.int64),
-        steps=np.zeros((count, 3), dtype=np.int64),
-        reversals=np.zeros((count, 3), dtype=np.int64),
-        ended=np.ones(count, dtype=np.bool_),
-    )

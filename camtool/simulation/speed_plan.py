@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.errors import MachineError
+from camtool.machine.model import Machine
 from camtool.simulation.motion import Floats
 
 
@@ -49,3 +51,24 @@ class SpeedPlan:
         ramps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * a)
         steady = np.maximum(d - ramps, 0.0) / peak
         return np.asarray((2.0 * peak - first - last) / a + steady)
+
+
+def allowed_along(limit: Floats, unit: Floats) -> Floats:
+    """(B,) what the limits of three axes (3,) allow along unit vectors (B, 3)."""
+    with np.errstate(divide="ignore"):
+        return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))
+
+
+def axis_limits(machine: Machine, key: str) -> Floats:
+    """(3,) a limit of each axis; MachineError where one is not said."""
+    values = []
+    for name, axis in zip("xyz", machine.axes, strict=True):
+        value: float | None = getattr(axis, key)
+        if value is None:
+            raise MachineError(
+                f"the planner of {machine.target.name} needs the {key} of each axis",
+                where=f"table [axes.{name}], key {key}",
+                mend="say it: it is one of the controller's settings",
+            )
+        values.append(value)
+    return np.array(values)

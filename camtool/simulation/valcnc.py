@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +27,7 @@ from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.kernels.valcnc_arcs import arc_angles
 from camtool.machine.controllers import ValcncController
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, controller_of
 from camtool.simulation import path
 from camtool.simulation.legs import LegRun, Legs, Standing
 from camtool.simulation.legs_rows import (
@@ -53,7 +52,7 @@ PIECE_EPS = 1e-9
 def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
     """The motion; see `camtool.simulation.models.ControllerModel`."""
     pieces = _Pieces(toolpath, machine)
-    period_s = 1.0 / _controller(machine).step_rate_hz
+    period_s = 1.0 / controller_of(machine, ValcncController).step_rate_hz
     waits = waits_s(toolpath, rows_up_to_end(toolpath))
     standing = Standing(pieces.in_steps(toolpath.start), waits, period_s)
     return LegRun(standing, machine, options).run(pieces.legs())
@@ -65,7 +64,7 @@ def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
     ProgramError for what the controller cannot follow.
     """
     pieces = _Pieces(toolpath, machine)
-    if _controller(machine).rounding == "nearest":
+    if controller_of(machine, ValcncController).rounding == "nearest":
         return path.held(toolpath, machine)
     step_mm = coded_steps_mm(machine)
     start, end = (pieces.in_steps(point) * step_mm for point in (toolpath.start, toolpath.end))
@@ -90,7 +89,7 @@ def interpolation(machine: Machine, options: Options) -> str:
 
 def assumptions(machine: Machine) -> tuple[str, ...]:
     """What the times and the path take for granted."""
-    controller = _controller(machine)
+    controller = controller_of(machine, ValcncController)
     pieces = f"pieces of {controller.arc_segment_mm:g} mm (controller.arc_segment_mm)"
     if controller.arc_segments is not None:
         pieces = f"{controller.arc_segments} pieces each (controller.arc_segments)"
@@ -102,16 +101,12 @@ def assumptions(machine: Machine) -> tuple[str, ...]:
     )
 
 
-def _controller(machine: Machine) -> ValcncController:
-    return cast(ValcncController, machine.controller)
-
-
 class _Pieces:
     """The lines of a toolpath: one for each straight row, several for each arc."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine) -> None:
         check_rows(toolpath, machine)
-        self._controller = _controller(machine)
+        self._controller = controller_of(machine, ValcncController)
         self._step_mm = coded_steps_mm(machine)
         count = rows_up_to_end(toolpath)
         self._start, self._end = toolpath.start, toolpath.end[:count]

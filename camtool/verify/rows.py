@@ -85,19 +85,6 @@ def row_figures(columns: Floats, is_cut: Bools, ledger: Ledger) -> RowFigures:
     )
 
 
-def empty_ledger(count: int) -> Ledger:
-    """The ledger of rows that did nothing yet."""
-    return Ledger(
-        row=np.arange(count),
-        duration_s=np.zeros(count),
-        compensation_s=np.zeros(count),
-        iterations=np.zeros(count, dtype=np.int64),
-        steps=np.zeros((count, 3), dtype=np.int64),
-        reversals=np.zeros((count, 3), dtype=np.int64),
-        ended=np.ones(count, dtype=np.bool_),
-    )
-
-
 def add_ledger(whole: Ledger, part: Ledger) -> None:
     """Add what a chunk says of its rows, each of which it says once, to the whole program's."""
     rows = part.row

@@ -18,14 +18,14 @@ import numpy as np
 
 from camtool.geometry.polylines import Floats, Ints
 from camtool.simulation.models import StepsOnTheWay
-from camtool.simulation.motion import Chunk
+from camtool.simulation.motion import Chunk, still_ledger
 from camtool.verify.ballbar import BothWays, Pairs, Reversing, reversing
 from camtool.verify.circles import UNSEEN, CircleFigures, circle_figures
 from camtool.verify.compare import Target
 from camtool.verify.cuts import Bools
 from camtool.verify.figures import Figure
 from camtool.verify.match import Goal, Match
-from camtool.verify.rows import RowFigures, add_ledger, empty_columns, empty_ledger, row_figures
+from camtool.verify.rows import RowFigures, add_ledger, empty_columns, row_figures
 from camtool.verify.tables import move_table
 from camtool.verify.trace import Trace, TraceSize, trace_of
 
@@ -43,7 +43,7 @@ class SlidePass:
         self.both_ways: list[BothWays] = []
         self._pairs = Pairs(goal.circles)
         self._cuts = decoded.cuts
-        self._ledger = empty_ledger(len(match.contour))
+        self._ledger = still_ledger(np.arange(len(match.contour)))
         self._first, self._last = _rows_of_circles(match.circle, len(goal.circles))
         self._slot = _slots(self._first, self._last)
         seen = np.flatnonzero(self._last >= 0)

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError
-from camtool.machine.controllers import PathController
+from camtool.machine.controllers import PathController, PicMmhController
 from camtool.machine.loader import build_machine, missing_keys, read_table, target_of
-from camtool.machine.model import Machine, pic_mmh_controller
+from camtool.machine.model import Machine, controller_of
 
 FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
 
@@ -203,7 +203,7 @@ def test_a_controller_that_follows_the_path_has_a_table_of_its_own() -> None:
     with pytest.raises(MachineError, match=r"\[controller\], key arcs: unknown.*start_play"):
         build_machine(path_machine(), "a.toml", None, ["controller.arcs=dsm"])
     with pytest.raises(MachineError, match="needs the controller pic-mmh"):
-        pic_mmh_controller(machine)
+        controller_of(machine, PicMmhController)
 
 
 def test_another_controller_model_leaves_the_options_of_the_first_behind(tmp_path: Path) -> None:
@@ -217,4 +217,4 @@ def test_another_controller_model_leaves_the_options_of_the_first_behind(tmp_pat
     with pytest.raises(MachineError, match=r"\[controller\], key arcs: unknown"):
         build_machine(table, "pic_mmh.toml", user)
     assert built("controller.arcs=dda").controller.start_direction == "+"  # nothing is lost
-    assert pic_mmh_controller(built("controller.model=pic-mmh")).arcs == "dsm"
+    assert controller_of(built("controller.model=pic-mmh"), PicMmhController).arcs == "dsm"

@@ -12,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError, ProgramError
-from camtool.machine.model import Machine
+from camtool.machine.controllers import MatlabRouterController
+from camtool.machine.model import Machine, controller_of
 from camtool.machine.registry import load_target
 from camtool.simulation.matlab_router import assumptions, held, spacing_mm
 from camtool.simulation.matlab_router_lines import lines_of
-from camtool.simulation.matlab_router_program import TEXT_KID, TEXT_KPD, router_of
+from camtool.simulation.matlab_router_program import TEXT_KID, TEXT_KPD
 from camtool.simulation.motion import Chunk
 from camtool.simulation.options import IDEAL, Options
 from camtool.simulation.simulate import simulate
@@ -221,7 +222,7 @@ def test_friction_shortens_the_coasting() -> None:
 
 def test_the_motors_follow_from_table_4_1() -> None:
     """L2872-2880: K = ωn²/Ki, 1/τ = 2 ζ ωn − Kp K with ωn = 22.63 and ζ = 0.707."""
-    record = router_of(router())
+    record = controller_of(router(), MatlabRouterController)
     table = {0: (3.5099, 0.1069), 1: (5.6304, 0.1732), 2: (3.2509, 0.10074)}
     for axis, (ki, kp) in table.items():
         k = 22.63**2 / ki
@@ -384,7 +385,7 @@ def test_gains_of_the_listing_are_whole() -> None:
         motion(line(1.0), router("kid=[17.5, 28.0, 28.0]"))
     assert places(motion(line(1.0), router("kid=[17.5, 28, 28]", "slaves=text"))).size
     with pytest.raises(MachineError, match="model"):
-        router_of(load_target("pic-mmh").machine)
+        controller_of(load_target("pic-mmh").machine, MatlabRouterController)
 
 
 @pytest.mark.parametrize(
