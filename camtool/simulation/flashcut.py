@@ -20,7 +20,6 @@ Every move ends: the longer axis arrives.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -97,7 +96,7 @@ class FlashcutRun:
 
     def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
         controller = controller_of(machine, FlashcutController)
-        path = followed(to_its_end(toolpath), machine)
+        path = followed(toolpath.first(toolpath.running), machine)
         check_rows(path, len(path))
         self._rows = len(path)
         self._still_s = np.where(path.kind == Kind.DWELL, path.value, 0.0)
@@ -175,13 +174,3 @@ class FlashcutRun:
             half_xy = half_z = np.full(len(rows), self._compensation_ms)
         milliseconds = (steps[:, 0] + steps[:, 1]) * (half_xy + 1) + steps[:, 2] * (half_z + 1)
         return np.asarray(self._parts * milliseconds / 1000.0)
-
-
-def to_its_end(toolpath: Toolpath) -> Toolpath:
-    """The rows up to the end of the program."""
-    ends = np.flatnonzero(toolpath.kind == Kind.END)
-    if len(ends) == 0:
-        return toolpath
-    names = ("kind", "end", "centre", "feed", "value", "source", "block")
-    rows = int(ends[0]) + 1
-    return replace(toolpath, **{name: getattr(toolpath, name)[:rows] for name in names})

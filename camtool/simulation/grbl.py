@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -41,10 +40,9 @@ def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chun
     """The motion; see `camtool.simulation.models.ControllerModel`."""
     controller = _controller(machine)
     path = held(toolpath, machine)
-    ends = np.flatnonzero(path.kind == Kind.END)
-    rows = int(ends[0]) + 1 if len(ends) else len(path)
+    rows = path.running
     check_rows(path, rows)
-    path = _until(path, rows)
+    path = path.first(rows)
     blocks = blocks_of(path, machine, controller)
     samples = GrblSamples(blocks, rows, machine)
     plan = speeds_of(blocks, path, machine)
@@ -138,9 +136,3 @@ def _dwell_s(seconds: float) -> float:
     """What `delay_sec` makes of a dwell; its count is a 32-bit float."""
     per_second = np.float32(1.0 / DWELL_STEP_S)
     return math.ceil(per_second * np.float32(seconds)) * DWELL_STEP_S
-
-
-def _until(path: Toolpath, rows: int) -> Toolpath:
-    """The first rows of a toolpath."""
-    columns = ("kind", "end", "centre", "feed", "value", "source", "block")
-    return replace(path, **{name: getattr(path, name)[:rows] for name in columns})

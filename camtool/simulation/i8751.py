@@ -24,7 +24,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers.i8751_pulses import PulseTimes, firmware_of
 from camtool.machine.model import Machine
 from camtool.simulation.legs import LegRun, Legs, Standing
-from camtool.simulation.legs_rows import check_rows, coded_steps_mm, place, rows_up_to_end, waits_s
+from camtool.simulation.legs_rows import check_rows, coded_steps_mm, place, waits_s
 from camtool.simulation.motion import Chunk, Floats, Ints
 from camtool.simulation.options import Options
 from camtool.toolpath.moves import Toolpath
@@ -36,7 +36,7 @@ ROWS_AT_ONCE = 1 << 14
 def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
     """The motion; see `camtool.simulation.models.ControllerModel`."""
     _check(toolpath, machine)
-    count = rows_up_to_end(toolpath)
+    count = toolpath.running
     times = PulseTimes(firmware_of(machine))
     points = np.concatenate([toolpath.start[None, :], toolpath.end[:count]])
     at = _in_steps(points, machine)
@@ -81,7 +81,7 @@ def assumptions(machine: Machine) -> tuple[str, ...]:
 
 def _check(toolpath: Toolpath, machine: Machine) -> None:
     check_rows(toolpath, machine)
-    arcs = toolpath.is_arc[: rows_up_to_end(toolpath)]
+    arcs = toolpath.is_arc[: toolpath.running]
     if arcs.any():
         raise ProgramError(
             "this controller has no arcs",

@@ -20,12 +20,6 @@ def coded_steps_mm(machine: Machine) -> Floats:
     return np.array([axis.coded_step_mm for axis in machine.axes])
 
 
-def rows_up_to_end(toolpath: Toolpath) -> int:
-    """How many rows run: those behind the end of the program do not."""
-    ends = np.flatnonzero(toolpath.kind == Kind.END)
-    return int(ends[0]) + 1 if len(ends) else len(toolpath)
-
-
 def check_rows(toolpath: Toolpath, machine: Machine) -> None:
     """ProgramError for rows that no controller without homing can follow, naming the block."""
     kind, step_mm = toolpath.kind, coded_steps_mm(machine)
@@ -50,7 +44,7 @@ def waits_s(toolpath: Toolpath, rows: int) -> Floats:
 
 def _refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "") -> None:
     """ProgramError for the first bad row."""
-    rows = np.flatnonzero(np.asarray(bad)[: rows_up_to_end(toolpath)])
+    rows = np.flatnonzero(np.asarray(bad)[: toolpath.running])
     if len(rows):
         raise ProgramError(message, where=place(toolpath, int(rows[0])), mend=mend)
 

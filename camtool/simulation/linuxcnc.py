@@ -20,7 +20,6 @@ over some milliseconds at half of the axis's limits; here it acts at once, and t
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -58,10 +57,9 @@ MODES = ("blend", "exact-path", "exact-stop")
 def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
     """The motion; see `camtool.simulation.models.ControllerModel`."""
     path = held(toolpath, machine)
-    ends = np.flatnonzero(path.kind == Kind.END)
-    rows = int(ends[0]) + 1 if len(ends) else len(path)
+    rows = path.running
     check_rows(path, rows)
-    path = _until(path, rows)
+    path = path.first(rows)
     rules = _rules(machine)
     path, chain = merged(path, rules.tolerance_mm if rules.mode == "blend" else 0.0)
     moves = moves_of(
@@ -248,9 +246,3 @@ def _path_mode(machine: Machine) -> tuple[str, float]:
             mend="the P of G64, in mm",
         )
     return mode, float(tolerance) if mode == "blend" and tolerance is not None else 0.0
-
-
-def _until(path: Toolpath, rows: int) -> Toolpath:
-    """The first rows of a toolpath."""
-    columns = ("kind", "end", "centre", "feed", "value", "source", "block")
-    return replace(path, **{name: getattr(path, name)[:rows] for name in columns})

@@ -37,7 +37,7 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ints, Ledger
 from camtool.simulation.options import Options
 from camtool.simulation.path import placed
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Toolpath
 
 FARTHEST_UNITS = 32767
 """Distances from home are an int16 of tenths of a millimetre (L4625-4635)."""
@@ -109,8 +109,7 @@ class _Run:
 
     def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
         path = held(toolpath, machine)
-        ends = np.flatnonzero(path.kind == Kind.END)
-        self._rows = int(ends[0]) + 1 if len(ends) else len(path)
+        self._rows = path.running
         self._lines: Lines = lines_of(path, self._rows, machine)
         self._program = program_of(self._lines.orders, self._lines.pauses_s, machine)
         self._state = state_of(path.start, machine)

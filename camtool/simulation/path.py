@@ -155,8 +155,7 @@ class PathRun:
 
     def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
         self._path = held(toolpath, machine)
-        ends = np.flatnonzero(self._path.kind == Kind.END)
-        self._rows = int(ends[0]) + 1 if len(ends) else len(self._path)
+        self._rows = self._path.running
         check_rows(self._path, self._rows)
         self._seconds = _durations(self._path, machine)
         self._samples = PathSamples(self._path, sample_spacing_mm(self._path, machine))

@@ -84,8 +84,7 @@ class PicMmh:
         if not self._mechanics.plain:
             return None
         toolpath = self._toolpath
-        ends = np.flatnonzero(toolpath.kind == Kind.END)
-        rows = int(ends[0]) + 1 if len(ends) else len(toolpath)
+        rows = toolpath.running
         places = positions(toolpath, self._position, self._ends, self._home)
         for row in np.flatnonzero(self._suspect(places)[:rows]).tolist():
             self._check(row, places[row])

@@ -35,7 +35,6 @@ from camtool.simulation.legs_rows import (
     check_rows,
     coded_steps_mm,
     place,
-    rows_up_to_end,
     waits_s,
 )
 from camtool.simulation.motion import Chunk, Floats, Ints
@@ -53,7 +52,7 @@ def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chun
     """The motion; see `camtool.simulation.models.ControllerModel`."""
     pieces = _Pieces(toolpath, machine)
     period_s = 1.0 / controller_of(machine, ValcncController).step_rate_hz
-    waits = waits_s(toolpath, rows_up_to_end(toolpath))
+    waits = waits_s(toolpath, toolpath.running)
     standing = Standing(pieces.in_steps(toolpath.start), waits, period_s)
     return LegRun(standing, machine, options).run(pieces.legs())
 
@@ -108,7 +107,7 @@ class _Pieces:
         check_rows(toolpath, machine)
         self._controller = controller_of(machine, ValcncController)
         self._step_mm = coded_steps_mm(machine)
-        count = rows_up_to_end(toolpath)
+        count = toolpath.running
         self._start, self._end = toolpath.start, toolpath.end[:count]
         self._arcs = self._angles(toolpath, count)
         self._count = np.where(toolpath.is_motion[:count], 1, 0)

@@ -10,7 +10,7 @@ at `start`. Planning builds it, posts write it, a post's reader gives it back, s
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -138,6 +138,17 @@ class Toolpath:
         same = (self.end[:, :2] == begin).all(axis=1)
         turn = np.where(same | (turn == 0.0), full, turn)
         return np.where(self.is_arc, sign * turn, 0.0)
+
+    @property
+    def running(self) -> int:
+        """How many rows run: those behind the end of the program do not."""
+        ends = np.flatnonzero(self.kind == Kind.END)
+        return int(ends[0]) + 1 if len(ends) else len(self)
+
+    def first(self, rows: int) -> Toolpath:
+        """The first rows alone."""
+        columns = ("kind", "end", "centre", "feed", "value", "source", "block")
+        return replace(self, **{name: getattr(self, name)[:rows] for name in columns})
 
     def text(self, row: int) -> str:
         """Provenance of a row ("" when it has none)."""

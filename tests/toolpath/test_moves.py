@@ -90,3 +90,12 @@ def test_arrays_are_read_only() -> None:
     path = ToolpathBuilder().rapid(1, 1).finish()
     with pytest.raises(ValueError, match="read-only"):
         path.end[0, 0] = 5.0
+
+
+def test_rows_behind_the_end_do_not_run() -> None:
+    b = ToolpathBuilder().line(1.0, 0.0, feed=1.0).event(Kind.END).line(2.0, 0.0, feed=1.0)
+    path = b.event(Kind.END).finish()
+    assert path.running == 2
+    assert [move.kind for move in path.first(path.running)] == [Kind.LINE, Kind.END]
+    assert ToolpathBuilder().line(1.0, 0.0, feed=1.0).finish().running == 1
+    assert ToolpathBuilder().finish().running == 0
