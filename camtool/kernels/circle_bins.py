@@ -13,7 +13,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.compiled import inner
+from camtool.kernels.compiled import bare
 from camtool.kernels.wide import larger, smaller, wide
 
 Floats = npt.NDArray[np.float64]
@@ -38,7 +38,7 @@ def empty_bins(count: int) -> Floats:
     return bins
 
 
-@inner
+@bare
 def _bin_of(x: float, y: float, directions: Floats) -> int:
     """The bin of a point: by its angle, and on the edge of two bins by the cross products."""
     turn = math.atan2(y, x) / (2.0 * math.pi)
@@ -51,24 +51,18 @@ def _bin_of(x: float, y: float, directions: Floats) -> int:
     return which
 
 
-@inner
+@wide
 def _stay(x: Floats, y: Floats, centre: Floats, one: Floats, next_: Floats) -> int:
     """How many of the points from the first on lie between the two directions: at least one."""
     cx, cy = centre[0], centre[1]
     from_x, from_y, to_x, to_y = one[0], one[1], next_[0], next_[1]
-    left, right = np.inf, np.inf
+    count = len(x)
+    stay = count
     for k in range(len(x)):
         px, py = x[k] - cx, y[k] - cy
-        after, before = from_x * py - from_y * px, px * to_y - py * to_x
-        left = smaller(left, after)
-        right = smaller(right, before)
-    if left >= 0.0 and right > 0.0:
-        return len(x)
-    for k in range(1, len(x)):
-        px, py = x[k] - cx, y[k] - cy
-        if from_x * py - from_y * px < 0.0 or px * to_y - py * to_x <= 0.0:
-            return k
-    return len(x)
+        inside = (from_x * py - from_y * px >= 0.0) & (px * to_y - py * to_x > 0.0)
+        stay = min(stay, count if inside else k)
+    return max(stay, 1)
 
 
 @wide
@@ -83,18 +77,21 @@ def fill_bins(x: Floats, y: Floats, centre: Floats, directions: Floats, bins: Fl
         done += stay
 
 
-@inner
+@wide
 def _add(x: Floats, y: Floats, centre: Floats, one: Floats) -> None:
     """Put points into one bin."""
     cx, cy = centre[0], centre[1]
-    least, largest = np.inf, -np.inf
+    least, largest, sum_x, sum_y = np.inf, -np.inf, 0.0, 0.0
     for k in range(len(x)):
-        square = (x[k] - cx) * (x[k] - cx) + (y[k] - cy) * (y[k] - cy)
+        px, py = x[k] - cx, y[k] - cy
+        square = px * px + py * py
         least = smaller(least, square)
         largest = larger(largest, square)
+        sum_x += px
+        sum_y += py
     one[0] += len(x)
-    one[1] += _sum(x, cx)
-    one[2] += _sum(y, cy)
+    one[1] += sum_x
+    one[2] += sum_y
     if least < one[3]:
         _place(x, y, centre, least, one[3:6])
     if largest > one[6]:
@@ -102,18 +99,12 @@ def _add(x: Floats, y: Floats, centre: Floats, one: Floats) -> None:
 
 
 @wide
-def _sum(x: Floats, centre: float) -> float:
-    total = 0.0
-    for k in range(len(x)):
-        total += x[k] - centre
-    return total
-
-
-@inner
 def _place(x: Floats, y: Floats, centre: Floats, square: float, out: Floats) -> None:
     """The first point with this square of its distance."""
+    cx, cy = centre[0], centre[1]
+    count = len(x)
+    place = count
     for k in range(len(x)):
-        px, py = x[k] - centre[0], y[k] - centre[1]
-        if px * px + py * py == square:
-            out[0], out[1], out[2] = square, px, py
-            return
+        px, py = x[k] - cx, y[k] - cy
+        place = min(place, k if px * px + py * py == square else count)
+    out[0], out[1], out[2] = square, x[place] - cx, y[place] - cy

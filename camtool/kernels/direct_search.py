@@ -53,7 +53,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.compiled import inner, kernel
+from camtool.kernels.compiled import bare, inner, kernel
 from camtool.kernels.heading import heading
 
 Ints = npt.NDArray[np.int64]
@@ -101,7 +101,7 @@ def direct_search_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints
     return np.array([x, y, error, sx, sy], dtype=np.int64)
 
 
-@inner
+@bare
 def _run_length(m: int, n: int, way: int, error: int, room: int) -> int:
     """How many positions, up to `room`, the closed form gives from M, N on while M runs `way`."""
     invariant = m * m + n * n - error
@@ -112,7 +112,7 @@ def _run_length(m: int, n: int, way: int, error: int, room: int) -> int:
     return min(room, int(math.sqrt(0.5 * invariant)) - 1 - abs(m))
 
 
-@inner
+@bare
 def _run(m: int, n: int, way: int, error: int, out_m: Ints, out_n: Ints) -> None:
     """The positions that follow M, N while M runs `way`, by the closed form."""
     invariant = float(m * m + n * n - error)
@@ -124,7 +124,7 @@ def _run(m: int, n: int, way: int, error: int, out_m: Ints, out_n: Ints) -> None
         out_n[k] = int(sign * math.floor(math.sqrt(invariant - here * here) + 0.5))
 
 
-@inner
+@bare
 def _meets(m: int, n: int, way: int, end_m: int, end_n: int, out_n: Ints) -> int:
     """How many of the positions of a run there are up to the end, or −1: M passes it once."""
     at = (end_m - m) * way - 1

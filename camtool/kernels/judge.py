@@ -28,10 +28,13 @@ from camtool.kernels.error_bins import BEFORE_FIRST, BINS, SHIFT
 from camtool.kernels.move_errors import lower_errors
 from camtool.kernels.near_moves import COUNT, nearest_errors
 from camtool.kernels.thin_trace import trace_block
-from camtool.kernels.wide import larger, smaller, wide
+from camtool.kernels.wide import first_of, larger, smaller, wide
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+WITHOUT_SIGN = (1 << 63) - 1
+"""The bits of a float64 that are its size."""
 
 BLOCK = 512
 """Samples that are judged together: their columns fill half of a processor's first cache."""
@@ -102,85 +105,78 @@ class Sums(NamedTuple):
     memo: Floats
 
 
-X, Y, SLIDE_X, SLIDE_Y, ERRORS, SIZE, SPOT = range(7)
-"""Rows of a bench (7, BLOCK), room for a block: commanded and slides mm, their errors, the sizes
-of these, and room for one point."""
+X, Y, SLIDE_X, SLIDE_Y, ERRORS, SIZE, PLACES, SPOT = range(8)
+"""Rows of a bench (8, BLOCK), room for a block: commanded and slides mm, their errors, the sizes
+of these, the bins of these (int64), and room for one point."""
 
-BENCH_ROWS = 7
+BENCH_ROWS = 8
 """How many rows."""
 
 
 @wide
-def _extents(figures: Floats, x: Floats, y: Floats) -> None:
+def _spread(
+    figures: Floats, x: Floats, y: Floats, slide_x: Floats, slide_y: Floats
+) -> tuple[float, float]:
+    """Extents of the slides; returns the largest square of mechanics and their sum."""
     low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+    lag, lags = 0.0, 0.0
     for k in range(len(x)):
-        low_x = smaller(low_x, x[k])
-        high_x = larger(high_x, x[k])
-        low_y = smaller(low_y, y[k])
-        high_y = larger(high_y, y[k])
+        low_x = smaller(low_x, slide_x[k])
+        high_x = larger(high_x, slide_x[k])
+        low_y = smaller(low_y, slide_y[k])
+        high_y = larger(high_y, slide_y[k])
+        off_x, off_y = slide_x[k] - x[k], slide_y[k] - y[k]
+        square = off_x * off_x + off_y * off_y
+        lags += square
+        lag = larger(lag, square)
     figures[LOW_X], figures[HIGH_X] = min(figures[LOW_X], low_x), max(figures[HIGH_X], high_x)
     figures[LOW_Y], figures[HIGH_Y] = min(figures[LOW_Y], low_y), max(figures[HIGH_Y], high_y)
+    return lag, lags
 
 
 @wide
-def _count_sizes(size: Floats, room: Floats, histogram: Ints) -> None:
-    """`histogram` (4 BINS,): four samples take turns, so that none waits for the one before.
-    `room` (n,) is overwritten."""
-    bits, places = size.view(np.int64), room.view(np.int64)
-    for k in range(len(bits)):
-        bin_ = min(max((bits[k] >> SHIFT) - BEFORE_FIRST, 0), BINS - 1)
-        places[k] = 4 * bin_ + (k & 3)
+def _sizes(errors: Floats, size: Floats, places: Ints) -> tuple[float, float, float]:
+    """Sizes of errors and their places in a histogram, where four samples take turns so that none
+    waits for the one before; returns the largest, the sum of squares and the signed sum."""
+    largest, squares, signed = 0.0, 0.0, 0.0
+    bits = errors.view(np.int64)
+    for k in range(len(errors)):
+        error = errors[k]
+        size[k] = abs(error)
+        signed += error
+        squares += error * error
+        largest = larger(largest, abs(error))
+        leading = ((bits[k] & WITHOUT_SIGN) >> SHIFT) - BEFORE_FIRST
+        places[k] = 4 * min(max(leading, 0), BINS - 1) + (k & 3)
+    return largest, squares, signed
+
+
+@wide
+def _count(places: Ints, histogram: Ints) -> None:
     for k in range(len(places)):
         histogram[np.uint64(places[k])] += 1
 
 
 @wide
-def _inner(figures: Floats, errors: Floats, size: Floats) -> None:
-    """Interpolation of samples; their sizes go to `size`."""
-    largest, squares = 0.0, 0.0
-    for k in range(len(errors)):
-        error = abs(errors[k])
-        size[k] = error
-        squares += error * error
-        largest = larger(largest, error)
-    figures[INNER_MAX] = max(figures[INNER_MAX], largest)
-    figures[INNER_SQUARES] += squares
+def _inner(figures: Floats, sums: tuple[float, float, float]) -> None:
+    """Interpolation of samples."""
+    figures[INNER_MAX] = max(figures[INNER_MAX], sums[0])
+    figures[INNER_SQUARES] += sums[1]
 
 
 @wide
-def _lag(figures: Floats, x: Floats, y: Floats, slide_x: Floats, slide_y: Floats) -> None:
-    """Mechanics of samples."""
-    lag, lags = 0.0, 0.0
-    for k in range(len(x)):
-        off_x, off_y = slide_x[k] - x[k], slide_y[k] - y[k]
-        square = off_x * off_x + off_y * off_y
-        lags += square
-        lag = larger(lag, square)
-    figures[LAG_MAX] = max(figures[LAG_MAX], math.sqrt(lag))
-    figures[LAG_SQUARES] += lags
-
-
-@wide
-def _total(figures: Floats, errors: Floats, x: Floats, y: Floats, size: Floats) -> float:
-    """Total error of samples; their sizes go to `size`. Returns the largest."""
-    largest, squares, signed = 0.0, 0.0, 0.0
-    for k in range(len(errors)):
-        error = errors[k]
-        absolute = abs(error)
-        size[k] = absolute
-        signed += error
-        squares += error * error
-        largest = larger(largest, absolute)
+def _total(
+    figures: Floats, sums: tuple[float, float, float], x: Floats, y: Floats, size: Floats
+) -> None:
+    """Total error of samples."""
+    largest, squares, signed = sums
     figures[TOTAL_SQUARES] += squares
     figures[TOTAL_SUM] += signed
     if largest > figures[TOTAL_MAX] or figures[KNOWN] == 0.0:
-        k = 0
-        while size[k] != largest:
-            k += 1
+        k = first_of(size, largest)
         figures[TOTAL_MAX] = largest
         figures[TOTAL_X], figures[TOTAL_Y] = x[k], y[k]
-    figures[KNOWN] += len(errors)
-    return largest
+    figures[KNOWN] += len(size)
 
 
 @wide
@@ -191,8 +187,9 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> 
     x, y = bench[X, :count], bench[Y, :count]
     slide_x, slide_y = bench[SLIDE_X, :count], bench[SLIDE_Y, :count]
     errors, size = bench[ERRORS, :count], bench[SIZE, :count]
+    places = bench[PLACES, :count].view(np.int64)
     figures = sums.rows[row]
-    _extents(figures, slide_x, slide_y)
+    lag, lags = _spread(figures, x, y, slide_x, slide_y)
     last = count - 1
     figures[SAMPLES] += count
     figures[END_X], figures[END_Y] = slide_x[last], slide_y[last]
@@ -200,16 +197,19 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> 
     about, largest = task.rows[row], 0.0
     own = about[OWN]
     if own >= 0:
+        figures[LAG_MAX] = max(figures[LAG_MAX], math.sqrt(lag))
+        figures[LAG_SQUARES] += lags
         lower_errors(task.own[own], x, y, errors, True)
-        _inner(figures, errors, size)
-        _count_sizes(size, errors, sums.histograms[0])
-        _lag(figures, x, y, slide_x, slide_y)
+        _inner(figures, _sizes(errors, size, places))
+        _count(places, sums.histograms[0])
         only = about[FIRST], about[LAST], task.window[row, 0], task.window[row, 1]
         moves = task.moves, task.heights, task.tree
         nearest_errors((slide_x, slide_y), only, moves, sums.found, sums.memo, bench[SPOT], errors)
         if sums.memo[COUNT] > 0.0:
-            largest = _total(figures, errors, slide_x, slide_y, size)
-            _count_sizes(size, errors, sums.histograms[1])
+            found = _sizes(errors, size, places)
+            _total(figures, found, slide_x, slide_y, size)
+            _count(places, sums.histograms[1])
+            largest = found[0]
         if about[CIRCLE] >= 0:
             bins = sums.bins[about[SLOT]]
             fill_bins(slide_x, slide_y, task.centre[about[CIRCLE]], task.directions, bins)

@@ -17,12 +17,13 @@ Exact: integers, as in the kernels that fill the buffer. Compiled, since rows ma
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from camtool.kernels.approach import approach_scan, expected_quadrants
-from camtool.kernels.compiled import inner, kernel
+from camtool.kernels.compiled import bare, inner, kernel
 from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
 from camtool.kernels.direct_search import direct_search_fill, direct_search_start
 from camtool.kernels.heading import rounded_radius
@@ -67,6 +68,28 @@ RUN_AHEAD = 1 << 12
 """Positions that are looked at in one go when an arc is run ahead."""
 
 
+STATE = 8
+"""Numbers of a state: as many as the method with the longest one has."""
+
+
+class Room(NamedTuple):
+    """Arrays to work in: bench of the judge; path (2 · `RUN_AHEAD`,) steps; the state (8,) of an
+    interpolator and a copy of it; tracker (6,) and registers (2,) of what runs."""
+
+    bench: Floats
+    path: Ints
+    state: Ints
+    other: Ints
+    tracker: Ints
+    registers: Floats
+
+
+@bare
+def _copy(from_: Ints, to: Ints) -> None:
+    for k in range(len(to)):
+        to[k] = from_[k]
+
+
 @inner
 def _start(leg: Ints, method: int, rounded: bool, state: Ints) -> None:
     """Set the state (8,) to the start of a leg; that of a line is where its counters are."""
@@ -86,7 +109,7 @@ def _start(leg: Ints, method: int, rounded: bool, state: Ints) -> None:
         state[k] = begun[k]
 
 
-@inner
+@bare
 def _fill(
     leg: Ints, method: int, state: Ints, registers: Floats, out: Ints
 ) -> tuple[int, int, bool]:
@@ -104,20 +127,20 @@ def _fill(
     return filled, passes, met
 
 
-@inner
+@bare
 def _run_ahead(
-    leg: Ints, method: int, before: Ints, entered: int, window: tuple[int, int]
+    leg: Ints, method: int, entered: int, window: tuple[int, int], room: Room
 ) -> tuple[int, bool]:
-    """How many positions there are from the state `before` to the end, and True; or to the
+    """How many positions there are from the present state to the end, and True; or to the
     nearest approach to it in the quadrants `window`, and False. `entered` quadrants lie behind."""
     low, high = window
-    end, registers = np.array([leg[END_X], leg[END_Y]]), np.zeros(2)
-    square = (before[0] - end[0]) ** 2 + (before[1] - end[1]) ** 2
-    tracker = np.array([before[0], before[1], entered, 0, 0, square if entered >= low else -1])
-    state = np.empty(len(before), np.int64)
-    for k in range(len(before)):
-        state[k] = before[k]
-    buffer = np.empty((2, min(RUN_AHEAD, 8 * (max(abs(leg[A]), abs(leg[B])) + 1))), np.int64).T
+    tracker, end, state = room.tracker, leg[END_X : END_Y + 1], room.other
+    _copy(room.state, state)
+    square = (state[0] - end[0]) ** 2 + (state[1] - end[1]) ** 2
+    tracker[0], tracker[1], tracker[2] = state[0], state[1], entered
+    tracker[3], tracker[4], tracker[5] = 0, 0, square if entered >= low else -1
+    size = min(RUN_AHEAD, 8 * (max(abs(leg[A]), abs(leg[B])) + 1))
+    buffer, registers = room.path[: 2 * size].reshape(2, size).T, room.registers
     while True:
         filled, _, met = _fill(leg, method, state, registers, buffer)
         approach_scan(buffer[:filled], end, tracker, low, high)
@@ -127,13 +150,13 @@ def _run_ahead(
             return tracker[3], True
 
 
-@inner
+@bare
 def _is_near(low: int, high: int, end: int) -> bool:
     """Whether low … high, in either order, comes within `NEAR_STEPS` of the end."""
     return min(low, high) <= end + NEAR_STEPS and max(low, high) >= end - NEAR_STEPS
 
 
-@inner
+@bare
 def _passed(
     leg: Ints, x: int, y: int, path: tuple[Ints, Ints], ways: tuple[int, int]
 ) -> tuple[int, bool]:
@@ -153,7 +176,7 @@ def _passed(
     return entered, near
 
 
-@inner
+@bare
 def _follow(
     leg: Ints,
     axis: int,
@@ -181,7 +204,7 @@ def _follow(
     counts[STEPS + axis] += way_on
 
 
-@inner
+@bare
 def _turn_round(leg: Ints, path_x: Ints, path_y: Ints) -> None:
     """Give the positions of a line their signs; a line of Z leaves X and Y where they are."""
     sign_x, sign_y = leg[SIGN_X], leg[SIGN_Y]
@@ -193,7 +216,7 @@ def _turn_round(leg: Ints, path_x: Ints, path_y: Ints) -> None:
         path_y[k] *= sign_y
 
 
-@inner
+@bare
 def _deepen(leg: Ints, state: Floats, counts: Ints) -> None:
     """Count a leg of Z, whose `state` (6,) need not say where the slide is."""
     counts[STEPS + 2] = leg[A]
@@ -218,58 +241,77 @@ def judge_legs(
     `mechanics`: axes (3, 5) and states (3, 6) of `camtool.kernels.play`, which go on.
     """
     method, rounded = how
-    bench, whole = np.empty((BENCH_ROWS, BLOCK)), np.empty((2, BLOCK), np.int64).T
-    state, before, registers = np.zeros(8, np.int64), np.zeros(8, np.int64), np.zeros(2)
+    room = Room(
+        np.empty((BENCH_ROWS, BLOCK)),
+        np.empty(2 * RUN_AHEAD, np.int64),
+        np.zeros(STATE, np.int64),
+        np.zeros(STATE, np.int64),
+        np.zeros(6, np.int64),
+        np.zeros(2),
+    )
     for number in range(len(legs)):
         leg, count = legs[number], counts[number]
-        arc, x, y = leg[KIND] == ARC, leg[A], leg[B]
-        if arc and x == 0 and y == 0:
+        if leg[KIND] != ARC or leg[A] != 0 or leg[B] != 0:
+            _start(leg, method, rounded, room.state)
+            _judge_leg(leg, method, step_mm, mechanics, count, task, sums, room)
+
+
+@bare
+def _judge_leg(
+    leg: Ints,
+    method: int,
+    step_mm: float,
+    mechanics: tuple[Floats, Floats],
+    count: Ints,
+    task: Task,
+    sums: Sums,
+    room: Room,
+) -> None:
+    """Run and judge a leg from the state in `room` on."""
+    arc, x, y = leg[KIND] == ARC, leg[A], leg[B]
+    room.registers[0] = room.registers[1] = 0.0
+    at_x, at_y = leg[FROM_X] - leg[ORIGIN_X], leg[FROM_Y] - leg[ORIGIN_Y]
+    careful, low, high = False, 0, 0
+    if arc:
+        expected = expected_quadrants(x, y, leg[CW] != 0, leg[END_X], leg[END_Y])
+        low, high = expected - 1, expected + 1
+        apart = abs(math.hypot(x, y) - math.hypot(leg[END_X], leg[END_Y]))
+        careful = method == DDA or apart > NEAR_RADIUS or max(abs(x), abs(y)) < LEAST_RADIUS
+    entered, left, met = 0, -1, False
+    while left != 0 and not (left < 0 and met):
+        if careful and left < 0:
+            left, met = _run_ahead(leg, method, entered, (low, high), room)
+            count[ENDED] = int(met)
             continue
-        _start(leg, method, rounded, state)
-        registers[0] = registers[1] = 0.0
-        at_x, at_y = leg[FROM_X] - leg[ORIGIN_X], leg[FROM_Y] - leg[ORIGIN_Y]
-        careful, low, high = False, 0, 0
-        if arc:
-            expected = expected_quadrants(x, y, leg[CW] != 0, leg[END_X], leg[END_Y])
-            low, high = expected - 1, expected + 1
-            apart = abs(math.hypot(x, y) - math.hypot(leg[END_X], leg[END_Y]))
-            careful = method == DDA or apart > NEAR_RADIUS or max(abs(x), abs(y)) < LEAST_RADIUS
-        entered, left, met = 0, -1, False
-        while left != 0 and not (left < 0 and met):
-            if careful and left < 0:
-                left, met = _run_ahead(leg, method, state, entered, (low, high))
-                count[ENDED] = int(met)
+        _copy(room.state, room.other)
+        size = BLOCK if left < 0 or left >= BLOCK else left
+        buffer = room.path[: 2 * size].reshape(2, size).T
+        filled, passes, met = _fill(leg, method, room.state, room.registers, buffer)
+        path_x, path_y = buffer[:, 0][:filled], buffer[:, 1][:filled]
+        if not arc:
+            _turn_round(leg, path_x, path_y)
+        way_x, way_y = way_of(at_x, path_x), way_of(at_y, path_y)
+        if left >= 0:
+            left -= filled
+        elif arc:
+            more, near = _passed(leg, at_x, at_y, (path_x, path_y), (way_x, way_y))
+            if entered + more > high or (near and entered + more >= low and not met):
+                _copy(room.other, room.state)
+                careful, met = True, False
                 continue
-            for k in range(len(state)):
-                before[k] = state[k]
-            buffer = whole if left < 0 or left >= BLOCK else np.empty((2, left), np.int64).T
-            filled, passes, met = _fill(leg, method, state, registers, buffer)
-            path_x, path_y = buffer[:, 0][:filled], buffer[:, 1][:filled]
-            if not arc:
-                _turn_round(leg, path_x, path_y)
-            way_x, way_y = way_of(at_x, path_x), way_of(at_y, path_y)
-            if left >= 0:
-                left -= filled
-            elif arc:
-                more, near = _passed(leg, at_x, at_y, (path_x, path_y), (way_x, way_y))
-                if entered + more > high or (near and entered + more >= low and not met):
-                    for k in range(len(state)):
-                        state[k] = before[k]
-                    careful, met = True, False
-                    continue
-                entered += more
-            count[PASSES] += passes
-            count[SAMPLES] += filled
-            if left < 0:
-                count[ENDED] = int(met)
-            if filled == 0:
-                continue
-            _follow(leg, 0, way_x, path_x, at_x, step_mm, mechanics, count, bench)
-            _follow(leg, 1, way_y, path_y, at_y, step_mm, mechanics, count, bench)
-            at_x, at_y = path_x[-1], path_y[-1]
-            judge_block(leg[ROW], filled, task, sums, bench)
-        if leg[KIND] == DEPTH:
-            _deepen(leg, mechanics[1][2], count)
-        elif arc:  # the controller takes itself to stand on the end that it was given
-            mechanics[1][0, 0] = (leg[ORIGIN_X] + leg[END_X]) * step_mm
-            mechanics[1][1, 0] = (leg[ORIGIN_Y] + leg[END_Y]) * step_mm
+            entered += more
+        count[PASSES] += passes
+        count[SAMPLES] += filled
+        if left < 0:
+            count[ENDED] = int(met)
+        if filled == 0:
+            continue
+        _follow(leg, 0, way_x, path_x, at_x, step_mm, mechanics, count, room.bench)
+        _follow(leg, 1, way_y, path_y, at_y, step_mm, mechanics, count, room.bench)
+        at_x, at_y = path_x[-1], path_y[-1]
+        judge_block(leg[ROW], filled, task, sums, room.bench)
+    if leg[KIND] == DEPTH:
+        _deepen(leg, mechanics[1][2], count)
+    elif arc:  # the controller takes itself to stand on the end that it was given
+        mechanics[1][0, 0] = (leg[ORIGIN_X] + leg[END_X]) * step_mm
+        mechanics[1][1, 0] = (leg[ORIGIN_Y] + leg[END_Y]) * step_mm

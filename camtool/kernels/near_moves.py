@@ -46,6 +46,9 @@ many points it was used."""
 MEMO = 10
 """Numbers in a memo."""
 
+SPOT = 3 + DEPTH
+"""Numbers that a search needs room for: a point with its error, and the nodes that wait."""
+
 
 def new_memo() -> Floats:
     """The memo of no list."""
@@ -56,7 +59,7 @@ def new_memo() -> Floats:
 
 @wide
 def _apart(move: Floats, x: float, y: float, spot: Floats) -> float:
-    """Distance of one point from a move; `spot` (3,) is room for it."""
+    """Distance of one point from a move; `spot` (≥ 3,) is room for it."""
     spot[0], spot[1] = x, y
     lower_errors(move, spot[:1], spot[1:2], spot[2:3], True)
     return float(abs(spot[2]))
@@ -86,14 +89,14 @@ def _search(
     """With `limit` < 0 the least distance of q; else the number of moves within it, in `found`.
 
     `only`: the moves first:last whose heights overlap low … high. `moves`: table, heights (K, 2),
-    tree.
+    tree. `spot` (`SPOT`,) is room.
     """
     x, y = q
     first, last, z_low, z_high = only
     table, heights, tree = moves
     leaves = len(tree) // 2
     best, count = (np.inf if limit < 0.0 else limit), 0
-    stack = np.empty(DEPTH, np.int64)
+    stack = spot[3 : 3 + DEPTH].view(np.int64)
     height, stack[0] = 1, 1
     while height > 0:
         height -= 1

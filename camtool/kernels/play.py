@@ -31,7 +31,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.compiled import inner, kernel
+from camtool.kernels.compiled import bare, kernel
 from camtool.kernels.deviates import deviate
 
 Ints = npt.NDArray[np.int64]
@@ -54,7 +54,7 @@ def play_start(position: float, scale: float, direction: int) -> Floats:
     return np.array([position, direction, 0.0, position * scale, 0.0, 0.0], dtype=np.float64)
 
 
-@inner
+@bare
 def turned(
     position: float, furthest: float, direction: float, least: float
 ) -> tuple[float, float, bool]:
@@ -67,7 +67,7 @@ def turned(
     return furthest, direction, False
 
 
-@inner
+@bare
 def taken_along(slide: float, motor: float, low: float, high: float) -> float:
     """The play operator: the slide after the motor went to `motor` mm without turning round."""
     return min(max(slide, motor + low), motor + high)

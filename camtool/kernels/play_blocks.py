@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.compiled import inner
+from camtool.kernels.compiled import bare
 from camtool.kernels.play import taken_along, turned
 from camtool.kernels.wide import larger, smaller
 
@@ -26,7 +26,7 @@ RISING, FALLING, STILL, TURNING = 1, -1, 0, 2
 """Which way a block of positions runs."""
 
 
-@inner
+@bare
 def way_of(before: int, positions: Ints) -> int:
     """Which way positions (n,) run that follow `before`."""
     least = most = positions[0] - before
@@ -40,7 +40,7 @@ def way_of(before: int, positions: Ints) -> int:
     return FALLING if most <= 0 else TURNING
 
 
-@inner
+@bare
 def play_block(way: int, positions: Floats, axis: Floats, state: Floats, out: Floats) -> int:
     """Slides, `out` (n,) mm, for positions (n,) that run `way`; returns the reversals.
 
@@ -76,7 +76,7 @@ def play_block(way: int, positions: Floats, axis: Floats, state: Floats, out: Fl
     return reversals
 
 
-@inner
+@bare
 def _step_by_step(positions: Floats, axis: Floats, state: Floats, out: Floats) -> int:
     reversals = 0
     for k in range(len(positions)):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.wide import larger, wide
+from camtool.kernels.wide import first_of, larger, wide
 
 Floats = npt.NDArray[np.float64]
 
@@ -106,8 +106,7 @@ def trace_block(
         at, peak = low, 0.0
         if largest > pen[PEAK] and largest > 0.0:
             peak = _largest(error[low:high])
-            while error[at] != peak:
-                at += 1
+            at += first_of(error[low:high], peak)
         if peak > pen[PEAK]:
             pen[PEAK], pen[PEAK_X], pen[PEAK_Y] = peak, x[at], y[at]
             pen[LAST_IS_WRITTEN] = 1.0 if at == high - 1 else 0.0

@@ -11,14 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, cast
 
+import numpy as np
+import numpy.typing as npt
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from camtool.kernels.compiled import loose_inner
+from camtool.kernels.compiled import loose_bare
 
-wide = loose_inner("nnan", "nsz", "reassoc")
-"""As `camtool.kernels.compiled.inner`, for loops over errors: sums may be taken in any order."""
+Floats = npt.NDArray[np.float64]
+
+wide = loose_bare("nnan", "nsz", "reassoc")
+"""As `camtool.kernels.compiled.bare`, for loops over errors: sums may be taken in any order."""
 
 
 def _of_two(name: str) -> Callable[[float, float], float]:
@@ -41,3 +45,13 @@ smaller = _of_two("llvm.minnum")
 
 larger = _of_two("llvm.maxnum")
 """The larger of two float64, neither of which is NaN."""
+
+
+@wide
+def first_of(values: Floats, value: float) -> int:
+    """The first place of `value` in `values` (n,), or n: without an early end, but wide."""
+    count = len(values)
+    place = count
+    for k in range(len(values)):
+        place = min(place, k if values[k] == value else count)
+    return place

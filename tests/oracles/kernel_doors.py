@@ -5,7 +5,7 @@ from numba import njit
 
 from camtool.kernels.circle_bins import fill_bins
 from camtool.kernels.move_errors import lower_errors
-from camtool.kernels.near_moves import nearest_errors
+from camtool.kernels.near_moves import SPOT, nearest_errors
 from camtool.kernels.play_blocks import play_block, way_of
 from camtool.kernels.thin_trace import trace_block
 
@@ -22,7 +22,7 @@ def lower_errors_(move, x, y, best):
 
 @njit
 def nearest_errors_(x, y, only, moves, found, memo, out):
-    nearest_errors((x, y), only, moves, found, memo, np.empty(3), out)
+    nearest_errors((x, y), only, moves, found, memo, np.empty(SPOT), out)
 
 
 @njit
