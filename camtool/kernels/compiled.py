@@ -58,7 +58,9 @@ class Kernel:
             from camtool.kernels.inlined import InlinedCompiler
 
             return self._made(no_cpython_wrapper=True, pipeline_class=InlinedCompiler)
-        made = self._made(no_cpython_wrapper=False)
+        from camtool.kernels.inlined import KernelCompiler
+
+        made = self._made(no_cpython_wrapper=False, pipeline_class=KernelCompiler)
         made._cache = _kept(self.py_func)
         return made
 
