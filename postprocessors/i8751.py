@@ -33,6 +33,13 @@ class I8751Post:
 
         return read_program(data, machine)
 
+    def stray_mm(self, machine: Machine) -> float:
+        """How far ends of records may lie from their lines, and lines from their arcs."""
+        from ._i8751_options import dialect_of
+
+        dialect = dialect_of(machine)
+        return dialect.tolerance_mm + dialect.arc_tolerance_mm
+
     def line_bytes(self, data: bytes, machine: Machine) -> int:
         """The bytes of the packets, whatever the form of the file."""
         from ._i8751_lines import packet_count

@@ -257,7 +257,9 @@ def _judged(
 
     line_bytes = getattr(target.post, "line_bytes", None)
     sent = len(data) if line_bytes is None else line_bytes(data, target.machine)
-    sized = replace(options, size_bytes=len(data), line_bytes=sent)
+    stray_mm = getattr(target.post, "stray_mm", None)
+    stray = 0.0 if stray_mm is None else stray_mm(target.machine)
+    sized = replace(options, size_bytes=len(data), line_bytes=sent, stray_mm=stray)
     return verify(
         decoded,
         target.machine,

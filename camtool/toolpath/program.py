@@ -32,7 +32,8 @@ class PostProcessor(Protocol):
     """One dialect. `read` shares no code with `write`, so a fault in one shows in the other.
 
     Where a program's file is not what goes over the line to the machine (a listing, a dump), a
-    post has besides `line_bytes(data, machine) -> int`: how many bytes do.
+    post has besides `line_bytes(data, machine) -> int`: how many bytes do. One whose moves may
+    leave the wanted path on purpose has `stray_mm(machine) -> float`: how far at most.
     """
 
     name: str

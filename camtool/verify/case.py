@@ -44,7 +44,8 @@ class VerifyOptions:
     `worst`: so many moves with the largest errors are listed. `size_bytes` is that of the file,
     `line_bytes` of what goes over the line to the machine. `blocks` None: counted from the decoded
     toolpath where it was read. `coverage_mm` None: `COVERAGE_MM`, `COVERAGE_STEPS` or
-    `COVERAGE_RESOLUTIONS`. `tool_diameter_mm`: rapids below the stock top may run where the tool
+    `COVERAGE_RESOLUTIONS`, and `stray_mm`, by which the dialect may leave the wanted path on
+    purpose. `tool_diameter_mm`: rapids below the stock top may run where the tool
     has cleared the way before; None, when nobody knows it: nowhere.
     """
 
@@ -56,6 +57,7 @@ class VerifyOptions:
     line_bytes: int | None = None
     blocks: int | None = None
     coverage_mm: float | None = None
+    stray_mm: float = 0.0
     sample_mm: float = SAMPLE_MM
     trace_points: int = TRACE_POINTS
     worst: int = WORST_LISTED
@@ -98,7 +100,8 @@ class Case:
         axes = (self.machine.axes.x, self.machine.axes.y)
         coarse = max(axis.coded_step_mm for axis in axes)
         said = max(axis.resolution_mm or 0.0 for axis in axes)
-        return max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * said)
+        least = max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * said)
+        return least + self.options.stray_mm
 
     @property
     def depth_mm(self) -> float:
