@@ -28,7 +28,7 @@ from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
 from camtool.kernels.direct_search import direct_search_fill, direct_search_start
 from camtool.kernels.heading import rounded_radius
 from camtool.kernels.judge import BENCH_ROWS, BLOCK, SLIDE_X, Sums, Task, X, judge_block
-from camtool.kernels.play_blocks import TURNING, play_block, way_of
+from camtool.kernels.play_blocks import STILL, TURNING, play_block, way_of
 from camtool.kernels.stairs import stairs_fill, stairs_start
 
 Floats = npt.NDArray[np.float64]
@@ -148,6 +148,28 @@ def _run_ahead(
             return tracker[4], False
         if met:
             return tracker[3], True
+
+
+@bare
+def _ways(
+    leg: Ints, method: int, states: tuple[Ints, Ints], at: tuple[int, int], path: Ints
+) -> tuple[int, int]:
+    """Which way X and Y run on the positions (n, 2) after `at`; `states` before and after them.
+
+    A line runs one way. So does a path of direct search between its quadrants, and what makes
+    signs come back is a whole turn: more than a block, when the circle is larger than that.
+    """
+    before, after = states
+    at_x, at_y = at
+    known, sign_x, sign_y = leg[KIND] == LINE, leg[SIGN_X], leg[SIGN_Y]
+    if method == DSM and leg[KIND] == ARC and max(abs(at_x), abs(at_y)) > BLOCK:
+        known = before[3] == after[3] and before[4] == after[4]
+        sign_x, sign_y = after[3], after[4]
+    if not known or len(path) == 0:
+        return way_of(at_x, path[:, 0]), way_of(at_y, path[:, 1])
+    last = len(path) - 1
+    way_x = STILL if path[last, 0] == at_x else sign_x
+    return way_x, STILL if path[last, 1] == at_y else sign_y
 
 
 @bare
@@ -290,7 +312,7 @@ def _judge_leg(
         path_x, path_y = buffer[:, 0][:filled], buffer[:, 1][:filled]
         if not arc:
             _turn_round(leg, path_x, path_y)
-        way_x, way_y = way_of(at_x, path_x), way_of(at_y, path_y)
+        way_x, way_y = _ways(leg, method, (room.other, room.state), (at_x, at_y), buffer[:filled])
         if left >= 0:
             left -= filled
         elif arc:
