@@ -1,7 +1,7 @@
 """The first run of `post` after an installation: its kernels are compiled by two processes.
 
 The run itself compiles what it comes to; beside it a process compiles from the other end what
-nearly every drawing needs: the order first, then what follows by a small job of its own. Neither
+nearly every drawing needs: the judging, by a small job of its own, and then the order. Neither
 compiles what the other one is at: it waits, and loads that (`camtool.kernels.compiled`).
 """
 
@@ -14,9 +14,9 @@ from contextlib import contextmanager
 
 from camtool.cli.talk import first_run, say_first_run
 
-SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="4mm" height="2mm" viewBox="0 0 4 2">
-<circle cx="1" cy="1" r="0.2"/><rect x="2" y="0.5" width="0.5" height="0.5"/></svg>"""
-"""A drawing that needs no more than every drawing does."""
+SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">
+<circle cx="1" cy="1" r="0.2"/></svg>"""
+"""A drawing of one contour: nothing is to be put into an order."""
 
 
 @contextmanager
@@ -41,14 +41,22 @@ def compile_ahead(target: str) -> None:
     import numpy as np
 
     from camtool.importers.read import read_bytes
+    from camtool.kernels.tour import Tour
+    from camtool.kernels.tour_search import settled
     from camtool.machine.registry import load_target
     from camtool.pipeline import post_drawing
     from camtool.planning.job import job_of
     from camtool.planning.order import Choices, best_order
 
-    places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    best_order(Choices(np.arange(3), places, places), np.empty((0, 2), dtype=np.int64))
     post_drawing(read_bytes(SMALL_JOB, "small.svg"), job_of(), load_target(target))
+    # Of one item, with no neighbours and nothing before it or after it.
+    places, rows, none = np.zeros((3, 4)), np.arange(3), np.empty(0, dtype=np.int64)
+    first, nothing = rows[:2].copy(), np.zeros(2, dtype=np.int64)
+    item, place = np.array([1, 0, 2]), np.array([1, 0, 2])
+    around = (none, nothing, none, nothing, none, nothing)
+    settled(Tour(places, rows, first, *around, -1, False, item, place, rows.copy()))
+    two = places[:2, :2].copy()
+    best_order(Choices(rows[:2], two, two), none.reshape(0, 2))
 
 
 if __name__ == "__main__":
