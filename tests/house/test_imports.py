@@ -33,7 +33,9 @@ ALLOWED = {
     "pipeline": JUDGE | {"verify", "preview"},
     "cli": JUDGE | {"verify", "preview", "calibration", "pipeline"},
     "__main__": {"cli"},
-    "__init__": set(),
+    "results": JUDGE | {"verify", "preview", "pipeline"},
+    "api": JUDGE | {"verify", "preview", "pipeline", "results"},
+    "__init__": {"api", "errors"},
 }
 HEAVY = {
     "build123d",
@@ -161,6 +163,18 @@ def loaded_by(*arguments: str) -> set[str]:
 
 def test_help_loads_nothing_heavy() -> None:
     assert not loaded_by("--help") & (HEAVY | {"numpy", "msgspec"})
+
+
+def test_importing_camtool_loads_nothing_of_it() -> None:
+    code = "import sys, camtool; dir(camtool); print(*sys.modules)"
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    loaded = set(result.stdout.split())
+    assert not {module.split(".")[0] for module in loaded} & (
+        HEAVY | {"numpy", "msgspec", "click"}
+    )
+    assert {module for module in loaded if module.startswith("camtool")} == {"camtool"}
 
 
 def test_an_svg_does_not_load_the_dxf_library() -> None:

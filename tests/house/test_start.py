@@ -73,6 +73,19 @@ def test_post_of_points(tmp_path: Path) -> None:
     assert loaded == {"numba", "numpy", "shapely"}
 
 
+def heavy_of(code: str) -> set[str]:
+    """The heavy packages that a piece of Python has loaded when it ends."""
+    command = [sys.executable, "-c", f"import sys, camtool; {code}; print('LOADED', *sys.modules)"]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+    return HEAVY & set(result.stdout.rpartition("LOADED")[2].split())
+
+
+def test_python_loads_what_its_calls_need() -> None:
+    assert heavy_of("camtool.targets") == {"numpy"}
+    assert heavy_of("camtool.targets()") == {"numpy"}
+    assert "ezdxf" not in heavy_of("camtool.read_drawing('samples/letter.svg')")
+
+
 def test_no_kernel_is_compiled_for_targets() -> None:
     assert not warm("targets") & {"numba", "ezdxf", "shapely"}
 

@@ -1,0 +1,185 @@
+"""camtool from Python: the names, what they give, and that it is what the commands do."""
+
+import importlib
+import inspect
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+import camtool
+from camtool import api
+from camtool.cli.main import cli
+from camtool.importers.options import ReadOptions, Selection
+from camtool.results import Posted, Verification, extended
+
+LOGO = Path("samples/logo.dxf")
+SQUARE = "0,0\n4,0\n4,4\n0,4\n0,0\n"
+
+
+@pytest.fixture
+def square(tmp_path: Path) -> Path:
+    file = tmp_path / "square.csv"
+    file.write_text(SQUARE)
+    return file
+
+
+@pytest.fixture(scope="module")
+def posted(tmp_path_factory: pytest.TempPathFactory) -> Posted:
+    file = tmp_path_factory.mktemp("api") / "square.csv"
+    file.write_text(SQUARE)
+    return api.post(file, "pic-mmh")
+
+
+def test_every_name_is_there_and_documented() -> None:
+    for name in camtool.__all__:
+        value = getattr(camtool, name)
+        assert (value.__doc__ or "").strip(), name
+        assert name in dir(camtool)
+        assert name in api.__all__
+    with pytest.raises(AttributeError, match="no attribute 'plann'"):
+        _ = camtool.plann
+
+
+def test_the_facade_tells_editors_the_same_names() -> None:
+    source = (
+        inspect.getsource(camtool).partition("if TYPE_CHECKING:")[2].partition("__version__")[0]
+    )
+    assert all(f" {name}\n" in source.replace(",\n", "\n") for name in camtool.__all__)
+
+
+@pytest.mark.parametrize(
+    "first", ["camtool.verify.report", "camtool.verify", "camtool.preview.draw", "camtool.api"]
+)
+def test_packages_are_functions_too_whoever_comes_first(first: str) -> None:
+    code = f"""
+import {first}, camtool, inspect
+import camtool.verify.report as report
+from camtool.preview import draw
+assert inspect.signature(camtool.verify).parameters.keys() >= {{"program", "target"}}
+assert inspect.signature(camtool.preview).parameters.keys() >= {{"what"}}
+assert camtool.verify.report is report and inspect.ismodule(camtool.verify)
+assert callable(camtool.preview) and not callable(camtool.pipeline)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_reading_takes_every_field_of_the_options() -> None:
+    wanted = {each.name for each in (*fields(ReadOptions), *fields(Selection))} - {"select"}
+    assert set(api.Reading.__annotations__) == wanted
+
+
+def test_a_drawing_prints_and_shows_itself() -> None:
+    drawing = camtool.read_drawing(LOGO, target="pic-mmh")
+    assert repr(drawing) == (
+        "<Drawing samples/logo.dxf: 4.880 × 4.880 mm, 23 closed and 9 open contours>"
+    )
+    assert drawing._repr_svg_().startswith("<svg")
+    cut = camtool.read_drawing(LOGO, layers=["CUT"])
+    assert set(cut.layers) == {"CUT"}
+    assert set(camtool.read_drawing(LOGO, colours=["red"]).colours) == {"#ff0000"}
+
+
+def test_the_targets_tolerance_reads_a_drawing() -> None:
+    coarse = camtool.read_drawing(LOGO, target="grbl")
+    fine = camtool.read_drawing(LOGO, target="grbl", tolerance_mm=0.0001)
+    assert len(fine.paths.vertices) > len(coarse.paths.vertices)
+
+
+def test_post_gives_what_the_command_writes(posted: Posted, tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    output = tmp_path / "square.pic"
+    arguments = ["post", posted.drawing.file, "-t", "pic-mmh", "-q", "-o", str(output)]
+    CliRunner().invoke(cli, arguments, standalone_mode=False, catch_exceptions=False)
+    assert posted.data == output.read_bytes()
+    assert not posted.failed
+    assert "µm at most" in str(posted)
+    assert repr(posted).startswith("<Posted square.csv for pic-mmh: ")
+
+
+def test_verify_of_bytes_a_file_and_a_program(posted: Posted, tmp_path: Path) -> None:
+    file = tmp_path / "square.pic"
+    file.write_bytes(posted.data)
+    assert posted.program is not None
+    by = [camtool.verify(each, "pic-mmh") for each in (posted.data, file, posted.program)]
+    assert len({each.report.error_um.total.max for each in by}) == 1
+    assert [each.report.source for each in by] == ["<bytes>", str(file), "<bytes>"]
+    held = camtool.verify(file, "pic-mmh", against=posted.drawing)
+    assert posted.verification is not None
+    assert held.report.error_um.total.max == posted.verification.report.error_um.total.max
+    assert "error " in repr(held)
+
+
+def test_everything_has_a_picture(posted: Posted) -> None:
+    verdict = posted.verification
+    assert isinstance(verdict, Verification)
+    path = camtool.plan(posted.drawing, "pic-mmh")
+    again = camtool.verify(posted.data, "pic-mmh")
+    shown = [camtool.preview(posted.drawing), camtool.preview(path), camtool.preview(posted)]
+    shown += [camtool.preview(verdict), camtool.preview(again)]
+    pictures = [each.svg for each in shown]
+    assert all(svg.startswith("<svg") for svg in pictures)
+    assert pictures[0] != pictures[1] != pictures[2]
+    assert camtool.preview(posted).svg == posted._repr_svg_()
+    with pytest.raises(TypeError, match="int has no picture"):
+        camtool.preview(3)  # type: ignore[arg-type]
+
+
+def test_the_houses_own_records_have_pictures_too(square: Path) -> None:
+    from camtool.importers import read_drawing
+
+    assert camtool.preview(read_drawing(square)).svg.startswith("<svg")
+
+
+def test_a_picture_is_saved_by_its_extension(square: Path, tmp_path: Path) -> None:
+    picture = camtool.preview(camtool.read_drawing(square))
+    picture.save(tmp_path / "square.svg")
+    picture.save(tmp_path / "square.png")
+    assert (tmp_path / "square.svg").read_text(encoding="utf-8") == picture.svg
+    assert (tmp_path / "square.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(camtool.CamtoolError, match=r"square\.gif"):
+        picture.save(tmp_path / "square.gif")
+
+
+def test_jobs_say_how_it_is_cut(square: Path) -> None:
+    job = camtool.job_of(tool_diameter_mm=1.0, side="outside")
+    path = camtool.plan(square, "grbl", job)
+    assert path.end[:, 0].max() == pytest.approx(4.5)
+    assert repr(path).startswith("<Toolpath of square.csv: ")
+
+
+def test_settings_of_a_machine() -> None:
+    other = camtool.load_target("pic-mmh", settings={"axes.x.backlash_mm": 0.25})
+    assert other.machine.axes.x.backlash_mm == 0.25
+    same = camtool.load_target("pic-mmh", settings=["axes.x.backlash_mm=0.25"])
+    assert same.machine == other.machine
+    with pytest.raises(camtool.CamtoolError, match="did you mean pic-mmh"):
+        camtool.load_target("pic-mh")
+
+
+def test_a_program_with_errors_has_no_bytes(posted: Posted) -> None:
+    without = extended(Posted, posted, program=None)
+    with pytest.raises(camtool.CamtoolError, match="must not be run"):
+        _ = without.data
+
+
+def test_mistakes_are_one_line(tmp_path: Path) -> None:
+    with pytest.raises(camtool.CamtoolError, match="cannot be read"):
+        camtool.verify(tmp_path / "none.pic", "pic-mmh")
+    with pytest.raises(camtool.CamtoolError, match="there is no such file"):
+        camtool.post(tmp_path / "none.dxf", "pic-mmh")
+    with pytest.raises(camtool.CamtoolError, match="unknown unit"):
+        camtool.read_drawing(LOGO, units="furlong")
+
+
+def test_targets_are_listed_and_a_broken_one_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [each.target.name for each in camtool.targets()]
+    assert "pic-mmh" in names
+    assert names == sorted(names)
+    module = importlib.import_module("camtool.api")
+    monkeypatch.setattr(module, "target_names", lambda: ["grbl", "broken"])
+    with pytest.warns(UserWarning, match="broken"):
+        assert [each.target.name for each in camtool.targets()] == ["grbl"]
