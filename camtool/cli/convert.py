@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
 from camtool.cli.finish import Asked, finish
 from camtool.cli.options import MachineFlags, talk_options
+from camtool.cli.report import flags_given, report_option
 from camtool.cli.talk import say_first_run
 from camtool.cli.types import feed
 from camtool.cli.verify import read_bytes, shown
+
+if TYPE_CHECKING:
+    from camtool.machine.registry import LoadedTarget
+    from camtool.pipeline import Posted
 
 
 @click.command(short_help="A program of one machine as that of another.")
@@ -24,6 +32,7 @@ from camtool.cli.verify import read_bytes, shown
     "--feed", "feed_mm_min", callback=feed, metavar="FEED", help="For all cuts, in mm/min."
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
+@report_option
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
 @talk_options
 def convert(
@@ -37,6 +46,7 @@ def convert(
     from_set: tuple[str, ...],
     feed_mm_min: float | None,
     report: str | None,
+    page: str | None,
     no_verify: bool,
     quiet: bool,
     verbose: bool,
@@ -48,7 +58,7 @@ def convert(
     """
     before = MachineFlags(source, from_machine, from_set).load()
     after = MachineFlags(target, machine, settings).load()
-    asked = Asked(program, output, report)
+    asked = Asked(program, output, report, page=page, flags=flags_given())
     asked.check(after.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import convert_program
@@ -62,4 +72,24 @@ def convert(
         feed_mm_min=feed_mm_min,
         check=not no_verify,
     )
-    return finish(made, asked, quiet=quiet, verbose=verbose)
+    return finish(
+        made,
+        asked,
+        quiet=quiet,
+        verbose=verbose,
+        picture=lambda name: _picture(name, shown(program), made, after),
+        target=after,
+    )
+
+
+def _picture(name: str, title: str, made: Posted, target: LoadedTarget) -> bytes:
+    from camtool.pipeline import picture
+    from camtool.preview.render import render
+
+    scene = picture(
+        title=Path(title).name,
+        toolpath=made.decoded or made.wanted,
+        verification=made.verification,
+        machine=target.machine,
+    )
+    return render(scene, name)

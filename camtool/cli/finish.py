@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.report import Subject, picture_beside, report_files
 from camtool.cli.talk import say, say_findings
 
 if TYPE_CHECKING:
+    from camtool.cli.report import Flags
+    from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Posted
 
 
@@ -24,14 +27,19 @@ class Asked:
     output: str | None
     report: str | None
     preview: str | None = None
+    page: str | None = None
+    flags: Flags = ()
 
     def check(self, extension: str, *, verified: bool) -> None:
         """OutputError, before any work is done, when a place cannot be written."""
-        if self.report is not None and not verified:
-            raise click.UsageError(
-                "--json is the report of the verification that --no-verify leaves out"
-            )
-        check_writable([self.program(extension), self.preview, self.report], [self.source])
+        for flag, name in (("--json", self.report), ("--report", self.page)):
+            if name is not None and not verified:
+                raise click.UsageError(
+                    f"{flag} is the report of the verification that --no-verify leaves out"
+                )
+        beside = picture_beside(self.page, self.preview)
+        names = [self.program(extension), self.preview, self.report, self.page, beside]
+        check_writable(names, [self.source])
 
     def program(self, extension: str) -> str:
         """The program's name; when none is given the source's, here; stdin goes to stdout."""
@@ -46,13 +54,20 @@ def finish(
     *,
     quiet: bool,
     verbose: bool,
-    picture: Callable[[str], bytes] | None = None,
+    picture: Callable[[str], bytes],
+    target: LoadedTarget,
 ) -> int:
-    """Writes what was made and says so; the exit code. `picture` draws the one that was asked."""
+    """Writes what was made and says so; the exit code. `picture` draws the ones that were asked.
+
+    Where something is wrong only the page that was asked for is written: it says what.
+    """
     say_findings(made.findings, quiet=quiet, verbose=verbose)
     if made.failed or made.program is None:
+        if asked.page is not None:
+            write_all(_page(made, asked, picture, target))
+        no = "nothing" if asked.page is None else "no program"
         say(
-            f"camtool: error: {asked.source}: nothing was written; mend the errors above",
+            f"camtool: error: {asked.source}: {no} was written; mend the errors above",
             quiet=False,
         )
         return 1
@@ -60,13 +75,30 @@ def finish(
     asked.check(made.program.extension, verified=True)
     output = asked.program(made.program.extension)
     files = {output: made.program.data}
-    if asked.preview is not None and picture is not None:
+    if asked.preview is not None:
         files[asked.preview] = picture(asked.preview)
     if asked.report is not None and made.verification is not None:
         files[asked.report] = made.verification.report.to_json().encode()
+    if asked.page is not None:
+        files.update(_page(made, asked, picture, target))
     write_all(files)
     if made.verification is not None:
         say(made.verification.report.to_text(findings=False), quiet=quiet)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(made.program.data)} bytes)", quiet=quiet)
     return 0
+
+
+def _page(
+    made: Posted, asked: Asked, picture: Callable[[str], bytes], target: LoadedTarget
+) -> dict[str, bytes]:
+    """The files of the page that was asked for."""
+    subject = Subject(
+        title=Path(asked.source).name if asked.source != STDOUT else "<stdin>",
+        target=target,
+        report=made.verification.report if made.verification is not None else None,
+        findings=made.findings,
+        program=made.program.data if made.program is not None else None,
+        flags=asked.flags,
+    )
+    return report_files(str(asked.page), subject, picture, preview=asked.preview)

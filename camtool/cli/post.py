@@ -17,6 +17,7 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
+from camtool.cli.report import flags_given, report_option
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.types import picture as picture_name
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     help="Picture of the predicted result, .svg or .png.",
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
+@report_option
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
 @click.option(
     "--compensate",
@@ -54,6 +56,7 @@ def post(
     output: str | None,
     preview: str | None,
     report: str | None,
+    page: str | None,
     no_verify: bool,
     compensate: bool,
     gates: GateFlags,
@@ -71,7 +74,7 @@ def post(
     if no_verify and gates.given:
         raise click.UsageError("--no-verify leaves nothing to hold against limits")
     target = machine.load()
-    asked = Asked(source, output, report, preview)
+    asked = Asked(source, output, report, preview, page, flags_given())
     asked.check(target.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import post_drawing
@@ -94,6 +97,7 @@ def post(
         quiet=quiet,
         verbose=verbose,
         picture=lambda name: _picture(name, read, wanted, posted, target),
+        target=target,
     )
 
 
@@ -105,7 +109,7 @@ def _picture(name: str, drawing: Drawing, job: Job, posted: Posted, target: Load
         title=Path(drawing.file).name,
         drawing=drawing,
         job=job,
-        toolpath=posted.decoded,
+        toolpath=posted.decoded or posted.wanted,
         verification=posted.verification,
         machine=target.machine,
     )

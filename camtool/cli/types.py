@@ -13,6 +13,7 @@ from camtool.errors import OptionError
 from camtool.units import parse_feed, parse_length, parse_time
 
 PICTURES = (".svg", ".png")
+PAGES = (".html", ".md", ".json")
 
 
 def length(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -43,4 +44,11 @@ def picture(ctx: click.Context, param: click.Parameter, value: str | None) -> st
     """The name of a picture that we can make."""
     if value is not None and PurePath(value).suffix.lower() not in PICTURES:
         raise click.BadParameter(f"{value!r} ends in neither .svg nor .png", ctx, param)
+    return value
+
+
+def page(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The name of a page that we can make; - is Markdown on stdout."""
+    if value not in (None, "-") and PurePath(str(value)).suffix.lower() not in PAGES:
+        raise click.BadParameter(f"{value!r} ends in none of {', '.join(PAGES)}", ctx, param)
     return value

@@ -19,6 +19,13 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.report import (
+    Subject,
+    flags_given,
+    picture_beside,
+    report_files,
+    report_option,
+)
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
@@ -72,6 +79,7 @@ if TYPE_CHECKING:
     help="Picture of the predicted result (with --compare: of all ways), .svg or .png.",
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
+@report_option
 @gate_options
 @job_options
 @drawing_options
@@ -87,6 +95,7 @@ def verify(
     compare: str | None,
     preview: str | None,
     report: str | None,
+    page: str | None,
     gates: GateFlags,
     job: JobFlags,
     drawing: DrawingFlags,
@@ -98,7 +107,11 @@ def verify(
     With --against, the path is compared with what DRAWING would give, planned with the same flags
     (--tool-diameter, --side ...). Exit code 1 when a finding is an error.
     """
-    check_writable([preview, report], [program, *([against] if against else [])])
+    if compare is not None and page is not None:
+        raise click.UsageError("--report is of one way to run a program; drop --compare")
+    beside = picture_beside(page, preview)
+    inputs = [program, *([against] if against else [])]
+    check_writable([preview, report, page, beside], inputs)
 
     from camtool.pipeline import Judging
 
@@ -122,7 +135,8 @@ def verify(
         with job.blamed():
             return _compared(data, ways, goal, Wishes(preview, report, quiet))
     with job.blamed():
-        return _judged(data, target, judging, goal, Wishes(preview, report, quiet, verbose))
+        wishes = Wishes(preview, report, quiet, verbose, page)
+        return _judged(data, target, judging, goal, wishes)
 
 
 @dataclass(frozen=True)
@@ -142,6 +156,7 @@ class Wishes:
     report: str | None
     quiet: bool
     verbose: bool = False
+    page: str | None = None
 
 
 def _judged(
@@ -155,7 +170,8 @@ def _judged(
         data, target, source=goal.name, drawing=goal.drawing, job=goal.job, judging=judging
     )
     files: dict[str, bytes] = {}
-    if wishes.preview is not None:
+
+    def pictured(name: str) -> bytes:
         from camtool.preview.render import render
 
         scene = picture(
@@ -166,11 +182,24 @@ def _judged(
             verification=verification,
             machine=target.machine,
         )
-        files[wishes.preview] = render(scene, wishes.preview)
+        return render(scene, name)
+
+    if wishes.preview is not None:
+        files[wishes.preview] = pictured(wishes.preview)
     if wishes.report is not None:
         files[wishes.report] = verification.report.to_json().encode()
+    if wishes.page is not None:
+        subject = Subject(
+            title=Path(goal.name).name,
+            target=target,
+            report=verification.report,
+            findings=verification.findings,
+            program=data,
+            flags=flags_given(),
+        )
+        files.update(report_files(wishes.page, subject, pictured, preview=wishes.preview))
     write_all(files)
-    if wishes.report != STDOUT and not wishes.quiet:
+    if STDOUT not in (wishes.report, wishes.page) and not wishes.quiet:
         click.echo(verification.report.to_text(findings=False))
         if judging.worst:
             click.echo(verification.report.worst_text())

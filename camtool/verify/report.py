@@ -68,9 +68,10 @@ class Report(msgspec.Struct, frozen=True):
 
     def to_markdown(self) -> str:
         """The report as Markdown, for a pull request or a job's record."""
-        from camtool.verify.wording import markdown
+        from camtool.verify.markdown import markdown
+        from camtool.verify.page import page_of
 
-        return markdown(self)
+        return markdown(page_of(self))
 
     def notes(self) -> tuple[str, ...]:
         """Two or three short lines to set beside a picture."""

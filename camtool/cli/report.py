@@ -1,0 +1,129 @@
+"""`--report`: a page about a program, as HTML, Markdown or JSON, with its picture.
+
+HTML holds its picture. Markdown links to a picture beside it: the one of `--preview`, or else an
+SVG of the page's own name; Markdown on stdout has none.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from camtool.cli.output import STDOUT
+from camtool.cli.types import page
+
+if TYPE_CHECKING:
+    from camtool.findings import Finding
+    from camtool.machine.registry import LoadedTarget
+    from camtool.verify.page import Page, Setup
+    from camtool.verify.report import Report
+
+Flags = tuple[tuple[str, str], ...]
+_CAPTION = "The predicted result"
+_PLACES = ("target", "machine", "settings", "output", "preview", "report", "page")
+_NOT_TOLD = frozenset((*_PLACES, "quiet", "verbose"))
+"""What says where things are and how much is said; the machine tells of itself."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a page is about; `report` None where nothing could be judged."""
+
+    title: str
+    target: LoadedTarget
+    report: Report | None
+    findings: tuple[Finding, ...]
+    program: bytes | None
+    flags: Flags = ()
+
+
+def report_option(command: Any) -> Any:
+    """Adds `page: str | None`, the name of the page that `--report` asks for."""
+    text = "A page: summary, picture, tables, findings; .html, .md or .json; - is Markdown."
+    add = click.option("--report", "page", metavar="FILE", callback=page, help=text)
+    return add(command)
+
+
+def flags_given() -> Flags:
+    """The flags of the running command that say how a program is made or judged, as given."""
+    context = click.get_current_context()
+    given = click.core.ParameterSource.COMMANDLINE
+    return tuple(
+        (param.opts[0], _said(context, str(param.name)))
+        for param in context.command.params
+        if param.name not in _NOT_TOLD
+        and context.get_parameter_source(str(param.name)) is given
+        and isinstance(param, click.Option)
+    )
+
+
+def _said(context: click.Context, name: str) -> str:
+    value = context.params.get(name)
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value))
+    return "yes" if value is True else str(value)
+
+
+def picture_beside(name: str | None, preview: str | None) -> str | None:
+    """The picture that a page links to and that nobody else writes; None when there is none."""
+    if name is None or name == STDOUT or PurePath(name).suffix.lower() != ".md":
+        return None
+    return str(PurePath(name).with_suffix(".svg")) if preview is None else None
+
+
+def report_files(
+    name: str, subject: Subject, picture: Callable[[str], bytes], *, preview: str | None
+) -> dict[str, bytes]:
+    """The page of this name, and the picture beside it where it has one of its own."""
+    from camtool.verify.html import html
+    from camtool.verify.markdown import markdown
+    from camtool.verify.page import to_json
+
+    suffix = PurePath(name).suffix.lower()
+    if name != STDOUT and suffix == ".json":
+        return {name: to_json(_page(subject, ())).encode()}
+    if name != STDOUT and suffix == ".html":
+        data = base64.b64encode(picture("picture.svg")).decode()
+        shown = ((_CAPTION, f"data:image/svg+xml;base64,{data}"),)
+        return {name: html(_page(subject, shown)).encode()}
+    beside = picture_beside(name, preview)
+    linked = None if name == STDOUT else beside or preview
+    pictures = () if linked is None else ((_CAPTION, _from(name, linked)),)
+    files = {name: markdown(_page(subject, pictures)).encode()}
+    return files if beside is None else {**files, beside: picture(beside)}
+
+
+def _from(page_name: str, picture_name: str) -> str:
+    """The picture's address as the page sees it, with forward slashes."""
+    folder = PurePath(page_name).parent
+    return PurePath(os.path.relpath(picture_name, folder)).as_posix()
+
+
+def _page(subject: Subject, pictures: tuple[tuple[str, str], ...]) -> Page:
+    from camtool.verify.page import Page
+    from camtool.verify.report import reported
+    from camtool.verify.wording import one_line
+
+    findings = reported(subject.findings)
+    return Page(one_line(subject.title), subject.report, findings, _setup(subject), pictures)
+
+
+def _setup(subject: Subject) -> Setup:
+    from camtool.machine.changes import changed_values, machine_digest
+    from camtool.verify.page import Changed, Setup
+
+    machine, program = subject.target.machine, subject.program
+    return Setup(
+        machine=f"{machine.target.name}: {machine.target.title}",
+        machine_sha256=machine_digest(machine),
+        program_sha256=None if program is None else hashlib.sha256(program).hexdigest(),
+        changed=tuple(Changed(*change) for change in changed_values(subject.target)),
+        flags=subject.flags,
+    )
