@@ -21,6 +21,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from camtool.kernels.compiled import bare
 from camtool.kernels.wide import larger, smaller, wide
 
 Floats = npt.NDArray[np.float64]
@@ -71,23 +72,36 @@ def _depth(from_start: float, from_end: float, above_half: bool) -> float:
     return smaller(from_start, from_end)
 
 
-@wide
+@bare
 def _off(height: float, over: float) -> float:
-    """How far outside of a circle a point is whose `height` above it, h below, is known."""
+    """How far outside of a circle a point is that is `height` = h above it, for small h.
+
+    With h = (|p|² − R²) / 2R and q = h / R, `over` being 1 / R, that is
+
+        √(R² + 2Rh) − R = h (1 − q/2 + q²/2 − 5q³/8 + 7q⁴/8 − 21q⁵/16 + …);
+
+    within |q| ≤ 2⁻⁹ what is left out is below 2⁻⁵³ R. Roots take three times as long.
+    """
     q = height * over
     return height * (1.0 + q * (-0.5 + q * (0.5 + q * (-0.625 + q * 0.875))))
 
 
-@wide
+@bare
+def _outside(px: float, py: float, radius: float, half: float, over: float) -> float:
+    """How far a point about the centre is outside of the circle; `half` is 1 / 2R. It hangs on
+    the point alone by which way, and so do its last bits."""
+    height = (px * px + py * py - radius * radius) * half
+    apart = math.sqrt(px * px + py * py) - radius
+    return _off(height, over) if abs(height) <= NEAR * radius else apart
+
+
+@bare
 def _to_circle(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> None:
-    # With h = (|p|² − R²) / 2R and q = h / R the point is outside of the circle by
-    #     √(R² + 2Rh) − R = h (1 − q/2 + q²/2 − 5q³/8 + 7q⁴/8 − 21q⁵/16 + …);
-    # within |q| ≤ 2⁻⁹ what is left out is below 2⁻⁵³ R. Roots take three times as long.
+    # Not `wide`, since both loops must round alike.
     cx, cy, radius, turn = move[CX], move[CY], move[RADIUS], move[TURN]
     square, half, over = radius * radius, 0.5 / radius, 1.0 / radius
     near, highest = NEAR * radius, 0.0
-    px, py = x[0] - cx, y[0] - cy
-    if first and abs((px * px + py * py - square) * half) <= near:
+    if first and abs((x[0] - cx) ** 2 + (y[0] - cy) ** 2 - square) * half <= near:
         for k in range(len(x)):
             px, py = x[k] - cx, y[k] - cy
             height = (px * px + py * py - square) * half
@@ -96,10 +110,7 @@ def _to_circle(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) ->
         if highest <= near:
             return
     for k in range(len(x)):
-        px, py = x[k] - cx, y[k] - cy
-        height = (px * px + py * py - square) * half
-        apart = math.sqrt(px * px + py * py) - radius
-        error = -turn * (_off(height, over) if abs(height) <= near else apart)
+        error = -turn * _outside(x[k] - cx, y[k] - cy, radius, half, over)
         best[k] = error if first or abs(error) < abs(best[k]) else best[k]
 
 
@@ -108,10 +119,10 @@ def _to_arc(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> No
     ax, ay, bx, by = move[AX], move[AY], move[BX], move[BY]
     cx, cy, radius, turn = move[CX], move[CY], move[RADIUS], move[TURN]
     ux, uy, vx, vy = move[UX], move[UY], move[VX], move[VY]
-    above_half = move[WIDE] != 0.0
+    above_half, half, over = move[WIDE] != 0.0, 0.5 / radius, 1.0 / radius
     for k in range(len(x)):
         px, py = x[k] - cx, y[k] - cy
-        inward = turn * (radius - math.sqrt(px * px + py * py))
+        inward = -turn * _outside(px, py, radius, half, over)
         to_a = (x[k] - ax) * (x[k] - ax) + (y[k] - ay) * (y[k] - ay)
         to_b = (x[k] - bx) * (x[k] - bx) + (y[k] - by) * (y[k] - by)
         end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
@@ -122,8 +133,8 @@ def _to_arc(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> No
 
 @wide
 def lower_errors(move: Floats, x: Floats, y: Floats, best: Floats, first: bool) -> None:
-    """Lower `best` (n,) to the errors of the points x, y (n,) against `move`; set it to them when
-    this is the `first` move."""
+    """Lower `best` (n ≥ 1,) to the errors of the points x, y (n,) against `move`; set it to them
+    when this is the `first` move."""
     if move[RADIUS] == 0.0:
         _to_line(move, x, y, best, first)
     elif move[WIDE] == FULL or _all_in_wedge(move, x, y):

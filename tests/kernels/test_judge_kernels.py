@@ -9,7 +9,13 @@ from camtool.kernels.box_tree import tree_of
 from camtool.kernels.circle_bins import ANGLE_BINS, bin_directions, empty_bins
 from camtool.kernels.near_moves import COUNT, new_memo
 from camtool.kernels.thin_trace import WRITTEN, new_pen, unwritten
-from tests.oracles.kernel_doors import fill_bins_, lower_errors_, nearest_errors_, trace_block_
+from tests.oracles.kernel_doors import (
+    fill_bins_,
+    lower_errors_,
+    nearest_errors_,
+    set_errors_,
+    trace_block_,
+)
 from tests.oracles.near_moves import Arc, Line, Move, nearest, random_move
 
 EPS = 1e-12
@@ -45,6 +51,26 @@ def test_every_place_about_an_arc_on_a_lattice(sweep: float, sense: float) -> No
         # the end either way.
         assert min(abs(abs(error) - choice) for choice in choices) < 1e-9
         assert abs(error) <= min(one, other) + 1e-9
+
+
+@pytest.mark.parametrize("sweep", [2.0, 2 * math.pi])
+def test_errors_of_circles_hang_on_the_point_alone(sweep: float) -> None:
+    """Near the circle by the series, elsewhere by the root: to rounding, whatever the block."""
+    rng = np.random.default_rng(7)
+    move = np.array(Arc((1.0, 2.0), 20.0, 0.0, sweep).row(), dtype=np.float64)
+    for limit in (1e-6, 0.99 * 2.0**-9, 1.1 * 2.0**-9, 0.3):
+        angle = rng.uniform(0.01, sweep - 0.01, 400)
+        radius = 20.0 * (1.0 + limit * rng.uniform(-1.0, 1.0, 400))
+        x, y = 1.0 + radius * np.cos(angle), 2.0 + radius * np.sin(angle)
+        block, lowered, alone = np.empty(400), np.full(400, np.inf), np.empty(400)
+        set_errors_(move, x, y, block)
+        lower_errors_(move, x, y, lowered)
+        for k in range(400):
+            set_errors_(move, x[k : k + 1], y[k : k + 1], alone[k : k + 1])
+        assert np.array_equal(block, alone)
+        assert np.array_equal(block, lowered)
+        exact = 20 - np.hypot(x.astype(np.longdouble) - 1, y.astype(np.longdouble) - 2)
+        assert np.abs(block - exact).max() < 3 * 2.0**-53 * 20.0
 
 
 def test_what_is_nearer_already_stays() -> None:

@@ -21,6 +21,11 @@ def lower_errors_(move, x, y, best):
 
 
 @njit
+def set_errors_(move, x, y, best):
+    lower_errors(move, x, y, best, True)
+
+
+@njit
 def nearest_errors_(x, y, only, moves, found, memo, out):
     nearest_errors((x, y), only, moves, found, memo, np.empty(SPOT), out)
 
