@@ -15,6 +15,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import check_writable, write_all
+from camtool.cli.pictureflags import PictureFlags, picture_options
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 )
 @machine_options
 @click.option("--simulate", is_flag=True, help="Show the predicted path and its error too.")
+@picture_options
 @job_options
 @drawing_options
 @talk_options
@@ -45,6 +47,7 @@ def preview(
     output: str,
     machine: MachineFlags,
     simulate: bool,
+    picture: PictureFlags,
     job: JobFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -60,9 +63,10 @@ def preview(
 
     from camtool.preview.render import render
 
+    options = picture.options()
     say_first_run(quiet=quiet)
     scene = _scene(source, machine, simulate, job, drawing)
-    write_all({output: render(scene, output)})
+    write_all({output: render(scene, output, options)})
     findings = scene.drawing.findings if scene.drawing is not None else ()
     say_findings(findings, quiet=quiet, verbose=verbose)
     say(f"written: {output}", quiet=quiet)

@@ -3,12 +3,14 @@
 The map runs from dark blue over magenta to orange, light and dark in even steps (the course of
 matplotlib's CC0 "plasma", without its yellow end, which is lost on white paper). Lightness grows
 all along it, so it reads the same to the colour-blind and in grey print; what is wrong glows.
+On a dark ground the map is cut at its other end: it runs from violet to plasma's yellow.
 Layers of a drawing are told apart by the colours of Okabe and Ito (jfly.uni-koeln.de/color).
 """
 
 from __future__ import annotations
 
 import math
+import re
 from itertools import pairwise
 
 PAPER = "#ffffff"
@@ -28,7 +30,7 @@ PLUNGE = "#f08a1d"
 TRAVEL = "#a99bc9"
 GAP = "#d5311e"
 
-LAYERS = ("#2b4c6f", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7f7f7f")
+LAYERS = ("#2b4c6f", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a")
 
 BINS = 24
 """Steps of the error map: fine enough to look smooth, few enough for small files."""
@@ -36,7 +38,37 @@ BINS = 24
 _ANCHORS = ("#0d0887", "#4903a0", "#7801a8", "#a52398", "#c8437b", "#e4695e", "#f8963c")
 
 
-def sequential(fraction: float) -> str:
+_DARK_ANCHORS = ("#9131cc", "#b0309f", "#cc4778", "#e56b5d", "#f89540", "#fdc527", "#f0f921")
+
+_DARK = {
+    PAPER: "#11161c",
+    PLOT: "#161c24",
+    INK: "#e8edf2",
+    QUIET: "#a9b5c1",
+    FRAME: "#4d5a68",
+    GRID: "#242d38",
+    DRAWING: "#55636f",
+    BODY: "#1d2631",
+    FEED: "#4aa3f0",
+    FEED_PALE: "#2f557a",
+    RAPID: "#78848f",
+    PLUNGE: "#f5a03c",
+    TRAVEL: "#7d6ca6",
+    GAP: "#ff6b57",
+    "#2b4c6f": "#cfdbe8",
+    "#d55e00": "#f0803c",
+    "#009e73": "#2fc79a",
+    "#cc79a7": "#e59cc4",
+    "#56b4e9": "#56b4e9",
+    "#e69f00": "#f0c040",
+    "#5a5a5a": "#8f8f8f",
+}
+"""The dark palette: what takes the place of each colour of the light one."""
+
+_PAINT = re.compile('(fill|stroke)="(#[0-9a-f]{6})"')
+
+
+def sequential(fraction: float, *, dark: bool = False) -> str:
     """The colour "#rrggbb" at `fraction` of the map, 0 … 1; ValueError outside.
 
     >>> sequential(0.0), sequential(1.0)
@@ -44,7 +76,7 @@ def sequential(fraction: float) -> str:
     """
     if not 0.0 <= fraction <= 1.0:
         raise ValueError(f"fraction {fraction} lies outside 0 … 1")
-    steps = list(pairwise(_ANCHORS))
+    steps = list(pairwise(_DARK_ANCHORS if dark else _ANCHORS))
     index = min(int(fraction * len(steps)), len(steps) - 1)
     share = fraction * len(steps) - index
     low, high = (_channels(colour) for colour in steps[index])
@@ -52,9 +84,15 @@ def sequential(fraction: float) -> str:
     return "#" + "".join(f"{channel:02x}" for channel in mixed)
 
 
-def bin_colours() -> tuple[str, ...]:
+def bin_colours(*, dark: bool = False) -> tuple[str, ...]:
     """The colour of each of the `BINS` steps of the map, taken at its middle."""
-    return tuple(sequential((index + 0.5) / BINS) for index in range(BINS))
+    return tuple(sequential((index + 0.5) / BINS, dark=dark) for index in range(BINS))
+
+
+def darkened(svg: str) -> str:
+    """A picture of the light palette in the dark one: only colours of fills and strokes change."""
+    instead = _DARK | dict(zip(bin_colours(), bin_colours(dark=True), strict=True))
+    return _PAINT.sub(lambda found: f'{found[1]}="{instead[found[2]]}"', svg)
 
 
 def lightness(colour: str) -> float:

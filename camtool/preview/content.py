@@ -12,6 +12,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.preview import legend, marks
 from camtool.preview.colours import DRAWING, FEED_PALE, OUTLINE, TRAVEL
 from camtool.preview.legend import Entry
+from camtool.preview.options import AS_USUAL, Options
 from camtool.preview.scene import Scene
 from camtool.preview.strokes import Chain, Strokes, chains_box, chains_of, strokes_of
 from camtool.preview.svg import Look
@@ -47,7 +48,7 @@ class Places:
 class Content:
     """`outlines` of the drawing, by layer in `groups`; `starts` (S, 2) mm are those of contours
     that no plunge marks; `places` are those that the drawing notes; `window` (2, 2) mm is what to
-    show."""
+    show, and `crop_mm` whether that was asked for."""
 
     scene: Scene
     groups: tuple[marks.Group, ...]
@@ -57,6 +58,7 @@ class Content:
     places: Places
     trace: Trace | None
     window: Floats
+    crop_mm: tuple[float, float, float, float] | None = None
 
     def zero_shown(self, view: View) -> bool:
         """Whether part zero is in the picture; one with nothing in it needs none."""
@@ -68,7 +70,7 @@ class Content:
         return not (self.outlines or len(self.places.points) or self.strokes or self.trace)
 
 
-def content_of(scene: Scene) -> Content:
+def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
     """Everything that the page and its layers need to know of the scene."""
     strokes = None if scene.toolpath is None else strokes_of(scene.toolpath)
     trace = trace_of(scene)
@@ -88,7 +90,12 @@ def content_of(scene: Scene) -> Content:
         starts=_bare_starts(strokes),
         places=places,
         trace=trace,
-        window=_window(outlines, places.points, strokes, trace),
+        window=(
+            _window(outlines, places.points, strokes, trace)
+            if options.crop_mm is None
+            else cropped(*options.crop_mm)
+        ),
+        crop_mm=options.crop_mm,
     )
 
 
@@ -103,6 +110,11 @@ def _places(drawing: Drawing) -> Places:
         points=columns([mark.at_mm for mark in drawing.marks]),
         doubts=columns(doubts),
     )
+
+
+def cropped(x: float, y: float, width: float, height: float) -> Floats:
+    """The window (2, 2) of a part that was asked for."""
+    return np.array([[x, x + width], [y, y + height]])
 
 
 def _window(

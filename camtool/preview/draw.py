@@ -10,21 +10,18 @@ random ids, no fonts. Inside the group "mm" coordinates are those of the part, i
 
 from __future__ import annotations
 
-from camtool.errors import OptionError
 from camtool.preview import axes, legend, marks, text
-from camtool.preview.colours import PAPER, QUIET
+from camtool.preview.colours import PAPER, QUIET, darkened
 from camtool.preview.content import Content, content_of
+from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options, check_width
 from camtool.preview.page import Page, page_of
 from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
 from camtool.preview.svg import Look, element, number, title
 from camtool.preview.text import Style
 from camtool.preview.trace import trace_layer
-from camtool.preview.view import PAGE, View
+from camtool.preview.view import View, page_width
 
 __all__ = ["Scene", "draw", "png", "scene_of_drawing", "scene_of_toolpath"]
-
-SMALLEST_PX, LARGEST_PX = 16, 20_000
-"""Widths of pictures that are allowed."""
 
 PNG_DPI = 96.0
 """resvg's own default of 0 makes lengths in mm vanish."""
@@ -32,11 +29,14 @@ PNG_DPI = 96.0
 TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 
 
-def draw(scene: Scene, *, size_px: int = 1000) -> str:
-    """The scene as SVG text, `size_px` wide; OptionError when that is no sensible width."""
-    _check_width(size_px)
-    content = content_of(scene)
-    page = page_of(content)
+def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUAL) -> str:
+    """The scene as SVG text, `size_px` wide, else as the options say; OptionError when that is no
+    sensible width."""
+    if size_px is None:
+        size_px = options.size_px or SVG_WIDTH_PX
+    check_width(size_px)
+    content = content_of(scene, options)
+    page = page_of(content, page_width(size_px))
     box = page.view.box
     sides = (box.left, box.top, box.width, box.height)
     plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
@@ -45,14 +45,14 @@ def draw(scene: Scene, *, size_px: int = 1000) -> str:
     root: Look = {
         "xmlns": "http://www.w3.org/2000/svg",
         "width": str(size_px),
-        "height": number(size_px * page.height / PAGE),
-        "viewBox": f"0 0 {number(PAGE)} {number(page.height)}",
+        "height": number(size_px * page.height / page.width),
+        "viewBox": f"0 0 {number(page.width)} {number(page.height)}",
     }
     picture = element(
         "svg",
         root,
         title(scene.title or "camtool picture"),
-        element("rect", {"width": PAGE, "height": page.height, "fill": PAPER}),
+        element("rect", {"width": page.width, "height": page.height, "fill": PAPER}),
         page.head,
         axes.frame(page.view, page.ticks),
         element("clipPath", {"id": clip}, element("rect", plot)),
@@ -60,26 +60,18 @@ def draw(scene: Scene, *, size_px: int = 1000) -> str:
         axes.axes(page.view, page.ticks),
         *_beside(content, page),
     )
-    return picture + "\n"
+    return (darkened(picture) if options.dark else picture) + "\n"
 
 
 def png(svg: str, width_px: int) -> bytes:
     """The PNG of an SVG text, `width_px` wide; OptionError when that is no sensible width."""
-    _check_width(width_px)
+    check_width(width_px)
     import resvg_py
 
     image = resvg_py.svg_to_bytes(
         svg_string=svg, width=width_px, dpi=PNG_DPI, skip_system_fonts=True
     )
     return bytes(image)
-
-
-def _check_width(width_px: int) -> None:
-    if not SMALLEST_PX <= width_px <= LARGEST_PX:
-        raise OptionError(
-            f"a picture cannot be {width_px} pixels wide",
-            mend=f"take {SMALLEST_PX} to {LARGEST_PX}",
-        )
 
 
 def _plot(content: Content, view: View) -> list[str]:

@@ -46,9 +46,9 @@ class Entry:
         return SWATCH + SWATCH_GAP + text.width(self.shown, ENTRY.cap) + ENTRY_GAP
 
 
-def head(name: str, notes: Sequence[str]) -> tuple[str, float]:
-    """Title and notes at the top, and the height at which they end."""
-    room = PAGE - 2.0 * MARGIN
+def head(name: str, notes: Sequence[str], page: float = PAGE) -> tuple[str, float]:
+    """Title and notes at the top of a page so wide, and the height at which they end."""
+    room = page - 2.0 * MARGIN
     down = MARGIN
     parts = []
     if name.strip():
@@ -64,8 +64,11 @@ def head(name: str, notes: Sequence[str]) -> tuple[str, float]:
 
 
 def rows(entries: Sequence[Entry], first: float, room: float) -> list[list[Entry]]:
-    """The entries in rows: the first no wider than `first`, the others than `room`."""
+    """The entries in rows: the first no wider than `first`, the others than `room`; the first
+    one stays empty when there is no room in it."""
     found: list[list[Entry]] = []
+    if entries and entries[0].width - ENTRY_GAP > first:
+        found.append([])
     used = math.inf
     for entry in entries:
         limit = first if len(found) <= 1 else room

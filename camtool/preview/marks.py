@@ -69,11 +69,21 @@ def groups_of(drawing: Drawing, chains: Sequence[Chain], *, alone: bool) -> tupl
 
 def pen(view: View, base: float, chains: Iterable[Chain]) -> float:
     """Line width on the page: `base`, or thinner where lines are crowded."""
-    length = sum(float(chain.lengths().sum()) for chain in chains) * view.scale
+    length = sum(_length_shown(chain, view) for chain in chains) * view.scale
     if length == 0.0:
         return base
     room = INK_SHARE * view.box.width * view.box.height / length
     return max(min(base, room), THINNEST)
+
+
+def _length_shown(chain: Chain, view: View) -> float:
+    """mm of a chain in view, about: moves whose ends have the window between them count whole,
+    none for more than its diagonal."""
+    low, high = np.array([view.x_range, view.y_range]).T
+    begin, end = chain.points[:-1], chain.points[1:]
+    near = (np.minimum(begin, end) <= high) & (np.maximum(begin, end) >= low)
+    lengths = np.minimum(chain.lengths(), math.hypot(*(high - low)))
+    return float(lengths[near.all(axis=1)].sum())
 
 
 def travel(size_mm: tuple[float, float], view: View) -> str:

@@ -9,23 +9,30 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import PurePath
 
 import numpy as np
 import numpy.typing as npt
 
-from camtool.errors import OutputError
 from camtool.preview import axes, legend, marks
 from camtool.preview.axes import Ticks
-from camtool.preview.colours import FEED_PALE, LAYERS, PAPER
-from camtool.preview.draw import png
+from camtool.preview.colours import FEED_PALE, LAYERS, PAPER, darkened
+from camtool.preview.content import cropped
 from camtool.preview.legend import Entry, line_swatch
+from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options
 from camtool.preview.page import BAR_ROOM, FOOT, GUESSED_LEFT, HEAD_GAP, LEGEND_DROP
-from camtool.preview.render import PNG_WIDTH_PX
+from camtool.preview.render import rendered
 from camtool.preview.strokes import strokes_of
 from camtool.preview.svg import Look, PathData, element, number, title
 from camtool.preview.trace import FINEST_SHARE
-from camtool.preview.view import MARGIN, PAGE, View, fit
+from camtool.preview.view import (
+    CROP_SHAPES,
+    MARGIN,
+    TALLEST,
+    WIDEST,
+    View,
+    fit,
+    page_width,
+)
 from camtool.toolpath.moves import Toolpath
 
 Floats = npt.NDArray[np.float64]
@@ -45,19 +52,18 @@ class Overlay:
     notes: tuple[str, ...] = ()
 
 
-def render_overlay(overlay: Overlay, name: str) -> bytes:
+def render_overlay(overlay: Overlay, name: str, options: Options = AS_USUAL) -> bytes:
     """SVG or PNG bytes for a file of this name; OutputError for other extensions."""
-    suffix = PurePath(name).suffix.lower()
-    if suffix not in (".svg", ".png"):
-        raise OutputError("is no kind of picture that we make", file=name, mend="use .svg or .png")
-    svg = draw_overlay(overlay)
-    return svg.encode() if suffix == ".svg" else png(svg, PNG_WIDTH_PX)
+    return rendered(lambda sized: draw_overlay(overlay, sized), name, options)
 
 
-def draw_overlay(overlay: Overlay) -> str:
+def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
     """The paths as SVG text; equal input gives equal bytes."""
-    head, down = legend.head(overlay.title, overlay.notes)
-    view, ticks = _fitted(overlay.window, down + HEAD_GAP)
+    size_px = options.size_px or SVG_WIDTH_PX
+    page = page_width(size_px)
+    head, down = legend.head(overlay.title, overlay.notes, page)
+    window = overlay.window if options.crop_mm is None else cropped(*options.crop_mm)
+    view, ticks = _fitted(window, down + HEAD_GAP, page, cut=options.crop_mm is not None)
     room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
     table = legend.rows(_entries(overlay), room, view.box.width)
     legend_y = view.box.bottom + LEGEND_DROP
@@ -66,15 +72,15 @@ def draw_overlay(overlay: Overlay) -> str:
     plot: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
     root: Look = {
         "xmlns": "http://www.w3.org/2000/svg",
-        "width": str(round(PAGE)),
-        "height": str(height),
-        "viewBox": f"0 0 {number(PAGE)} {height}",
+        "width": str(size_px),
+        "height": number(size_px * height / page),
+        "viewBox": f"0 0 {number(page)} {height}",
     }
     picture = element(
         "svg",
         root,
         title(overlay.title),
-        element("rect", {"width": PAGE, "height": float(height), "fill": PAPER}),
+        element("rect", {"width": page, "height": float(height), "fill": PAPER}),
         head,
         axes.frame(view, ticks),
         element("clipPath", {"id": "plot-overlay"}, element("rect", plot)),
@@ -83,14 +89,15 @@ def draw_overlay(overlay: Overlay) -> str:
         legend.legend(table, box.left, legend_y),
         axes.scale_bar(view, box.right, legend_y),
     )
-    return picture + "\n"
+    return (darkened(picture) if options.dark else picture) + "\n"
 
 
-def _fitted(window: Floats, top: float) -> tuple[View, Ticks]:
+def _fitted(window: Floats, top: float, page: float, *, cut: bool) -> tuple[View, Ticks]:
     """The view and its ticks; fitted twice, since the room for numbers follows from the scale."""
     left = MARGIN + GUESSED_LEFT
+    shapes = CROP_SHAPES if cut else (WIDEST, TALLEST)
     for _ in range(2):
-        view = fit(window, left, top, PAGE - MARGIN)
+        view = fit(window, left, top, page - MARGIN, shapes)
         ticks = axes.ticks_of(view)
         left = MARGIN + ticks.left_width + axes.TICK + axes.LABEL_GAP
     return view, ticks

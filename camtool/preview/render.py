@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import PurePath
 
 from camtool.errors import OutputError
 from camtool.preview.draw import Scene, draw, png
+from camtool.preview.options import AS_USUAL, PNG_WIDTH_PX, SVG_WIDTH_PX, Options
 
-PNG_WIDTH_PX = 1200
+__all__ = ["PNG_WIDTH_PX", "render", "rendered"]
 
 
-def render(scene: Scene, name: str) -> bytes:
+def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
     """SVG or PNG bytes of the scene for a file of this name; OutputError for other extensions."""
+    return rendered(lambda sized: draw(scene, options=sized), name, options)
+
+
+def rendered(drawn: Callable[[Options], str], name: str, options: Options) -> bytes:
+    """The same of whatever makes SVG text with options that say how wide."""
     suffix = PurePath(name).suffix.lower()
-    svg = draw(scene)
-    if suffix == ".svg":
-        return svg.encode()
-    if suffix == ".png":
-        return png(svg, PNG_WIDTH_PX)
-    raise OutputError("is no kind of picture that we make", file=name, mend="use .svg or .png")
+    if suffix not in (".svg", ".png"):
+        raise OutputError("is no kind of picture that we make", file=name, mend="use .svg or .png")
+    usual = SVG_WIDTH_PX if suffix == ".svg" else PNG_WIDTH_PX
+    width = options.size_px or usual
+    svg = drawn(replace(options, size_px=width))
+    return svg.encode() if suffix == ".svg" else png(svg, width)

@@ -12,7 +12,14 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 PAGE = 1000.0
-"""Width of every picture in its own units; the real size is only an attribute of the SVG."""
+"""Width of a picture of ordinary size in its own units, in which lines and letters are given."""
+
+ORDINARY_PX = (1000, 1200)
+"""Pictures so wide have a page of `PAGE` units. Smaller ones have fewer units and larger ones
+more, by the root of the size: letters grow with the picture, but less than it does."""
+
+LEAST_PAGE = 560.0
+"""No page has fewer units: the head, the legend and the numbers need them."""
 
 MARGIN = 36.0
 
@@ -30,6 +37,9 @@ EMPTY_WINDOW_MM = 10.0
 
 WIDEST, TALLEST = 0.34, 0.88
 """Least and greatest height of the plot, as a share of its width."""
+
+CROP_SHAPES = (0.2, 2.0)
+"""The same when a part is asked for: it is shown as it is, unless it is longer or higher."""
 
 ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
 
@@ -96,6 +106,15 @@ class View:
         return x0 <= x <= x1 and y0 <= y <= y1
 
 
+def page_width(size_px: int) -> float:
+    """Units of the page of a picture that is `size_px` wide."""
+    low, high = ORDINARY_PX
+    if low <= size_px <= high:
+        return PAGE
+    width = PAGE * math.sqrt(size_px / (low if size_px < low else high))
+    return max(float(round(width)), LEAST_PAGE)
+
+
 def union(boxes: Iterable[Floats | None]) -> Floats | None:
     """The extents [[xmin, xmax], [ymin, ymax]] of all that are there."""
     present = [box for box in boxes if box is not None]
@@ -125,12 +144,19 @@ def window(part: Floats | None, around: Floats | None) -> Floats:
     return np.asarray(both + np.array([-pad, pad]))
 
 
-def fit(shown: Floats, left: float, top: float, right: float) -> View:
-    """The view of this window in a box of that width, as high as its shape asks for."""
+def fit(
+    shown: Floats,
+    left: float,
+    top: float,
+    right: float,
+    shapes: tuple[float, float] = (WIDEST, TALLEST),
+) -> View:
+    """The view of this window in a box of that width, as high as its shape asks for; `shapes`
+    are the least and the greatest height, as a share of the width."""
     sizes = shown[:, 1] - shown[:, 0]
     left, top, right = float(math.ceil(left)), float(math.ceil(top)), float(math.floor(right))
     width = right - left
-    height = width * min(max(float(sizes[1] / sizes[0]), WIDEST), TALLEST)
+    height = width * min(max(float(sizes[1] / sizes[0]), shapes[0]), shapes[1])
     scale = min(width / float(sizes[0]), height / float(sizes[1]))
     middle = shown.mean(axis=1)
     # Nine digits are what the matrix is written with.

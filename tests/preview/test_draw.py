@@ -1,6 +1,7 @@
 """Whole pictures: well-formed, complete, the same every time, and nothing over anything else."""
 
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,8 +13,12 @@ import pytest
 
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Branch, Gap, Healing, Mark, SelfCrossing
-from camtool.preview.colours import FEED, PLUNGE, RAPID, bin_colours
-from camtool.preview.draw import Scene, draw, png
+from camtool.preview.axes import TICK_CAP
+from camtool.preview.colours import FEED, PAPER, PLUNGE, RAPID, bin_colours
+from camtool.preview.content import content_of
+from camtool.preview.draw import ALONE_PEN, TRACE_PEN, Scene, draw, png
+from camtool.preview.options import Options
+from camtool.preview.page import page_of
 from camtool.preview.svg import clean
 from tests.oracles import svg_page
 from tests.oracles.png import decode
@@ -281,10 +286,78 @@ def test_the_picture_is_the_right_way_up() -> None:
     assert columns.mean() < 0.3 * (right - left)
 
 
-def test_size_is_an_attribute_only() -> None:
-    small, large = draw(SCENES["drawing"], size_px=500), draw(SCENES["drawing"], size_px=2000)
+def test_pictures_of_ordinary_size_are_alike() -> None:
+    small, large = draw(SCENES["drawing"], size_px=1000), draw(SCENES["drawing"], size_px=1200)
     assert small.split("viewBox")[1] == large.split("viewBox")[1]
-    assert 'width="2000"' in large
+    assert 'width="1200"' in large
+
+
+@pytest.mark.parametrize("size", [400, 4000])
+def test_letters_and_lines_suit_the_size(size: int) -> None:
+    """Pixels of a capital and of a line: neither too small to read nor as coarse as a poster."""
+    root = svg_page.parse(draw(SCENES["result"], size_px=size))
+    pixels = size / float(root.attrib["viewBox"].split()[2])
+    assert 9.0 < pixels * TICK_CAP < 36.0
+    assert 1.5 < pixels * TRACE_PEN < 8.0
+
+
+@pytest.mark.parametrize("size", [400, 4000])
+@pytest.mark.parametrize("name", list(SCENES))
+def test_no_two_labels_touch_at_any_size(name: str, size: int) -> None:
+    root = svg_page.parse(draw(SCENES[name], size_px=size))
+    page = [float(part) for part in root.attrib["viewBox"].split()]
+    boxes = list(svg_page.label_boxes(root).items())
+    for (one, box), (other, other_box) in combinations(boxes, 2):
+        assert apart(box, other_box), (one, other)
+    assert all(0.0 < box[0] < box[2] < page[2] and box[1] > 0.0 for _, box in boxes)
+
+
+def test_a_part_is_shown_as_it_was_asked_for() -> None:
+    crop = Options(crop_mm=(1.0, 2.0, 2.0, 1.5))
+    view = page_of(content_of(SCENES["result"], crop)).view
+    assert view.x_range == pytest.approx((1.0, 3.0), abs=0.005)
+    assert view.y_range == pytest.approx((2.0, 3.5), abs=0.005)
+    svg = draw(SCENES["result"], options=crop)
+    assert "part-zero" not in ids(svg_page.parse(svg))
+    whole = draw(SCENES["result"])
+    assert bar_numbers(svg)[-1] == bar_numbers(whole)[-1]
+
+
+def bar_numbers(svg: str) -> list[str]:
+    bar = named(svg_page.parse(svg), "error-scale")
+    numbers = [g.attrib["aria-label"] for g in bar.iter() if "aria-label" in g.attrib]
+    return [number for number in numbers if number[0].isdigit()]
+
+
+def test_lines_of_a_part_are_not_thinned_by_what_lies_outside() -> None:
+    far = [circle(50.0, 50.0, 1.0 + k / 200) for k in range(200)]
+    scene = Scene("", drawing_of([circle(0.0, 0.0, 1.0), *far], ["0"] * 201))
+    options = Options(crop_mm=(-2.0, -2.0, 4.0, 4.0))
+    root = svg_page.parse(draw(scene, options=options))
+    factor = float(named(root, "mm").attrib["transform"][7:].split()[0])
+    width = float(named(root, "drawing").attrib["stroke-width"])
+    assert factor * width == pytest.approx(ALONE_PEN, rel=1e-3)
+
+
+@pytest.mark.parametrize("crop", [(0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, -1.0), (0, 0, 1, np.inf)])
+def test_senseless_parts_are_refused(crop: tuple[float, float, float, float]) -> None:
+    with pytest.raises(OptionError, match="cannot be shown"):
+        Options(crop_mm=crop)
+
+
+def test_the_dark_palette_changes_colours_only(scene: Scene) -> None:
+    light, dark = draw(scene), draw(scene, options=Options(dark=True))
+    paint = re.compile('"#[0-9a-f]{6}"')
+    assert paint.sub("", dark) == paint.sub("", light)
+    assert f'fill="{PAPER}"' not in dark
+
+
+def test_png_of_a_dark_picture_is_dark() -> None:
+    svg = draw(SCENES["result"], options=Options(dark=True))
+    image = decode(png(svg, 320))[..., :3].astype(int)
+    assert np.median(image.max(axis=2)) < 48
+    top = rgb(bin_colours(dark=True)[-1])
+    assert (np.abs(image - top).max(axis=2) <= 24).sum() >= 5
 
 
 @pytest.mark.parametrize("width", [0, -5, 15, 20_001])

@@ -1,0 +1,79 @@
+"""The flags that say how a picture looks, for every command that makes one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.cli.drawing import Command
+from camtool.cli.gather import decorate, gather
+from camtool.cli.sections import option
+from camtool.errors import OptionError
+from camtool.units import parse_length
+
+if TYPE_CHECKING:
+    from camtool.preview.options import Options
+
+_PICTURE = "Picture"
+
+
+@dataclass(frozen=True)
+class PictureFlags:
+    """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`."""
+
+    size: int | None
+    crop: tuple[float, float, float, float] | None
+    dark: bool
+
+    @property
+    def given(self) -> bool:
+        """Whether anything is asked of the picture."""
+        return self != PictureFlags(None, None, False)
+
+    def options(self) -> Options:
+        """What `camtool.preview` is told."""
+        from camtool.preview.options import Options
+
+        return Options(self.size, self.crop, self.dark)
+
+
+def picture_options(command: Command) -> Command:
+    """Adds `picture: PictureFlags`."""
+    wrapped = gather("picture", PictureFlags, ("size", "crop", "dark"))(command)
+    return decorate(  # type: ignore[no-any-return]
+        wrapped,
+        [
+            option(
+                _PICTURE,
+                "--size",
+                type=click.INT,
+                metavar="PX",
+                help="Width of the picture; letters and lines suit it.  [1200, .svg 1000]",
+            ),
+            option(
+                _PICTURE,
+                "--crop",
+                callback=_crop,
+                metavar="X,Y,W,H",
+                help="Only this part: lower left corner, width and height.",
+            ),
+            option(_PICTURE, "--dark", is_flag=True, help="On a dark ground."),
+        ],
+    )
+
+
+def _crop(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[float, float, float, float] | None:
+    """`10,20,4mm,1/8in` as mm."""
+    if value is None:
+        return None
+    try:
+        lengths = [parse_length(part) for part in value.split(",")]
+    except OptionError as error:
+        raise click.BadParameter(str(error), ctx, param) from error
+    if len(lengths) != 4:
+        raise click.BadParameter(f"{value!r} is not X,Y,WIDTH,HEIGHT", ctx, param)
+    return lengths[0], lengths[1], lengths[2], lengths[3]

@@ -1,0 +1,49 @@
+"""How a picture is to look: its size, its part, its palette."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from camtool.errors import OptionError
+
+SMALLEST_PX, LARGEST_PX = 16, 20_000
+"""Widths of pictures that are allowed."""
+
+SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
+"""Widths of pictures when nobody says."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
+    the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
+    ground. OptionError for sizes that make no picture."""
+
+    size_px: int | None = None
+    crop_mm: tuple[float, float, float, float] | None = None
+    dark: bool = False
+
+    def __post_init__(self) -> None:
+        if self.size_px is not None:
+            check_width(self.size_px)
+        crop = self.crop_mm
+        if crop is not None and not (
+            all(map(math.isfinite, crop)) and crop[2] > 0.0 and crop[3] > 0.0
+        ):
+            raise OptionError(
+                f"a part of {crop[2]:g} × {crop[3]:g} mm cannot be shown",
+                mend="give X,Y,WIDTH,HEIGHT, the last two above 0",
+            )
+
+
+AS_USUAL = Options()
+
+
+def check_width(width_px: int) -> None:
+    """OptionError when no picture can be so wide."""
+    if not SMALLEST_PX <= width_px <= LARGEST_PX:
+        raise OptionError(
+            f"a picture cannot be {width_px} pixels wide",
+            mend=f"take {SMALLEST_PX} to {LARGEST_PX}",
+        )
