@@ -158,7 +158,8 @@ class Turn:
 
     A kernel has its turn before those that it calls, so two processes never wait for each other.
     It ends with the process at last. Where the system has no such locks both compile. Meanwhile
-    no garbage is looked for, which would take a tenth of the time: a compiler keeps what it makes.
+    no garbage is looked for, which would take a tenth of the time: a compiler keeps what it makes,
+    and later nobody looks there either (a twentieth).
     """
 
     def __init__(self, file: Path | None = None) -> None:
@@ -175,6 +176,7 @@ class Turn:
     def end(self) -> None:
         """Let the others go on."""
         if self.collects:
+            gc.freeze()
             gc.enable()
             self.collects = False
         if self.file is not None and self.lock is not None:
