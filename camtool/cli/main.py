@@ -18,6 +18,7 @@ from camtool.cli.calibrate import calibrate
 from camtool.cli.check import check
 from camtool.cli.convert import convert
 from camtool.cli.coupon import coupon
+from camtool.cli.filter import filter_command
 from camtool.cli.job import job
 from camtool.cli.post import post
 from camtool.cli.preview import preview
@@ -41,6 +42,7 @@ def cli() -> None:
     camtool verify  logo.pic --target pic-mmh   judge any program of a machine
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
+    camtool filter  logo.dxf                    LinuxCNC opens the drawing
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure
@@ -52,6 +54,7 @@ def cli() -> None:
 
 for _command in (post, verify, convert, preview, check, job, targets, coupon, calibrate):
     cli.add_command(_command)
+cli.add_command(filter_command)
 
 
 def main() -> NoReturn:

@@ -1,0 +1,67 @@
+"""`camtool filter`: LinuxCNC opens a drawing.
+
+LinuxCNC runs the line that `[FILTER]` of its INI file gives for a file's extension, through a
+shell, with the file's name behind it. The program is expected on stdout; a line
+`FILTER_PROGRESS=10` on stderr moves its progress bar; when the exit code is not 0 it shows what
+else was on stderr (LinuxCNC's manual, "Filter programs").
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.cli.finish import Asked, finish
+from camtool.cli.options import talk_options
+from camtool.cli.output import STDOUT
+from camtool.cli.posting import posting_options
+from camtool.cli.sections import SectionedCommand
+
+if TYPE_CHECKING:
+    from camtool.cli.posting import Posting
+
+TARGET = "linuxcnc"
+BEGUN, READ, MADE, DONE = 1, 20, 95, 100
+"""What the progress bar shows, per cent: begun, read, made and judged, written."""
+
+
+@click.command("filter", cls=SectionedCommand, short_help="LinuxCNC opens a drawing.")
+@click.argument("source", metavar="FILE")
+@posting_options
+@talk_options
+def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
+    """Write the program of the drawing FILE to stdout, as [FILTER] of LinuxCNC's INI file wants.
+
+    \b
+    [FILTER]
+    PROGRAM_EXTENSION = .dxf,.svg Drawing
+    dxf = camtool filter --tool-diameter 1mm --depth 0.5mm
+    svg = camtool filter --tool-diameter 1mm --depth 0.5mm
+
+    A job file beside a drawing, part.toml for part.dxf, is its job; --job is for those without
+    one. The target is linuxcnc unless --target or --machine names another one.
+    """
+    if posting.machine.name() is None:
+        posting = replace(posting, machine=replace(posting.machine, target=TARGET))
+    _progress(BEGUN)
+    target = posting.load()
+    made = posting.of(source).make(source, target, quiet=quiet, on_read=lambda: _progress(READ))
+    _progress(MADE)
+    code = finish(
+        made.posted,
+        Asked(source, STDOUT, None),
+        quiet=quiet,
+        verbose=verbose,
+        picture=made.picture,
+        target=target,
+    )
+    if code == 0:
+        _progress(DONE)
+    return code
+
+
+def _progress(percent: int) -> None:
+    """Moves LinuxCNC's progress bar: a line of its own, at once."""
+    click.echo(f"FILTER_PROGRESS={percent}", err=True)

@@ -1,0 +1,122 @@
+"""The flags with which a drawing becomes a program, as one record: for `post` and its like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.cli.ahead import compiled_beside
+from camtool.cli.drawing import Command, DrawingFlags, drawing_options
+from camtool.cli.gather import decorate, gather
+from camtool.cli.jobflags import JobFlags, job_options
+from camtool.cli.judging import GateFlags, gate_options
+from camtool.cli.options import MachineFlags, machine_options
+
+if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
+    from camtool.machine.registry import LoadedTarget
+    from camtool.pipeline import Posted
+    from camtool.planning.job import Job
+
+JOB_ENDING = ".toml"
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A drawing and what was made of it."""
+
+    drawing: Drawing
+    job: Job
+    posted: Posted
+    target: LoadedTarget
+
+    def picture(self, name: str) -> bytes:
+        """The predicted result as a picture file of this name."""
+        from camtool.pipeline import picture
+        from camtool.preview.render import render
+
+        scene = picture(
+            title=Path(self.drawing.file).name,
+            drawing=self.drawing,
+            job=self.job,
+            toolpath=self.posted.decoded or self.posted.wanted,
+            verification=self.posted.verification,
+            machine=self.target.machine,
+        )
+        return render(scene, name)
+
+
+@dataclass(frozen=True)
+class Posting:
+    """How drawings are posted."""
+
+    machine: MachineFlags
+    gates: GateFlags
+    job: JobFlags
+    drawing: DrawingFlags
+    no_verify: bool
+    compensate: bool
+
+    def load(self) -> LoadedTarget:
+        """The target; a usage error when the flags contradict each other."""
+        if self.no_verify and self.gates.given:
+            raise click.UsageError("--no-verify leaves nothing to hold against limits")
+        return self.machine.load()
+
+    def make(
+        self,
+        source: str,
+        target: LoadedTarget,
+        *,
+        quiet: bool,
+        on_read: Callable[[], None] | None = None,
+    ) -> Made:
+        """The drawing posted; `on_read` is called when it has been read."""
+        from camtool.pipeline import post_drawing
+
+        with compiled_beside(target.machine.target.name, quiet=quiet):
+            wanted = self.job.job(self.drawing)
+            read = self.drawing.read(source, target.machine, wanted)
+            if on_read is not None:
+                on_read()
+            with self.job.blamed():
+                posted = post_drawing(
+                    read,
+                    wanted,
+                    target,
+                    check=not self.no_verify,
+                    compensate=self.compensate,
+                    gates=self.gates.gates(),
+                )
+        return Made(read, wanted, posted, target)
+
+    def of(self, source: str) -> Posting:
+        """The same with the drawing's own job file, `part.toml` beside `part.dxf`, if it has one.
+
+        Its own job takes the place of `--job`; flags are laid over either.
+        """
+        own = Path(source).with_suffix(JOB_ENDING)
+        if not own.is_file():
+            return self
+        return replace(self, job=replace(self.job, file=str(own)))
+
+
+def posting_options(command: Command) -> Command:
+    """Adds `posting: Posting`."""
+    names = ("machine", "gates", "job", "drawing", "no_verify", "compensate")
+    inner = drawing_options(gather("posting", Posting, names)(command))
+    verify, bend = (
+        click.option("--no-verify", is_flag=True, help="Write without simulating the machine."),
+        click.option(
+            "--compensate",
+            is_flag=True,
+            help="Bend the path against the machine's play, scale and squareness.",
+        ),
+    )
+    return decorate(  # type: ignore[no-any-return]
+        machine_options(gate_options(job_options(inner))), [verify, bend]
+    )
