@@ -117,10 +117,11 @@ def read_drawing(
 ) -> Drawing:
     """The drawing in a DXF, SVG, point list, STEP file or build123d script; mm, Y up.
 
-    `paths` holds N contours of lines and arcs (vertices (M, 2) mm, bulges (M,)), beside it stand
-    `layers`, `colours` and `sources`, N each. Lines and arcs are exact, other curves become arcs
-    within `tolerance_mm`: that of the `target` if one is given. Raises DrawingError, and
-    OptionError for a way of reading that cannot be. Source: docs/formats.md.
+    `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
+    `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines
+    and arcs are exact, other curves become arcs within `tolerance_mm`: that of the `target` if one
+    is given. Raises DrawingError, and OptionError for a way of reading that cannot be. Source:
+    docs/formats.md.
     """
     from camtool.importers.options import ReadOptions, Selection
     from camtool.importers.read import read_drawing as read
