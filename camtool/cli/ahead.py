@@ -1,8 +1,9 @@
 """The first run of `post` after an installation: its kernels are compiled by two processes.
 
 The run itself compiles what it comes to; beside it a process compiles from the other end what
-nearly every drawing needs: the judging, by a small job of its own, and then the order. Neither
-compiles what the other one is at: it waits, and loads that (`camtool.kernels.compiled`).
+nearly every drawing needs: the search for the order, judging by a small job of its own, and the
+rest of the order. Neither compiles what the other one is at: it waits, and loads that
+(`camtool.kernels.compiled`).
 """
 
 from __future__ import annotations
@@ -48,13 +49,13 @@ def compile_ahead(target: str) -> None:
     from camtool.planning.job import job_of
     from camtool.planning.order import Choices, best_order
 
-    post_drawing(read_bytes(SMALL_JOB, "small.svg"), job_of(), load_target(target))
     # Of one item, with no neighbours and nothing before it or after it.
     places, rows, none = np.zeros((3, 4)), np.arange(3), np.empty(0, dtype=np.int64)
     first, nothing = rows[:2].copy(), np.zeros(2, dtype=np.int64)
     item, place = np.array([1, 0, 2]), np.array([1, 0, 2])
     around = (none, nothing, none, nothing, none, nothing)
     settled(Tour(places, rows, first, *around, -1, False, item, place, rows.copy()))
+    post_drawing(read_bytes(SMALL_JOB, "small.svg"), job_of(), load_target(target))
     two = places[:2, :2].copy()
     best_order(Choices(rows[:2], two, two), none.reshape(0, 2))
 

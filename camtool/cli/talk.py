@@ -38,7 +38,7 @@ def one_line(text: str) -> str:
 def say_first_run(*, quiet: bool) -> None:
     """A word before the long silence of the first run."""
     if first_run():
-        say("camtool: first run: compiling the kernels, once, for some 20 s", quiet=quiet)
+        say("camtool: first run: compiling the kernels, once, for some 12 s", quiet=quiet)
 
 
 def first_run() -> bool:
