@@ -8,10 +8,12 @@ import click
 
 from camtool.cli.finish import Asked, finish
 from camtool.cli.options import talk_options
+from camtool.cli.output import STDOUT
 from camtool.cli.posting import posting_options
 from camtool.cli.report import flags_given, report_option
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.types import picture as picture_name
+from camtool.cli.watch import watch
 
 if TYPE_CHECKING:
     from camtool.cli.posting import Posting
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
+@click.option("--watch", "watching", is_flag=True, help="Again when a file has changed.")
 @posting_options
 @talk_options
 def post(
@@ -36,6 +39,7 @@ def post(
     preview: str | None,
     report: str | None,
     page: str | None,
+    watching: bool,
     posting: Posting,
     quiet: bool,
     verbose: bool,
@@ -46,15 +50,22 @@ def post(
     and mechanics, and compared with the drawing. Exit code 1 (and no file) when something is
     wrong.
     """
-    target = posting.load()
-    asked = Asked(source, output, report, preview, page, flags_given())
-    asked.check(target.machine.target.extension, verified=not posting.no_verify)
-    made = posting.make(source, target, quiet=quiet)
-    return finish(
-        made.posted,
-        asked,
-        quiet=quiet,
-        verbose=verbose,
-        picture=made.picture,
-        target=target,
-    )
+    if watching and STDOUT in (source, output, report, page):
+        raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
+    flags = flags_given()
+
+    def once() -> int:
+        target = posting.load()
+        asked = Asked(source, output, report, preview, page, flags)
+        asked.check(target.machine.target.extension, verified=not posting.no_verify)
+        made = posting.make(source, target, quiet=quiet)
+        return finish(
+            made.posted,
+            asked,
+            quiet=quiet,
+            verbose=verbose,
+            picture=made.picture,
+            target=target,
+        )
+
+    return watch(once, posting.files(source), quiet=quiet) if watching else once()

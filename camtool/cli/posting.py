@@ -36,7 +36,7 @@ class Made:
 
     def picture(self, name: str) -> bytes:
         """The predicted result as a picture file of this name."""
-        from camtool.pipeline import picture
+        from camtool.pipeline import picture, posted_listing
         from camtool.preview.render import render
 
         scene = picture(
@@ -46,6 +46,7 @@ class Made:
             toolpath=self.posted.decoded or self.posted.wanted,
             verification=self.posted.verification,
             machine=self.target.machine,
+            listing=posted_listing(self.posted, self.target),
         )
         return render(scene, name)
 
@@ -93,6 +94,10 @@ class Posting:
                     gates=self.gates.gates(),
                 )
         return Made(read, wanted, posted, target)
+
+    def files(self, source: str) -> list[str]:
+        """The files that a program is made of: drawing, job and machine."""
+        return [file for file in (source, self.job.file, self.machine.machine) if file is not None]
 
     def of(self, source: str) -> Posting:
         """The same with the drawing's own job file, `part.toml` beside `part.dxf`, if it has one.

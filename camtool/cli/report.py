@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Flags = tuple[tuple[str, str], ...]
 _CAPTION = "The predicted result"
 _PLACES = ("target", "machine", "settings", "output", "preview", "report", "page")
-_NOT_TOLD = frozenset((*_PLACES, "quiet", "verbose"))
+_NOT_TOLD = frozenset((*_PLACES, "quiet", "verbose", "watching"))
 """What says where things are and how much is said; the machine tells of itself."""
 
 

@@ -1,0 +1,82 @@
+"""`--watch`: the same again whenever one of its files has changed.
+
+Files are looked at by their content, so that a save without a change does nothing and no clock of
+a network drive matters. A change counts when it has settled: an editor may write in several goes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from camtool.cli.talk import say
+from camtool.errors import CamtoolError
+
+POLL_S = 0.4
+"""Files are looked at so often."""
+
+SETTLED_S = 0.2
+"""A change counts when the files are the same after so long."""
+
+Digests = tuple[bytes | None, ...]
+
+
+def watch(
+    again: Callable[[], int],
+    files: Sequence[str],
+    *,
+    quiet: bool,
+    wait: Callable[[float], None] = time.sleep,
+) -> int:
+    """Calls `again` now and after each change of `files`, until Ctrl-C; then 0.
+
+    What is wrong is said on one line, and watching goes on: the next save may mend it.
+    """
+    try:
+        say(f"camtool: watching {', '.join(files)}; Ctrl-C ends", quiet=quiet)
+        seen = _digests(files)
+        _tried(again)
+        while True:
+            wait(POLL_S)
+            now = _settled(files, seen, wait)
+            changed = [file for file, a, b in zip(files, now, seen, strict=True) if a != b]
+            seen = now
+            if changed:
+                say(f"camtool: changed: {', '.join(changed)}", quiet=quiet)
+                _tried(again)
+    except KeyboardInterrupt:
+        say("camtool: watching ended", quiet=quiet)
+        return 0
+
+
+def _tried(again: Callable[[], int]) -> None:
+    try:
+        again()
+    except CamtoolError as error:
+        say(f"camtool: error: {error}", quiet=False)
+
+
+def _settled(files: Sequence[str], seen: Digests, wait: Callable[[float], None]) -> Digests:
+    """What the files hold; where that has changed, once it stays the same."""
+    now = _digests(files)
+    while now != seen:
+        wait(SETTLED_S)
+        before, now = now, _digests(files)
+        if now == before:
+            break
+    return now
+
+
+def _digests(files: Sequence[str]) -> Digests:
+    """The content of each file as a digest; None for what cannot be read just now."""
+    return tuple(_digest(Path(file)) for file in files)
+
+
+def _digest(file: Path) -> bytes | None:
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").digest()
+    except OSError:
+        return None

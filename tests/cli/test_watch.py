@@ -1,0 +1,169 @@
+"""`camtool post --watch`: again after each change, whatever the change does."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from camtool.cli.watch import POLL_S, SETTLED_S, watch
+from camtool.errors import DrawingError
+from tests.cli.conftest import Run
+
+RING = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="40mm" viewBox="0 0 40 40">'
+    '<circle cx="20" cy="20" r="{radius}"/></svg>'
+)
+PATIENCE_S = 60.0
+
+
+class Days:
+    """Each wait is a step of a story; after the last one comes Ctrl-C."""
+
+    def __init__(self, *steps: Callable[[], object]) -> None:
+        self.steps = list(steps)
+        self.waited: list[float] = []
+
+    def __call__(self, seconds: float) -> None:
+        self.waited.append(seconds)
+        if not self.steps:
+            raise KeyboardInterrupt
+        self.steps.pop(0)()
+
+
+def nothing() -> None:
+    """A step in which nothing happens."""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    place = tmp_path / "a.txt"
+    place.write_text("one")
+    return place
+
+
+def rounds(file: Path, *steps: Callable[[], object]) -> list[str | None]:
+    """What the file held in each round."""
+    held: list[str | None] = []
+
+    def again() -> int:
+        held.append(file.read_text() if file.exists() else None)
+        return 1
+
+    assert watch(again, [str(file), "missing.toml"], quiet=True, wait=Days(*steps)) == 0
+    return held
+
+
+def test_nothing_happens_without_a_change(file: Path) -> None:
+    assert rounds(file, nothing, nothing, nothing) == ["one"]
+
+
+def test_a_save_without_a_change_is_none(file: Path) -> None:
+    assert rounds(file, lambda: file.write_text("one"), nothing) == ["one"]
+    assert rounds(file, lambda: os.utime(file, (1, 1)), nothing) == ["one"]
+
+
+def test_each_change_counts_once(file: Path) -> None:
+    steps = (lambda: file.write_text("two"), nothing, nothing, lambda: file.write_text("three"))
+    assert rounds(file, *steps, nothing, nothing) == ["one", "two", "three"]
+
+
+def test_a_file_in_several_goes_counts_when_it_has_settled(file: Path) -> None:
+    steps = [lambda part=part: file.write_text("two"[:part]) for part in (0, 1, 2, 3)]
+    days = Days(*steps, nothing, nothing)
+    held: list[str] = []
+    watch(lambda: held.append(file.read_text()) or 0, [str(file)], quiet=True, wait=days)
+    assert held == ["one", "two"]
+    assert days.waited[:6] == [POLL_S, *[SETTLED_S] * 4, POLL_S]
+
+
+def test_a_change_that_is_taken_back_is_none(file: Path) -> None:
+    steps = (lambda: file.write_text("two"), lambda: file.write_text("one"))
+    assert rounds(file, *steps, nothing, nothing) == ["one"]
+
+
+def test_a_file_that_is_replaced_is_waited_for(file: Path) -> None:
+    assert rounds(file, file.unlink, lambda: file.write_text("two"), nothing, nothing) == [
+        "one",
+        "two",
+    ]
+
+
+def test_a_change_while_it_runs_is_seen(file: Path) -> None:
+    held: list[str] = []
+
+    def again() -> int:
+        held.append(file.read_text())
+        if len(held) == 1:
+            file.write_text("two")
+        return 0
+
+    watch(again, [str(file)], quiet=True, wait=Days(nothing, nothing, nothing))
+    assert held == ["one", "two"]
+
+
+def test_an_error_is_said_and_watching_goes_on(file: Path, capsys) -> None:
+    count = 0
+
+    def again() -> int:
+        nonlocal count
+        count += 1
+        raise DrawingError("is no drawing", file="a.txt")
+
+    days = Days(lambda: file.write_text("two"), nothing, nothing)
+    assert watch(again, [str(file)], quiet=True, wait=days) == 0
+    assert count == 2
+    assert capsys.readouterr().err == "camtool: error: a.txt: is no drawing\n" * 2
+
+
+@pytest.mark.parametrize("flags", [("-", "-o", "a.nc"), ("a.svg", "-o", "-")])
+def test_streams_cannot_be_watched(camtool: Run, flags: tuple[str, ...]) -> None:
+    done = camtool("post", *flags, "-t", "grbl", "--watch")
+    assert done.returncode == 2
+    assert b"--watch works on files" in done.stderr
+
+
+def until(is_so: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not is_so():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.05)
+
+
+def test_a_process_posts_again_until_ctrl_c(tmp_path: Path) -> None:
+    drawing, job = tmp_path / "ring.svg", tmp_path / "job.toml"
+    machine, program = tmp_path / "mill.toml", tmp_path / "ring.nc"
+    drawing.write_text(RING.format(radius=10))
+    job.write_text('depth = "0.5mm"\n')
+    machine.write_text('extends = "grbl"\n')
+    log = tmp_path / "log"
+    command = [sys.executable, "-m", "camtool", "post", drawing.name, "--job", job.name]
+    command += ["--machine", machine.name, "-o", program.name, "--watch"]
+    with log.open("wb") as stream:
+        running = subprocess.Popen(command, cwd=tmp_path, stderr=stream)
+    try:
+        until(lambda: program.exists() and b"written" in log.read_bytes())
+        first = program.read_bytes()
+        drawing.write_text("<svg")  # half a drawing: an error, and the program stays
+        until(lambda: b"camtool: error" in log.read_bytes())
+        assert program.read_bytes() == first
+        drawing.write_text(RING.format(radius=9))
+        until(lambda: program.read_bytes() != first)
+        second = program.read_bytes()
+        job.write_text('depth = "0.25mm"\n')
+        until(lambda: b"Z-0.25" in program.read_bytes())
+        machine.write_text('extends = "grbl"\n[feed]\ndefault_mm_min = 77.0\n')
+        until(lambda: b"F77" in program.read_bytes())
+        assert second not in (first, program.read_bytes())
+        running.send_signal(signal.SIGINT)
+        assert running.wait(PATIENCE_S) == 0
+    finally:
+        running.kill()
+        running.wait()
+    assert b"fault" not in log.read_bytes()
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["job.toml", "log", "mill.toml", "ring.nc", "ring.svg"]
