@@ -25,6 +25,18 @@ from typing import Any, TypeVar, cast
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+OWN_COMPILERS_FOR = ("0.68.",)
+"""The versions of numba that `camtool.kernels.inlined` knows the inside of; with others kernels
+are compiled numba's own way, which takes longer and gives the same."""
+
+
+def own_compilers() -> bool:
+    """Whether the installed numba is one that we know the inside of."""
+    import numba
+
+    return str(numba.__version__).startswith(OWN_COMPILERS_FOR)
+
+
 class Kernel:
     """Stands for a function until it is called, and then for what numba made of it."""
 
@@ -54,14 +66,14 @@ class Kernel:
     @functools.cached_property
     def dispatcher(self) -> Any:
         """numba's form of the function for other kernels; what Python calls is kept on disk."""
-        if self.inside:
-            from camtool.kernels.inlined import InlinedCompiler
+        options: dict[str, Any] = {"no_cpython_wrapper": self.inside}
+        if own_compilers():
+            from camtool.kernels.inlined import InlinedCompiler, KernelCompiler
 
-            return self._made(no_cpython_wrapper=True, pipeline_class=InlinedCompiler)
-        from camtool.kernels.inlined import KernelCompiler
-
-        made = self._made(no_cpython_wrapper=False, pipeline_class=KernelCompiler)
-        made._cache = _kept(self.py_func)
+            options["pipeline_class"] = InlinedCompiler if self.inside else KernelCompiler
+        made = self._made(**options)
+        if not self.inside:
+            made._cache = _kept(self.py_func)
         return made
 
     @property
