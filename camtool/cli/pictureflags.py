@@ -21,27 +21,28 @@ _PICTURE = "Picture"
 
 @dataclass(frozen=True)
 class PictureFlags:
-    """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`."""
+    """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`."""
 
     size: int | None
     crop: tuple[float, float, float, float] | None
     dark: bool
+    exaggerate: float | None
 
     @property
     def given(self) -> bool:
         """Whether anything is asked of the picture."""
-        return self != PictureFlags(None, None, False)
+        return self != PictureFlags(None, None, False, None)
 
     def options(self) -> Options:
         """What `camtool.preview` is told."""
         from camtool.preview.options import Options
 
-        return Options(self.size, self.crop, self.dark)
+        return Options(self.size, self.crop, self.dark, self.exaggerate or 1.0)
 
 
 def picture_options(command: Command) -> Command:
     """Adds `picture: PictureFlags`."""
-    wrapped = gather("picture", PictureFlags, ("size", "crop", "dark"))(command)
+    wrapped = gather("picture", PictureFlags, ("size", "crop", "dark", "exaggerate"))(command)
     return decorate(  # type: ignore[no-any-return]
         wrapped,
         [
@@ -60,6 +61,13 @@ def picture_options(command: Command) -> Command:
                 help="Only this part: lower left corner, width and height.",
             ),
             option(_PICTURE, "--dark", is_flag=True, help="On a dark ground."),
+            option(
+                _PICTURE,
+                "--exaggerate",
+                type=click.FLOAT,
+                metavar="TIMES",
+                help="Draw the predicted path so many times as far from the wanted one.",
+            ),
         ],
     )
 

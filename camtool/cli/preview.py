@@ -59,6 +59,8 @@ def preview(
     """
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
+    if picture.exaggerate is not None and not simulate:
+        raise click.UsageError("--exaggerate needs --simulate")
     check_writable([output], [source])
 
     from camtool.preview.render import render

@@ -19,6 +19,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.pictureflags import PictureFlags, picture_options
 from camtool.cli.report import (
     Subject,
     flags_given,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Judging, Way
     from camtool.planning.job import Job
+    from camtool.preview.options import Options
 
 
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
+@picture_options
 @gate_options
 @job_options
 @drawing_options
@@ -96,6 +99,7 @@ def verify(
     preview: str | None,
     report: str | None,
     page: str | None,
+    picture: PictureFlags,
     gates: GateFlags,
     job: JobFlags,
     drawing: DrawingFlags,
@@ -115,6 +119,7 @@ def verify(
 
     from camtool.pipeline import Judging
 
+    looks = picture.options()
     judging = Judging(
         interpolator=cast("Interpolator | None", interpolator),
         effects=left_out(without) if without else None,
@@ -133,9 +138,9 @@ def verify(
             raise click.UsageError("limits hold for one way to run a program; drop --compare")
         ways = ways_to_compare(compare, machine, judging)
         with job.blamed():
-            return _compared(data, ways, goal, Wishes(preview, report, quiet))
+            return _compared(data, ways, goal, Wishes(preview, report, quiet, looks=looks))
     with job.blamed():
-        wishes = Wishes(preview, report, quiet, verbose, page)
+        wishes = Wishes(preview, report, quiet, verbose, page, looks)
         return _judged(data, target, judging, goal, wishes)
 
 
@@ -157,6 +162,7 @@ class Wishes:
     quiet: bool
     verbose: bool = False
     page: str | None = None
+    looks: Options | None = None
 
 
 def _judged(
@@ -172,6 +178,7 @@ def _judged(
     files: dict[str, bytes] = {}
 
     def pictured(name: str) -> bytes:
+        from camtool.preview.options import AS_USUAL
         from camtool.preview.render import render
 
         scene = picture(
@@ -182,7 +189,7 @@ def _judged(
             verification=verification,
             machine=target.machine,
         )
-        return render(scene, name)
+        return render(scene, name, wishes.looks or AS_USUAL)
 
     if wishes.preview is not None:
         files[wishes.preview] = pictured(wishes.preview)
@@ -219,10 +226,11 @@ def _compared(data: bytes, ways: list[Way], goal: Goal, wishes: Wishes) -> int:
     rows = [row_of(variant.name, variant.verification.report) for variant in variants]
     files: dict[str, bytes] = {}
     if wishes.preview is not None:
+        from camtool.preview.options import AS_USUAL
         from camtool.preview.overlay import render_overlay
 
         overlay = compare_picture(data, ways, variants, title=Path(goal.name).name)
-        files[wishes.preview] = render_overlay(overlay, wishes.preview)
+        files[wishes.preview] = render_overlay(overlay, wishes.preview, wishes.looks or AS_USUAL)
     if wishes.report is not None:
         files[wishes.report] = to_json(rows).encode()
     write_all(files)

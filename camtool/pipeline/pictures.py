@@ -45,6 +45,7 @@ def picture(
         trace_cutting=trace.cutting if trace is not None else None,
         travel_mm=_travel(toolpath, machine),
         notes=verification.report.notes() if verification is not None else (),
+        wanted=verification.wanted.segments if verification is not None else None,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,14 @@ from camtool.preview.colours import DRAWING, FEED_PALE, OUTLINE, TRAVEL
 from camtool.preview.legend import Entry
 from camtool.preview.options import AS_USUAL, Options
 from camtool.preview.scene import Scene
-from camtool.preview.strokes import Chain, Strokes, chains_box, chains_of, strokes_of
+from camtool.preview.strokes import (
+    Chain,
+    Strokes,
+    chains_between,
+    chains_box,
+    chains_of,
+    strokes_of,
+)
 from camtool.preview.svg import Look
 from camtool.preview.trace import Trace, trace_of
 from camtool.preview.view import View, points_box, union, window
@@ -48,7 +55,8 @@ class Places:
 class Content:
     """`outlines` of the drawing, by layer in `groups`; `starts` (S, 2) mm are those of contours
     that no plunge marks; `places` are those that the drawing notes; `window` (2, 2) mm is what to
-    show, and `crop_mm` whether that was asked for."""
+    show, and `crop_mm` whether that was asked for; `times` is how many times as large errors are
+    drawn, and `notes` what is said above."""
 
     scene: Scene
     groups: tuple[marks.Group, ...]
@@ -59,6 +67,15 @@ class Content:
     trace: Trace | None
     window: Floats
     crop_mm: tuple[float, float, float, float] | None = None
+    times: float = 1.0
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The notes of the scene, and by how much errors are exaggerated."""
+        if self.times == 1.0:
+            return self.scene.notes
+        factor = f"the path is drawn with its deviation from the wanted one × {self.times:g}"
+        return (*self.scene.notes, factor)
 
     def zero_shown(self, view: View) -> bool:
         """Whether part zero is in the picture; one with nothing in it needs none."""
@@ -73,7 +90,14 @@ class Content:
 def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
     """Everything that the page and its layers need to know of the scene."""
     strokes = None if scene.toolpath is None else strokes_of(scene.toolpath)
-    trace = trace_of(scene)
+    trace = trace_of(scene, options.exaggerate)
+    if (
+        strokes is not None
+        and trace is not None
+        and trace.times != 1.0
+        and scene.wanted is not None
+    ):
+        strokes = replace(strokes, feeds=chains_between(scene.wanted), ramps=())
     outlines: tuple[Chain, ...] = ()
     groups: tuple[marks.Group, ...] = ()
     places = Places(NOWHERE, NOWHERE, NOWHERE)
@@ -96,6 +120,7 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
             else cropped(*options.crop_mm)
         ),
         crop_mm=options.crop_mm,
+        times=1.0 if trace is None else trace.times,
     )
 
 
@@ -177,17 +202,27 @@ def _drawing_entries(content: Content) -> list[Entry]:
     return [*entries, Entry("", f"and {more} more layers")] if more else entries
 
 
+def _path_name(trace: Trace) -> str:
+    if trace.times == 1.0:
+        return "predicted path, by error"
+    return f"predicted path, error × {trace.times:g}"
+
+
+def _below(trace: Trace) -> str:
+    return "programmed path" if trace.times == 1.0 else "wanted path"
+
+
 def _toolpath_entries(content: Content) -> list[Entry]:
     entries: list[Entry] = []
     strokes, trace = content.strokes, content.trace
     if trace is not None:
-        entries.append(Entry(legend.map_swatch(4.0), "predicted path, by error"))
+        entries.append(Entry(legend.map_swatch(4.0), _path_name(trace)))
     if strokes is None:
         return entries
     if strokes.feeds:
         pale = legend.line_swatch(FEED_PALE, 2.0)
         swatch = legend.line_swatch(*legend.FEED_SWATCH) if trace is None else pale
-        entries.append(Entry(swatch, "feed" if trace is None else "programmed path"))
+        entries.append(Entry(swatch, "feed" if trace is None else _below(trace)))
     if trace is not None:
         return entries
     if strokes.ramps:

@@ -157,11 +157,21 @@ def colour_bar(top_um: float, box: Box) -> str:
     left = box.right + BAR_GAP
     step = box.height / BINS
     parts = []
-    for index, colour in enumerate(bin_colours()):
+    for index, colour in reversed(list(enumerate(bin_colours()))):
         # Each step reaches down to the foot, and the lower ones cover it: no seams.
-        down = box.bottom - (index + 1) * step
-        piece: Look = {"x": left, "y": number(down), "width": BAR_WIDTH, "height": number(step)}
-        parts.append(element("rect", {**piece, "fill": colour, "shape-rendering": "crispEdges"}))
+        down = round(box.bottom - (index + 1) * step, 2)
+        piece: Look = {"x": left, "y": number(down), "width": BAR_WIDTH}
+        parts.append(
+            element(
+                "rect",
+                {
+                    **piece,
+                    "height": box.bottom - down,
+                    "fill": colour,
+                    "shape-rendering": "crispEdges",
+                },
+            )
+        )
     edge: Look = {"x": left, "y": box.top, "width": BAR_WIDTH, "height": box.height}
     parts.append(element("rect", {**edge, "fill": "none", "stroke": FRAME, "stroke-width": 1.4}))
     ticks = PathData()

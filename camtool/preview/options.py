@@ -14,19 +14,30 @@ SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
 """Widths of pictures when nobody says."""
 
 
+LEAST_TIMES, MOST_TIMES = 1.0, 1e6
+"""Errors may be drawn so many times as large."""
+
+
 @dataclass(frozen=True)
 class Options:
     """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
     the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
-    ground. OptionError for sizes that make no picture."""
+    ground. `exaggerate`: the predicted path is drawn so many times as far from the wanted one.
+    OptionError for sizes that make no picture."""
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None
     dark: bool = False
+    exaggerate: float = 1.0
 
     def __post_init__(self) -> None:
         if self.size_px is not None:
             check_width(self.size_px)
+        if not LEAST_TIMES <= self.exaggerate <= MOST_TIMES:
+            raise OptionError(
+                f"errors cannot be drawn {self.exaggerate:g} times as large",
+                mend=f"take {LEAST_TIMES:g} to {MOST_TIMES:g}",
+            )
         crop = self.crop_mm
         if crop is not None and not (
             all(map(math.isfinite, crop)) and crop[2] > 0.0 and crop[3] > 0.0

@@ -45,7 +45,7 @@ class Page:
 
 def page_of(content: Content, width: float = PAGE) -> Page:
     """Fit the plot twice: the room that its numbers need follows from its scale."""
-    head, down = legend.head(content.scene.title, content.scene.notes, width)
+    head, down = legend.head(content.scene.title, content.notes, width)
     top = down + HEAD_GAP
     left, right = MARGIN + GUESSED_LEFT, width - MARGIN
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.geometry.drawing import Drawing
+from camtool.geometry.polylines import Segments
 from camtool.toolpath.moves import Toolpath
 
 Floats = npt.NDArray[np.float64]
@@ -17,6 +18,8 @@ Bools = npt.NDArray[np.bool_]
 @dataclass(frozen=True, eq=False)
 class Scene:
     """What to draw; whatever is None or empty is left out.
+
+    `wanted` are the lines and arcs that the trace was held against.
 
     trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
     wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
@@ -34,6 +37,7 @@ class Scene:
     trace_cutting: Bools | None = None
     travel_mm: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
+    wanted: Segments | None = None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -157,6 +158,22 @@ def chains_of(lines: Polylines) -> tuple[Chain, ...]:
             Chain(points, all_segments.centre[part], all_segments.sweep[part], bool(closed))
         )
     return tuple(chains)
+
+
+def chains_between(segments: Segments) -> tuple[Chain, ...]:
+    """Lines and arcs as chains: one goes on while the next piece begins where the last ended."""
+    if not len(segments):
+        return ()
+    apart = np.hypot(*(segments.start[1:] - segments.end[:-1]).T) > POSITION_EPS_MM
+    bounds = [0, *(np.flatnonzero(apart) + 1).tolist(), len(segments)]
+    return tuple(
+        Chain(
+            np.concatenate([segments.start[low : low + 1], segments.end[low:high]]),
+            segments.centre[low:high],
+            segments.sweep[low:high],
+        )
+        for low, high in pairwise(bounds)
+    )
 
 
 def path_data(chains: Iterable[Chain]) -> str:

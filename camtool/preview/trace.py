@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.preview.colours import BINS, bin_colours
+from camtool.preview.exaggerate import exaggerated
 from camtool.preview.scene import Scene
 from camtool.preview.svg import Look, PathData, element
 from camtool.preview.view import View
@@ -35,21 +36,30 @@ MERGED_SHARE = 1.25e-4
 @dataclass(frozen=True, eq=False)
 class Trace:
     """Points (T, 2) mm, |error| (T,) µm, whether the tool cut on the way there (T,); the map's
-    end."""
+    end; how many times as far from the wanted path the points are drawn as they are."""
 
     points: Floats
     error_um: Floats
     cutting: npt.NDArray[np.bool_]
     top_um: float
+    times: float = 1.0
 
 
-def trace_of(scene: Scene) -> Trace | None:
-    """The trace of a scene; None when there is none or it never cuts."""
+def trace_of(scene: Scene, times: float = 1.0) -> Trace | None:
+    """The trace of a scene, its errors drawn so many `times` as large where the wanted path is
+    known; None when there is none or it never cuts."""
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or not cutting.any():
         return None
     error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
-    return Trace(points, error_um, cutting, max(float(error_um.max()), LEAST_TOP_UM))
+    top_um = max(float(error_um.max()), LEAST_TOP_UM)
+    if times == 1.0 or scene.wanted is None:
+        return Trace(points, error_um, cutting, top_um)
+    # The point before a cut is where the cut begins.
+    drawn = cutting | np.append(cutting[1:], False)
+    moved = points.copy()
+    moved[drawn] = exaggerated(points[drawn], scene.wanted, times)
+    return Trace(moved, error_um, cutting, top_um, times)
 
 
 def bins_of(trace: Trace) -> Ints:

@@ -30,7 +30,7 @@ from camtool.verify.case import Case, VerifyOptions
 from camtool.verify.circles import full_circles
 from camtool.verify.compare import Target
 from camtool.verify.coverage import Coverage, cover
-from camtool.verify.cuts import cut_moves, is_flat
+from camtool.verify.cuts import CutMoves, cut_moves, is_flat
 from camtool.verify.figures import Figure
 from camtool.verify.holes import hole_findings, holes_of
 from camtool.verify.match import Goal, carried_match, own_match
@@ -48,13 +48,14 @@ __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The report, all findings that are in it, the slides' path for pictures, and what became of
-    each row."""
+    """The report, all findings that are in it, the slides' path for pictures, what became of
+    each row, and the moves that the slides' path was judged against."""
 
     report: Report
     trace: Trace
     findings: tuple[Finding, ...]
     rows: RowFigures
+    wanted: CutMoves
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
         """The same with these findings, in the report too."""
@@ -114,7 +115,9 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     findings = _all_findings(case, coverage, noticed)
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally)
     trace = slides.trace()
-    return Verification(result.report(extents, findings, trace), trace, findings, rows)
+    return Verification(
+        result.report(extents, findings, trace), trace, findings, rows, wanted.cuts
+    )
 
 
 def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:

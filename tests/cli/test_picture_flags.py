@@ -50,3 +50,20 @@ def test_what_is_no_part_is_refused(drawing: str, crop: str) -> None:
 def test_sizes_that_nobody_can_look_at_are_refused(drawing: str) -> None:
     with pytest.raises(OptionError, match="pixels wide"):
         run("preview", drawing, "-o", "a.svg", "--size", "1000000")
+
+
+def test_verify_and_preview_draw_the_same_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    circle = str(Path("samples/circle-30-steps.pic").absolute())
+    monkeypatch.chdir(tmp_path)
+    flags = ("-t", "pic-mmh", "--size", "500", "--dark", "--exaggerate", "2")
+    run("preview", circle, *flags, "--simulate", "-o", "a.svg")
+    run("verify", circle, *flags, "--preview", "b.svg")
+    assert Path("a.svg").read_bytes() == Path("b.svg").read_bytes()
+    assert "error × 2" in Path("a.svg").read_text(encoding="utf-8")
+
+
+def test_there_is_nothing_to_exaggerate_without_a_prediction(drawing: str) -> None:
+    with pytest.raises(click.UsageError, match="--simulate"):
+        run("preview", drawing, "-o", "a.svg", "-t", "pic-mmh", "--exaggerate", "2")
