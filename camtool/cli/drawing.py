@@ -34,15 +34,22 @@ class DrawingFlags:
     line_types: tuple[str, ...]
     given: dict[str, Any]
 
-    def read(self, name: str, machine: Machine | None = None, job: Job | None = None) -> Drawing:
+    def read(
+        self,
+        name: str,
+        machine: Machine | None = None,
+        job: Job | None = None,
+        data: bytes | None = None,
+    ) -> Drawing:
         """The drawing (`-` is stdin), of the layers that the job's operations take.
 
-        Tolerances that no flag gives are the machine's, or else the importer's. OptionError for
-        a layer or colour of the job that the drawing has not, unless flags restrict it.
+        `data` is the file's content where it has been read already. Tolerances that no flag
+        gives are the machine's, or else the importer's. OptionError for a layer or colour of
+        the job that the drawing has not, unless flags restrict it.
         """
         from camtool.cli.joblayers import layers_of, refuse_unmatched, unmatched
         from camtool.importers.options import ReadOptions, Selection
-        from camtool.importers.read import read_drawing
+        from camtool.importers.read import read_bytes, read_drawing
         from camtool.importers.select import NoMatchError, colour_named
 
         settings: dict[str, Any] = {}
@@ -57,7 +64,11 @@ class DrawingFlags:
             line_types=self.line_types,
         )
         try:
-            drawing = read_drawing(Path(name), options=ReadOptions(**settings))
+            options = ReadOptions(**settings)
+            if data is None:
+                drawing = read_drawing(Path(name), options=options)
+            else:
+                drawing = read_bytes(data, name, options)
         except NoMatchError as error:
             if job is None or error.pattern not in layers_of(job) or self.layers:
                 raise

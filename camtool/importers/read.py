@@ -16,7 +16,7 @@ from camtool.importers.read_format import find_format
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
-__all__ = ["MAX_FILE_BYTES", "STDIN", "find_format", "read_bytes", "read_drawing"]
+__all__ = ["MAX_FILE_BYTES", "STDIN", "file_bytes", "find_format", "read_bytes", "read_drawing"]
 
 MAX_FILE_BYTES = 500_000_000
 """A larger file is refused before it is read: its drawing would not fit into memory."""
@@ -36,7 +36,7 @@ def read_drawing(path: Path, *, options: ReadOptions = DEFAULTS) -> Drawing:
     """The Drawing in a file, in mm; `-` is standard input. DrawingError when there is none."""
     if str(path) == "-":
         return read_bytes(_standard_input(), STDIN, options)
-    return read_bytes(_content(path), str(path), options)
+    return read_bytes(file_bytes(path), str(path), options)
 
 
 def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawing:
@@ -57,7 +57,7 @@ def _standard_input() -> bytes:
     return _bounded(sys.stdin.buffer, STDIN)
 
 
-def _content(path: Path) -> bytes:
+def file_bytes(path: Path) -> bytes:
     """The file's content; DrawingError when there is none."""
     file = str(path)
     try:

@@ -1,0 +1,118 @@
+"""Which drawings a batch takes, and where the outputs of each one go.
+
+    drawings/            every drawing below it      drawings/a/b.dxf → OUT/a/b.*
+    'parts/**/*.dxf'     what the pattern matches    parts/x/y.dxf    → OUT/x/y.*
+    one.dxf              this file                   one.dxf          → OUT/one.*
+
+Outputs keep the path below the folder, or below the part of a pattern that has no wildcard.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path, PurePath
+
+from camtool.batch.records import Task
+from camtool.errors import InputError, OutputError
+
+SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
+"""What a folder is searched for. Lists of points and scripts share their extensions with much
+else: they are taken when they are named or matched by a pattern."""
+
+
+def find_tasks(
+    sources: Sequence[str], out: Path, made: Collection[Path] = frozenset()
+) -> list[Task]:
+    """One task for each drawing, sorted by output; a drawing that is named twice counts once.
+
+    `made` are outputs of earlier runs (resolved paths): they are no drawings. InputError when a
+    source gives none; OutputError, which names both, when two drawings have one output.
+    """
+    tasks: dict[Path, Task] = {}
+    for source in sources:
+        found = False
+        for path, stem in _found(source, out):
+            place = path.resolve()
+            if place not in made:
+                found = True
+                tasks.setdefault(place, Task(str(path), stem))
+        if not found:
+            raise InputError(
+                "holds no drawing" if Path(source).is_dir() else "no file matches",
+                file=source,
+                mend=f"a folder is searched for {', '.join(SUFFIXES)}; quote a pattern such as "
+                "'parts/**/*.csv' for others",
+            )
+    _refuse_collisions(tasks.values())
+    return sorted(tasks.values(), key=lambda task: task.stem)
+
+
+def refuse_overwriting(tasks: Sequence[Task], out: Path, extensions: Sequence[str]) -> None:
+    """OutputError when an output would take the place of a drawing."""
+    drawings = {task.path.resolve(): task.source for task in tasks}
+    for task in tasks:
+        for extension in extensions:
+            place = (out / f"{task.stem}{extension}").resolve()
+            if place in drawings:
+                raise OutputError(
+                    f"an output of {task.source} would take the place of {drawings[place]}",
+                    file=str(out),
+                    mend="choose another --out",
+                )
+
+
+def _found(source: str, out: Path) -> Iterator[tuple[Path, str]]:
+    """(drawing, stem) of one argument."""
+    path = Path(source)
+    if path.is_dir():
+        for found in _below(path, out):
+            yield found, _stem(found.relative_to(path))
+    elif path.exists() or not glob.has_magic(source):
+        if not path.exists():
+            raise InputError("there is no such file or folder", file=source, mend="check the path")
+        yield path, _stem(PurePath(path.name))
+    else:
+        base = _fixed_part(source)
+        for name in sorted(glob.iglob(source, recursive=True)):  # noqa: PTH207 - may be absolute
+            if Path(name).is_file():
+                yield Path(name), _stem(Path(name).relative_to(base))
+
+
+def _below(folder: Path, out: Path) -> Iterator[Path]:
+    """Drawings in a folder and those below it, but for hidden ones and the output folder."""
+    apart = out.resolve()
+    for parent, folders, names in os.walk(folder):
+        here = Path(parent)
+        folders[:] = sorted(
+            name
+            for name in folders
+            if not name.startswith(".") and (here / name).resolve() != apart
+        )
+        for name in sorted(names):
+            if not name.startswith(".") and PurePath(name).suffix.lower() in SUFFIXES:
+                yield here / name
+
+
+def _fixed_part(pattern: str) -> Path:
+    """The folders of a pattern before its first wildcard."""
+    parts = PurePath(pattern).parts
+    fixed = next(n for n, part in enumerate(parts) if glob.has_magic(part))
+    return Path(*parts[: min(fixed, len(parts) - 1)])
+
+
+def _stem(relative: PurePath) -> str:
+    """The path without the extension of the file."""
+    return relative.with_suffix("").as_posix()
+
+
+def _refuse_collisions(tasks: Collection[Task]) -> None:
+    places: dict[str, Task] = {}
+    for task in tasks:
+        other = places.setdefault(os.path.normcase(task.stem), task)
+        if other is not task:
+            raise OutputError(
+                f"{other.source} and {task.source} would both be written as {task.stem}.*",
+                mend="rename one, or make them by two batches with an --out for each",
+            )

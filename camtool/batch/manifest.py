@@ -1,0 +1,97 @@
+"""What an output folder holds, and of what it was made.
+
+A line of JSON for each drawing, appended when its files are in place, so that a run which ends
+in any way leaves a manifest that can be used: a line that was cut short is passed over, and of
+several for one drawing the last counts. A run that ends well writes it anew, sorted.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from camtool.batch.digests import file_digest
+
+NAME = ".camtool-batch.jsonl"
+"""The manifest's name in the output folder."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One drawing: the digest of all that its outputs depend on, and theirs by name."""
+
+    key: str
+    files: Mapping[str, str]
+    warnings: int = 0
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+
+class Manifest:
+    """The entries of an output folder by stem."""
+
+    def __init__(self, out: Path) -> None:
+        self._out = out
+        self._place = out / NAME
+        self._entries = _read(self._place)
+
+    def up_to_date(self, stem: str, key: str) -> Entry | None:
+        """The entry if it was made of just this and its files are as they were written."""
+        entry = self._entries.get(stem)
+        if entry is None or entry.key != key:
+            return None
+        return entry if all(self._is(*each) for each in entry.files.items()) else None
+
+    def outputs(self) -> frozenset[Path]:
+        """All files that it knows of, resolved."""
+        names = (name for entry in self._entries.values() for name in entry.files)
+        return frozenset((self._out / name).resolve() for name in names)
+
+    def add(self, stem: str, entry: Entry) -> None:
+        """Append an entry; OSError when the disk does not take it."""
+        self._entries[stem] = entry
+        # The line break comes first too: what a full disk cut short must not take this line along.
+        line = f"\n{_line(stem, entry)}\n".encode()
+        handle = os.open(self._place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        try:
+            if os.write(handle, line) != len(line):
+                raise OSError("the disk is full")
+        finally:
+            os.close(handle)
+
+    def tidy(self, write: Callable[[dict[str, bytes]], None]) -> None:
+        """Write it anew, one line for each drawing."""
+        lines = [_line(stem, self._entries[stem]) for stem in sorted(self._entries)]
+        write({str(self._place): ("\n".join(lines) + "\n").encode()})
+
+    def _is(self, name: str, digest: str) -> bool:
+        try:
+            return file_digest(self._out / name) == digest
+        except OSError:
+            return False
+
+
+def _line(stem: str, entry: Entry) -> str:
+    return json.dumps({"stem": stem, **asdict(entry)}, ensure_ascii=True, sort_keys=True)
+
+
+def _read(place: Path) -> dict[str, Entry]:
+    """The entries of the lines that are whole; none when there is no manifest."""
+    try:
+        lines = place.read_bytes().splitlines()
+    except OSError:
+        return {}
+    entries: dict[str, Entry] = {}
+    for line in lines:
+        try:
+            row: dict[str, Any] = json.loads(line)
+            stem = row.pop("stem")
+            entry = Entry(**row)
+        except (ValueError, TypeError, KeyError, AttributeError):
+            continue
+        if isinstance(stem, str) and isinstance(entry.files, dict):
+            entries[stem] = entry
+    return entries

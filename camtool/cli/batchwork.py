@@ -1,0 +1,170 @@
+"""What `camtool batch` does with one drawing: what `post` does, its files as bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from camtool import __version__
+from camtool.batch.digests import code_digest, content_digest, digest_of
+from camtool.batch.records import Made, Task
+from camtool.cli.drawing import DrawingFlags
+from camtool.cli.jobflags import JobFlags
+from camtool.cli.talk import one_line
+
+if TYPE_CHECKING:
+    from camtool.findings import Finding
+    from camtool.geometry.drawing import Drawing
+    from camtool.machine.registry import LoadedTarget
+    from camtool.pipeline import Posted
+    from camtool.planning.job import Job
+    from camtool.verify.gates import Gates
+
+REMARKS = 20
+"""So many findings of a drawing come back from its worker; there may be a hundred thousand."""
+
+OWN_JOB = ".toml"
+"""`part.toml` beside `part.dxf` is its job."""
+
+
+@dataclass(frozen=True)
+class JobOrder:
+    """The job of one drawing; `file` names what it was read from."""
+
+    job: Job
+    file: str | None
+
+
+@dataclass(frozen=True)
+class PostWork:
+    """Post one drawing as `camtool post` does; `preview` is an extension, None for no picture."""
+
+    target: LoadedTarget
+    drawing: DrawingFlags
+    gates: Gates | None = None
+    preview: str | None = None
+    reports: bool = False
+    check: bool = True
+    compensate: bool = False
+
+    @property
+    def extensions(self) -> tuple[str, ...]:
+        """The extensions of what it makes."""
+        made = (self.target.machine.target.extension, self.preview, ".json" * self.reports)
+        return tuple(each for each in made if each)
+
+    def warm(self) -> None:
+        """Load, and compile if nobody has yet, what every drawing needs."""
+        from camtool.cli.ahead import SMALL_JOB
+        from camtool.importers.read import read_bytes
+        from camtool.pipeline import post_drawing
+        from camtool.planning.job import job_of
+
+        drawing = read_bytes(SMALL_JOB, "small.svg")
+        post_drawing(drawing, job_of(), self.target, check=self.check)
+
+    def make(self, task: Task, data: bytes | None) -> Made:
+        """Program, picture and report of a drawing, none of them when it has an error."""
+        from camtool.importers.read import file_bytes
+        from camtool.pipeline import post_drawing
+
+        data = file_bytes(task.path) if data is None else data
+        order: JobOrder = task.order
+        drawing = self.drawing.read(task.source, self.target.machine, order.job, data)
+        with JobFlags(order.file, (), {}).blamed():
+            posted = post_drawing(
+                drawing,
+                order.job,
+                self.target,
+                check=self.check,
+                compensate=self.compensate,
+                gates=self.gates,
+            )
+        made = _said(task, posted)
+        if made.error is not None:
+            return made
+        files = dict(self._files(task, drawing, order.job, posted))
+        return replace(made, content=content_digest(data), files=files, figures=_figures(posted))
+
+    def digest(self) -> str:
+        """The digest of all that outputs depend on but drawing and job."""
+        import msgspec
+
+        target = self.target
+        options = (self.preview, self.reports, self.check, self.compensate, self.gates)
+        return digest_of(
+            __version__,
+            code_digest(Path(__file__).parents[1].rglob("*.py")),
+            code_digest(each for each in target.file.parent.iterdir() if _is_code(each)),
+            target.file.name,
+            msgspec.json.encode(target.machine, order="deterministic"),
+            repr(self.drawing),
+            repr(options),
+        )
+
+    def _files(
+        self, task: Task, drawing: Drawing, job: Job, posted: Posted
+    ) -> Iterator[tuple[str, bytes]]:
+        if posted.program is not None:
+            yield posted.program.extension, posted.program.data
+        if self.preview is not None:
+            yield self.preview, self._picture(drawing, job, posted)
+        if self.reports and posted.verification is not None:
+            yield ".json", posted.verification.report.to_json().encode()
+
+    def _picture(self, drawing: Drawing, job: Job, posted: Posted) -> bytes:
+        from camtool.pipeline import picture
+        from camtool.preview.render import render
+
+        name = Path(drawing.file).name
+        scene = picture(
+            title=name,
+            drawing=drawing,
+            job=job,
+            toolpath=posted.decoded,
+            verification=posted.verification,
+            machine=self.target.machine,
+        )
+        return render(scene, f"{name}{self.preview}")
+
+
+def own_job(source: Path) -> Path | None:
+    """The job file beside a drawing."""
+    beside = source.with_suffix(OWN_JOB)
+    return beside if beside.is_file() else None
+
+
+def _is_code(path: Path) -> bool:
+    return path.suffix in (".py", ".toml") and path.is_file()
+
+
+def _said(task: Task, posted: Posted) -> Made:
+    """The findings: the error of a drawing that must not be written, and the worst lines."""
+    from camtool.findings import Severity
+
+    def lines(severity: Severity) -> list[Finding]:
+        return [each for each in posted.findings if each.severity == severity]
+
+    errors, warnings = lines(Severity.ERROR), lines(Severity.WARNING)
+    remarks = tuple(
+        f"{task.source}: {one_line(str(finding))}" for finding in (*errors, *warnings)[:REMARKS]
+    )
+    made = Made(remarks=remarks, warnings=len(warnings))
+    if not posted.failed and posted.program is not None:
+        return made
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return replace(made, error=f"{remarks[0]}{more}" if errors else f"{task.source}: no program")
+
+
+def _figures(posted: Posted) -> dict[str, float]:
+    """What the summary says of a drawing."""
+    program, verification = posted.program, posted.verification
+    figures: dict[str, float] = {"bytes": len(program.data) if program else 0}
+    if verification is not None:
+        report = verification.report
+        figures["time_s"] = report.time_s
+        if report.error_um.total.max is not None:
+            figures["error_um"] = report.error_um.total.max
+    return figures

@@ -1,0 +1,179 @@
+"""`camtool batch` as a user runs it."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from camtool.batch.records import Pool
+from camtool.cli import batch as command
+from camtool.cli import batchwork
+from tests.cli.conftest import Run
+from tests.oracles.batch_works import HerePool
+
+PIC = ("-t", "pic-mmh", "--out", "build")
+QUICK = ("--no-verify",)
+
+
+@pytest.fixture
+def pools(monkeypatch: pytest.MonkeyPatch) -> list[HerePool]:
+    """The drawings are made in this process; the pool of each run, to see what it was asked."""
+    made: list[HerePool] = []
+
+    def here(batched: command.Batched, loudness: object) -> Pool:
+        made.append(HerePool(batched.work))
+        return made[-1]
+
+    monkeypatch.setattr(command.Batched, "_pool", here)
+    monkeypatch.setattr(batchwork, "code_digest", lambda files: "of no matter here")
+    return made
+
+
+@pytest.fixture
+def drawings(tmp_path: Path, samples: Path) -> Path:
+    """Two good drawings and a broken one between them."""
+    folder = tmp_path / "drawings"
+    (folder / "in").mkdir(parents=True)
+    shutil.copy(samples / "pieces" / "pic-mmh-square.dxf", folder / "in" / "square.dxf")
+    shutil.copy(samples / "letter.svg", folder / "letter.svg")
+    (folder / "junk.dxf").write_text("junk\n")
+    return folder
+
+
+def files_in(folder: Path) -> set[str]:
+    return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+
+
+MANIFEST = ".camtool-batch.jsonl"
+
+
+@pytest.mark.usefixtures("pools")
+def test_good_drawings_are_made_and_the_broken_one_is_in_the_table(
+    camtool: Run, drawings: Path, tmp_path: Path
+) -> None:
+    done = camtool(
+        "batch", "drawings", *PIC, "--preview", "png", "--reports", "--json", "all.json"
+    )
+    assert done.returncode == 1
+    said = done.stderr.decode()
+    assert "camtool: error: drawings/junk.dxf: is no DXF" in said
+    assert "drawings/junk.dxf | is no DXF" in said
+    assert "3 drawings: 2 made, 1 failed" in said
+    stems = ("letter", "in/square")
+    made = {f"{stem}{extension}" for stem in stems for extension in (".pic", ".png", ".json")}
+    assert files_in(tmp_path / "build") == {MANIFEST, *made}
+    whole = json.loads((tmp_path / "all.json").read_text())
+    assert (whole["made"], whole["failed"], whole["target"]) == (2, 1, "pic-mmh")
+    assert [row["state"] for row in whole["drawings"]] == ["made", "failed", "made"]
+    assert whole["drawings"][0]["figures"]["error_um"] > 0.0
+    report = json.loads((tmp_path / "build" / "letter.json").read_text())
+    assert report["source"] == "drawings/letter.svg"
+
+
+@pytest.mark.usefixtures("pools")
+def test_it_makes_what_post_makes(camtool: Run, drawings: Path, tmp_path: Path) -> None:
+    flags = ("-t", "pic-mmh", "--origin", "lower-left", "--feed", "0.5")
+    assert camtool("post", "drawings/letter.svg", *flags, "-o", "one.pic").returncode == 0
+    assert camtool("batch", "drawings/letter.svg", *flags, "-o", "build").returncode == 0
+    assert (tmp_path / "build/letter.pic").read_bytes() == (tmp_path / "one.pic").read_bytes()
+
+
+def asked(camtool: Run, pools: list[HerePool], *flags: str) -> list[str]:
+    """What a run over the good drawings made anew."""
+    before = len(pools)
+    target = () if "-t" in flags else ("-t", "pic-mmh")
+    sources = ("drawings/letter.svg", "drawings/in/square.dxf")
+    done = camtool("batch", *sources, *target, "-o", "build", *QUICK, *flags)
+    assert done.returncode == 0, done.stderr.decode()
+    return pools[before].asked
+
+
+def test_only_what_has_changed_is_made_again(
+    camtool: Run, drawings: Path, tmp_path: Path, pools: list[HerePool]
+) -> None:
+    both = ["letter", "square"]
+    assert asked(camtool, pools) == both
+    (drawings / "letter.svg").touch()
+    assert asked(camtool, pools) == []
+    assert asked(camtool, pools, "--force") == both
+    text = (drawings / "letter.svg").read_text()
+    (drawings / "letter.svg").write_text(text + "<!-- -->")
+    assert asked(camtool, pools) == ["letter"]
+    (tmp_path / "build" / "square.pic").write_text("changed by hand")
+    assert asked(camtool, pools) == ["square"]
+    for flags in (
+        ("--preview", "svg"),
+        ("--feed", "0.5"),
+        ("--set", "axes.x.backlash_mm=0.004"),
+        ("--tolerance", "0.002"),
+        ("-t", "grbl"),
+    ):
+        assert asked(camtool, pools, *flags) == both, flags
+        assert asked(camtool, pools, *flags) == [], flags
+
+
+def test_a_job_beside_a_drawing_is_its_own(
+    camtool: Run, drawings: Path, tmp_path: Path, pools: list[HerePool]
+) -> None:
+    asked(camtool, pools)
+    plain = (tmp_path / "build" / "letter.pic").read_bytes()
+    (drawings / "letter.toml").write_text('feed = "0.5"\n')
+    assert asked(camtool, pools) == ["letter"]
+    assert (tmp_path / "build" / "letter.pic").read_bytes() != plain
+    (drawings / "letter.toml").write_text('# the same\nfeed = "0.5mm/min"\n')
+    assert asked(camtool, pools) == []
+    assert asked(camtool, pools, "--no-own-jobs") == ["letter"]
+    assert (tmp_path / "build" / "letter.pic").read_bytes() == plain
+
+
+@pytest.mark.usefixtures("pools")
+def test_a_wrong_job_fails_its_drawing_alone(camtool: Run, drawings: Path, tmp_path: Path) -> None:
+    (drawings / "letter.toml").write_text("fed = 1\n")
+    done = camtool("batch", "drawings/letter.svg", "drawings/in", *PIC, *QUICK)
+    assert done.returncode == 1
+    assert b"drawings/letter.svg: drawings/letter.toml: key fed: unknown key" in done.stderr
+    assert files_in(tmp_path / "build") == {MANIFEST, "square.pic"}
+    shutil.copy(drawings / "letter.toml", tmp_path / "all.toml")
+    assert camtool("batch", "drawings/in", *PIC, "--job", "all.toml").returncode == 2
+
+
+@pytest.mark.usefixtures("pools")
+def test_fail_fast_stops(camtool: Run, drawings: Path, tmp_path: Path) -> None:
+    (drawings / "in" / "a.dxf").write_text("junk\n")
+    done = camtool("batch", "drawings", *PIC, "--fail-fast", "--json", "-", "-q")
+    assert done.returncode == 1
+    whole = json.loads(done.stdout)
+    assert (whole["made"], whole["failed"], whole["not_run"]) == (0, 1, 3)
+
+
+@pytest.mark.usefixtures("pools")
+def test_findings_are_failures_and_old_files_stay(
+    camtool: Run, drawings: Path, tmp_path: Path
+) -> None:
+    flags = ("batch", "drawings/letter.svg", *PIC)
+    assert camtool(*flags).returncode == 0
+    before = (tmp_path / "build" / "letter.pic").read_bytes()
+    done = camtool(*flags, "--max-error", "0.001um")
+    assert done.returncode == 1
+    assert (tmp_path / "build" / "letter.pic").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("flags", "why"),
+    [
+        (("drawings",), "letter.* and drawings/letter.svg|both be written as letter.*"),
+        (("nowhere",), "no such file or folder"),
+        (("drawings/in", "--no-verify", "--reports"), "nothing to report"),
+        (("drawings/in", "--scheduler", "x", "--jobs", "2"), "not for a cluster"),
+        (("drawings/in", "--json", "no/where.json"), "does not exist"),
+    ],
+)
+def test_wrong_use_is_refused_before_anything_is_made(
+    camtool: Run, drawings: Path, tmp_path: Path, flags: tuple[str, ...], why: str
+) -> None:
+    shutil.copy(drawings / "letter.svg", drawings / "letter.svgz")
+    done = camtool("batch", *flags, *PIC)
+    assert done.returncode == 2
+    assert any(each in done.stderr.decode() for each in why.split("|"))
+    assert not (tmp_path / "build").exists()
