@@ -7,7 +7,6 @@ OptionError that names the file, the table and the key (or the flag), and the me
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from camtool.errors import OptionError
+from camtool.patterns import guess
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -162,8 +162,7 @@ def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
 
 
 def _meant(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=1)
-    return (f"did you mean {near[0]}? " if near else "") + f"known keys: {_listed(known)}"
+    return f"{guess(name, known)}known keys: {_listed(known)}"
 
 
 def _listed(known: Iterable[str]) -> str:

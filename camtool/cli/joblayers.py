@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
 from camtool.importers.select import NAMED, NoMatchError
-from camtool.patterns import matches
+from camtool.patterns import guess, matches
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -40,7 +40,7 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
                         f"no {what} matches {pattern!r}",
                         file=drawing.file,
                         where=f"{_called(operation, number)}key {what}s",
-                        mend=f"it has {_listed(known)}",
+                        mend=f"{guess(pattern, known)}it has {_listed(known)}",
                     )
 
 

@@ -5,13 +5,13 @@ Lengths, angles, feeds and times take units in texts; bare numbers are mm, degre
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from camtool.cli.jobgiven import Given, Key, Table, part_of, record_of, refuse_idle
 from camtool.errors import OptionError
+from camtool.patterns import guess
 from camtool.planning.job import ENTRIES, LEADS, ORIGINS, STARTS, Entry, Lead, Tabs
 from camtool.units import parse_angle, parse_feed, parse_length, parse_time
 
@@ -97,10 +97,9 @@ def word(known: Sequence[str]) -> Read:
     def convert(value: object) -> str:
         said = text(value)
         if said not in known:
-            near = difflib.get_close_matches(said, known, n=1)
-            guess = f"did you mean {near[0]}? " if near else ""
             raise OptionError(
-                f"unknown word {said!r}", mend=f"{guess}use one of {', '.join(known)}"
+                f"unknown word {said!r}",
+                mend=f"{guess(said, known)}use one of {', '.join(known)}",
             )
         return said
 
@@ -211,10 +210,9 @@ def _word_or_place(value: object, known: Sequence[str]) -> str | tuple[float, fl
         return said
     places = said.split(",")
     if len(places) != 2:
-        near = difflib.get_close_matches(said, known, n=1)
-        guess = f"did you mean {near[0]}? " if near else ""
         raise OptionError(
-            f"{said!r} is no place", mend=f"{guess}use one of {', '.join(known)}, or x,y"
+            f"{said!r} is no place",
+            mend=f"{guess(said, known)}use one of {', '.join(known)}, or x,y",
         )
     return length(places[0]), length(places[1])
 

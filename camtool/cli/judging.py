@@ -14,6 +14,7 @@ from camtool.cli.options import INTERPOLATORS, MachineFlags
 from camtool.cli.sections import option
 from camtool.cli.types import duration, length
 from camtool.errors import OptionError
+from camtool.patterns import guess
 
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
@@ -131,7 +132,7 @@ def left_out(names: Sequence[str]) -> Effects:
         raise OptionError(
             f"{unknown[0]!r} is no part of the mechanics",
             where="--without",
-            mend=f"one of {', '.join(EFFECTS)}",
+            mend=f"{guess(unknown[0], EFFECTS)}one of {', '.join(EFFECTS)}",
         )
     return replace(ALL, **dict.fromkeys(names, False))
 

@@ -15,7 +15,7 @@ from camtool.errors import DrawingError, OptionError
 from camtool.geometry.drawing import Skipped
 from camtool.importers.options import Selection
 from camtool.importers.piece import Piece
-from camtool.patterns import matches
+from camtool.patterns import guess, matches
 
 NAMED = 12
 """So many names are listed when a pattern chooses none of them."""
@@ -27,7 +27,9 @@ class NoMatchError(DrawingError):
     def __init__(self, what: str, pattern: str, file: str, known: Sequence[str]) -> None:
         listed = ", ".join(sorted(known)[:NAMED]) + (" …" if len(known) > NAMED else "")
         super().__init__(
-            f"no {what} matches {pattern!r}", file=file, mend=f"it has {listed or 'none'}"
+            f"no {what} matches {pattern!r}",
+            file=file,
+            mend=f"{guess(pattern, known)}it has {listed or 'none'}",
         )
         self.pattern = pattern
 

@@ -23,6 +23,7 @@ import msgspec
 from camtool.errors import MachineError
 from camtool.machine.controllers import Controller, SlideStart
 from camtool.machine.model import Machine, Target
+from camtool.patterns import guess
 
 NEEDS = "needs"
 """Key at the top of a target's file: the keys that only the user's machine file can give."""
@@ -137,12 +138,16 @@ def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -
         *tables, key = keys or ["?"]
         where = (f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}"
         raise MachineError(
-            message, file=file, where=where, mend=_mend(kind, table, tables) if unknown else ""
+            message,
+            file=file,
+            where=where,
+            mend=_mend(kind, table, tables, key) if unknown else "",
         ) from None
 
 
-def _mend(kind: type, values: Any, tables: list[str]) -> str:
-    """The keys that a table knows; where models have tables of their own, that of its model."""
+def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
+    """The key that was meant, and those that a table knows; where models have tables of their
+    own, that of its model."""
     record: Any = kind
     for name in tables:
         fields = {f.name: f.type for f in msgspec.structs.fields(record)}
@@ -152,10 +157,10 @@ def _mend(kind: type, values: Any, tables: list[str]) -> str:
             if config is not None and values.get(config.tag_field) == config.tag:
                 record = model
     try:
-        known = ", ".join(f.encode_name for f in msgspec.structs.fields(record))
+        known = [f.encode_name for f in msgspec.structs.fields(record)]
     except TypeError:
         return ""
-    return f"known keys: {known}"
+    return f"{guess(key, known)}known keys: {', '.join(known)}"
 
 
 def _finite(value: object, file: str, at: str) -> None:
