@@ -14,6 +14,7 @@ from typing import NoReturn
 import click
 
 from camtool import __version__
+from camtool.cli.batch import batch
 from camtool.cli.calibrate import calibrate
 from camtool.cli.check import check
 from camtool.cli.convert import convert
@@ -40,6 +41,7 @@ def cli() -> None:
     camtool check   logo.dxf                    what is in the drawing
     camtool post    logo.dxf --target pic-mmh   drawing to verified program
     camtool verify  logo.pic --target pic-mmh   judge any program of a machine
+    camtool batch   drawings/ -t pic-mmh -o build/   many, those that have changed
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool filter  logo.dxf                    LinuxCNC opens the drawing
@@ -52,7 +54,7 @@ def cli() -> None:
     """
 
 
-for _command in (post, verify, convert, preview, check, job, targets, coupon, calibrate):
+for _command in (post, batch, verify, convert, preview, check, job, targets, coupon, calibrate):
     cli.add_command(_command)
 cli.add_command(filter_command)
 
