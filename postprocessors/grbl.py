@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.program import Program
+from camtool.toolpath.program import Listing, Program
 
 
 class GrblPost:
@@ -29,6 +29,12 @@ class GrblPost:
         from ._grbl_read import read_grbl
 
         return read_grbl(data, machine)
+
+    def listing(self, data: bytes, machine: Machine) -> Listing:
+        """The lines that are blocks."""
+        from ._gcode_listing import listing
+
+        return listing(data)
 
 
 POST = GrblPost()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.program import Program
+from camtool.toolpath.program import Listing, Program
 
 
 class I8751Post:
@@ -45,6 +45,12 @@ class I8751Post:
         from ._i8751_lines import packet_count
 
         return packet_count(data, machine)
+
+    def listing(self, data: bytes, machine: Machine) -> Listing:
+        """The bytes of each record."""
+        from ._i8751_listing_bytes import listing
+
+        return listing(data, machine)
 
 
 POST = I8751Post()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.program import Program
+from camtool.toolpath.program import Listing, Program
 
 
 class LinuxCncPost:
@@ -29,6 +29,12 @@ class LinuxCncPost:
         from ._linuxcnc_read import read_linuxcnc
 
         return read_linuxcnc(data, machine)
+
+    def listing(self, data: bytes, machine: Machine) -> Listing:
+        """The lines that are blocks."""
+        from ._gcode_listing import listing
+
+        return listing(data)
 
 
 POST = LinuxCncPost()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Move, Toolpath
-from camtool.toolpath.program import Program
+from camtool.toolpath.program import Listing, Program
 
 
 class PicMmhPost:
@@ -38,6 +38,13 @@ class PicMmhPost:
         from ._pic_mmh_write import format_block
 
         return format_block(move, machine)
+
+    def listing(self, data: bytes, machine: Machine) -> Listing:
+        """What stands before each semicolon, with it."""
+        from ._pic_mmh_read import BLANKS
+
+        *blocks, _ = data.decode("ascii").split(";")
+        return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks))
 
 
 POST = PicMmhPost()

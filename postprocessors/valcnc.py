@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.program import Program
+from camtool.toolpath.program import Listing, Program
 
 
 class ValcncPost:
@@ -32,6 +32,12 @@ class ValcncPost:
         from ._valcnc_read import read_program
 
         return read_program(data, machine)
+
+    def listing(self, data: bytes, machine: Machine) -> Listing:
+        """The lines that are blocks."""
+        from ._gcode_listing import listing
+
+        return listing(data)
 
 
 POST = ValcncPost()

@@ -83,7 +83,7 @@ def convert(
 
 
 def _picture(name: str, title: str, made: Posted, target: LoadedTarget) -> bytes:
-    from camtool.pipeline import picture
+    from camtool.pipeline import picture, posted_listing
     from camtool.preview.render import render
 
     scene = picture(
@@ -91,5 +91,6 @@ def _picture(name: str, title: str, made: Posted, target: LoadedTarget) -> bytes
         toolpath=made.decoded or made.wanted,
         verification=made.verification,
         machine=target.machine,
+        listing=posted_listing(made, target),
     )
     return render(scene, name)

@@ -18,6 +18,7 @@ from camtool.cli.output import check_writable, write_all
 from camtool.cli.pictureflags import PictureFlags, picture_options
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.types import is_viewer
 from camtool.cli.types import picture as picture_name
 from camtool.cli.verify import read_bytes
 from camtool.errors import CamtoolError
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     metavar="PICTURE",
     callback=picture_name,
     required=True,
-    help="A .svg or .png file.",
+    help="A .svg or .png file; .html to pan, zoom and play.",
 )
 @machine_options
 @click.option("--simulate", is_flag=True, help="Show the predicted path and its error too.")
@@ -62,6 +63,8 @@ def preview(
     if picture.exaggerate is not None and not simulate:
         raise click.UsageError("--exaggerate needs --simulate")
     check_writable([output], [source])
+    # What is to be played needs its times, which only the machine's model knows.
+    simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
     from camtool.preview.render import render
 
@@ -79,7 +82,13 @@ def _scene(
     source: str, machine: MachineFlags, simulate: bool, job: JobFlags, drawing: DrawingFlags
 ) -> Scene:
     """What to draw: a drawing, a program, or the toolpath planned from a drawing."""
-    from camtool.pipeline import picture, post_drawing, verify_program
+    from camtool.pipeline import (
+        listing_of,
+        picture,
+        post_drawing,
+        posted_listing,
+        verify_program,
+    )
     from camtool.planning.plan import plan
 
     title = Path(source).name
@@ -92,7 +101,13 @@ def _scene(
         data = read_bytes(source)
         decoded, verification = verify_program(data, target, source=source)
         judged = verification if simulate else None
-        return picture(title=title, toolpath=decoded, verification=judged, machine=target.machine)
+        return picture(
+            title=title,
+            toolpath=decoded,
+            verification=judged,
+            machine=target.machine,
+            listing=listing_of(data, target, decoded),
+        )
     wanted = job.job(drawing)
     read = drawing.read(source, target.machine, wanted)
     if not simulate:
@@ -114,6 +129,7 @@ def _scene(
         toolpath=posted.decoded or posted.wanted,
         verification=posted.verification,
         machine=target.machine,
+        listing=posted_listing(posted, target),
     )
 
 

@@ -12,7 +12,7 @@ import click
 from camtool.errors import OptionError
 from camtool.units import parse_feed, parse_length, parse_time
 
-PICTURES = (".svg", ".png")
+PICTURES = (".svg", ".png", ".html")
 PAGES = (".html", ".md", ".json")
 
 
@@ -40,10 +40,15 @@ def duration(ctx: click.Context, param: click.Parameter, value: str | None) -> f
         raise click.BadParameter(str(error), ctx, param) from error
 
 
+def is_viewer(name: str) -> bool:
+    """Whether a picture of this name is a page to pan, zoom and play."""
+    return PurePath(name).suffix.lower() == ".html"
+
+
 def picture(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """The name of a picture that we can make."""
     if value is not None and PurePath(value).suffix.lower() not in PICTURES:
-        raise click.BadParameter(f"{value!r} ends in neither .svg nor .png", ctx, param)
+        raise click.BadParameter(f"{value!r} ends in none of .svg, .png and .html", ctx, param)
     return value
 
 

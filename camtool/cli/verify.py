@@ -29,6 +29,7 @@ from camtool.cli.report import (
 )
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.types import is_viewer
 from camtool.cli.types import picture as picture_name
 from camtool.errors import ProgramError
 
@@ -78,7 +79,8 @@ if TYPE_CHECKING:
     "--preview",
     metavar="FILE",
     callback=picture_name,
-    help="Picture of the predicted result (with --compare: of all ways), .svg or .png.",
+    help="Picture of the predicted result (with --compare: of all ways), .svg or .png; "
+    ".html to pan, zoom and play.",
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
@@ -136,6 +138,8 @@ def verify(
     if compare is not None:
         if judging.gates is not None:
             raise click.UsageError("limits hold for one way to run a program; drop --compare")
+        if preview is not None and is_viewer(preview):
+            raise click.UsageError("--compare draws .svg and .png alone")
         ways = ways_to_compare(compare, machine, judging)
         with job.blamed():
             return _compared(data, ways, goal, Wishes(preview, report, quiet, looks=looks))
@@ -170,7 +174,7 @@ def _judged(
 ) -> int:
     """The verdict on one program; the exit code."""
     from camtool.findings import Severity, worst
-    from camtool.pipeline import picture, verify_program
+    from camtool.pipeline import listing_of, picture, verify_program
 
     decoded, verification = verify_program(
         data, target, source=goal.name, drawing=goal.drawing, job=goal.job, judging=judging
@@ -188,6 +192,7 @@ def _judged(
             toolpath=decoded,
             verification=verification,
             machine=target.machine,
+            listing=listing_of(data, target, decoded),
         )
         return render(scene, name, wishes.looks or AS_USUAL)
 

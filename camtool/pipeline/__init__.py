@@ -14,6 +14,7 @@ from __future__ import annotations
 from camtool.pipeline.compare import Way, compare_picture, compare_program
 from camtool.pipeline.judge import Judging, Posted, convert_program, post_drawing, verify_program
 from camtool.pipeline.pictures import picture
+from camtool.pipeline.viewing import listing_of, posted_listing
 
 __all__ = [
     "Judging",
@@ -22,7 +23,9 @@ __all__ = [
     "compare_picture",
     "compare_program",
     "convert_program",
+    "listing_of",
     "picture",
     "post_drawing",
+    "posted_listing",
     "verify_program",
 ]

@@ -6,11 +6,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
     from camtool.preview.draw import Scene
+    from camtool.preview.viewer.run import Run
     from camtool.toolpath.moves import Toolpath
+    from camtool.toolpath.program import Listing
     from camtool.verify.verify import Verification
 
 
@@ -22,10 +26,12 @@ def picture(
     toolpath: Toolpath | None = None,
     verification: Verification | None = None,
     machine: Machine | None = None,
+    listing: Callable[[], Listing | None] | None = None,
 ) -> Scene:
     """The scene of whatever is there; with a verification, the slides' path by its error.
 
-    `job` tells where it places the drawing in the work frame.
+    `job` tells where it places the drawing in the work frame; `listing` gives the program's lines
+    to the viewer.
     """
     from camtool.preview.scene import Scene, scene_of_drawing
 
@@ -46,7 +52,25 @@ def picture(
         travel_mm=_travel(toolpath, machine),
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
+        run=_run(toolpath, verification, machine, listing),
     )
+
+
+def _run(
+    toolpath: Toolpath | None,
+    verification: Verification | None,
+    machine: Machine | None,
+    listing: Callable[[], Listing | None] | None,
+) -> Callable[[], Run] | None:
+    """What makes the run, when the viewer asks for it."""
+    if toolpath is None or machine is None:
+        return None
+    from camtool.pipeline.viewing import run_of
+
+    def run() -> Run:
+        return run_of(toolpath, verification, machine, None if listing is None else listing())
+
+    return run
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:

@@ -14,7 +14,12 @@ __all__ = ["PNG_WIDTH_PX", "render", "rendered"]
 
 
 def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
-    """SVG or PNG bytes of the scene for a file of this name; OutputError for other extensions."""
+    """SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
+    extensions. HTML is the viewer, which has no options."""
+    if PurePath(name).suffix.lower() == ".html":
+        from camtool.preview.viewer.page import viewer_page
+
+        return viewer_page(scene)
     return rendered(lambda sized: draw(scene, options=sized), name, options)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy.typing as npt
 
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Segments
+from camtool.preview.viewer.run import Run
 from camtool.toolpath.moves import Toolpath
 
 Floats = npt.NDArray[np.float64]
@@ -23,7 +25,8 @@ class Scene:
 
     trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
     wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
-    other errors do not count. travel_mm is the size of the table's travel from (0, 0).
+    other errors do not count. travel_mm is the size of the table's travel from (0, 0). `run` gives
+    how the toolpath runs, for the viewer; it is called only there.
     The drawing is in the work frame. With a trace the picture is one of the
     part: rapids and plunges are left out, feeds are pale. ValueError when the trace is incomplete
     or not finite.
@@ -38,6 +41,7 @@ class Scene:
     travel_mm: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
     wanted: Segments | None = None
+    run: Callable[[], Run] | None = None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm

@@ -28,12 +28,23 @@ class Program:
     findings: tuple[Finding, ...] = ()
 
 
+@dataclass(frozen=True)
+class Listing:
+    """A program for people: `blocks` (B,) are its lines, numbered as in `Toolpath.block`;
+    `binary` where they are bytes in hex."""
+
+    blocks: tuple[str, ...]
+    binary: bool = False
+
+
 class PostProcessor(Protocol):
     """One dialect. `read` shares no code with `write`, so a fault in one shows in the other.
 
     Where a program's file is not what goes over the line to the machine (a listing, a dump), a
     post has besides `line_bytes(data, machine) -> int`: how many bytes do. One whose moves may
     leave the wanted path on purpose has `stray_mm(machine) -> float`: how far at most.
+    One that can show which part of a program each block is has `listing(data, machine) ->
+    Listing`, of a program that `read` takes.
     """
 
     name: str

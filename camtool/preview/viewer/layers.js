@@ -1,0 +1,123 @@
+// What is to be seen and in which colour: the layers, the ways to colour moves, their styles.
+
+const SORTS = ["rapid", "feed", "plunge"];
+
+/** The colours of the page as they are now: the system's preference, or paper. */
+function palette() {
+  const style = getComputedStyle(document.documentElement);
+  const colour = (name) => style.getPropertyValue(`--${name}`).trim();
+  const names = ["ink", "quiet", "grid", "drawing", "feed", "rapid", "plunge", "pale", "tool", "pick"];
+  return Object.fromEntries(names.map((name) => [name, colour(name)]));
+}
+
+class Layers {
+  constructor(head, columns) {
+    this.head = head;
+    this.columns = columns;
+    this.on = new Map();
+    this.list = [];
+    head.layers.forEach((layer, index) => {
+      this.add(`drawing ${index}`, layer.name ? `drawing: ${layer.name}` : "drawing");
+    });
+    if (columns.move_kind.length) {
+      this.add("rapid", "rapids");
+      this.add("feed", "feeds");
+      this.add("plunge", "slopes and plunges");
+    }
+    if (columns.trace_row.length) this.add("trace", "predicted path, by error");
+    if (head.worst.length) this.add("worst", "worst places");
+    this.by = "kind";
+    this.sortOf = columns.move_sort;
+    this.binOf = this.bins();
+    this.traceBin = Uint8Array.from(columns.trace_error, (um) => this.bin(um));
+  }
+
+  add(key, name) {
+    this.list.push({ key, name });
+    this.on.set(key, true);
+  }
+
+  bin(um) {
+    const count = this.head.map.light.length;
+    if (!(um >= 0)) return count;
+    return Math.min(count - 1, Math.floor((um / this.head.top_um) * count));
+  }
+
+  /** Per move: the step of the map for each way to colour; behind the map where unknown. */
+  bins() {
+    const { move_error: errors, move_kind: kinds, move_end: ends } = this.columns;
+    const count = this.head.map.light.length, rows = kinds.length;
+    const error = new Uint8Array(rows), height = new Uint8Array(rows);
+    let low = Infinity, high = -Infinity;
+    for (let row = 0; row < rows; row++) {
+      low = Math.min(low, ends[3 * row + 2]);
+      high = Math.max(high, ends[3 * row + 2]);
+    }
+    this.heights = rows ? [low, high] : [0, 0];
+    for (let row = 0; row < rows; row++) {
+      error[row] = this.bin(errors[row]);
+      const share = high > low ? (high - ends[3 * row + 2]) / (high - low) : 0;
+      height[row] = Math.min(count - 1, Math.floor(share * count));
+    }
+    return { error, height };
+  }
+
+  mapColours() {
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches && !this.printing;
+    return dark ? this.head.map.dark : this.head.map.light;
+  }
+
+  /** The move's style: its sort while coloured by kind, else its step of the map. */
+  moveStyles(colours) {
+    const drawn = (sort, style) => (this.on.get(sort) ? style : null);
+    const rapid = drawn("rapid", { colour: colours.rapid, width: 1, dash: [5, 4] });
+    const plunge = drawn("plunge", { colour: colours.plunge, width: 1.5 });
+    if (this.by === "kind") {
+      const feed = drawn("feed", { colour: colours.feed, width: 1.5 });
+      return { of: this.sortOf, styles: [rapid, feed, plunge] };
+    }
+    const map = this.mapColours().map((colour) => drawn("feed", { colour, width: 2 }));
+    const unknown = drawn("feed", { colour: colours.pale, width: 1 });
+    return { of: this.styleByMap(map.length), styles: [...map, unknown, rapid, plunge] };
+  }
+
+  styleByMap(count) {
+    if (this.styled && this.styled.by === this.by) return this.styled.of;
+    const bins = this.binOf[this.by], of = new Uint8Array(bins.length);
+    this.styled = { by: this.by, of };
+    for (let row = 0; row < of.length; row++) {
+      const sort = this.sortOf[row];
+      of[row] = sort === 0 ? count + 1 : sort === 2 && this.by === "error" ? count + 2 : bins[row];
+    }
+    return of;
+  }
+
+  paleStyles(colours) {
+    const pale = (sort, dash) => (
+      this.on.get(sort) ? { colour: colours.pale, width: 1, dash } : null
+    );
+    return { of: this.sortOf, styles: [pale("rapid", [5, 4]), pale("feed"), pale("plunge")] };
+  }
+
+  traceStyles() {
+    if (!this.on.get("trace")) return [];
+    return [...this.mapColours().map((colour) => ({ colour, width: 2 })), null];
+  }
+
+  drawingStyles(colours) {
+    const alone = !this.columns.move_kind.length;
+    return this.head.layers.map((layer, index) => {
+      if (!this.on.get(`drawing ${index}`)) return null;
+      return alone
+        ? { colour: this.mapOfLayer(layer, colours), width: 1.5 }
+        : { colour: colours.drawing, width: 4 };
+    });
+  }
+
+  mapOfLayer(layer, colours) {
+    return this.head.layers.length > 1 ? layer.colour : colours.feed;
+  }
+
+  /** Whether a move is to be seen. */
+  shows(row) { return this.on.get(SORTS[this.sortOf[row]]); }
+}

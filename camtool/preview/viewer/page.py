@@ -1,0 +1,160 @@
+"""The page: template, styles, script and data put together, the same bytes for the same scene.
+
+Whatever comes from drawings and programs stands in the page as data only. The head is JSON in
+which `<`, `>` and `&` are written as escapes, and the script sets it as text; title and notes are
+escaped for HTML. Should something slip through all the same, the page's own policy lets the
+browser run no script but the one whose digest it names, and load nothing from anywhere.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+from collections.abc import Mapping
+from importlib import resources
+
+import numpy as np
+
+from camtool.preview.colours import LAYERS, bin_colours
+from camtool.preview.scene import Scene
+from camtool.preview.viewer.columns import columns_of, layer_names, packed
+from camtool.preview.viewer.run import Run, Table, by_feed
+from camtool.units import UM_PER_MM
+
+SCRIPTS = (
+    "read.js",
+    "track.js",
+    "grid.js",
+    "view.js",
+    "paint.js",
+    "marks.js",
+    "run.js",
+    "layers.js",
+    "stage.js",
+    "words.js",
+    "panel.js",
+    "player.js",
+    "hand.js",
+    "main.js",
+)
+"""The files of the script in their order; the last one begins."""
+
+LEAST_TOP_UM = 1e-3
+"""The colour map ends here when no error is larger."""
+
+_DARK = ("#5a63d8", "#8a55d6", "#b44cc0", "#d8558f", "#ee7361", "#fba046", "#fde04a")
+"""The map on dark ground: as light as it must be to be seen there, and growing lighter."""
+
+_SLOT = re.compile(r"\{([a-z]+)\}")
+
+
+def viewer_page(scene: Scene) -> bytes:
+    """The HTML file of a scene, UTF-8. Where the scene does not tell how its toolpath runs, every
+    move takes as long as its feed says. ValueError when that is the run of another toolpath."""
+    run = _run(scene)
+    named, data = packed(columns_of(scene, run))
+    script = '(() => {\n"use strict";\n' + "\n".join(map(_file, SCRIPTS)) + "})();\n"
+    style = _file("viewer.css")
+    title = _printable(scene.title) or "camtool"
+    slots = {
+        "policy": _policy(script, style),
+        "title": html.escape(title),
+        "notes": html.escape(" · ".join(map(_printable, scene.notes))),
+        "label": html.escape(f"picture of {title}"),
+        "style": style,
+        "script": script,
+        "head": _json({"columns": named, **_head(scene, run)}),
+        "columns": base64.b64encode(data).decode("ascii"),
+    }
+    # One pass: what stands in a slot is never looked through for slots.
+    page = _SLOT.sub(lambda found: slots[found[1]], _file("viewer.html"))
+    return page.encode("utf-8")
+
+
+def _run(scene: Scene) -> Run | None:
+    if scene.toolpath is None:
+        return None
+    return by_feed(scene.toolpath, np.inf) if scene.run is None else scene.run()
+
+
+def _head(scene: Scene, run: Run | None) -> dict[str, object]:
+    drawing, toolpath = scene.drawing, scene.toolpath
+    names = [] if drawing is None else layer_names(drawing)
+    blocks = None if run is None or run.blocks is None else run.blocks
+    return {
+        "layers": [
+            {"name": name, "colour": LAYERS[index % len(LAYERS)]}
+            for index, name in enumerate(names)
+        ],
+        "sources": [] if drawing is None else list(drawing.sources),
+        "texts": [] if toolpath is None else list(toolpath.texts),
+        "blocks": None if blocks is None else "\n".join(map(_one_line, blocks)),
+        "hex": run is not None and run.binary,
+        "tool_mm": None if run is None else run.tool_mm,
+        "top_um": _top_um(scene, run),
+        "map": {"light": bin_colours(), "dark": _dark_colours()},
+        "tables": [] if run is None else [_table(table) for table in run.tables],
+        "worst": [] if run is None else [{"at": place.at_mm} for place in run.worst],
+    }
+
+
+def _table(table: Table) -> dict[str, object]:
+    return {
+        "title": table.title,
+        "columns": table.columns,
+        "rows": [{"cells": line.cells, "move": line.move} for line in table.lines],
+    }
+
+
+def _top_um(scene: Scene, run: Run | None) -> float:
+    """Where the map of errors ends: at the largest that is known, of moves and of the trace."""
+    errors = [LEAST_TOP_UM / UM_PER_MM]
+    if run is not None:
+        errors += [float(error) for error in run.error_mm[np.isfinite(run.error_mm)]]
+    if scene.trace_error_mm is not None and scene.trace_cutting is not None:
+        errors += np.abs(scene.trace_error_mm[scene.trace_cutting]).tolist()
+    return round(max(errors) * UM_PER_MM, 6)
+
+
+def _dark_colours() -> tuple[str, ...]:
+    """As many steps as on light ground."""
+    count, places = len(bin_colours()), np.linspace(0.0, 1.0, len(_DARK))
+    channels = np.array([[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in _DARK])
+    shares = (np.arange(count) + 0.5) / count
+    mixed = np.column_stack([np.interp(shares, places, channel) for channel in channels.T])
+    return tuple(
+        "#" + "".join(f"{value:02x}" for value in row)
+        for row in np.rint(mixed).astype(int).tolist()
+    )
+
+
+def _policy(script: str, style: str) -> str:
+    def digest(text: str) -> str:
+        return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+
+    return (
+        f"default-src 'none'; base-uri 'none'; form-action 'none'; "
+        f"script-src 'sha256-{digest(script)}'; style-src 'sha256-{digest(style)}'"
+    )
+
+
+def _json(value: Mapping[str, object]) -> str:
+    """JSON in ASCII without any sign that means something to HTML."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def _one_line(words: str) -> str:
+    """Lines are told apart by line feeds, so a line has none."""
+    return words.replace("\r", " ").replace("\n", " ")
+
+
+def _printable(words: str) -> str:
+    return "".join(sign if sign.isprintable() else " " for sign in words)
+
+
+def _file(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,147 @@
+// Beside the picture: layers, colours with their scale, the move under way, the program's lines.
+
+const LINES_AROUND = 7;
+
+class LayerPanel {
+  constructor(layers, changed) {
+    this.layers = layers;
+    this.changed = changed;
+    layers.list.forEach((layer, index) => {
+      const box = element("input", undefined, { type: "checkbox", id: `layer-${index}` });
+      box.checked = true;
+      box.addEventListener("change", () => {
+        layers.on.set(layer.key, box.checked);
+        changed();
+      });
+      const label = element("label", undefined, { for: box.id });
+      const number = index < 9 ? element("kbd", String(index + 1)) : "";
+      label.append(box, element("span", layer.name), number);
+      find("layers").append(label);
+    });
+    this.colourChoice();
+  }
+
+  colourChoice() {
+    const { columns, heights } = this.layers, choice = find("colour-by");
+    if (!columns.move_kind.length) { find("colours").hidden = true; return; }
+    const known = columns.move_error.some((um) => um >= 0);
+    if (known) choice.append(element("option", "error", { value: "error" }));
+    if (heights[1] > heights[0]) choice.append(element("option", "height", { value: "height" }));
+    choice.addEventListener("change", () => {
+      this.layers.by = choice.value;
+      this.scale();
+      this.changed();
+    });
+    this.scale();
+  }
+
+  toggle(index) {
+    const box = find(`layer-${index}`);
+    if (box) box.click();
+  }
+
+  nextColour() {
+    const choice = find("colour-by");
+    if (!choice.options.length) return;
+    choice.selectedIndex = (choice.selectedIndex + 1) % choice.options.length;
+    choice.dispatchEvent(new Event("change"));
+  }
+
+  /** The map's colours with the numbers that they stand for. */
+  scale() {
+    const { layers } = this, { by, heights, columns } = layers, place = find("scale");
+    place.hidden = by === "kind" && !columns.trace_row.length;
+    if (place.hidden) return;
+    const bar = find("scale-bar"), height = by === "height";
+    bar.width = layers.mapColours().length;
+    const ctx = bar.getContext("2d");
+    layers.mapColours().forEach((colour, index) => {
+      ctx.fillStyle = colour;
+      ctx.fillRect(index, 0, 1, bar.height);
+    });
+    find("scale-low").textContent = height ? `Z ${heights[1].toFixed(3)} mm` : "0 µm";
+    find("scale-high").textContent = height
+      ? `${heights[0].toFixed(3)} mm` : `${Number(layers.head.top_um.toPrecision(4))} µm`;
+  }
+}
+
+/** The program's lines around one of them; a click goes there. */
+class Listing {
+  constructor(head, columns, go) {
+    this.head = head;
+    this.place = find("listing");
+    this.place.hidden = !head.blocks;
+    if (!head.blocks) return;
+    this.rows = firstRows(columns.move_block, head.blocks.length);
+    this.go = go;
+    this.place.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.show(this.middle + Math.sign(event.deltaY) * 3, this.current);
+    }, { passive: false });
+    this.lines = Array.from({ length: 2 * LINES_AROUND + 1 }, () => this.line());
+  }
+
+  line() {
+    const line = element("li");
+    line.append(element("span"), element("code"));
+    line.addEventListener("click", () => {
+      const row = this.rows[Number(line.dataset.block)];
+      if (row >= 0) this.go(row);
+    });
+    this.place.append(line);
+    return line;
+  }
+
+  /** Lines around `middle`, with `current` marked; blocks from 0. */
+  show(middle, current) {
+    if (!this.head.blocks) return;
+    const count = this.head.blocks.length;
+    this.middle = Math.min(count - 1, Math.max(0, middle));
+    this.current = current;
+    this.lines.forEach((line, index) => {
+      const block = this.middle + index - LINES_AROUND, there = block >= 0 && block < count;
+      line.dataset.block = String(block);
+      line.classList.toggle("current", block === current);
+      line.children[0].textContent = there ? String(block + 1) : "";
+      line.children[1].textContent = there ? this.head.blocks[block] : " ";
+    });
+  }
+}
+
+/** The first move of each block, −1 for blocks without any. */
+function firstRows(blockOf, count) {
+  const rows = new Int32Array(count).fill(-1);
+  for (let row = blockOf.length - 1; row >= 0; row--) {
+    if (blockOf[row] >= 0 && blockOf[row] < count) rows[blockOf[row]] = row;
+  }
+  return rows;
+}
+
+/** The report's tables below the picture; rows that name a move go there. */
+function showTables(head, go) {
+  for (const table of head.tables) {
+    const made = element("table"), body = element("tbody");
+    made.append(element("caption", table.title));
+    if (table.columns.length) {
+      const names = element("tr");
+      table.columns.forEach((name) => names.append(element("th", name, { scope: "col" })));
+      const top = element("thead");
+      top.append(names);
+      made.append(top);
+    }
+    for (const row of table.rows) {
+      const line = element("tr");
+      row.cells.forEach((cell) => line.append(element("td", cell)));
+      if (row.move !== null) {
+        const button = element("button", "show", { type: "button" });
+        button.addEventListener("click", () => go(row.move));
+        const last = element("td");
+        last.append(button);
+        line.append(last);
+      }
+      body.append(line);
+    }
+    made.append(body);
+    find("tables").append(made);
+  }
+}

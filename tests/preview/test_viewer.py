@@ -1,0 +1,176 @@
+"""The viewer's pages as files: whole, the same every time, and safe whatever names they hold."""
+
+import base64
+import hashlib
+import re
+import tomllib
+from html.parser import HTMLParser
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camtool.preview.draw import Scene
+from camtool.preview.render import render
+from camtool.preview.viewer.columns import columns_of, packed
+from camtool.preview.viewer.page import SCRIPTS, viewer_page
+from camtool.preview.viewer.run import Line, Run, Table, by_feed
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind
+from tests.preview.conftest import NASTY, circle, drawing_of, followed
+from tests.preview.viewer_pages import (
+    HOSTILE,
+    busy,
+    head_of,
+    large,
+    run_of,
+    text_of,
+    with_run,
+)
+
+MOST_BYTES = 20_000_000
+
+
+class Tags(HTMLParser):
+    """All tags with their attributes, and the text of each script."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.inside = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self.inside = tag
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        self.inside = ""
+
+    def handle_data(self, data: str) -> None:
+        if self.inside == "script":
+            self.scripts[-1] += data
+
+
+def test_every_scene_makes_a_page_of_its_own_the_same_each_time(scene: Scene) -> None:
+    page = viewer_page(scene)
+    assert page == viewer_page(scene) == render(scene, "a.HTML")
+    tags = [name for name, _ in Tags(page.decode()).tags]
+    assert tags.count("html") == tags.count("body") == 1
+    assert tags.count("script") == 3
+
+
+def test_nothing_is_loaded_from_anywhere(scenes: dict[str, Scene]) -> None:
+    page = text_of(busy(scenes["result"]))
+    for _, attributes in Tags(page).tags:
+        assert not {"src", "href", "style", "action"} & set(attributes)
+        assert not any(name.startswith("on") for name in attributes)
+    assert not re.search(r"https?:|@import|url\(|fetch\(|XMLHttp|WebSocket|import\(", page)
+
+
+def test_the_policy_names_the_script_and_the_styles(scenes: dict[str, Scene]) -> None:
+    page = text_of(scenes["toolpath"])
+    tags = Tags(page)
+    policy = next(a["content"] for n, a in tags.tags if "http-equiv" in a and n == "meta")
+    style = re.search(r"<style>(.*?)</style>", page, re.S)
+    assert policy is not None
+    assert style is not None
+    for kind, text in (("script", tags.scripts[-1]), ("style", style[1])):
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}'" in policy
+    assert policy.startswith("default-src 'none'")
+
+
+def test_the_script_makes_no_markup_of_text() -> None:
+    folder = resources.files("camtool.preview.viewer")
+    for name in SCRIPTS:
+        text = folder.joinpath(name).read_text(encoding="utf-8")
+        for way in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("):
+            assert way not in text, name
+        assert "</" not in text
+        assert len(text.splitlines()) <= 300
+
+
+@pytest.mark.parametrize("words", [HOSTILE, NASTY, "{head}{columns}", "<!--", "]]>"])
+def test_names_stay_names(words: str) -> None:
+    drawing = drawing_of([circle(1.0, 1.0, 1.0)], [words])
+    toolpath = followed(drawing)
+    table = Table(words, (words,), (Line((words,), 0),))
+    run = run_of(toolpath, blocks=(words,) * 3, tables=(table,))
+    scene = with_run(Scene(words, drawing, toolpath, notes=(words,)), run)
+    page = text_of(scene)
+    plain = text_of(with_run(Scene("t", drawing_of([circle(1.0, 1.0, 1.0)], ["l"])), run))
+    tags, clean = Tags(page), Tags(plain)
+    assert [name for name, _ in tags.tags] == [name for name, _ in clean.tags]
+    assert tags.scripts[-1] == clean.scripts[-1]
+    head = head_of(page)
+    assert head["layers"] == [{"name": words, "colour": "#2b4c6f"}]
+    assert head["tables"] == [
+        {"title": words, "columns": [words], "rows": [{"cells": [words], "move": 0}]}
+    ]
+    assert str(head["blocks"]).count("\n") == 2
+
+
+def test_columns_come_back_as_they_went_in(scenes: dict[str, Scene]) -> None:
+    scene = busy(scenes["result"])
+    assert scene.run is not None
+    assert scene.toolpath is not None
+    run = Run(
+        scene.run().seconds,
+        scene.run().error_mm,
+        np.arange(len(scene.trace_points if scene.trace_points is not None else ())),
+    )
+    columns = columns_of(scene, run)
+    named, data = packed(columns)
+    for name, (kind, offset, count) in named.items():
+        assert offset % 4 == 0
+        held = np.frombuffer(data, dtype=kind, count=count, offset=offset)
+        np.testing.assert_array_equal(held, columns[name].ravel())
+    np.testing.assert_allclose(columns["move_end"], scene.toolpath.end, atol=1e-6)
+    assert len(columns["trace_row"]) == len(columns["trace_error"]) > 100
+    page = text_of(scene)
+    block = re.search(r'id="columns">([^<]*)<', page)
+    assert block is not None
+    assert base64.b64decode(block[1])
+
+
+def test_a_run_by_feeds_takes_the_time_of_the_way() -> None:
+    path = ToolpathBuilder().rapid(3.0, 4.0).line(3.0, 4.0, -1.0, feed=30.0)
+    path.arc(3.0, 4.0, centre=(3.0, 3.0), ccw=True, feed=60.0).event(Kind.DWELL, 2.5)
+    run = by_feed(path.finish(), 300.0)
+    np.testing.assert_allclose(run.seconds[:4], [1.0, 2.0, 2.0 * np.pi, 2.5])
+    assert np.isnan(run.error_mm).all()
+    assert by_feed(path.finish(), np.inf).seconds[0] == 0.0
+
+
+def test_what_does_not_fit_is_refused(scenes: dict[str, Scene]) -> None:
+    scene = scenes["toolpath"]
+    ints = np.empty(0, dtype=np.int64)
+    with pytest.raises(ValueError, match="another toolpath"):
+        viewer_page(with_run(scene, Run(np.zeros(2), np.zeros(2), ints)))
+    with pytest.raises(ValueError, match="different lengths"):
+        Run(np.zeros(2), np.zeros(3), ints)
+    with pytest.raises(ValueError, match="below 0"):
+        Run(np.array([-1.0]), np.zeros(1), ints)
+
+
+def test_two_hundred_thousand_moves_stay_small() -> None:
+    page = viewer_page(large(200_000))
+    assert 1_000_000 < len(page) < MOST_BYTES
+
+
+def test_the_package_holds_every_file() -> None:
+    """What the page is made of is installed with it."""
+    root = Path(__file__).parents[2]
+    project = tomllib.loads((root / "pyproject.toml").read_text())
+    patterns = project["tool"]["setuptools"]["package-data"]["camtool"]
+    held = {file for pattern in patterns for file in (root / "camtool").glob(pattern)}
+    folder = root / "camtool/preview/viewer"
+    files = {file for file in folder.iterdir() if file.suffix in (".js", ".css", ".html")}
+    assert files <= held
+    assert {file.name for file in files if file.suffix == ".js"} == set(SCRIPTS)
+    assert "camtool.preview.viewer" in project["tool"]["setuptools"]["packages"]

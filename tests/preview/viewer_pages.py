@@ -1,0 +1,76 @@
+"""Pages of the viewer that its tests look at."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from camtool.preview.draw import Scene
+from camtool.preview.viewer.page import viewer_page
+from camtool.preview.viewer.run import Line, Run, Table, Worst, by_feed
+from camtool.toolpath.moves import Toolpath
+
+HOSTILE = "</script><script>hack()</script><img src=x onerror=hack()> {script} &amp; \ud800\x00\n"
+
+
+def run_of(toolpath: Toolpath, **more: object) -> Run:
+    """The run of a toolpath by its feeds, and whatever else is said."""
+    return replace(by_feed(toolpath, 60.0), **more)
+
+
+def with_run(scene: Scene, run: Run) -> Scene:
+    return replace(scene, run=lambda: run)
+
+
+def busy(scene: Scene) -> Scene:
+    """The scene with blocks, errors and tables."""
+    toolpath = scene.toolpath
+    assert toolpath is not None
+    count = len(toolpath)
+    numbered = replace(toolpath, block=np.arange(count))
+    run = run_of(
+        numbered,
+        error_mm=np.linspace(0.0, 0.02, count),
+        blocks=tuple(f"N{row} G01 X{row}" for row in range(count)),
+        tables=(Table("Worst moves", ("block", "error"), (Line(("3", "20"), 2),)),),
+        worst=(Worst((2.5, 2.5)),),
+        tool_mm=0.5,
+    )
+    return with_run(replace(scene, toolpath=numbered), run)
+
+
+def spiral(count: int) -> Toolpath:
+    """A toolpath of many short lines on a spiral that fills 60 × 60 mm."""
+    turn = np.linspace(0.0, 400.0, count)
+    radius = 30.0 * turn / turn[-1]
+    end = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(count, -0.1)])
+    return Toolpath(
+        kind=np.ones(count),
+        end=end,
+        centre=np.full((count, 2), np.nan),
+        feed=np.full(count, 50.0),
+        value=np.full(count, np.nan),
+        source=np.full(count, -1),
+        block=np.arange(count),
+        start=np.zeros(3),
+    )
+
+
+def large(count: int) -> Scene:
+    """A scene of so many moves, with a program and errors."""
+    toolpath = spiral(count)
+    blocks = tuple(f"G01X{x * 1000:09.2f}Y{y * 1000:09.2f}F050;" for x, y, _ in toolpath.end)
+    error = np.abs(np.sin(np.arange(count))) * 0.01
+    scene = Scene("many moves", toolpath=toolpath)
+    return with_run(scene, run_of(toolpath, blocks=blocks, error_mm=error))
+
+
+def text_of(scene: Scene) -> str:
+    return viewer_page(scene).decode("utf-8")
+
+
+def head_of(page: str) -> dict[str, object]:
+    found = re.search(r'<script type="application/json" id="head">(.*?)</script>', page, re.S)
+    assert found is not None
+    return dict(json.loads(found[1]))
