@@ -111,7 +111,8 @@ def _done(client: Client, busy: dict[Future, Task]) -> list[Any]:
     if not busy:
         return []
     try:
-        wait(list(busy), timeout=TICK_S, return_when="FIRST_COMPLETED")
+        with client.as_current():
+            wait(list(busy), timeout=TICK_S, return_when="FIRST_COMPLETED")
     except TimeoutError:
         if client.status != "running" and client.status != "connecting":
             raise CamtoolError(
