@@ -17,6 +17,7 @@ from camtool import __version__
 from camtool.cli.batch import batch
 from camtool.cli.calibrate import calibrate
 from camtool.cli.check import check
+from camtool.cli.completion import VARIABLE, completion, values_told
 from camtool.cli.convert import convert
 from camtool.cli.coupon import coupon
 from camtool.cli.filter import filter_command
@@ -57,11 +58,14 @@ def cli() -> None:
 for _command in (post, batch, verify, convert, preview, check, job, targets, coupon, calibrate):
     cli.add_command(_command)
 cli.add_command(filter_command)
+cli.add_command(completion)
 
 
 def main() -> NoReturn:
     """Run the command line; never returns. One line on stderr for every error."""
     debug = "--debug" in sys.argv[1:]
+    if VARIABLE in os.environ:
+        values_told(cli)
     try:
         code = cli.main(prog_name="camtool", standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)

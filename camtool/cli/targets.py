@@ -14,6 +14,8 @@ import click
 from camtool.cli.options import talk_options
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from camtool.machine.mechanics import PlayCells
     from camtool.machine.model import Machine
 
@@ -24,6 +26,12 @@ class _Targets(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of this name, or the one that shows a target."""
         return super().get_command(ctx, cmd_name) or show
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """The commands and the targets."""
+        from camtool.cli.completion import target_items
+
+        return [*super().shell_complete(ctx, incomplete), *target_items(incomplete)]
 
 
 @click.group(
