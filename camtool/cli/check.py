@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,17 +11,18 @@ import click
 
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import talk_options
-from camtool.cli.output import check_writable, write_all
+from camtool.cli.output import STDOUT, check_writable, write_all
 from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say_findings, say_first_run
+from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
+from camtool.errors import CamtoolError
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
 
 @click.command(cls=SectionedCommand, short_help="What is in a drawing.")
-@click.argument("source", metavar="DRAWING")
+@click.argument("sources", metavar="DRAWING...", nargs=-1, required=True)
 @click.option("--json", "report", metavar="FILE", help="The same as JSON; - is stdout.")
 @click.option(
     "--preview",
@@ -31,36 +33,71 @@ if TYPE_CHECKING:
 @drawing_options
 @talk_options
 def check(
-    source: str,
+    sources: tuple[str, ...],
     report: str | None,
     preview: str | None,
     drawing: DrawingFlags,
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Say what an importer sees in DRAWING (- is stdin).
+    """Say what an importer sees in each DRAWING (- is stdin).
 
-    Units and why, size, layers, entities used and not used, gaps, and the smallest features.
+    Units and why, size, layers, entities used and not used, gaps, and the smallest features. Of
+    several drawings all are looked at, whatever is wrong with one of them.
     """
-    check_writable([report, preview], [source])
+    asked = Asked(report, preview, quiet, verbose)
+    if len(sources) == 1:
+        return _checked(sources[0], drawing, asked)
+    if report is not None or preview is not None:
+        raise click.UsageError("--json and --preview are of one drawing")
     say_first_run(quiet=quiet)
+    return max(_tried(source, drawing, asked) for source in sources)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the user wants to have of a drawing."""
+
+    report: str | None
+    preview: str | None
+    quiet: bool
+    verbose: bool
+
+
+def _tried(source: str, drawing: DrawingFlags, asked: Asked) -> int:
+    """One of several drawings; the exit code of an error is a result like another."""
+    try:
+        return _checked(source, drawing, asked)
+    except CamtoolError as error:
+        say(f"camtool: error: {error}", quiet=False)
+        return error.exit_code
+
+
+def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
+    """The facts of one drawing, and whether any of them is an error."""
+    from camtool.findings import Severity, worst
+
+    check_writable([asked.report, asked.preview], [source])
+    say_first_run(quiet=asked.quiet)
     read = drawing.read(source)
     facts = _facts(read)
     files: dict[str, bytes] = {}
-    if report is not None:
-        files[report] = (json.dumps(facts, indent=2, ensure_ascii=False) + "\n").encode()
-    if preview is not None:
+    if asked.report is not None:
+        text = json.dumps(facts, indent=2, ensure_ascii=False) + "\n"
+        files[asked.report] = text.encode()
+    if asked.preview is not None:
         from camtool.pipeline import picture
         from camtool.preview.render import render
 
-        files[preview] = render(picture(title=Path(read.file).name, drawing=read), preview)
+        scene = picture(title=Path(read.file).name, drawing=read)
+        files[asked.preview] = render(scene, asked.preview)
     write_all(files)
-    if report != "-" and not quiet:
+    if asked.report != STDOUT and not asked.quiet:
         from camtool.cli.check_table import table
 
-        click.echo(table(facts, verbose=verbose))
-    say_findings(read.findings, quiet=quiet, verbose=verbose)
-    return 0
+        click.echo(table(facts, verbose=asked.verbose))
+    say_findings(read.findings, quiet=asked.quiet, verbose=asked.verbose)
+    return 1 if worst(read.findings) >= Severity.ERROR else 0
 
 
 def _facts(drawing: Drawing) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from camtool.cli.filter import filter_command
 from camtool.cli.job import job
 from camtool.cli.post import post
 from camtool.cli.preview import preview
+from camtool.cli.stale import stale
 from camtool.cli.targets import targets
 from camtool.cli.verify import verify
 from camtool.errors import CamtoolError
@@ -46,6 +47,7 @@ def cli() -> None:
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool filter  logo.dxf                    LinuxCNC opens the drawing
+    camtool stale   drawings/ -t pic-mmh        programs that are not of their drawings now
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure
@@ -58,6 +60,7 @@ def cli() -> None:
 for _command in (post, batch, verify, convert, preview, check, job, targets, coupon, calibrate):
     cli.add_command(_command)
 cli.add_command(filter_command)
+cli.add_command(stale)
 cli.add_command(completion)
 
 

@@ -1,0 +1,127 @@
+"""`camtool stale`: are the programs beside drawings what camtool would write of them now?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.cli.options import talk_options
+from camtool.cli.posting import JOB_ENDING, posting_options
+from camtool.cli.sections import SectionedCommand
+from camtool.cli.talk import one_line, say
+from camtool.errors import CamtoolError, InputError
+from camtool.findings import Severity
+
+if TYPE_CHECKING:
+    from camtool.cli.posting import Posting
+    from camtool.machine.registry import LoadedTarget
+
+DRAWINGS = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
+"""What a folder is searched for, and what a program or a job file is taken to belong to."""
+
+
+@click.command(cls=SectionedCommand, short_help="Programs that are not of their drawings now.")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@posting_options
+@click.option("--missing", is_flag=True, help="A drawing without a program is an error too.")
+@talk_options
+def stale(
+    files: tuple[str, ...], posting: Posting, missing: bool, quiet: bool, verbose: bool
+) -> int:
+    """Compare programs with what camtool would write now of the drawings beside them.
+
+    Each FILE is a drawing, its program or its job file (part.dxf, part.nc, part.toml), or a folder
+    to search for drawings. Give the flags that the programs were posted with. Nothing is written;
+    exit code 1 when a program is not byte for byte what it should be.
+    """
+    target = posting.load()
+    posting = replace(posting, no_verify=not posting.gates.given)
+    worst = 0
+    for name, drawings in named_drawings(files).items():
+        if not missing and not _has_program(name):
+            say(f"camtool: {one_line(str(name))}: has no program", quiet=not verbose)
+            continue
+        faults: list[Fault] = []
+        for drawing in drawings:
+            fault = _fault(drawing, posting, target, missing=missing, quiet=quiet)
+            faults += [] if fault is None else [fault]
+            if fault is None:  # of several drawings of one name the program is of one
+                break
+        else:
+            click.echo(one_line(f"camtool: error: {faults[0].words}"), err=True)
+            worst = max(worst, faults[0].code)
+    return worst
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why a program is not what it should be, and the exit code of that."""
+
+    code: int
+    words: str
+
+
+def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
+    """The drawings that these files are, belong to, or lie in, by their names without ending.
+
+    A picture of a program may lie beside its drawing as an SVG of the same name, so that one name
+    may have several; the likeliest is first. InputError for what is not there.
+    """
+    names = dict.fromkeys(name for file in files for name in _names(Path(file)))
+    found = {name: _ordered(_beside(name)) for name in names}
+    return {name: drawings for name, drawings in found.items() if drawings}
+
+
+def _names(file: Path) -> Iterator[Path]:
+    if file.is_dir():
+        for folder, folders, names in os.walk(file):
+            folders.sort()
+            yield from (
+                Path(folder, name).with_suffix("")
+                for name in sorted(names)
+                if Path(name).suffix.lower() in DRAWINGS
+            )
+    elif not os.path.lexists(file):
+        raise InputError("is not there", file=str(file), mend="check the path")
+    else:
+        yield file.with_suffix("")
+
+
+def _ordered(files: list[Path]) -> list[Path]:
+    drawings = [file for file in files if file.suffix.lower() in DRAWINGS]
+    return sorted(drawings, key=lambda file: DRAWINGS.index(file.suffix.lower()))
+
+
+def _beside(name: Path) -> list[Path]:
+    """The files of this name, whatever their ending, sorted."""
+    return sorted(other for other in name.parent.iterdir() if other.with_suffix("") == name)
+
+
+def _has_program(name: Path) -> bool:
+    """Whether anything lies there that may be a program: a dialect may have several endings."""
+    return any(file.suffix.lower() not in (*DRAWINGS, JOB_ENDING) for file in _beside(name))
+
+
+def _fault(
+    drawing: Path, posting: Posting, target: LoadedTarget, *, missing: bool, quiet: bool
+) -> Fault | None:
+    """What is wrong with the program beside a drawing; None when it is as it should be."""
+    try:
+        made = posting.of(str(drawing)).make(str(drawing), target, quiet=quiet)
+    except CamtoolError as error:
+        return Fault(error.exit_code, str(error))
+    program = made.posted.program
+    if made.posted.failed or program is None:
+        grave = next(each for each in made.posted.findings if each.severity >= Severity.ERROR)
+        return Fault(1, f"{drawing}: cannot be posted any more: {grave}")
+    place = drawing.with_suffix(program.extension)
+    if not place.is_file():
+        return Fault(1, f"{place}: is not there; post {drawing}") if missing else None
+    if place.read_bytes() == program.data:
+        return None
+    return Fault(1, f"{place}: is not what camtool writes of {drawing} now; post it again")

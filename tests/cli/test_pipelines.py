@@ -1,0 +1,299 @@
+"""What docs/pipelines.md promises: the hooks, the Makefile and the action, run as they stand."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.cli.conftest import ROOT, Run
+
+PAGE = (ROOT / "docs" / "pipelines.md").read_text(encoding="utf-8")
+HOOKS = {
+    hook["id"]: hook for hook in yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+}
+ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+RING = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="40mm" viewBox="0 0 40 40">'
+    '<circle cx="20" cy="20" r="{radius}"/></svg>'
+)
+HOLE = "0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n8\n0\n10\n9\n20\n9\n40\n5\n0\nENDSEC\n0\nEOF\n"
+"""A circle as the smallest DXF; it has no unit."""
+
+PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+
+
+def ring(file: Path, radius: float = 10.0) -> Path:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(RING.format(radius=radius))
+    return file
+
+
+def entry(hook: str) -> list[str]:
+    """The hook's command, as pre-commit begins it."""
+    name, *arguments = shlex.split(HOOKS[hook]["entry"])
+    assert name == "camtool"
+    return arguments
+
+
+# camtool-check
+
+
+def test_check_passes_good_drawings(camtool: Run, samples: Path) -> None:
+    done = camtool(*entry("camtool-check"), samples / "logo.dxf", samples / "letter.svg")
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+
+
+def test_check_looks_at_all_whatever_is_wrong_with_one(
+    camtool: Run, samples: Path, tmp_path: Path
+) -> None:
+    for name in ("a.dxf", "b.svg"):
+        (tmp_path / name).write_text("no drawing")
+    done = camtool(*entry("camtool-check"), "a.dxf", samples / "logo.dxf", "b.svg")
+    assert done.returncode == 2
+    lines = done.stderr.decode().splitlines()
+    assert [line.split(": ")[2] for line in lines] == ["a.dxf", "b.svg"]
+
+
+def test_check_says_each_drawing(camtool: Run, samples: Path) -> None:
+    done = camtool("check", samples / "logo.dxf", samples / "letter.svg")
+    assert done.stdout.count(b"file      ") == 2
+    done = camtool("check", samples / "logo.dxf", samples / "letter.svg", "--json", "-")
+    assert done.returncode == 2
+
+
+# camtool-stale
+
+
+@pytest.fixture
+def posted(camtool: Run, tmp_path: Path) -> Path:
+    """A drawing and its program beside it."""
+    drawing = ring(tmp_path / "ring.svg")
+    assert camtool("post", drawing, "-t", "grbl", "-o", "ring.nc").returncode == 0
+    return drawing
+
+
+def stale(camtool: Run, *arguments: str | Path) -> tuple[int, str]:
+    done = camtool(*entry("camtool-stale"), "--target", "grbl", *arguments)
+    assert done.stdout == b""
+    return done.returncode, done.stderr.decode()
+
+
+@pytest.mark.parametrize("given", ["ring.svg", "ring.nc", "."])
+def test_a_program_of_its_drawing_is_fine(camtool: Run, posted: Path, given: str) -> None:
+    assert stale(camtool, given) == (0, "")
+
+
+@pytest.mark.parametrize("given", ["ring.svg", "ring.nc"])
+def test_a_changed_drawing_is_seen(camtool: Run, posted: Path, given: str) -> None:
+    ring(posted, 9.0)
+    code, said = stale(camtool, given)
+    assert code == 1
+    assert said == (
+        "camtool: error: ring.nc: is not what camtool writes of ring.svg now; post it again\n"
+    )
+
+
+def test_a_program_that_somebody_touched_is_seen(camtool: Run, posted: Path) -> None:
+    with posted.with_suffix(".nc").open("ab") as stream:
+        stream.write(b"\n")
+    assert stale(camtool, "ring.nc", "ring.svg")[0] == 1
+
+
+def test_other_flags_give_another_program(camtool: Run, posted: Path) -> None:
+    assert stale(camtool, "ring.svg", "--depth", "0.7mm")[0] == 1
+
+
+def test_the_job_beside_it_counts(camtool: Run, posted: Path, tmp_path: Path) -> None:
+    (tmp_path / "ring.toml").write_text('depth = "0.7mm"\n')
+    assert stale(camtool, "ring.toml")[0] == 1
+    camtool("post", posted, "-t", "grbl", "-o", "ring.nc", "--job", "ring.toml")
+    assert stale(camtool, "ring.toml") == (0, "")
+
+
+def test_no_program_is_an_error_only_when_asked(camtool: Run, tmp_path: Path) -> None:
+    ring(tmp_path / "alone.svg")
+    (tmp_path / "alone.toml").write_text("")
+    assert stale(camtool, "alone.svg") == (0, "")
+    code, said = stale(camtool, "--missing", "alone.svg")
+    assert code == 1
+    assert "alone.nc: is not there" in said
+
+
+def test_a_picture_beside_a_drawing_is_no_second_drawing(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "hole.dxf").write_text(HOLE)
+    camtool("post", "hole.dxf", "-t", "grbl", "--report", "hole.md")
+    assert (tmp_path / "hole.svg").exists()
+    assert stale(camtool, ".", "--units", "mm") == (0, "")
+    assert stale(camtool, "hole.svg") == (0, "")
+
+
+def test_what_is_not_there_or_unreadable_is_said(camtool: Run, posted: Path) -> None:
+    assert stale(camtool, "none.dxf")[0] == 2
+    posted.write_text("no drawing")
+    code, said = stale(camtool, "ring.nc")
+    assert code == 2
+    assert said.startswith("camtool: error: ring.svg")
+
+
+def test_files_of_others_are_nothing_to_it(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "readme.txt").write_text("no program")
+    (tmp_path / "pyproject.toml").write_text("")
+    assert stale(camtool, "readme.txt", "pyproject.toml") == (0, "")
+
+
+def test_hooks_take_the_files_that_they_are_for() -> None:
+    check, both = (re.compile(HOOKS[name]["files"]) for name in ("camtool-check", "camtool-stale"))
+    assert all(check.search(name) for name in ("a.dxf", "b/c.svg", "d.step"))
+    assert not check.search("a.nc")
+    from camtool.machine.registry import list_target, target_names
+
+    endings = {list_target(name).target.extension for name in target_names()}
+    assert [e for e in endings if not both.search(f"part{e}")] == []
+    assert {hook["language"] for hook in HOOKS.values()} == {"python"}
+
+
+# the Makefile
+
+
+def test_the_makefile_posts_what_has_changed(tmp_path: Path) -> None:
+    if shutil.which("make") is None:
+        pytest.skip("make is missing")
+    (recipe,) = re.findall(r"```make\n(.*?)```", PAGE, re.DOTALL)
+    (tmp_path / "Makefile").write_text(recipe)
+    (tmp_path / "my-mill.toml").write_text('extends = "grbl"\n')
+    (tmp_path / "drawings").mkdir()
+    (tmp_path / "drawings" / "one.dxf").write_text(HOLE)
+
+    def make() -> str:
+        done = subprocess.run(
+            ["make"], cwd=tmp_path, capture_output=True, text=True,
+            env={**os.environ, "PATH": PATH}, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert "camtool post drawings/one.dxf" in make()
+    assert (tmp_path / "build" / "one.nc").stat().st_size > 100
+    assert (tmp_path / "build" / "one.html").exists()
+    assert "camtool" not in make()
+    newer = (tmp_path / "build" / "one.nc").stat().st_mtime + 10
+    os.utime(tmp_path / "my-mill.toml", (newer, newer))
+    assert "camtool post" in make()
+
+
+# the action
+
+
+def step() -> dict[str, Any]:
+    (found,) = [step for step in ACTION["runs"]["steps"] if step.get("id") == "run"]
+    return found
+
+
+def git(folder: Path, *arguments: str) -> str:
+    who = ("-c", "user.name=t", "-c", "user.email=t@example.org")
+    done = subprocess.run(
+        ["git", *who, *arguments], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def run_action(folder: Path, **values: str) -> tuple[int, str, dict[str, str]]:
+    """(exit code, summary, outputs) of the action's own step in this repository."""
+    there = folder.parent / "runner"
+    shutil.rmtree(there, ignore_errors=True)
+    there.mkdir()
+    inputs = {name.upper(): value.get("default", "") for name, value in ACTION["inputs"].items()}
+    env = {key: str(inputs.get(key, "")) for key in step()["env"]} | values
+    env |= {"OUT": str(there / "out"), "PATH": PATH}
+    env |= {"GITHUB_STEP_SUMMARY": str(there / "summary"), "GITHUB_OUTPUT": str(there / "output")}
+    command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", step()["run"]]
+    done = subprocess.run(
+        command, cwd=folder, env={**os.environ, **env}, capture_output=True, check=False
+    )
+    read = [there / name for name in ("summary", "output")]
+    summary, output = (file.read_text() if file.exists() else "" for file in read)
+    return done.returncode, summary, dict(line.split("=") for line in output.splitlines())
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """A repository of two drawings; its second commit changes one and adds another."""
+    folder = tmp_path / "repository"
+    ring(folder / "old.svg")
+    ring(folder / "parts" / "changed.svg")
+    git(folder, "init", "-q")
+    git(folder, "add", ".")
+    git(folder, "commit", "-qm", "one")
+    ring(folder / "parts" / "changed.svg", 9.0)
+    ring(folder / "parts" / "$(touch owned) `x`;.svg", 8.0)
+    (folder / "parts" / "changed.toml").write_text('depth = "0.7mm"\n')
+    git(folder, "add", ".")
+    git(folder, "commit", "-qm", "two")
+    return folder
+
+
+def test_the_action_posts_changed_drawings(repository: Path) -> None:
+    base = git(repository, "rev-parse", "HEAD~1")
+    code, summary, outputs = run_action(repository, TARGET="grbl", BASE=base)
+    assert code == 0
+    assert outputs == {"checked": "2", "failed": "0"}
+    assert "# changed.svg" in summary
+    assert "old.svg" not in summary
+    assert "![" not in summary
+    made = repository.parent / "runner" / "out" / "parts"
+    assert b"Z-0.7" in (made / "changed.nc").read_bytes()
+    assert (made / "changed.svg").read_bytes().startswith(b"<svg")
+    assert (made / "$(touch owned) `x`;.nc").exists()
+    assert not list(repository.rglob("owned"))
+    assert git(repository, "status", "--porcelain") == ""
+
+
+@pytest.mark.parametrize("base", ["0" * 40, "1" * 40])
+def test_the_action_takes_all_where_the_base_cannot_be_had(repository: Path, base: str) -> None:
+    _, _, outputs = run_action(repository, TARGET="grbl", BASE=base, FLAGS="--no-verify -q")
+    assert outputs["checked"] == "3"
+    assert outputs["failed"] == "3"  # a page is of a verification: the flags were wrong
+
+
+def test_the_action_fails_with_a_page_of_why(repository: Path) -> None:
+    base = git(repository, "rev-parse", "HEAD~1")
+    flags = "--max-time 1s --quiet"
+    code, summary, outputs = run_action(repository, TARGET="grbl", BASE=base, FLAGS=flags)
+    assert code == 1
+    assert outputs == {"checked": "2", "failed": "2"}
+    assert "ABOVE_GATE" in summary
+
+
+def test_the_action_verifies_programs_against_their_drawings(
+    camtool: Run, repository: Path
+) -> None:
+    camtool("post", repository / "old.svg", "-t", "grbl", "-o", repository / "old.nc")
+    git(repository, "add", ".")
+    git(repository, "commit", "-qm", "three")
+    base = git(repository, "rev-parse", "HEAD~1")
+    values = {"TARGET": "grbl", "BASE": base, "MODE": "verify", "FILES": "*.nc"}
+    code, summary, outputs = run_action(repository, **values)
+    assert (code, outputs) == (0, {"checked": "1", "failed": "0"})
+    assert "# old.nc" in summary
+    assert "| --against | ./old.svg |" in summary
+
+
+def test_nothing_of_a_pull_request_stands_in_the_script() -> None:
+    assert "${{" not in "".join(step.get("run", "") for step in ACTION["runs"]["steps"])
+    assert set(step()["env"]) >= {"MODE", "TARGET", "FILES", "FLAGS", "ALL", "BASE", "OUT"}
+    assert ACTION["runs"]["using"] == "composite"
+    assert all("shell" in step for step in ACTION["runs"]["steps"] if "run" in step)
+
+
+def test_the_page_names_every_input_of_the_action_and_every_hook() -> None:
+    for name in (*ACTION["inputs"], *HOOKS):
+        assert f"`{name}`" in PAGE, name
+    for block in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL):
+        assert yaml.safe_load(block)
