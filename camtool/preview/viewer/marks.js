@@ -14,6 +14,7 @@ function paintGrid(ctx, view, colours) {
   const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   ctx.font = "11px system-ui, sans-serif";
   ctx.lineWidth = 1;
+  ctx.lineCap = "butt";
   ctx.setLineDash([]);
   ctx.strokeStyle = colours.grid;
   ctx.fillStyle = colours.quiet;

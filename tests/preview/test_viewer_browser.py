@@ -1,0 +1,289 @@
+"""The viewer in a real browser: Debian's Chromium, headless, led by Playwright."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from camtool.preview.draw import Scene
+from tests.preview.conftest import SCENES
+from tests.preview.viewer_pages import HOSTILE, busy, large, text_of
+
+CHROMIUM = "/usr/bin/chromium"
+# Without the last ones it keeps looking for its maker's hosts.
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+MOST_LOAD_S = 20.0
+MOST_PAINT_S = 6.0
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytestmark = [
+    pytest.mark.referee,
+    pytest.mark.skipif(not Path(CHROMIUM).exists(), reason=f"{CHROMIUM} is not installed"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as tool:
+        running = tool.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield running
+        running.close()
+
+
+class Shown:
+    """A page in the browser, and what it complained about."""
+
+    def __init__(self, browser: Any, scene: Scene, folder: Path, **more: Any) -> None:
+        file = folder / "page.html"
+        file.write_text(text_of(scene), encoding="utf-8")
+        self.page = browser.new_page(viewport={"width": 1200, "height": 800}, **more)
+        self.complaints: list[str] = []
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", self._asked)
+        self.page.goto(file.as_uri())
+        self.page.wait_for_selector("body[data-painted]", timeout=60_000)
+
+    def _asked(self, request: Any) -> None:
+        if not request.url.startswith("file:"):
+            self.complaints.append(f"asks for {request.url}")
+
+    def text(self, place: str) -> str:
+        return str(self.page.inner_text(place))
+
+    def press(self, *keys: str) -> None:
+        for key in keys:
+            self.page.keyboard.press(key)
+
+    def settled(self) -> None:
+        """All frames that were asked for are painted."""
+        self.page.wait_for_timeout(80)
+
+    def pixels(self, canvas: str) -> int:
+        """How many pixels of a canvas are not empty."""
+        self.settled()
+        return int(
+            self.page.evaluate(
+                """(name) => {
+                  const canvas = document.getElementById(name), copy = canvas.cloneNode();
+                  const ctx = copy.getContext("2d", { willReadFrequently: true });
+                  ctx.drawImage(canvas, 0, 0);
+                  const data = ctx.getImageData(0, 0, canvas.width, canvas.height).data;
+                  let seen = 0;
+                  for (let at = 3; at < data.length; at += 4) if (data[at]) seen++;
+                  return seen;
+                }""",
+                canvas,
+            )
+        )
+
+    def place_of(self, x: float, y: float) -> tuple[float, float]:
+        """Where a point of the frame, 0 … 1 of the stage, lies on the page."""
+        box = self.page.locator("#stage").bounding_box()
+        return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+
+@pytest.fixture
+def shown(browser: Any, tmp_path: Path) -> Iterator[Any]:
+    """Opens scenes; nothing that it opened may have complained."""
+    opened: list[Shown] = []
+
+    def show(scene: Scene, **more: Any) -> Shown:
+        opened.append(Shown(browser, scene, tmp_path, **more))
+        return opened[-1]
+
+    yield show
+    for each in opened:
+        complaints = each.complaints
+        each.page.close()
+        assert not complaints
+
+
+@pytest.mark.parametrize("name", ["drawing", "result", "wide", "line", "empty", "empty toolpath"])
+def test_every_scene_opens_without_a_complaint(shown: Any, name: str) -> None:
+    shown(SCENES[name])
+
+
+def test_the_slider_moves_the_tool(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    assert "move\n14," in view.text("#now")
+    end, whole = view.pixels("over"), view.pixels("done")
+    view.page.locator("#slider").fill("3000")
+    assert "move\n14," not in view.text("#now")
+    assert view.pixels("over") != end
+    assert 0 < view.pixels("done") < whole
+    assert not view.text("#clock").startswith(view.text("#clock").split(" of ")[1])
+    view.press("End")
+    assert view.pixels("done") == whole
+
+
+def test_play_goes_on_and_stops(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    view.page.locator("#play").click()
+    view.page.wait_for_timeout(300)
+    assert view.text("#play") == "Pause"
+    first = int(view.page.locator("#slider").input_value())
+    view.page.wait_for_timeout(300)
+    second = int(view.page.locator("#slider").input_value())
+    assert 0 < first < second < 10_000
+    view.page.locator("h1").click()
+    view.press(" ")
+    assert view.text("#play") == "Play"
+    rests = view.page.locator("#slider").input_value()
+    view.page.wait_for_timeout(150)
+    assert view.page.locator("#slider").input_value() == rests
+
+
+def test_hovering_shows_the_block_and_a_click_goes_there(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    assert view.page.locator("#tip").is_hidden()
+    # The lower edge of the plate: its first cut.
+    tip = _find_move(view, view.place_of(0.42, 0.85))
+    assert "N3 G01 X3" in tip
+    assert "block\n4" in tip
+    assert "outline" in tip
+    assert view.text("#listing .current").split() == ["4", "N3", "G01", "X3"]
+    view.page.mouse.down()
+    view.page.mouse.up()
+    assert "move\n4," in view.text("#now")
+    view.page.mouse.move(*view.place_of(0.99, 0.01))
+    assert view.page.locator("#tip").is_hidden()
+
+
+def _find_move(view: Any, at: tuple[float, float]) -> str:
+    """Put the mouse on the move below a place; its words."""
+    for down in range(-40, 41, 2):
+        view.page.mouse.move(at[0], at[1] + down)
+        if view.page.locator("#tip").is_visible():
+            return str(view.text("#tip"))
+    raise AssertionError("there is no move")
+
+
+def test_layers_and_colours(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    plan, done = view.pixels("plan"), view.pixels("done")
+    view.page.locator("#layers input").nth(0).uncheck()
+    assert view.pixels("plan") < plan
+    view.press("3")  # rapids
+    fewer = view.pixels("done")
+    assert 0 < fewer < done
+    view.press("3", "1")
+    assert view.pixels("done") == done
+    assert view.pixels("plan") == plan
+    assert view.page.locator("#scale").is_hidden()
+    view.press("e")
+    assert view.text("#scale-high") == "20 µm"
+    assert view.page.locator("#colour-by").input_value() == "error"
+
+
+def test_keys_zoom_pan_fit_and_step(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    view.settled()
+    fitted = view.page.screenshot()
+    view.press("+", "+", "Shift+ArrowLeft")
+    view.settled()
+    assert view.page.screenshot() != fitted
+    view.press("f")
+    view.settled()
+    assert view.page.screenshot() == fitted
+    view.press("Home", "ArrowRight")
+    assert "move\n2," in view.text("#now") or "move\n3," in view.text("#now")
+    view.press("?")
+    assert view.page.locator("#help").is_visible()
+    view.press("Escape")
+    assert view.page.locator("#help").is_hidden()
+
+
+def test_the_wheel_zooms_where_the_mouse_is(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    _find_move(view, view.place_of(0.42, 0.85))
+    before = view.text("#tip")
+    view.page.mouse.wheel(0, -400)
+    view.settled()
+    box = view.page.locator("#stage").bounding_box()
+    assert box is not None
+    view.page.mouse.move(0, 0)
+    _find_move(view, view.place_of(0.42, 0.85))
+    assert view.text("#tip") == before
+
+
+def test_the_table_shows_a_move(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    assert "Worst moves" in view.text("#tables")
+    view.page.locator("#tables button").click()
+    assert "move\n3," in view.text("#now")
+
+
+def test_dark_and_paper_have_their_own_colours(shown: Any) -> None:
+    light, dark = (
+        shown(busy(SCENES["toolpath"]), color_scheme=scheme) for scheme in ("light", "dark")
+    )
+    assert _paper(light) > 200 > 60 > _paper(dark)
+    dark.page.emulate_media(media="print", color_scheme="dark")
+    assert _paper(dark) > 200
+    assert dark.page.locator("#controls").is_hidden()
+    assert dark.page.locator("#tables").is_visible()
+
+
+def _paper(view: Any) -> int:
+    """The red of the page's ground."""
+    words = view.page.evaluate("() => getComputedStyle(document.body).backgroundColor")
+    return int(words.split("(")[1].split(",")[0])
+
+
+def test_hostile_names_stay_names(shown: Any) -> None:
+    from dataclasses import replace
+
+    scene = busy(SCENES["toolpath"])
+    view = shown(replace(scene, title=HOSTILE, notes=(HOSTILE,)))
+    assert "hack()" in view.text("h1")
+    assert view.page.evaluate("() => typeof hack") == "undefined"
+    assert view.page.locator("img").count() == 0
+
+
+def test_the_picture_shows_the_errors_in_colours(shown: Any) -> None:
+    view = shown(busy(SCENES["result"]))
+    view.press("e")
+    view.settled()
+    colours = view.page.evaluate(
+        """() => {
+          const copy = document.createElement("canvas"), names = ["plan", "done", "over"];
+          const ctx = copy.getContext("2d", { willReadFrequently: true });
+          [copy.width, copy.height] = [600, 400];
+          for (const name of names) ctx.drawImage(document.getElementById(name), 0, 0, 600, 400);
+          const data = new Uint32Array(ctx.getImageData(0, 0, 600, 400).data.buffer);
+          return new Set(data).size;
+        }"""
+    )
+    assert colours > 50
+
+
+def test_many_moves_stay_quick(shown: Any) -> None:
+    begin = time.perf_counter()
+    view = shown(large(200_000))
+    assert time.perf_counter() - begin < MOST_LOAD_S
+    assert view.pixels("done") > 10_000
+    for deed in (
+        lambda: view.page.locator("#slider").fill("5000"),
+        lambda: view.press("+"),
+        lambda: view.page.mouse.move(*view.place_of(0.5, 0.5)),
+        lambda: view.press("e"),
+    ):
+        painted = int(view.page.evaluate("() => document.body.dataset.painted"))
+        begin = time.perf_counter()
+        deed()
+        view.page.wait_for_function(
+            "(before) => Number(document.body.dataset.painted) > before", arg=painted
+        )
+        assert time.perf_counter() - begin < MOST_PAINT_S
+    assert "G01X" in view.text("#now")
