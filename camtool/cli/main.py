@@ -25,6 +25,7 @@ from camtool.cli.job import job
 from camtool.cli.post import post
 from camtool.cli.preview import preview
 from camtool.cli.stale import stale
+from camtool.cli.talk import tinted
 from camtool.cli.targets import targets
 from camtool.cli.verify import verify
 from camtool.errors import CamtoolError
@@ -83,7 +84,7 @@ def main() -> NoReturn:
     except CamtoolError as error:
         if debug:
             traceback.print_exc()
-        click.echo(f"camtool: error: {error}", err=True)
+        click.echo(tinted(f"camtool: error: {error}"), err=True)
         sys.exit(error.exit_code)
     except BrokenPipeError:
         # The reader of our stdout went away; say nothing when Python flushes at exit.

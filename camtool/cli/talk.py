@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -14,10 +16,31 @@ if TYPE_CHECKING:
     from camtool.findings import Finding
 
 
+COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
+"""What a message is called, on a terminal."""
+
+
 def say(text: str, *, quiet: bool) -> None:
     """One message, unless quiet."""
     if not quiet:
-        click.echo(text, err=True)
+        click.echo(tinted(text), err=True)
+
+
+def in_colour(stream: TextIO) -> bool:
+    """Whether a stream is a terminal of somebody who has not said NO_COLOR (no-color.org)."""
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def tinted(text: str) -> str:
+    """A message with the word that says how bad it is in colour, where stderr shows colours."""
+    if not in_colour(sys.stderr):
+        return text
+    words = "|".join(COLOURS)
+    return re.sub(
+        rf"^(camtool: )({words})\b",
+        lambda found: found[1] + click.style(found[2], fg=COLOURS[found[2]], bold=True),
+        text,
+    )
 
 
 def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
@@ -27,7 +50,7 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
     least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
     for finding in findings:
         if finding.severity >= least:
-            click.echo(f"camtool: {one_line(str(finding))}", err=True)
+            click.echo(tinted(f"camtool: {one_line(str(finding))}"), err=True)
 
 
 def one_line(text: str) -> str:

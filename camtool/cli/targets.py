@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.options import talk_options
+from camtool.cli.talk import in_colour
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -112,10 +114,29 @@ def _list(as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps({"targets": rows}, indent=2, ensure_ascii=False))
         return
+    if in_colour(sys.stdout):
+        _table(rows)
+        return
     width = max((len(row["name"]) for row in rows), default=0)
     for row in rows:
         needs = f" (needs --machine FILE: {', '.join(row['needs'])})" if row["needs"] else ""
         click.echo(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}{needs}")
+
+
+def _table(rows: list[dict[str, Any]]) -> None:
+    """The list as a table, for terminals."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("target", "file", "machine", "needs --machine FILE with"):
+        table.add_column(heading)
+    for row in rows:
+        # Titles and keys come from files: they are text, no markup.
+        name, rest = Text(row["name"], style="bold"), (row["extension"], row["title"])
+        table.add_row(name, *map(Text, (*rest, ", ".join(row["needs"]))))
+    Console().print(table)
 
 
 def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bool) -> None:
