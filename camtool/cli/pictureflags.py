@@ -21,28 +21,37 @@ _PICTURE = "Picture"
 
 @dataclass(frozen=True)
 class PictureFlags:
-    """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`."""
+    """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`, `--layers`,
+    `--no-layer`."""
 
     size: int | None
     crop: tuple[float, float, float, float] | None
     dark: bool
     exaggerate: float | None
+    layers: str | None
+    no_layer: tuple[str, ...]
 
     @property
     def given(self) -> bool:
         """Whether anything is asked of the picture."""
-        return self != PictureFlags(None, None, False, None)
+        return self != PictureFlags(None, None, False, None, None, ())
 
     def options(self) -> Options:
         """What `camtool.preview` is told."""
+        from camtool.preview.layers import chosen
         from camtool.preview.options import Options
 
-        return Options(self.size, self.crop, self.dark, self.exaggerate or 1.0)
+        times = 1.0 if self.exaggerate is None else self.exaggerate
+        named = [name.strip() for name in (self.layers or "").split(",") if name.strip()]
+        layers = chosen(named, self.no_layer)
+        return Options(self.size, self.crop, self.dark, times, layers)
 
 
 def picture_options(command: Command) -> Command:
     """Adds `picture: PictureFlags`."""
-    wrapped = gather("picture", PictureFlags, ("size", "crop", "dark", "exaggerate"))(command)
+    wrapped = gather(
+        "picture", PictureFlags, ("size", "crop", "dark", "exaggerate", "layers", "no_layer")
+    )(command)
     return decorate(  # type: ignore[no-any-return]
         wrapped,
         [
@@ -67,6 +76,19 @@ def picture_options(command: Command) -> Command:
                 type=click.FLOAT,
                 metavar="TIMES",
                 help="Draw the predicted path so many times as far from the wanted one.",
+            ),
+            option(
+                _PICTURE,
+                "--layers",
+                metavar="NAME,...",
+                help="Only these layers; those of docs/pictures.md.",
+            ),
+            option(
+                _PICTURE,
+                "--no-layer",
+                multiple=True,
+                metavar="NAME",
+                help="Without this layer.",
             ),
         ],
     )

@@ -104,7 +104,7 @@ def post_drawing(
         decoded,
         target,
         Goal(goal, plan.placed, sent),
-        VerifyOptions(source=drawing.file, tool_diameter_mm=_tool_mm(job)),
+        VerifyOptions(source=drawing.file, tool_diameter_mm=tool_mm(job)),
     )
     beyond = _beyond(verification, gates)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
@@ -147,7 +147,7 @@ def verify_program(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
         source=source,
-        tool_diameter_mm=_tool_mm(job or Job()),
+        tool_diameter_mm=tool_mm(job or Job()),
         worst=WORST_LISTED if judging.worst is None else judging.worst,
     )
     found = _judged(data, decoded, target, goal, options)
@@ -243,7 +243,7 @@ def _read(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     return toolpath
 
 
-def _tool_mm(job: Job) -> float | None:
+def tool_mm(job: Job) -> float | None:
     """The diameter of the one tool that all operations cut with, mm; None for several or none."""
     diameters = {operation.tool.diameter_mm for operation in job.operations}
     return (diameters.pop() or None) if len(diameters) == 1 else None

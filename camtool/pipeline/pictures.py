@@ -33,6 +33,7 @@ def picture(
     `job` tells where it places the drawing in the work frame; `listing` gives the program's lines
     to the viewer.
     """
+    from camtool.pipeline.judge import tool_mm
     from camtool.preview.scene import Scene, scene_of_drawing
 
     if drawing is not None and toolpath is None:
@@ -52,6 +53,8 @@ def picture(
         travel_mm=_travel(toolpath, machine),
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
+        worst=worst_places(verification),
+        tool_mm=None if job is None else tool_mm(job),
         run=_run(toolpath, verification, machine, listing),
     )
 
@@ -71,6 +74,13 @@ def _run(
         return run_of(toolpath, verification, machine, None if listing is None else listing())
 
     return run
+
+
+def worst_places(verification: Verification | None) -> tuple[tuple[float, float], ...]:
+    """Where the largest errors are, mm, the largest first."""
+    if verification is None:
+        return ()
+    return tuple(one.at_mm for one in verification.report.worst)
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:

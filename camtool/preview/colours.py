@@ -29,6 +29,8 @@ RAPID = "#8b96a3"
 PLUNGE = "#f08a1d"
 TRAVEL = "#a99bc9"
 GAP = "#d5311e"
+SWEPT = "#d6e6f6"
+REVERSAL = "#8a2be2"
 
 LAYERS = ("#2b4c6f", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a")
 
@@ -55,6 +57,8 @@ _DARK = {
     PLUNGE: "#f5a03c",
     TRAVEL: "#7d6ca6",
     GAP: "#ff6b57",
+    SWEPT: "#28435f",
+    REVERSAL: "#c79bff",
     "#2b4c6f": "#cfdbe8",
     "#d55e00": "#f0803c",
     "#009e73": "#2fc79a",

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.preview import legend, marks
-from camtool.preview.colours import DRAWING, FEED_PALE, OUTLINE, TRAVEL
+from camtool.preview import legend, marks, numbers
+from camtool.preview.colours import DRAWING, FEED_PALE, OUTLINE, SWEPT, TRAVEL
+from camtool.preview.exaggerate import exaggerated
+from camtool.preview.layers import USUAL
 from camtool.preview.legend import Entry
 from camtool.preview.options import AS_USUAL, Options
 from camtool.preview.scene import Scene
@@ -24,10 +27,12 @@ from camtool.preview.strokes import (
 )
 from camtool.preview.svg import Look
 from camtool.preview.trace import Trace, trace_of
+from camtool.preview.turns import turns_of
 from camtool.preview.view import View, points_box, union, window
 
 Floats = npt.NDArray[np.float64]
 
+T = TypeVar("T")
 NOWHERE: Floats = np.empty((0, 2))
 
 MOST_LAYERS_NAMED = 7
@@ -56,7 +61,9 @@ class Content:
     """`outlines` of the drawing, by layer in `groups`; `starts` (S, 2) mm are those of contours
     that no plunge marks; `places` are those that the drawing notes; `window` (2, 2) mm is what to
     show, and `crop_mm` whether that was asked for; `times` is how many times as large errors are
-    drawn, and `notes` what is said above."""
+    drawn, and `notes` what is said above. `shown` are the names of layers; `swept`
+    is what the tool covers; `reversals` (R, 2) and
+    `worst` (W, 2) are places in mm, empty when they are not shown."""
 
     scene: Scene
     groups: tuple[marks.Group, ...]
@@ -66,6 +73,10 @@ class Content:
     places: Places
     trace: Trace | None
     window: Floats
+    shown: frozenset[str] = USUAL
+    swept: tuple[Chain, ...] = ()
+    reversals: Floats = field(default_factory=lambda: NOWHERE)
+    worst: Floats = field(default_factory=lambda: NOWHERE)
     crop_mm: tuple[float, float, float, float] | None = None
     times: float = 1.0
 
@@ -79,7 +90,7 @@ class Content:
 
     def zero_shown(self, view: View) -> bool:
         """Whether part zero is in the picture; one with nothing in it needs none."""
-        return not self.is_empty and view.shows(0.0, 0.0)
+        return "zero" in self.shown and not self.is_empty and view.shows(0.0, 0.0)
 
     @property
     def is_empty(self) -> bool:
@@ -106,7 +117,8 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
         alone = strokes is None and trace is None
         groups = marks.groups_of(scene.drawing, outlines, alone=alone)
         places = _places(scene.drawing)
-    return Content(
+    tool_mm = scene.tool_mm if "swept" in options.layers else None
+    content = Content(
         scene=scene,
         groups=groups,
         outlines=outlines,
@@ -115,13 +127,63 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
         places=places,
         trace=trace,
         window=(
-            _window(outlines, places.points, strokes, trace)
+            _window(outlines, places.points, strokes, trace, tool_mm)
             if options.crop_mm is None
             else cropped(*options.crop_mm)
         ),
         crop_mm=options.crop_mm,
         times=1.0 if trace is None else trace.times,
     )
+    return _shown(content, options.layers)
+
+
+def _shown(content: Content, layers: frozenset[str]) -> Content:
+    """The content without what is in no layer that is to be seen; the window stays."""
+    scene, strokes = content.scene, content.strokes
+
+    def kept(layer: str, value: T, otherwise: T) -> T:
+        return value if layer in layers else otherwise
+
+    if strokes is not None:
+        strokes = replace(
+            strokes,
+            feeds=kept("feeds", strokes.feeds, ()),
+            ramps=kept("feeds", strokes.ramps, ()),
+            rapids=kept("rapids", strokes.rapids, ()),
+            plunges=kept("plunges", strokes.plunges, NOWHERE),
+        )
+    turns = NOWHERE
+    if "reversals" in layers and scene.toolpath is not None:
+        turns = turns_of(scene.toolpath)
+    return replace(
+        content,
+        scene=replace(scene, travel_mm=kept("travel", scene.travel_mm, None)),
+        groups=kept("drawing", content.groups, ()),
+        outlines=kept("drawing", content.outlines, ()),
+        strokes=strokes,
+        starts=kept("starts", content.starts, NOWHERE),
+        places=kept("doubts", content.places, Places(NOWHERE, NOWHERE, NOWHERE)),
+        trace=kept("path", content.trace, None),
+        reversals=turns,
+        swept=kept("swept", _swept(content), ()),
+        worst=kept("worst", _worst(content), NOWHERE),
+        shown=layers,
+    )
+
+
+def _swept(content: Content) -> tuple[Chain, ...]:
+    """What the tool covers is known where its diameter is."""
+    strokes = content.strokes
+    return (*strokes.feeds, *strokes.ramps) if strokes and content.scene.tool_mm else ()
+
+
+def _worst(content: Content) -> Floats:
+    """(W, 2) where the worst places are drawn."""
+    scene = content.scene
+    places = np.array(scene.worst, dtype=np.float64).reshape(-1, 2)
+    if scene.wanted is None or content.times == 1.0:
+        return places
+    return exaggerated(places, scene.wanted, content.times)
 
 
 def _places(drawing: Drawing) -> Places:
@@ -143,14 +205,20 @@ def cropped(x: float, y: float, width: float, height: float) -> Floats:
 
 
 def _window(
-    outlines: tuple[Chain, ...], points: Floats, strokes: Strokes | None, trace: Trace | None
+    outlines: tuple[Chain, ...],
+    points: Floats,
+    strokes: Strokes | None,
+    trace: Trace | None,
+    tool_mm: float | None,
 ) -> Floats:
     part = [chains_box(outlines), points_box(points)]
     around = [points_box(np.zeros((1, 2)))]
     if trace is not None:
         part.append(points_box(trace.points[trace.cutting]))
     if strokes is not None:
-        part += [chains_box(strokes.feeds), chains_box(strokes.ramps), points_box(strokes.plunges)]
+        cuts = union([chains_box(strokes.feeds), chains_box(strokes.ramps)])
+        reach = 0.5 * (tool_mm or 0.0) * np.array([-1.0, 1.0])
+        part += [None if cuts is None else cuts + reach, points_box(strokes.plunges)]
         around += [chains_box(strokes.rapids), points_box(strokes.begin[None, :])]
     whole = union(part)
     if whole is None and strokes is None:
@@ -238,6 +306,15 @@ def _toolpath_entries(content: Content) -> list[Entry]:
 
 def _mark_entries(content: Content, view: View) -> list[Entry]:
     entries: list[Entry] = []
+    if content.swept:
+        swept = f"tool {content.scene.tool_mm:.4g} mm wide"
+        entries.append(Entry(legend.line_swatch(SWEPT, 9.0), swept))
+    for name, places, look in (
+        ("reversal", content.reversals, marks.reversal_look()),
+        ("largest errors, by rank", content.worst, numbers.worst_look()),
+    ):
+        if any(view.shows(*place) for place in places.tolist()):
+            entries.append(Entry(legend.dot_swatch(look), name))
     for _, name, places, look in content.places.looks():
         if any(view.shows(*place) for place in places.tolist()):
             entries.append(Entry(legend.dot_swatch(look), name))

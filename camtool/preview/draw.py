@@ -10,7 +10,7 @@ random ids, no fonts. Inside the group "mm" coordinates are those of the part, i
 
 from __future__ import annotations
 
-from camtool.preview import axes, legend, marks, text
+from camtool.preview import axes, legend, marks, numbers, text
 from camtool.preview.colours import PAPER, QUIET, darkened
 from camtool.preview.content import Content, content_of
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options, check_width
@@ -80,14 +80,20 @@ def _plot(content: Content, view: View) -> list[str]:
     layers = [element("g", {"id": "mm", "transform": view.matrix()}, *lines)] if lines else []
     strokes, trace = content.strokes, content.trace
     if strokes is not None and trace is None:
-        layers.append(marks.arrows(strokes.feeds, view))
+        if "arrows" in content.shown:
+            layers.append(marks.arrows(strokes.feeds, view))
         layers.append(marks.dots("starts", content.starts.tolist(), view, marks.start_look()))
         plunges = strokes.plunges.tolist()
         layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
+        if "order" in content.shown:
+            layers.append(numbers.order(numbers.placed(strokes.starts.tolist(), view)))
+    turns = content.reversals.tolist()
+    layers.append(marks.dots("reversals", turns, view, marks.reversal_look()))
     if content.zero_shown(view):
         layers.append(marks.origin(view.page(0.0, 0.0)))
     for name, _, places, look in content.places.looks():
         layers.append(marks.dots(name, places.tolist(), view, look))
+    layers.append(numbers.worst(numbers.placed(content.worst.tolist(), view)))
     if content.is_empty:
         middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
         layers.append(text.label("nothing to draw", middle, Style(16.0, QUIET, "middle")))
@@ -100,6 +106,8 @@ def _lines(content: Content, view: View) -> list[str]:
     strokes, trace, travel = content.strokes, content.trace, content.scene.travel_mm
     if content.outlines:
         layers.append(marks.body(content.outlines))
+    if content.swept and content.scene.tool_mm:
+        layers.append(marks.swept(content.swept, content.scene.tool_mm))
     if travel is not None:
         layers.append(marks.travel(travel, view))
     if content.outlines:

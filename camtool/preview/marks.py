@@ -21,6 +21,8 @@ from camtool.preview.colours import (
     PAPER,
     PLUNGE,
     RAPID,
+    REVERSAL,
+    SWEPT,
     TRAVEL,
 )
 from camtool.preview.strokes import Chain, path_data
@@ -100,6 +102,18 @@ def body(chains: Sequence[Chain]) -> str:
         return ""
     fill: Look = {"d": path_data(closed), "fill": BODY, "fill-rule": "evenodd"}
     return element("g", {"id": "body"}, element("path", fill))
+
+
+def swept(chains: Sequence[Chain], tool_mm: float) -> str:
+    """What the tool covers, at its true width."""
+    round_pen: Look = {"stroke-linecap": "round", "stroke-linejoin": "round"}
+    line: Look = {"fill": "none", "stroke": SWEPT, "stroke-width": tool_mm, **round_pen}
+    return element("g", {"id": "swept", **line}, element("path", {"d": path_data(chains)}))
+
+
+def reversal_look() -> Look:
+    """Places where an axis turns: small violet discs."""
+    return {"r": 3.4, "fill": REVERSAL, "stroke": PAPER, "stroke-width": 1.0}
 
 
 def drawing(groups: Sequence[Group], view: View, width: float) -> str:

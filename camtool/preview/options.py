@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from camtool.errors import OptionError
+from camtool.preview.layers import USUAL
 
 SMALLEST_PX, LARGEST_PX = 16, 20_000
 """Widths of pictures that are allowed."""
@@ -23,12 +24,13 @@ class Options:
     """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
     the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
     ground. `exaggerate`: the predicted path is drawn so many times as far from the wanted one.
-    OptionError for sizes that make no picture."""
+    `layers` are the names of those to show. OptionError for sizes that make no picture."""
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None
     dark: bool = False
     exaggerate: float = 1.0
+    layers: frozenset[str] = USUAL
 
     def __post_init__(self) -> None:
         if self.size_px is not None:

@@ -21,7 +21,8 @@ Bools = npt.NDArray[np.bool_]
 class Scene:
     """What to draw; whatever is None or empty is left out.
 
-    `wanted` are the lines and arcs that the trace was held against.
+    `wanted` are the lines and arcs that the trace was held against, `worst` the places of the
+    largest errors, mm, the largest first; `tool_mm` is the diameter of the one tool.
 
     trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
     wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
@@ -41,6 +42,8 @@ class Scene:
     travel_mm: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
     wanted: Segments | None = None
+    worst: tuple[tuple[float, float], ...] = ()
+    tool_mm: float | None = None
     run: Callable[[], Run] | None = None
 
     def __post_init__(self) -> None:

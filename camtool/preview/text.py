@@ -56,6 +56,18 @@ def wrapped(text: str, cap: float, limit: float) -> list[str]:
 
 def label(text: str, at: tuple[float, float], style: Style, *, full: str | None = None) -> str:
     """The strokes of `text` with its baseline at `at`; `full` is the text for screen readers."""
+    data = strokes(text, at, style)
+    spoken = text if full is None else full
+    return element(
+        "g",
+        {"role": "img", "aria-label": spoken},
+        title(spoken),
+        element("path", {"d": data, **stroke_of(style)}) if data else "",
+    )
+
+
+def strokes(text: str, at: tuple[float, float], style: Style) -> str:
+    """The path data of a label; empty when there is nothing to see."""
     shown = one_line(text)
     scale = style.cap / CAP_UNITS
     x = at[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[style.anchor] * width(shown, style.cap)
@@ -67,13 +79,7 @@ def label(text: str, at: tuple[float, float], style: Style, *, full: str | None 
                 to = (x + dx * scale, at[1] + (dy - BASELINE) * scale)
                 (data.line if index else data.move)(*to)
         x += drawn.advance * scale
-    spoken = text if full is None else full
-    return element(
-        "g",
-        {"role": "img", "aria-label": spoken},
-        title(spoken),
-        element("path", {"d": str(data), **stroke_of(style)}) if data else "",
-    )
+    return str(data)
 
 
 def stroke_of(style: Style) -> Look:

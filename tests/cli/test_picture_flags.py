@@ -67,3 +67,15 @@ def test_verify_and_preview_draw_the_same_picture(
 def test_there_is_nothing_to_exaggerate_without_a_prediction(drawing: str) -> None:
     with pytest.raises(click.UsageError, match="--simulate"):
         run("preview", drawing, "-o", "a.svg", "-t", "pic-mmh", "--exaggerate", "2")
+
+
+def test_layers_are_named_or_left_out(drawing: str) -> None:
+    post = ("preview", drawing, "-t", "grbl", "--tool-diameter", "0.2")
+    run(*post, "-o", "a.svg")
+    assert {'id="swept"', 'id="order"'} <= set(Path("a.svg").read_text().replace(">", " ").split())
+    run(*post, "-o", "b.svg", "--no-layer", "swept", "--no-layer", "order")
+    assert not {'id="swept"', 'id="order"'} & set(Path("b.svg").read_text().split())
+    run(*post, "-o", "c.svg", "--layers", "feeds, reversals")
+    assert "rapids" not in Path("c.svg").read_text()
+    with pytest.raises(OptionError, match="no layer"):
+        run(*post, "-o", "c.svg", "--layers", "fed")

@@ -105,8 +105,10 @@ def test_no_two_labels_touch_and_all_are_on_the_page(scene: Scene) -> None:
 def test_labels_stay_out_of_the_plot(scene: Scene) -> None:
     root = svg_page.parse(draw(scene))
     plot = plot_box(root)
+    inside = [svg_page.group(root, name) for name in ("order", "worst")]
+    numbers = {g.get("aria-label") for layer in inside if layer is not None for g in layer.iter()}
     for name, box in svg_page.label_boxes(root).items():
-        if name[0] != "nothing to draw":
+        if name[0] != "nothing to draw" and name[0] not in numbers:
             assert apart(box, plot), name
 
 

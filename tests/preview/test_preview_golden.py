@@ -1,14 +1,28 @@
 """Pictures stay as they are: byte by byte against tests/golden, re-blessed only by --bless."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from camtool.geometry.polylines import Polylines, Segments
 from camtool.preview.draw import draw
-from tests.preview.conftest import SCENES
+from camtool.preview.layers import LAYERS
+from camtool.preview.options import Options
+from tests.preview.conftest import SCENES, circle
 
 GOLDEN = Path(__file__).parents[1] / "golden"
-NAMES = ("drawing", "toolpath", "result", "line")
+DRESSED = replace(
+    SCENES["result"],
+    wanted=Segments.of(Polylines.of([circle(2.5, 2.5, 2.0)])),
+    worst=((4.5, 2.5), (2.5, 4.5)),
+)
+MILLED = replace(SCENES["toolpath"], tool_mm=0.5)
+PICTURES = {
+    **{name: (SCENES[name], Options()) for name in ("drawing", "toolpath", "result", "line")},
+    "dark": (DRESSED, Options(dark=True, size_px=400, exaggerate=10.0)),
+    "layers": (MILLED, Options(layers=frozenset(LAYERS), crop_mm=(0.0, 0.0, 3.0, 3.0))),
+}
 
 
 def compare(name: str, svg: str, folder: Path) -> None:
@@ -17,9 +31,10 @@ def compare(name: str, svg: str, folder: Path) -> None:
     assert svg == path.read_text(encoding="utf-8"), f"{path.name} differs"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", list(PICTURES))
 def test_pictures_stay_as_they_are(name: str, pytestconfig: pytest.Config) -> None:
-    svg = draw(SCENES[name])
+    scene, options = PICTURES[name]
+    svg = draw(scene, options=options)
     if pytestconfig.getoption("--bless", default=False):
         (GOLDEN / f"preview-{name}.svg").write_text(svg, encoding="utf-8")
     compare(name, svg, GOLDEN)

@@ -1,0 +1,42 @@
+"""The layers of a picture by name: which there are, and a picture's content with some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+from camtool.errors import OptionError
+
+LAYERS = (
+    "drawing",
+    "swept",
+    "travel",
+    "rapids",
+    "feeds",
+    "plunges",
+    "starts",
+    "order",
+    "arrows",
+    "reversals",
+    "path",
+    "worst",
+    "zero",
+    "doubts",
+)
+"""Names of layers, from the ground up."""
+
+USUAL = frozenset(LAYERS) - {"reversals"}
+"""What is shown when nobody says."""
+
+
+def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
+    """The layers `names` (none: the usual ones) but those `without`; OptionError for others."""
+    shown, left_out = set(names), set(without)
+    for name in sorted(shown | left_out):
+        if name not in LAYERS:
+            near = get_close_matches(name, LAYERS, 1)
+            meant = f"did you mean {near[0]}? " if near else ""
+            raise OptionError(
+                f"{name!r} is no layer", mend=f"{meant}There are {', '.join(LAYERS)}"
+            )
+    return frozenset(shown or USUAL) - left_out

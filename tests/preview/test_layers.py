@@ -1,0 +1,156 @@
+"""Layers: what each shows, and pictures with some of them only."""
+
+import math
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from camtool.errors import OptionError
+from camtool.preview.content import content_of
+from camtool.preview.draw import Scene, draw, scene_of_toolpath
+from camtool.preview.layers import LAYERS, USUAL, chosen
+from camtool.preview.numbers import CLEAR, placed
+from camtool.preview.options import Options
+from camtool.preview.page import page_of
+from camtool.preview.turns import turns_of
+from camtool.toolpath.builder import ToolpathBuilder
+from tests.oracles import svg_page
+from tests.preview.conftest import SCENES, circle, drawing_of, followed, plate
+
+MILLED = replace(scene_of_toolpath(followed(plate()), title="", drawing=plate()), tool_mm=0.5)
+JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))
+GROUPS = {
+    "drawing": ("drawing",),
+    "swept": ("swept",),
+    "rapids": ("rapids",),
+    "feeds": ("feeds",),
+    "plunges": ("plunges",),
+    "order": ("order",),
+    "arrows": ("arrows",),
+    "reversals": ("reversals",),
+    "zero": ("part-zero",),
+}
+
+
+def ids(scene: Scene, *layers: str) -> set[str]:
+    svg = draw(scene, options=Options(layers=frozenset(layers)))
+    return {g.attrib["id"] for g in svg_page.parse(svg).iter() if "id" in g.attrib}
+
+
+@pytest.mark.parametrize("layer", [name for name in GROUPS if name != "arrows"])
+def test_a_layer_alone_shows_itself_alone(layer: str) -> None:
+    shown = ids(MILLED, layer)
+    assert set(GROUPS[layer]) <= shown
+    others = {group for name, groups in GROUPS.items() if name != layer for group in groups}
+    assert not others & shown
+
+
+@pytest.mark.parametrize("layer", list(GROUPS))
+def test_without_a_layer_the_others_stay(layer: str) -> None:
+    shown = ids(MILLED, *(set(LAYERS) - {layer}))
+    assert not set(GROUPS[layer]) & shown
+    others = {group for name, groups in GROUPS.items() if name != layer for group in groups}
+    needs_feeds = {"arrows"} if layer == "feeds" else set()
+    assert others - needs_feeds <= shown
+
+
+def test_layers_do_not_move_the_picture() -> None:
+    usual = content_of(JUDGED).window
+    for layer in LAYERS:
+        options = Options(layers=frozenset(LAYERS) - {layer})
+        assert content_of(JUDGED, options).window.tolist() == usual.tolist()
+
+
+def test_names_of_layers_are_checked() -> None:
+    assert chosen([], []) == USUAL
+    assert chosen(["feeds", "order"], ["order"]) == {"feeds"}
+    with pytest.raises(OptionError) as found:
+        chosen(["reversal"], [])
+    assert "did you mean reversals?" in str(found.value)
+    with pytest.raises(OptionError, match="no layer"):
+        chosen([], ["x"])
+
+
+def test_the_tool_is_drawn_at_its_true_width() -> None:
+    root = svg_page.parse(draw(MILLED))
+    swept = svg_page.group(root, "swept")
+    assert swept is not None
+    assert float(swept.attrib["stroke-width"]) == 0.5
+    assert "tool 0.5 mm wide" in {g.get("aria-label") for g in root.iter()}
+    feeds = svg_page.group(root, "feeds")
+    assert feeds is not None
+    assert swept[0].attrib["d"] == feeds[0].attrib["d"]
+
+
+def test_what_a_wide_tool_covers_is_in_the_picture() -> None:
+    window = content_of(replace(MILLED, tool_mm=8.0)).window
+    assert (window[:, 0] < 0.5 - 4.0).all()
+    assert (window[:, 1] > 4.5 + 4.0).all()
+
+
+def test_contours_are_numbered_in_their_order() -> None:
+    root = svg_page.parse(draw(MILLED))
+    order = svg_page.group(root, "order")
+    assert order is not None
+    assert [g.get("aria-label") for g in order if "aria-label" in g.attrib] == ["1", "2"]
+
+
+def test_no_number_covers_another_and_crowded_ones_are_left_out() -> None:
+    view = page_of(content_of(SCENES["many paths"])).view
+    rng = np.random.default_rng(7)
+    for count in (10, 100, 400):
+        found = placed(rng.uniform(0.0, 500.0, (count, 2)).tolist(), view)
+        for one, other in combinations([number.box for number in found], 2):
+            apart = one[2] + CLEAR <= other[0] or other[2] + CLEAR <= one[0]
+            assert apart or one[3] + CLEAR <= other[1] or other[3] + CLEAR <= one[1]
+        names = [int(number.name) for number in found]
+        assert names == sorted(names)
+        assert len(names) <= count
+    assert len(found) < 400  # there is no room for all
+
+
+def test_the_worst_places_have_rings_and_ranks() -> None:
+    layer = svg_page.group(svg_page.parse(draw(JUDGED)), "worst")
+    assert layer is not None
+    assert [g.get("aria-label") for g in layer if "aria-label" in g.attrib] == ["1", "2", "3"]
+    assert len([circle for circle in layer if circle.tag.endswith("circle")]) == 3
+
+
+def test_an_axis_turns_at_corners_and_at_quarters_of_circles() -> None:
+    full = ToolpathBuilder((2.0, 0.0, 0.0)).arc(2.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=1.0)
+    turns = turns_of(full.finish())
+    # At 0° it begins and ends: nothing goes before and nothing comes after.
+    assert turns == pytest.approx(np.array([[0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]]), abs=1e-12)
+    tour = ToolpathBuilder()
+    for x, y in ((1.0, 1.0), (2.0, 0.0), (3.0, 0.0), (2.0, 0.0)):
+        tour.line(x, y, feed=1.0)
+    assert turns_of(tour.finish()).tolist() == [[1.0, 1.0], [3.0, 0.0]]
+
+
+def test_a_turn_counts_when_the_tool_is_fed_after_it() -> None:
+    air = ToolpathBuilder().line(1.0, 0.0, feed=1.0).rapid(0.0, 0.0).line(1.0, 0.0, feed=1.0)
+    assert turns_of(air.finish()).tolist() == [[0.0, 0.0]]
+
+
+@pytest.mark.parametrize("ccw", [False, True])
+def test_turns_are_those_of_a_finely_sampled_path(ccw: bool) -> None:
+    path = ToolpathBuilder((1.0, 0.0, 0.0))
+    path.arc(math.cos(2.0), math.sin(2.0), centre=(0.0, 0.0), ccw=ccw, feed=1.0)
+    path.line(-2.0, 0.3, feed=1.0).line(-1.0, 2.0, feed=1.0)
+    toolpath = path.finish()
+    sweep = float(toolpath.sweeps()[0])
+    angle = np.linspace(0.0, sweep, 20_001)
+    points = np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([points, toolpath.end[1:, :2]])
+    last, found = np.zeros(2), 0
+    for step in np.sign(np.diff(points, axis=0)):
+        found += bool((step * last < 0).any())
+        last = np.where(step == 0, last, step)
+    assert len(turns_of(toolpath)) == found
+
+
+def test_pictures_of_all_layers_are_drawn() -> None:
+    scene = scene_of_toolpath(followed(drawing_of([circle(1.0, 1.0, 1.0)], ["0"])), title="all")
+    assert draw(scene, options=Options(layers=frozenset(LAYERS)))
