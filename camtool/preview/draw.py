@@ -79,6 +79,8 @@ def _plot(content: Content, view: View) -> list[str]:
     lines = [layer for layer in _lines(content, view) if layer]
     layers = [element("g", {"id": "mm", "transform": view.matrix()}, *lines)] if lines else []
     strokes, trace = content.strokes, content.trace
+    turns = content.reversals.tolist()
+    layers.append(marks.dots("reversals", turns, view, marks.reversal_look()))
     if strokes is not None and trace is None:
         if "arrows" in content.shown:
             layers.append(marks.arrows(strokes.feeds, view))
@@ -87,8 +89,6 @@ def _plot(content: Content, view: View) -> list[str]:
         layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
         if "order" in content.shown:
             layers.append(numbers.order(numbers.placed(strokes.starts.tolist(), view)))
-    turns = content.reversals.tolist()
-    layers.append(marks.dots("reversals", turns, view, marks.reversal_look()))
     if content.zero_shown(view):
         layers.append(marks.origin(view.page(0.0, 0.0)))
     for name, _, places, look in content.places.looks():

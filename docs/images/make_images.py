@@ -23,7 +23,7 @@ from camtool.preview.render import render
 from camtool.preview.scene import Scene
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("docs/toolpaths.md", "docs/reversals.md", "docs/verifying.md")
+PAGES = ("docs/toolpaths.md", "docs/reversals.md", "docs/verifying.md", "docs/pictures.md")
 DISTANCE_MM = 1.6
 
 

@@ -13,7 +13,7 @@ from camtool.cli.main import cli
 ROOT = Path(__file__).parents[2]
 PAGES = {
     name: (ROOT / "docs" / name).read_text(encoding="utf-8")
-    for name in ("toolpaths.md", "verifying.md")
+    for name in ("toolpaths.md", "verifying.md", "pictures.md")
 }
 COMMANDS = [
     found
