@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -53,6 +54,17 @@ class JobFlags:
         if drawing.layers and len(job.operations) == 1:
             return replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
         return job
+
+    def tool_table(self) -> str | None:
+        """The file of the tool table that the flag or the job file names; None without any, and
+        where the job file cannot be read: `job` says why."""
+        if self.file is None or "tool_table" in self.given:
+            return self.given.get("tool_table")
+        try:
+            name = tomllib.loads(Path(self.file).read_text(encoding="utf-8")).get("tool_table")
+        except (OSError, ValueError):
+            return None
+        return str(Path(self.file).parent / name) if isinstance(name, str) else None
 
     @contextmanager
     def blamed(self) -> Iterator[None]:

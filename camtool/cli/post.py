@@ -68,4 +68,4 @@ def post(
             target=target,
         )
 
-    return watch(once, posting.files(source), quiet=quiet) if watching else once()
+    return watch(once, lambda: posting.files(source), quiet=quiet) if watching else once()

@@ -96,8 +96,9 @@ class Posting:
         return Made(read, wanted, posted, target)
 
     def files(self, source: str) -> list[str]:
-        """The files that a program is made of: drawing, job and machine."""
-        return [file for file in (source, self.job.file, self.machine.machine) if file is not None]
+        """The files that a program is made of: drawing, job, its tool table, and machine."""
+        given = (source, self.job.file, self.job.tool_table(), self.machine.machine)
+        return [file for file in given if file is not None]
 
     def of(self, source: str) -> Posting:
         """The same with the drawing's own job file, `part.toml` beside `part.dxf`, if it has one.

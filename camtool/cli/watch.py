@@ -20,28 +20,30 @@ POLL_S = 0.4
 SETTLED_S = 0.2
 """A change counts when the files are the same after so long."""
 
-Digests = tuple[bytes | None, ...]
+Files = Callable[[], Sequence[str]]
+Digests = dict[str, bytes | None]
 
 
 def watch(
     again: Callable[[], int],
-    files: Sequence[str],
+    files: Files,
     *,
     quiet: bool,
     wait: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Calls `again` now and after each change of `files`, until Ctrl-C; then 0.
+    """Calls `again` now and after each change of the `files`, until Ctrl-C; then 0.
 
+    Which files these are may change with what they hold: a job file names a tool table.
     What is wrong is said on one line, and watching goes on: the next save may mend it.
     """
     try:
-        say(f"camtool: watching {', '.join(files)}; Ctrl-C ends", quiet=quiet)
         seen = _digests(files)
+        say(f"camtool: watching {', '.join(seen)}; Ctrl-C ends", quiet=quiet)
         _tried(again)
         while True:
             wait(POLL_S)
             now = _settled(files, seen, wait)
-            changed = [file for file, a, b in zip(files, now, seen, strict=True) if a != b]
+            changed = [file for file in now if file not in seen or now[file] != seen[file]]
             seen = now
             if changed:
                 say(f"camtool: changed: {', '.join(changed)}", quiet=quiet)
@@ -58,7 +60,7 @@ def _tried(again: Callable[[], int]) -> None:
         say(f"camtool: error: {error}", quiet=False)
 
 
-def _settled(files: Sequence[str], seen: Digests, wait: Callable[[float], None]) -> Digests:
+def _settled(files: Files, seen: Digests, wait: Callable[[float], None]) -> Digests:
     """What the files hold; where that has changed, once it stays the same."""
     now = _digests(files)
     while now != seen:
@@ -69,9 +71,9 @@ def _settled(files: Sequence[str], seen: Digests, wait: Callable[[float], None])
     return now
 
 
-def _digests(files: Sequence[str]) -> Digests:
+def _digests(files: Files) -> Digests:
     """The content of each file as a digest; None for what cannot be read just now."""
-    return tuple(_digest(Path(file)) for file in files)
+    return {file: _digest(Path(file)) for file in files()}
 
 
 def _digest(file: Path) -> bytes | None:

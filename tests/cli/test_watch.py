@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from camtool.cli.jobflags import JobFlags
 from camtool.cli.watch import POLL_S, SETTLED_S, watch
 from camtool.errors import DrawingError
 from tests.cli.conftest import Run
@@ -54,7 +55,7 @@ def rounds(file: Path, *steps: Callable[[], object]) -> list[str | None]:
         held.append(file.read_text() if file.exists() else None)
         return 1
 
-    assert watch(again, [str(file), "missing.toml"], quiet=True, wait=Days(*steps)) == 0
+    assert watch(again, lambda: [str(file), "missing.toml"], quiet=True, wait=Days(*steps)) == 0
     return held
 
 
@@ -76,7 +77,7 @@ def test_a_file_in_several_goes_counts_when_it_has_settled(file: Path) -> None:
     steps = [lambda part=part: file.write_text("two"[:part]) for part in (0, 1, 2, 3)]
     days = Days(*steps, nothing, nothing)
     held: list[str] = []
-    watch(lambda: held.append(file.read_text()) or 0, [str(file)], quiet=True, wait=days)
+    watch(lambda: held.append(file.read_text()) or 0, lambda: [str(file)], quiet=True, wait=days)
     assert held == ["one", "two"]
     assert days.waited[:6] == [POLL_S, *[SETTLED_S] * 4, POLL_S]
 
@@ -102,7 +103,7 @@ def test_a_change_while_it_runs_is_seen(file: Path) -> None:
             file.write_text("two")
         return 0
 
-    watch(again, [str(file)], quiet=True, wait=Days(nothing, nothing, nothing))
+    watch(again, lambda: [str(file)], quiet=True, wait=Days(nothing, nothing, nothing))
     assert held == ["one", "two"]
 
 
@@ -115,9 +116,33 @@ def test_an_error_is_said_and_watching_goes_on(file: Path, capsys) -> None:
         raise DrawingError("is no drawing", file="a.txt")
 
     days = Days(lambda: file.write_text("two"), nothing, nothing)
-    assert watch(again, [str(file)], quiet=True, wait=days) == 0
+    assert watch(again, lambda: [str(file)], quiet=True, wait=days) == 0
     assert count == 2
     assert capsys.readouterr().err == "camtool: error: a.txt: is no drawing\n" * 2
+
+
+def test_a_tool_table_of_the_job_is_watched(tmp_path: Path) -> None:
+    job = tmp_path / "job.toml"
+    flags = JobFlags(str(job), (), {})
+    assert flags.tool_table() is None
+    job.write_text("tool_table = [")
+    assert flags.tool_table() is None
+    job.write_text('tool_table = "my.tbl"')
+    assert flags.tool_table() == str(tmp_path / "my.tbl")
+    assert JobFlags(str(job), (), {"tool_table": "other.tbl"}).tool_table() == "other.tbl"
+
+
+def test_a_file_that_is_named_anew_counts(file: Path, tmp_path: Path) -> None:
+    names, count = [str(file)], 0
+
+    def again() -> int:
+        nonlocal count
+        count += 1
+        return 0
+
+    days = Days(lambda: names.append(str(tmp_path / "new.tbl")), nothing, nothing)
+    watch(again, lambda: names, quiet=True, wait=days)
+    assert count == 2
 
 
 @pytest.mark.parametrize("flags", [("-", "-o", "a.nc"), ("a.svg", "-o", "-")])
