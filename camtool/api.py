@@ -33,6 +33,7 @@ __all__ = [
     "Judging",
     "ListedTarget",
     "LoadedTarget",
+    "Looks",
     "Operation",
     "Picture",
     "Placement",
@@ -76,6 +77,18 @@ class Reading(TypedDict, total=False):
     exclude_layers: Sequence[str]
     colours: Sequence[str]
     line_types: Sequence[str]
+
+
+class Looks(TypedDict, total=False):
+    """How a picture looks: the fields of `camtool.preview.options.Options`. `size_px` is its
+    width, `crop_mm` the part (x, y, width, height) that it shows, `exaggerate` how many times as
+    far from the wanted path the predicted one is drawn, `layers` the names of those to show."""
+
+    size_px: int | None
+    crop_mm: tuple[float, float, float, float] | None
+    dark: bool
+    exaggerate: float
+    layers: frozenset[str]
 
 
 _SELECTION = ("layers", "exclude_layers", "colours", "line_types")
@@ -182,6 +195,7 @@ def post(
         verdict = extended(
             Verification,
             made.verification,
+            data=b"" if made.program is None else made.program.data,
             decoded=made.decoded,
             target=loaded,
             drawing=read,
@@ -214,23 +228,21 @@ def verify(
         data, loaded, source=source, drawing=read, job=job, judging=judging
     )
     context = {"target": loaded, "drawing": read, "job": job or Job()}
-    return extended(Verification, found, decoded=decoded, **context)
+    return extended(Verification, found, data=data, decoded=decoded, **context)
 
 
 def preview(
     what: DrawingRecord | ToolpathRecord | PostedRecord | Verification,
-    *,
-    width_px: int = 1000,
+    **looks: Unpack[Looks],
 ) -> Picture:
     """The picture of what any of these calls gave: the drawing, its toolpath, or the path that
     the slides are predicted to take, coloured by its error (µm, with scale).
 
-    The page is `width_px` wide; for the same value its bytes are the same. Raises OptionError for
-    a width that cannot be drawn. Source: docs/overview.md.
+    Raises OptionError for looks that make no picture. Source: docs/viewer.md, docs/overview.md.
     """
-    from camtool.preview.draw import draw
+    from camtool.preview.options import Options
 
-    return Picture(draw(_shown(what)._scene(), size_px=width_px))
+    return Picture(_shown(what)._scene(), Options(**looks))
 
 
 def _shown(what: Any) -> Drawing | Toolpath | Posted | Verification:

@@ -20,6 +20,7 @@ from camtool.verify.verify import Verification as VerificationRecord
 if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
+    from camtool.preview.options import Options
     from camtool.preview.scene import Scene
 
 Made = TypeVar("Made")
@@ -33,29 +34,31 @@ def extended(kind: type[Made], record: Any, **more: Any) -> Made:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Picture:
-    """An SVG picture (`svg`, text), the same for the same values; `png` makes pixels of it."""
+    """A picture of `scene`, looking as `options` say; the same bytes for the same values."""
 
-    svg: str
+    scene: Scene
+    options: Options
 
-    def png(self, width_px: int = 1200) -> bytes:
-        """The picture in PNG; OptionError for a width that cannot be drawn."""
-        from camtool.preview.draw import png
+    @property
+    def svg(self) -> str:
+        """The picture as SVG text; OptionError for options that make no picture."""
+        from camtool.preview.draw import draw
 
-        return png(self.svg, width_px)
+        return draw(self.scene, options=self.options)
+
+    def render(self, name: str) -> bytes:
+        """The bytes of a file of this name: .svg, .png, or .html, which is the viewer (it has no
+        options). OutputError for any other."""
+        from camtool.preview.render import render
+
+        return render(self.scene, name, self.options)
 
     def save(self, file: str | Path) -> None:
-        """Write it as .svg or .png, by the file's extension; OutputError for any other."""
-        from camtool.errors import OutputError
-
-        suffix = PurePath(file).suffix.lower()
-        if suffix not in (".svg", ".png"):
-            raise OutputError(
-                "is no kind of picture that we make", file=str(file), mend="use .svg or .png"
-            )
-        Path(file).write_bytes(self.svg.encode() if suffix == ".svg" else self.png())
+        """Write the file, by its extension; raises as `render` does."""
+        Path(file).write_bytes(self.render(str(file)))
 
     def __repr__(self) -> str:
-        return f"<Picture, {len(self.svg)} characters of SVG>"
+        return f"<Picture of {self.scene.title}>" if self.scene.title else "<Picture>"
 
     def _repr_svg_(self) -> str:
         return self.svg
@@ -86,7 +89,7 @@ class Drawing(_Shown, DrawingRecord):
         return picture(title=PurePath(self.file).name, drawing=self)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Toolpath(_Shown, ToolpathRecord):
     """Moves in the work frame, mm and mm/min (`camtool.toolpath.moves.Toolpath`); `drawing`,
     `job` and `target` are what it was planned from."""
@@ -112,12 +115,13 @@ class Toolpath(_Shown, ToolpathRecord):
         )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verification(_Shown, VerificationRecord):
     """The verdict on a program (`camtool.verify.verify.Verification`): `report` holds the
     figures, `findings` what is to be said. `decoded` is the toolpath that the controller makes of
-    the program; it was held against `drawing`, planned with `job`, where there is one."""
+    the program `data`; it was held against `drawing`, planned with `job`, where there is one."""
 
+    data: bytes
     decoded: ToolpathRecord
     target: LoadedTarget
     drawing: DrawingRecord | None = None
@@ -134,7 +138,7 @@ class Verification(_Shown, VerificationRecord):
         return f"<Verification of {report.source} on {report.target}: {said}, {noticed}>"
 
     def _scene(self) -> Scene:
-        from camtool.pipeline import picture
+        from camtool.pipeline import listing_of, picture
 
         return picture(
             title=PurePath(self.report.source).name,
@@ -143,10 +147,11 @@ class Verification(_Shown, VerificationRecord):
             toolpath=self.decoded,
             verification=self,
             machine=self.target.machine,
+            listing=listing_of(self.data, self.target, self.decoded),
         )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Posted(_Shown, PostedRecord):
     """A drawing as a program (`camtool.pipeline.Posted`), with what it was made from."""
 
@@ -174,7 +179,7 @@ class Posted(_Shown, PostedRecord):
         return f"<Posted {name} for {target}: {made}, {_noticed(len(self.findings))}>"
 
     def _scene(self) -> Scene:
-        from camtool.pipeline import picture
+        from camtool.pipeline import picture, posted_listing
 
         return picture(
             title=PurePath(self.drawing.file).name,
@@ -183,6 +188,7 @@ class Posted(_Shown, PostedRecord):
             toolpath=self.decoded or self.wanted,
             verification=self.verification,
             machine=self.target.machine,
+            listing=posted_listing(self, self.target),
         )
 
 

@@ -13,6 +13,7 @@ import camtool
 from camtool import api
 from camtool.cli.main import cli
 from camtool.importers.options import ReadOptions, Selection
+from camtool.preview.options import Options
 from camtool.results import Posted, Verification, extended
 
 LOGO = Path("samples/logo.dxf")
@@ -69,6 +70,27 @@ assert callable(camtool.preview) and not callable(camtool.pipeline)
 def test_reading_takes_every_field_of_the_options() -> None:
     wanted = {each.name for each in (*fields(ReadOptions), *fields(Selection))} - {"select"}
     assert set(api.Reading.__annotations__) == wanted
+
+
+def test_pictures_take_every_option() -> None:
+    assert set(api.Looks.__annotations__) == {each.name for each in fields(Options)}
+
+
+def test_looks_change_a_picture(posted: Posted) -> None:
+    usual = camtool.preview(posted)
+    for looks in ({"size_px": 400}, {"dark": True}, {"crop_mm": (0.0, 0.0, 1.0, 1.0)}):
+        assert camtool.preview(posted, **looks).svg != usual.svg
+    assert usual.svg == usual.render("square.svg").decode() == usual._repr_svg_()
+    assert repr(usual) == "<Picture of square.csv>"
+
+
+def test_the_viewer_has_the_programs_blocks(posted: Posted, tmp_path: Path) -> None:
+    camtool.preview(posted).save(tmp_path / "square.html")
+    assert posted.verification is not None
+    page = camtool.preview(posted.verification).render("x.html")
+    assert b"<html" in page
+    assert b"G01" in page
+    assert (tmp_path / "square.html").read_bytes().startswith(b"<!")
 
 
 def test_a_drawing_prints_and_shows_itself() -> None:
