@@ -93,6 +93,11 @@ def bin_colours(*, dark: bool = False) -> tuple[str, ...]:
     return tuple(sequential((index + 0.5) / BINS, dark=dark) for index in range(BINS))
 
 
+def on_dark(colour: str) -> str:
+    """What stands on dark ground for a colour of the light palette; KeyError for any other."""
+    return _DARK[colour]
+
+
 def darkened(svg: str) -> str:
     """A picture of the light palette in the dark one: only colours of fills and strokes change."""
     instead = _DARK | dict(zip(bin_colours(), bin_colours(dark=True), strict=True))

@@ -108,7 +108,7 @@ def test_names_stay_names(words: str) -> None:
     assert [name for name, _ in tags.tags] == [name for name, _ in clean.tags]
     assert tags.scripts[-1] == clean.scripts[-1]
     head = head_of(page)
-    assert head["layers"] == [{"name": words, "colour": "#2b4c6f"}]
+    assert head["layers"] == [{"name": words, "light": "#2b4c6f", "dark": "#cfdbe8"}]
     assert head["tables"] == [
         {"title": words, "columns": [words], "rows": [{"cells": [words], "move": 0}]}
     ]

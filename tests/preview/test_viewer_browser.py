@@ -229,6 +229,10 @@ def test_dark_and_paper_have_their_own_colours(shown: Any) -> None:
         shown(busy(SCENES["toolpath"]), color_scheme=scheme) for scheme in ("light", "dark")
     )
     assert _paper(light) > 200 > 60 > _paper(dark)
+    dark.page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
+    assert _paper(dark) > 200
+    dark.page.evaluate("() => dispatchEvent(new Event('afterprint'))")
+    assert _paper(dark) < 60
     dark.page.emulate_media(media="print", color_scheme="dark")
     assert _paper(dark) > 200
     assert dark.page.locator("#controls").is_hidden()

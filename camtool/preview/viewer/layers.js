@@ -37,6 +37,21 @@ class Layers {
     this.on.set(key, true);
   }
 
+  /** [left, low, right, high] mm of the predicted path where it cuts; null without one. */
+  traced() {
+    const { trace_point: points, trace_error: errors } = this.columns;
+    const box = [Infinity, Infinity, -Infinity, -Infinity];
+    for (let at = 0; at < errors.length; at++) {
+      if (!(errors[at] >= 0)) continue;
+      const x = points[2 * at], y = points[2 * at + 1];
+      box[0] = Math.min(box[0], x);
+      box[1] = Math.min(box[1], y);
+      box[2] = Math.max(box[2], x);
+      box[3] = Math.max(box[3], y);
+    }
+    return box[0] <= box[2] ? box : null;
+  }
+
   bin(um) {
     const count = this.head.map.light.length;
     if (!(um >= 0)) return count;
@@ -62,10 +77,9 @@ class Layers {
     return { error, height };
   }
 
-  mapColours() {
-    const dark = matchMedia("(prefers-color-scheme: dark)").matches && !this.printing;
-    return dark ? this.head.map.dark : this.head.map.light;
-  }
+  get isDark() { return matchMedia("(prefers-color-scheme: dark)").matches && !this.printing; }
+
+  mapColours() { return this.isDark ? this.head.map.dark : this.head.map.light; }
 
   /** The move's style: its sort while coloured by kind, else its step of the map. */
   moveStyles(colours) {
@@ -109,13 +123,13 @@ class Layers {
     return this.head.layers.map((layer, index) => {
       if (!this.on.get(`drawing ${index}`)) return null;
       return alone
-        ? { colour: this.mapOfLayer(layer, colours), width: 1.5 }
+        ? { colour: this.colourOfLayer(layer, colours), width: 1.5 }
         : { colour: colours.drawing, width: 4 };
     });
   }
 
-  mapOfLayer(layer, colours) {
-    return this.head.layers.length > 1 ? layer.colour : colours.feed;
+  colourOfLayer(layer, colours) {
+    return this.head.layers.length > 1 ? layer[this.isDark ? "dark" : "light"] : colours.feed;
   }
 
   /** Whether a move is to be seen. */

@@ -57,8 +57,10 @@ function listen(parts) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", anew);
   const print = (printing) => () => {
     stage.layers.printing = printing;
+    document.documentElement.classList.toggle("paper", printing);
     panel.scale();
-    stage.paintNow();
+    if (printing) stage.paintForPrint();
+    else stage.paintNow();
   };
   window.addEventListener("beforeprint", print(true));
   window.addEventListener("afterprint", print(false));

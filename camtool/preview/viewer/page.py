@@ -15,10 +15,11 @@ import json
 import re
 from collections.abc import Mapping
 from importlib import resources
+from itertools import cycle
 
 import numpy as np
 
-from camtool.preview.colours import LAYERS, bin_colours
+from camtool.preview.colours import LAYERS, bin_colours, on_dark
 from camtool.preview.scene import Scene
 from camtool.preview.viewer.columns import columns_of, layer_names, packed
 from camtool.preview.viewer.run import Run, Table, by_feed
@@ -44,9 +45,6 @@ SCRIPTS = (
 
 LEAST_TOP_UM = 1e-3
 """The colour map ends here when no error is larger."""
-
-_DARK = ("#5a63d8", "#8a55d6", "#b44cc0", "#d8558f", "#ee7361", "#fba046", "#fde04a")
-"""The map on dark ground: as light as it must be to be seen there, and growing lighter."""
 
 _SLOT = re.compile(r"\{([a-z]+)\}")
 
@@ -86,16 +84,16 @@ def _head(scene: Scene, run: Run | None) -> dict[str, object]:
     blocks = None if run is None or run.blocks is None else run.blocks
     return {
         "layers": [
-            {"name": name, "colour": LAYERS[index % len(LAYERS)]}
-            for index, name in enumerate(names)
+            {"name": name, "light": colour, "dark": on_dark(colour)}
+            for name, colour in zip(names, cycle(LAYERS), strict=False)
         ],
         "sources": [] if drawing is None else list(drawing.sources),
         "texts": [] if toolpath is None else list(toolpath.texts),
         "blocks": None if blocks is None else "\n".join(map(_one_line, blocks)),
         "hex": run is not None and run.binary,
-        "tool_mm": None if run is None else run.tool_mm,
+        "tool_mm": scene.tool_mm if run is None or run.tool_mm is None else run.tool_mm,
         "top_um": _top_um(scene, run),
-        "map": {"light": bin_colours(), "dark": _dark_colours()},
+        "map": {"light": bin_colours(), "dark": bin_colours(dark=True)},
         "tables": [] if run is None else [_table(table) for table in run.tables],
         "worst": [] if run is None else [{"at": place.at_mm} for place in run.worst],
     }
@@ -117,18 +115,6 @@ def _top_um(scene: Scene, run: Run | None) -> float:
     if scene.trace_error_mm is not None and scene.trace_cutting is not None:
         errors += np.abs(scene.trace_error_mm[scene.trace_cutting]).tolist()
     return round(max(errors) * UM_PER_MM, 6)
-
-
-def _dark_colours() -> tuple[str, ...]:
-    """As many steps as on light ground."""
-    count, places = len(bin_colours()), np.linspace(0.0, 1.0, len(_DARK))
-    channels = np.array([[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in _DARK])
-    shares = (np.arange(count) + 0.5) / count
-    mixed = np.column_stack([np.interp(shares, places, channel) for channel in channels.T])
-    return tuple(
-        "#" + "".join(f"{value:02x}" for value in row)
-        for row in np.rint(mixed).astype(int).tolist()
-    )
 
 
 def _policy(script: str, style: str) -> str:

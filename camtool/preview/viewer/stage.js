@@ -24,19 +24,21 @@ class Stage {
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.place;
-    const ratio = window.devicePixelRatio || 1;
-    this.view.resize(width, height);
+    const ratio = window.devicePixelRatio || 1, { view } = this;
+    if (this.painted && view.width === width && view.height === height) return;
+    view.resize(width, height);
     for (const ctx of Object.values(this.contexts)) {
       ctx.canvas.width = Math.round(width * ratio);
       ctx.canvas.height = Math.round(height * ratio);
       ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     }
-    if (this.view.isFitted) this.fit();
-    else this.changed();
+    // Canvases of another size are empty: no waiting here.
+    if (view.isFitted) this.fit();
+    this.paintNow();
   }
 
   fit() {
-    const boxes = [this.drawing.extent(), this.moves.extent()].filter(Boolean);
+    const boxes = [this.drawing.extent(), this.moves.extent(), this.layers.traced()].filter(Boolean);
     if (!boxes.length) boxes.push([0, 0, 1, 1]);
     const whole = [0, 1, 2, 3].map((k) => (k < 2 ? Math.min : Math.max)(...boxes.map((box) => box[k])));
     this.view.fit(whole);
@@ -143,8 +145,17 @@ class Stage {
     if (moves.count) paintTool(ctx, view, moves, run, this.layers.head.tool_mm, colours);
   }
 
-  /** All anew, and now: before printing. */
+  /** Everything on the lowest canvas, in the colours of paper: on paper, what is cleared on one
+   * canvas would hide those below it. */
+  paintForPrint() {
+    this.paintNow();
+    const { plan, done, over } = this.contexts, { width, height } = this.view;
+    for (const ctx of [done, over]) plan.drawImage(ctx.canvas, 0, 0, width, height);
+  }
+
+  /** All anew, and now. */
   paintNow() {
+    clearTimeout(this.resting);
     this.wantsAll = true;
     this.paint();
   }
