@@ -285,6 +285,16 @@ def test_the_action_verifies_programs_against_their_drawings(
     assert "| --against | ./old.svg |" in summary
 
 
+def test_the_action_passes_over_pictures_of_programs(repository: Path) -> None:
+    (repository / "old.dxf").write_text(HOLE)
+    git(repository, "add", ".")
+    git(repository, "commit", "-qm", "three")
+    values = {"TARGET": "grbl", "ALL": "true", "FILES": "old.*", "FLAGS": "--units mm"}
+    code, summary, outputs = run_action(repository, **values)
+    assert (code, outputs) == (0, {"checked": "1", "failed": "0"})
+    assert "# old.dxf" in summary
+
+
 def test_nothing_of_a_pull_request_stands_in_the_script() -> None:
     assert "${{" not in "".join(step.get("run", "") for step in ACTION["runs"]["steps"])
     assert set(step()["env"]) >= {"MODE", "TARGET", "FILES", "FLAGS", "ALL", "BASE", "OUT"}
