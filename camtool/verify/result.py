@@ -42,8 +42,11 @@ class Result:
     rows: RowFigures
     tally: Tally
 
-    def report(self, extents: Floats, findings: tuple[Finding, ...], trace: Trace) -> Report:
-        """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides."""
+    def report(
+        self, extents: Floats, findings: tuple[Finding, ...], trace: Trace | None
+    ) -> Report:
+        """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides
+        where a shape is to be made of it."""
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
@@ -203,9 +206,9 @@ class Result:
         missed = missed_ends(self.rows, self.cuts.toolpath, steps)
         return record.UnreachedReport(missed.count, certain(missed.most_mm * UM_PER_MM))
 
-    def _shape(self, trace: Trace) -> record.ShapeReport | None:
+    def _shape(self, trace: Trace | None) -> record.ShapeReport | None:
         diameter = self.case.options.tool_diameter_mm
-        if not diameter:
+        if not diameter or trace is None:
             return None
         from camtool.verify.shape import machined_shape  # loads shapely
 

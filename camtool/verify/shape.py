@@ -6,7 +6,8 @@ and a depth, how far its farthest point lies from the other shape.
 
 Arcs are chords here, and so are the discs' edges: both shapes with the same tolerance, so that
 depths are wrong by two of it at most; what is not deeper than that is nothing. All depths of a
-job are seen as one. The predicted path is the thinned one of the trace, which keeps the peaks.
+job are seen as one. The predicted path is the thinned one of the trace, which must have points
+enough for its arcs (`points_wanted`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Floats
-from camtool.verify.cuts import CutMoves
+from camtool.verify.cuts import CutMoves, moved_lengths
 from camtool.verify.trace import Trace
 
 SHAPE_TOLERANCE_MM = 5e-4
@@ -30,6 +31,13 @@ TOLERANCE_SHARE = 2e-3
 
 FEWEST_QUARTER = 8
 """A quarter of the tool's edge is so many chords at least."""
+
+
+MOST_MOVES = 10_000
+"""Programs of more cutting moves get no shape: to sweep them takes longer than all the rest ..."""
+
+MOST_POINTS = 200_000
+"""... and none whose path needs more points than this to be true."""
 
 
 @dataclass(frozen=True)
@@ -44,13 +52,37 @@ class Shape:
     tolerance_mm: float
 
 
+def _tolerance_mm(diameter_mm: float) -> float:
+    return min(SHAPE_TOLERANCE_MM, TOLERANCE_SHARE * 0.5 * diameter_mm)
+
+
+def points_wanted(decoded: CutMoves, diameter_mm: float) -> int | None:
+    """How many points a trace of these moves must have for the shape of a tool; None when that is
+    too much work, or no tool.
+
+    Chords of s mm leave an arc of radius r by s²/(8 r), so s ≤ √(8 r tolerance) of the smallest
+    arc will do; a trace has a point every 2 way / points mm, twice as far apart at most, and one
+    at the end of each move.
+    """
+    arcs = decoded.segments.is_arc
+    if not diameter_mm or len(decoded.rows) > MOST_MOVES:
+        return None
+    points = 2 * len(decoded.toolpath)
+    if arcs.any():
+        least = float(decoded.segments.radius[arcs].min())
+        chord = math.sqrt(8.0 * least * _tolerance_mm(diameter_mm))
+        way = float(moved_lengths(decoded.toolpath).sum())
+        points += math.ceil(4.0 * way / chord)
+    return points if points <= MOST_POINTS else None
+
+
 def machined_shape(trace: Trace, wanted: CutMoves, diameter_mm: float) -> Shape | None:
     """What a tool of this diameter makes along the trace against what it makes along `wanted`;
     None when one of them cuts nothing."""
     import shapely
 
     radius = 0.5 * diameter_mm
-    tolerance = min(SHAPE_TOLERANCE_MM, TOLERANCE_SHARE * radius)
+    tolerance = _tolerance_mm(diameter_mm)
     made_of, wanted_of = _runs(trace, tolerance), _chords(wanted, tolerance)
     if made_of is None or wanted_of is None:
         return None

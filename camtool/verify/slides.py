@@ -11,6 +11,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ from camtool.geometry.polylines import Floats, Ints
 from camtool.simulation.models import StepsOnTheWay
 from camtool.simulation.motion import Chunk, still_ledger
 from camtool.verify.ballbar import BothWays, Pairs, Reversing, reversing
-from camtool.verify.circles import UNSEEN, CircleFigures, circle_figures
+from camtool.verify.circles import UNSEEN, Circle, CircleFigures, circle_figures
 from camtool.verify.compare import Target
 from camtool.verify.cuts import Bools
 from camtool.verify.figures import Figure
@@ -33,6 +34,20 @@ if TYPE_CHECKING:
     from camtool.kernels.judge import Sums, Task
 
 
+BINS_KEPT = 64
+"""The bins of so many circles are kept for pictures, 52 kB each."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeenCircle:
+    """A circle and what became of it, with its bins (720, 9) about the programmed centre."""
+
+    circle: Circle
+    figures: CircleFigures
+    reversing: Reversing
+    bins: Floats
+
+
 class SlidePass:
     """Takes the motion in order; its figures hold after `finish`."""
 
@@ -41,6 +56,7 @@ class SlidePass:
         self.circle_figures: list[CircleFigures] = [UNSEEN] * len(goal.circles)
         self.reversing: list[Reversing | None] = [None] * len(goal.circles)
         self.both_ways: list[BothWays] = []
+        self.bins: dict[int, Floats] = {}
         self._pairs = Pairs(goal.circles)
         self._cuts = decoded.cuts
         self._ledger = still_ledger(np.arange(len(match.contour)))
@@ -96,9 +112,19 @@ class SlidePass:
             self.circle_figures[circle] = circle_figures(bins, one.radius_mm)
             self.reversing[circle] = reversing(bins, one.ccw)
             self.both_ways += self._pairs.add(circle, bins)
+            if len(self.bins) < BINS_KEPT:
+                self.bins[circle] = bins.copy()
             from camtool.kernels.circle_bins import empty_bins
 
             bins[:] = empty_bins(1)[0]
+
+    def seen(self) -> tuple[SeenCircle, ...]:
+        """The circles that were gone round, in their order, as far as they are kept."""
+        return tuple(
+            SeenCircle(self.circles[circle], self.circle_figures[circle], found, self.bins[circle])
+            for circle in sorted(self.bins)
+            if (found := self.reversing[circle]) is not None
+        )
 
     @property
     def rows(self) -> RowFigures:

@@ -40,7 +40,8 @@ from camtool.verify.records import Before, Planned
 from camtool.verify.report import Report
 from camtool.verify.result import Result
 from camtool.verify.rows import RowFigures
-from camtool.verify.slides import SlidePass
+from camtool.verify.shape import points_wanted
+from camtool.verify.slides import SeenCircle, SlidePass
 from camtool.verify.trace import Trace, trace_size
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
@@ -49,13 +50,14 @@ __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 @dataclass(frozen=True, eq=False)
 class Verification:
     """The report, all findings that are in it, the slides' path for pictures, what became of
-    each row, and the moves that the slides' path was judged against."""
+    each row, the moves that the slides' path was judged against, and full circles."""
 
     report: Report
     trace: Trace
     findings: tuple[Finding, ...]
     rows: RowFigures
     wanted: CutMoves
+    circles: tuple[SeenCircle, ...] = ()
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
         """The same with these findings, in the report too."""
@@ -100,7 +102,9 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     circles = full_circles(wanted.cuts, case.coverage_mm)
     goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
     coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
-    size = trace_size(case.decoded, case.spacing_mm, case.options.trace_points)
+    shaped = points_wanted(decoded.cuts, case.options.tool_diameter_mm or 0.0)
+    points = max(case.options.trace_points, shaped or 0)
+    size = trace_size(case.decoded, case.spacing_mm, points)
     slides = SlidePass(decoded, goal, coverage.match, size)
     if isinstance(motion, Iterable):
         for chunk in motion:
@@ -115,9 +119,8 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     findings = _all_findings(case, coverage, noticed)
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally)
     trace = slides.trace()
-    return Verification(
-        result.report(extents, findings, trace), trace, findings, rows, wanted.cuts
-    )
+    report = result.report(extents, findings, trace if shaped else None)
+    return Verification(report, trace, findings, rows, wanted.cuts, slides.seen())
 
 
 def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:

@@ -7,8 +7,10 @@ import pytest
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verify.cuts import CutMoves, cut_moves
-from camtool.verify.shape import machined_shape
+from camtool.verify.shape import MOST_MOVES, machined_shape, points_wanted
 from camtool.verify.trace import Trace
+from camtool.verify.verify import VerifyOptions, verify
+from tests.oracles.path_machine import path_machine
 
 
 def circle(radius: float) -> CutMoves:
@@ -78,3 +80,36 @@ def test_nothing_cut_is_no_shape() -> None:
     assert machined_shape(still, strip(5.0), 1.0) is None
     nothing = cut_moves(ToolpathBuilder().finish(), flat_cuts=False)
     assert machined_shape(round_about(1.0), nothing, 1.0) is None
+
+
+def test_a_trace_needs_points_for_its_smallest_arcs_and_its_ends() -> None:
+    few = points_wanted(circle(5.0), 1.0)
+    many = points_wanted(circle(0.05), 1.0)
+    assert few is not None
+    assert many is not None
+    # √(8 r tolerance): ten times finer chords on a way that is a hundred times shorter.
+    assert few / many == pytest.approx(10.0, rel=0.05)
+    assert points_wanted(strip(5.0), 1.0) == 2
+    assert points_wanted(strip(5.0), 0.0) is None
+
+
+def test_what_is_too_much_work_has_no_shape() -> None:
+    b = ToolpathBuilder((0.0, 0.0, -1.0))
+    for number in range(MOST_MOVES + 2):
+        b.line(float(number % 7), float(number), feed=1.0)
+    long = cut_moves(b.finish(), flat_cuts=False)
+    assert points_wanted(long, 1.0) is None
+    assert points_wanted(circle(5000.0), 0.001) is None
+
+
+def test_the_shape_of_a_long_way_of_small_arcs_is_true() -> None:
+    b = ToolpathBuilder().rapid(z=1.0).rapid(0.0, 0.0).line(z=-1.0, feed=60.0)
+    for number in range(400):
+        x = 0.2 * (number + 1)
+        b.arc(x, 0.0, centre=(x - 0.1, 0.0), ccw=number % 2 == 0, feed=60.0)
+    path = b.rapid(z=1.0).finish()
+    machine = path_machine("axes.x.coded_step_mm=0.0005", "axes.y.coded_step_mm=0.0005")
+    options = VerifyOptions(tool_diameter_mm=0.05, trace_points=50)
+    found = verify(path, machine, wanted=path, options=options).report.shape
+    assert found is not None
+    assert max(found.overcut_um, found.undercut_um) < 1.0
