@@ -67,7 +67,8 @@ class Shown:
 
     def settled(self) -> None:
         """All frames that were asked for are painted."""
-        self.page.wait_for_timeout(80)
+        self.page.wait_for_timeout(40)
+        self.page.wait_for_function("() => !document.body.dataset.waiting")
 
     def pixels(self, canvas: str) -> int:
         """How many pixels of a canvas are not empty."""

@@ -47,11 +47,17 @@ class Stage {
 
   /** The view or a style has changed: everything anew, at once where that is quick. */
   changed() {
-    clearTimeout(this.resting);
+    this.rest();
     if (this.painted && this.slowest > SLOW_MS) {
       this.slide();
+      document.body.dataset.waiting = "yes";
       this.resting = setTimeout(() => this.soon("all"), REST_MS);
     } else this.soon("all");
+  }
+
+  rest() {
+    clearTimeout(this.resting);
+    this.resting = 0;
   }
 
   /** Show the old picture where it belongs in the new view. */
@@ -65,7 +71,11 @@ class Stage {
 
   /** Paint in the next frame: "all", or what has moved. */
   soon(what) {
-    if (what === "all") this.wantsAll = true;
+    if (what === "all") {
+      this.wantsAll = true;
+      this.rest();
+    }
+    document.body.dataset.waiting = "yes";
     if (this.frame) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
@@ -86,6 +96,7 @@ class Stage {
       this.slowest = performance.now() - begin;
     } else this.paintDone(colours);
     this.paintOver(colours);
+    if (!this.frame && !this.resting) delete document.body.dataset.waiting;
     document.body.dataset.painted = String(Number(document.body.dataset.painted || 0) + 1);
   }
 
@@ -155,7 +166,7 @@ class Stage {
 
   /** All anew, and now. */
   paintNow() {
-    clearTimeout(this.resting);
+    this.rest();
     this.wantsAll = true;
     this.paint();
   }
