@@ -22,7 +22,7 @@ _PICTURE = "Picture"
 @dataclass(frozen=True)
 class PictureFlags:
     """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`, `--layers`,
-    `--no-layer`."""
+    `--no-layer`, `--polar`."""
 
     size: int | None
     crop: tuple[float, float, float, float] | None
@@ -30,11 +30,12 @@ class PictureFlags:
     exaggerate: float | None
     layers: str | None
     no_layer: tuple[str, ...]
+    polar: int | None
 
     @property
     def given(self) -> bool:
         """Whether anything is asked of the picture."""
-        return self != PictureFlags(None, None, False, None, None, ())
+        return self != PictureFlags(None, None, False, None, None, (), None)
 
     def options(self) -> Options:
         """What `camtool.preview` is told."""
@@ -44,13 +45,15 @@ class PictureFlags:
         times = 1.0 if self.exaggerate is None else self.exaggerate
         named = [name.strip() for name in (self.layers or "").split(",") if name.strip()]
         layers = chosen(named, self.no_layer)
-        return Options(self.size, self.crop, self.dark, times, layers)
+        return Options(self.size, self.crop, self.dark, times, layers, self.polar)
 
 
 def picture_options(command: Command) -> Command:
     """Adds `picture: PictureFlags`."""
     wrapped = gather(
-        "picture", PictureFlags, ("size", "crop", "dark", "exaggerate", "layers", "no_layer")
+        "picture",
+        PictureFlags,
+        ("size", "crop", "dark", "exaggerate", "layers", "no_layer", "polar"),
     )(command)
     return decorate(  # type: ignore[no-any-return]
         wrapped,
@@ -89,6 +92,13 @@ def picture_options(command: Command) -> Command:
                 multiple=True,
                 metavar="NAME",
                 help="Without this layer.",
+            ),
+            option(
+                _PICTURE,
+                "--polar",
+                type=click.IntRange(min=1),
+                metavar="N",
+                help="The radial errors of the N-th full circle, as a ball-bar shows them.",
             ),
         ],
     )

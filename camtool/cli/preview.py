@@ -62,6 +62,8 @@ def preview(
         raise click.UsageError("--simulate needs --target")
     if picture.exaggerate is not None and not simulate:
         raise click.UsageError("--exaggerate needs --simulate")
+    if picture.polar is not None and not simulate:
+        raise click.UsageError("--polar needs --simulate")
     check_writable([output], [source])
     # What is to be played needs its times, which only the machine's model knows.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
     from camtool.preview.draw import Scene
+    from camtool.preview.rounds import Round
     from camtool.preview.viewer.run import Run
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing
@@ -55,6 +56,7 @@ def picture(
         wanted=verification.wanted.segments if verification is not None else None,
         worst=worst_places(verification),
         tool_mm=None if job is None else tool_mm(job),
+        rounds=() if verification is None else rounds_of(verification),
         run=_run(toolpath, verification, machine, listing),
     )
 
@@ -74,6 +76,24 @@ def _run(
         return run_of(toolpath, verification, machine, None if listing is None else listing())
 
     return run
+
+
+def rounds_of(verification: Verification) -> tuple[Round, ...]:
+    """The full circles as polar plots show them."""
+    from camtool.preview.rounds import Round
+
+    return tuple(
+        Round(
+            one.circle.centre_mm,
+            one.circle.radius_mm,
+            one.circle.ccw,
+            one.bins,
+            one.figures.circular_mm,
+            (one.figures.radial_max_mm, one.figures.radial_min_mm, one.figures.radial_mean_mm),
+            one.reversing.value,
+        )
+        for one in verification.circles
+    )
 
 
 def worst_places(verification: Verification | None) -> tuple[tuple[float, float], ...]:

@@ -15,6 +15,7 @@ from camtool.preview.colours import PAPER, QUIET, darkened
 from camtool.preview.content import Content, content_of
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options, check_width
 from camtool.preview.page import Page, page_of
+from camtool.preview.polar import draw_polar
 from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
 from camtool.preview.svg import Look, element, number, title
 from camtool.preview.text import Style
@@ -35,6 +36,8 @@ def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUA
     if size_px is None:
         size_px = options.size_px or SVG_WIDTH_PX
     check_width(size_px)
+    if options.polar is not None:
+        return draw_polar(scene, options.polar, size_px, dark=options.dark)
     content = content_of(scene, options)
     page = page_of(content, page_width(size_px))
     box = page.view.box

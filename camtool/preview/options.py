@@ -24,6 +24,7 @@ class Options:
     """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
     the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
     ground. `exaggerate`: the predicted path is drawn so many times as far from the wanted one.
+    `polar`: the plot of the radial errors of this circle, from 1, in place of the picture.
     `layers` are the names of those to show. OptionError for sizes that make no picture."""
 
     size_px: int | None = None
@@ -31,6 +32,7 @@ class Options:
     dark: bool = False
     exaggerate: float = 1.0
     layers: frozenset[str] = USUAL
+    polar: int | None = None
 
     def __post_init__(self) -> None:
         if self.size_px is not None:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Segments
+from camtool.preview.rounds import Round
 from camtool.preview.viewer.run import Run
 from camtool.toolpath.moves import Toolpath
 
@@ -22,7 +23,8 @@ class Scene:
     """What to draw; whatever is None or empty is left out.
 
     `wanted` are the lines and arcs that the trace was held against, `worst` the places of the
-    largest errors, mm, the largest first; `tool_mm` is the diameter of the one tool.
+    largest errors, mm, the largest first; `tool_mm` is the diameter of the one tool,
+    `rounds` are full circles with what became of them.
 
     trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
     wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
@@ -44,6 +46,7 @@ class Scene:
     wanted: Segments | None = None
     worst: tuple[tuple[float, float], ...] = ()
     tool_mm: float | None = None
+    rounds: tuple[Round, ...] = ()
     run: Callable[[], Run] | None = None
 
     def __post_init__(self) -> None:

@@ -79,3 +79,13 @@ def test_layers_are_named_or_left_out(drawing: str) -> None:
     assert "rapids" not in Path("c.svg").read_text()
     with pytest.raises(OptionError, match="no layer"):
         run(*post, "-o", "c.svg", "--layers", "fed")
+
+
+def test_a_circle_of_a_program_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    circle = str(Path("samples/circle-30-steps.pic").absolute())
+    monkeypatch.chdir(tmp_path)
+    run("verify", circle, "-t", "pic-mmh", "--without", "play", "--without", "compensation",
+        "--polar", "1", "--preview", "a.svg")  # fmt: skip
+    assert "circle 1: radius 0.0042 mm" in Path("a.svg").read_text(encoding="utf-8")
+    with pytest.raises(OptionError, match="no circle 2"):
+        run("verify", circle, "-t", "pic-mmh", "--polar", "2", "--preview", "b.svg")
