@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     "--preview",
     metavar="FILE",
     callback=picture_name,
-    help="Picture of the drawing, .svg or .png.",
+    help="Picture of the drawing, .svg, .png or .html.",
 )
 @drawing_options
 @talk_options
