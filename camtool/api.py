@@ -82,13 +82,15 @@ class Reading(TypedDict, total=False):
 class Looks(TypedDict, total=False):
     """How a picture looks: the fields of `camtool.preview.options.Options`. `size_px` is its
     width, `crop_mm` the part (x, y, width, height) that it shows, `exaggerate` how many times as
-    far from the wanted path the predicted one is drawn, `layers` the names of those to show."""
+    far from the wanted path the predicted one is drawn, `layers` the names of those to show,
+    `polar` the circle, from 1, of which the radial errors are plotted instead."""
 
     size_px: int | None
     crop_mm: tuple[float, float, float, float] | None
     dark: bool
     exaggerate: float
     layers: frozenset[str]
+    polar: int | None
 
 
 _SELECTION = ("layers", "exclude_layers", "colours", "line_types")
