@@ -3,12 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
-from camtool.preview.draw import draw
+from camtool.preview.draw import Scene, draw
 from camtool.preview.layers import LAYERS
 from camtool.preview.options import Options
+from camtool.preview.rounds import Round
 from tests.preview.conftest import SCENES, circle
 
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -18,7 +20,21 @@ DRESSED = replace(
     worst=((4.5, 2.5), (2.5, 4.5)),
 )
 MILLED = replace(SCENES["toolpath"], tool_mm=0.5)
+
+
+def lobed() -> Scene:
+    """A circle whose radius is off by three lobes of 10 µm, in bins of one point each."""
+    angle = (np.arange(720) + 0.5) * np.pi / 360.0
+    radius = 2.0 + 0.01 * np.sin(3.0 * angle)
+    point = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    square = radius[:, None] ** 2
+    bins = np.hstack([np.ones((720, 1)), point, square, point, square, point])
+    one = Round((0.0, 0.0), 2.0, False, bins, 0.02, (0.01, -0.01, 0.0), (0.001, -0.002))
+    return Scene("Three lobes", rounds=(one,))
+
+
 PICTURES = {
+    "polar": (lobed(), Options(polar=1)),
     **{name: (SCENES[name], Options()) for name in ("drawing", "toolpath", "result", "line")},
     "dark": (DRESSED, Options(dark=True, size_px=400, exaggerate=10.0)),
     "layers": (MILLED, Options(layers=frozenset(LAYERS), crop_mm=(0.0, 0.0, 3.0, 3.0))),
