@@ -60,6 +60,7 @@ def worker(address: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
         yield running
 
 
+@pytest.mark.slow
 def test_a_cluster_makes_what_one_computer_makes_though_a_worker_is_killed(tmp_path: Path) -> None:
     drawings = tmp_path / "drawings"
     (drawings / "in").mkdir(parents=True)
