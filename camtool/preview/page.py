@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from camtool.preview import axes, legend
 from camtool.preview.axes import Ticks, ticks_of
-from camtool.preview.content import Content, entries_of
+from camtool.preview.content import Content
+from camtool.preview.entries import entries_of
 from camtool.preview.legend import Entry
 from camtool.preview.view import (
     CROP_SHAPES,
