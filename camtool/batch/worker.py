@@ -9,6 +9,7 @@ import time
 import traceback
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from camtool.batch.records import Made, Task, Work
@@ -61,7 +62,16 @@ def made_of(work: Work, task: Task, data: bytes | None) -> Made:
 
 
 def peak_mib() -> float:
-    """The most memory that this process has had, MiB; 0 where the system does not tell."""
+    """The most memory that this process has had, MiB; 0 where the system does not tell.
+
+    Linux's getrusage would tell that of the parent at the fork where it was more, even behind an
+    exec; VmHWM is that of the program itself.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        return float(status.partition("VmHWM:")[2].split()[0]) / (1 << 10)
+    except (OSError, IndexError, ValueError):
+        pass
     try:
         import resource
     except ImportError:

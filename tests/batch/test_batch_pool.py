@@ -60,6 +60,14 @@ def test_workers_are_replaced_before_they_grow(tmp_path: Path) -> None:
         assert len({made[n].files[".out"] for n in "0123"}) == 2 + 2 * ("recycle_mib" in options)
 
 
+def test_the_memory_of_the_parent_is_not_the_worker_s(tmp_path: Path) -> None:
+    much = bytearray(700 << 20)
+    much[:: 1 << 12] = b"x" * len(much[:: 1 << 12])  # every page is really there
+    made = run(tasks_of(tmp_path, *["pid"] * 3), jobs=1, recycle_mib=600.0)
+    assert len(much) == 700 << 20
+    assert len({made[n].files[".out"] for n in "012"}) == 1
+
+
 def test_where_no_worker_can_live_the_run_ends(tmp_path: Path) -> None:
     with pytest.raises(CamtoolError, match="die before their first drawing"):
         run(tasks_of(tmp_path, "a", "b"), Obedient(dies_warm=True), jobs=2)
