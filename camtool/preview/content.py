@@ -57,7 +57,7 @@ class Content:
     that no plunge marks; `places` are those that the drawing notes; `window` (2, 2) mm is what to
     show, and `crop_mm` whether that was asked for; `times` is how many times as large errors are
     drawn, and `notes` what is said above. `shown` are the names of layers; `swept`
-    is what the tool covers; `reversals` (R, 2) and
+    is what the tool covers, `arrows` along which directions are shown; `reversals` (R, 2) and
     `worst` (W, 2) are places in mm, empty when they are not shown."""
 
     scene: Scene
@@ -70,6 +70,7 @@ class Content:
     window: Floats
     shown: frozenset[str] = USUAL
     swept: tuple[Chain, ...] = ()
+    arrows: tuple[Chain, ...] = ()
     reversals: Floats = field(default_factory=lambda: NOWHERE)
     worst: Floats = field(default_factory=lambda: NOWHERE)
     crop_mm: tuple[float, float, float, float] | None = None
@@ -161,6 +162,7 @@ def _shown(content: Content, layers: frozenset[str]) -> Content:
         trace=kept("path", content.trace, None),
         reversals=turns,
         swept=kept("swept", _swept(content), ()),
+        arrows=kept("arrows", content.strokes.feeds if content.strokes else (), ()),
         worst=kept("worst", _worst(content), NOWHERE),
         shown=layers,
     )

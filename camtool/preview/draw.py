@@ -10,14 +10,16 @@ random ids, no fonts. Inside the group "mm" coordinates are those of the part, i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from camtool.preview import axes, legend, marks, numbers, text
-from camtool.preview.colours import PAPER, QUIET, darkened
+from camtool.preview.colours import QUIET
 from camtool.preview.content import Content, content_of
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options, check_width
-from camtool.preview.page import Page, page_of
+from camtool.preview.page import Page, page_of, sheet
 from camtool.preview.polar import draw_polar
 from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
-from camtool.preview.svg import Look, element, number, title
+from camtool.preview.svg import Look, element, number
 from camtool.preview.text import Style
 from camtool.preview.trace import trace_layer
 from camtool.preview.view import View, page_width
@@ -33,37 +35,31 @@ TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUAL) -> str:
     """The scene as SVG text, `size_px` wide, else as the options say; OptionError when that is no
     sensible width."""
-    if size_px is None:
-        size_px = options.size_px or SVG_WIDTH_PX
+    size_px = size_px or options.size_px or SVG_WIDTH_PX
     check_width(size_px)
+    options = replace(options, size_px=size_px)
     if options.polar is not None:
-        return draw_polar(scene, options.polar, size_px, dark=options.dark)
+        return draw_polar(scene, options.polar, options)
     content = content_of(scene, options)
     page = page_of(content, page_width(size_px))
+    beside = _beside(content, page)
+    return sheet(scene.title, (page.width, page.height), options, *panel(content, page), *beside)
+
+
+def panel(content: Content, page: Page) -> list[str]:
+    """Head and plot with its axes."""
     box = page.view.box
     sides = (box.left, box.top, box.width, box.height)
     plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
     # Named after its own sides: two pictures in one page share it only when it is the same.
     clip = "plot-" + "-".join(number(side, 0) for side in sides)
-    root: Look = {
-        "xmlns": "http://www.w3.org/2000/svg",
-        "width": str(size_px),
-        "height": number(size_px * page.height / page.width),
-        "viewBox": f"0 0 {number(page.width)} {number(page.height)}",
-    }
-    picture = element(
-        "svg",
-        root,
-        title(scene.title or "camtool picture"),
-        element("rect", {"width": page.width, "height": page.height, "fill": PAPER}),
+    return [
         page.head,
         axes.frame(page.view, page.ticks),
         element("clipPath", {"id": clip}, element("rect", plot)),
         element("g", {"clip-path": f"url(#{clip})"}, *_plot(content, page.view)),
         axes.axes(page.view, page.ticks),
-        *_beside(content, page),
-    )
-    return (darkened(picture) if options.dark else picture) + "\n"
+    ]
 
 
 def png(svg: str, width_px: int) -> bytes:
@@ -85,8 +81,7 @@ def _plot(content: Content, view: View) -> list[str]:
     turns = content.reversals.tolist()
     layers.append(marks.dots("reversals", turns, view, marks.reversal_look()))
     if strokes is not None and trace is None:
-        if "arrows" in content.shown:
-            layers.append(marks.arrows(strokes.feeds, view))
+        layers.append(marks.arrows(content.arrows, view))
         layers.append(marks.dots("starts", content.starts.tolist(), view, marks.start_look()))
         plunges = strokes.plunges.tolist()
         layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
