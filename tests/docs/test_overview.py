@@ -1,0 +1,88 @@
+"""The maps of the house are true: overview.md, README.md, index.md and the site's navigation."""
+
+import pkgutil
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from camtool.cli.main import cli
+
+ROOT = Path(__file__).parents[2]
+OVERVIEW = (ROOT / "docs" / "overview.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "docs" / "overview.md", ROOT / "docs" / "index.md", ROOT / "README.md"]
+TREES = ("camtool/", "postprocessors/", "tests/", "samples/", "docs/")
+
+
+def rows(text: str) -> list[list[str]]:
+    """The cells of every row of the text's tables, but heads and rules."""
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return [each for each in cells if not set("".join(each)) <= set("-")]
+
+
+def missing(text: str) -> Iterator[str]:
+    """Files that the tables name and that are not there; a bare name lies beside the one that
+    stands before it in its row, or below it."""
+    for cells in rows(text):
+        folder = ROOT
+        for name in re.findall(r"`([\w./-]+(?:\.py|\.md|/))`", " ".join(cells)):
+            if "NAME" in name or name == "reader.py":
+                continue  # of several packages
+            file = ROOT / name if name.startswith(TREES) else folder / name
+            if not file.exists():
+                yield name
+            elif name.startswith(TREES):
+                folder = file if file.is_dir() else file.parent
+
+
+def test_files_of_the_overview_exist() -> None:
+    assert list(missing(OVERVIEW)) == []
+    text = (
+        "| a | `camtool/cli/main.py` and `nobody.py` beside it |\n| `camtool/preview/pocket/` |\n"
+    )
+    assert list(missing(text)) == ["nobody.py", "camtool/preview/pocket/"]
+
+
+def test_names_of_the_overview_exist() -> None:
+    names = re.findall(r"`((?:camtool|camtool_postprocessors)\.[\w.]+)[`(]", OVERVIEW)
+    assert len(names) > 15
+    for name in names:
+        if name != "camtool.postprocessors":  # a group of entry points
+            pkgutil.resolve_name(name)
+
+
+def test_every_room_has_a_row() -> None:
+    rooms = {
+        path.parent.relative_to(ROOT).as_posix() + "/"
+        for path in ROOT.glob("camtool/*/__init__.py")
+    }
+    house = OVERVIEW.partition("## The house")[2].partition("## Where to find")[0]
+    told = set(re.findall(r"^\| `(camtool/\w+/)`", house, re.MULTILINE))
+    assert told == rooms
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_nothing_is_told_twice(page: Path) -> None:
+    found = [cells[0] for cells in rows(page.read_text(encoding="utf-8")) if cells[0]]
+    assert sorted(set(found)) == sorted(found)
+
+
+def test_the_readme_shows_every_command() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^camtool +([\w-]+)", text, re.MULTILINE))
+    assert shown == set(cli.commands)
+
+
+def test_the_changelog_has_every_command() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert [name for name in cli.commands if not re.search(rf"`(camtool )?{name}\b", text)] == []
+
+
+def test_the_navigation_has_every_page_once() -> None:
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:")[2]
+    listed = re.findall(r"- (?:[^:\n]+: )?([\w./-]+\.md)$", text, re.MULTILINE)
+    assert sorted(set(listed)) == sorted(listed)
+    pages = {page.relative_to(ROOT / "docs").as_posix() for page in ROOT.glob("docs/**/*.md")}
+    assert {page for page in pages if not page.startswith("decisions/0")} == set(listed)
