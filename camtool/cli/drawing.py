@@ -47,10 +47,10 @@ class DrawingFlags:
         gives are the machine's, or else the importer's. OptionError for a layer or colour of
         the job that the drawing has not, unless flags restrict it.
         """
-        from camtool.cli.joblayers import layers_of, refuse_unmatched, unmatched
         from camtool.importers.options import ReadOptions, Selection
         from camtool.importers.read import read_bytes, read_drawing
         from camtool.importers.select import NoMatchError, colour_named
+        from camtool.jobs.layers import layers_of, refuse_unmatched, unmatched
 
         settings: dict[str, Any] = {}
         if machine is not None:

@@ -47,10 +47,10 @@ def new(
 
     It works as it is; every other key stands there as a comment.
     """
-    from camtool.cli.jobtemplate import job_template
     from camtool.cli.output import STDOUT, write_all
     from camtool.cli.talk import say, say_findings, say_first_run
     from camtool.errors import OutputError
+    from camtool.jobs.template import job_template
 
     output = output or "job.toml"
     if output != STDOUT and os.path.lexists(output):

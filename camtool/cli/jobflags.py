@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from camtool.cli.drawing import Command, DrawingFlags
 from camtool.cli.gather import decorate, gather
-from camtool.cli.jobgiven import Given, Key, Table
-from camtool.cli.jobkeys import OPERATION, PLACE, TOOL_KEYS, TOOL_NAME, WHOLE
 from camtool.cli.sections import option
 from camtool.errors import OptionError
+from camtool.jobs.given import Given, Key, Table
+from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, TOOL_NAME, WHOLE
 
 if TYPE_CHECKING:
     from camtool.planning.job import Job
@@ -41,8 +41,8 @@ class JobFlags:
 
         `--layer` restricts the drawing; a job of one operation takes just that of it.
         """
-        from camtool.cli.jobbuild import build_job
-        from camtool.cli.jobfile import Said, read_job_file
+        from camtool.jobs.build import build_job
+        from camtool.jobs.file import Said, read_job_file
 
         file = Said() if self.file is None else read_job_file(Path(self.file))
         flags = Said(

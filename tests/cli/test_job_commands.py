@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.cli.jobbuild import build_job
-from camtool.cli.jobfile import Said, read_job_file
-from camtool.cli.jobtemplate import job_template, pattern_of, quoted
+from camtool.jobs.build import build_job
+from camtool.jobs.file import Said, read_job_file
+from camtool.jobs.template import job_template, pattern_of, quoted
 from camtool.geometry.drawing import Drawing, Mark, Units
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.patterns import matches

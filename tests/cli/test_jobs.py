@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from camtool.cli.drawing import DrawingFlags
-from camtool.cli.jobbuild import build_job
-from camtool.cli.jobfile import Said, read_job_file
+from camtool.jobs.build import build_job
+from camtool.jobs.file import Said, read_job_file
 from camtool.cli.jobflags import JobFlags
-from camtool.cli.jobkeys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, WHOLE
-from camtool.cli.jobvalues import ENTRY, LEAD, TABS
+from camtool.jobs.keys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, WHOLE
+from camtool.jobs.values import ENTRY, LEAD, TABS
 from camtool.planning.job import (
     Entry,
     Job,

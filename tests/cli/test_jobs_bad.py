@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.cli.drawing import DrawingFlags
-from camtool.cli.jobbuild import build_job
-from camtool.cli.jobfile import AT_THE_TOP, OF_OPERATIONS, Said, said_of
+from camtool.jobs.build import build_job
+from camtool.jobs.file import AT_THE_TOP, OF_OPERATIONS, Said, said_of
 from camtool.cli.jobflags import JobFlags
-from camtool.cli.jobkeys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, WHOLE
-from camtool.cli.jobvalues import ENTRY, LEAD, TABS
+from camtool.jobs.keys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, WHOLE
+from camtool.jobs.values import ENTRY, LEAD, TABS
 from camtool.errors import OptionError
 from camtool.planning.job import ENTRIES, KINDS, LEADS, Job
 from tests.cli.conftest import Run

@@ -30,12 +30,13 @@ ALLOWED = {
     "verify": JUDGE,
     "preview": JUDGE,
     "calibration": SHARED,
+    "jobs": SHARED | {"importers", "planning"},
     "pipeline": JUDGE | {"verify", "preview"},
     "batch": JUDGE | {"verify", "preview", "pipeline"},
-    "cli": JUDGE | {"verify", "preview", "calibration", "pipeline", "batch"},
+    "cli": JUDGE | {"verify", "preview", "calibration", "pipeline", "batch", "jobs"},
     "__main__": {"cli"},
-    "results": JUDGE | {"verify", "preview", "pipeline"},
-    "api": JUDGE | {"verify", "preview", "pipeline", "results"},
+    "results": JUDGE | {"verify", "preview", "calibration", "pipeline", "jobs"},
+    "api": JUDGE | {"verify", "preview", "calibration", "pipeline", "jobs", "results"},
     "__init__": {"api", "errors"},
 }
 HEAVY = {

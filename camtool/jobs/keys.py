@@ -5,8 +5,8 @@ docs/jobs.md explains them; a test keeps the page and these tables equal.
 
 from __future__ import annotations
 
-from camtool.cli.jobgiven import Key
-from camtool.cli.jobvalues import (
+from camtool.jobs.given import Key
+from camtool.jobs.values import (
     angle,
     colours,
     counts,

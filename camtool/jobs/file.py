@@ -8,7 +8,7 @@
     [[operations]]                  # in the order in which they are cut
 
 A file without `[[operations]]` is one operation, whose keys stand at its top. docs/jobs.md
-explains every key. What is read here is not yet a job: `jobbuild` lays the flags over it.
+explains every key. What is read here is not yet a job: `build` lays the flags over it.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from camtool.cli.jobgiven import Given, Table, table_of
-from camtool.cli.jobkeys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, TOOL_NAME, WHOLE
 from camtool.errors import MachineError, OptionError
+from camtool.jobs.given import Given, Table, table_of
+from camtool.jobs.keys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, TOOL_NAME, WHOLE
 from camtool.machine.loader import read_table
 
 OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from camtool.cli.jobgiven import Given, Table, record_of, refuse_idle
-from camtool.cli.jobkeys import TOOL, TOOL_KEYS, TOOL_NAME
 from camtool.errors import OptionError
+from camtool.jobs.given import Given, Table, record_of, refuse_idle
+from camtool.jobs.keys import TOOL, TOOL_KEYS, TOOL_NAME
 from camtool.planning.job import Tool
 from camtool.planning.tooltable import TableTool, read_tool_table
 

@@ -11,11 +11,11 @@ import difflib
 from dataclasses import replace
 from pathlib import Path
 
-from camtool.cli.jobfile import Said
-from camtool.cli.jobgiven import Table, record_of, why_idle
-from camtool.cli.jobkeys import OPERATION, PLACE, STOCK, WHOLE
-from camtool.cli.jobtools import Tools, refuse_bad_tools, with_table
 from camtool.errors import OptionError
+from camtool.jobs.file import Said
+from camtool.jobs.given import Table, record_of, why_idle
+from camtool.jobs.keys import OPERATION, PLACE, STOCK, WHOLE
+from camtool.jobs.tools import Tools, refuse_bad_tools, with_table
 from camtool.planning.job import Job, Operation, Placement, Stock
 
 _TABLE_KEYS = ("tool_table", "tool_table_units")

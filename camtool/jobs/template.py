@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camtool.cli.jobgiven import Key
-from camtool.cli.jobkeys import OPERATION, PLACE, TOOL, WHOLE
-from camtool.cli.talk import one_line
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.measure import extents
+from camtool.jobs.given import Key
+from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE
 from camtool.planning.drill import circle_of
 
 if TYPE_CHECKING:
@@ -214,7 +213,7 @@ def _row(text: str, remark: str) -> str:
 
 def _commented(text: str) -> str:
     """Text for a comment: one line, and nothing that TOML refuses there."""
-    return one_line(text)
+    return "".join(char if char.isprintable() else " " for char in text)
 
 
 def pattern_of(name: str) -> str:

@@ -9,8 +9,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from camtool.cli.jobgiven import Given, Key, Table, part_of, record_of, refuse_idle
 from camtool.errors import OptionError
+from camtool.jobs.given import Given, Key, Table, part_of, record_of, refuse_idle
 from camtool.patterns import guess
 from camtool.planning.job import ENTRIES, LEADS, ORIGINS, STARTS, Entry, Lead, Tabs
 from camtool.units import parse_angle, parse_feed, parse_length, parse_time
