@@ -35,7 +35,8 @@ TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUAL) -> str:
     """The scene as SVG text, `size_px` wide, else as the options say; OptionError when that is no
     sensible width."""
-    size_px = size_px or options.size_px or SVG_WIDTH_PX
+    if size_px is None:
+        size_px = options.size_px or SVG_WIDTH_PX
     check_width(size_px)
     options = replace(options, size_px=size_px)
     if options.polar is not None:

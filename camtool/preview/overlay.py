@@ -15,14 +15,21 @@ import numpy.typing as npt
 
 from camtool.preview import axes, legend, marks
 from camtool.preview.axes import Ticks
-from camtool.preview.colours import FEED_PALE, LAYERS, PAPER, darkened
+from camtool.preview.colours import FEED_PALE, LAYERS
 from camtool.preview.content import cropped
 from camtool.preview.legend import Entry, line_swatch
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options
-from camtool.preview.page import BAR_ROOM, FOOT, GUESSED_LEFT, HEAD_GAP, LEGEND_DROP
+from camtool.preview.page import (
+    BAR_ROOM,
+    GUESSED_LEFT,
+    HEAD_GAP,
+    LEGEND_DROP,
+    foot_of,
+    sheet,
+)
 from camtool.preview.render import rendered
 from camtool.preview.strokes import strokes_of
-from camtool.preview.svg import Look, PathData, element, number, title
+from camtool.preview.svg import Look, PathData, element
 from camtool.preview.trace import FINEST_SHARE
 from camtool.preview.view import (
     CROP_SHAPES,
@@ -67,20 +74,12 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
     room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
     table = legend.rows(_entries(overlay), room, view.box.width)
     legend_y = view.box.bottom + LEGEND_DROP
-    height = round(legend_y + max(len(table) - 1, 0) * legend.ROW_STEP + FOOT)
     box = view.box
     plot: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
-    root: Look = {
-        "xmlns": "http://www.w3.org/2000/svg",
-        "width": str(size_px),
-        "height": number(size_px * height / page),
-        "viewBox": f"0 0 {number(page)} {height}",
-    }
-    picture = element(
-        "svg",
-        root,
-        title(overlay.title),
-        element("rect", {"width": page, "height": float(height), "fill": PAPER}),
+    return sheet(
+        overlay.title,
+        (page, foot_of(table, legend_y)),
+        options,
         head,
         axes.frame(view, ticks),
         element("clipPath", {"id": "plot-overlay"}, element("rect", plot)),
@@ -89,7 +88,6 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
         legend.legend(table, box.left, legend_y),
         axes.scale_bar(view, box.right, legend_y),
     )
-    return (darkened(picture) if options.dark else picture) + "\n"
 
 
 def _fitted(window: Floats, top: float, page: float, *, cut: bool) -> tuple[View, Ticks]:

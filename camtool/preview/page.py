@@ -1,4 +1,5 @@
-"""Where everything lies on the page: head, plot, numbers, colour bar, legend, scale bar."""
+"""Where everything lies on the page (head, plot, numbers, colour bar, legend, scale bar), and the
+page itself."""
 
 from __future__ import annotations
 
@@ -6,9 +7,12 @@ from dataclasses import dataclass
 
 from camtool.preview import axes, legend
 from camtool.preview.axes import Ticks, ticks_of
+from camtool.preview.colours import PAPER, darkened
 from camtool.preview.content import Content
 from camtool.preview.entries import entries_of
 from camtool.preview.legend import Entry
+from camtool.preview.options import SVG_WIDTH_PX, Options
+from camtool.preview.svg import Look, element, number, title
 from camtool.preview.view import (
     CROP_SHAPES,
     MARGIN,
@@ -62,5 +66,25 @@ def page_of(content: Content, width: float = PAGE) -> Page:
     room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
     table = legend.rows(entries_of(content, view), room, view.box.width)
     legend_y = view.box.bottom + LEGEND_DROP
-    height = legend_y + max(len(table) - 1, 0) * legend.ROW_STEP + FOOT
-    return Page(head, view, ticks, table, legend_y, round(height), width)
+    return Page(head, view, ticks, table, legend_y, foot_of(table, legend_y), width)
+
+
+def foot_of(rows: list[list[Entry]], legend_y: float) -> float:
+    """Height of a page whose legend of these rows begins at `legend_y`."""
+    return round(legend_y + max(len(rows) - 1, 0) * legend.ROW_STEP + FOOT)
+
+
+def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) -> str:
+    """The whole SVG text of a picture: its parts on paper of `sizes`, width and height in units
+    of its own, as large and as dark as the options say."""
+    width, height = sizes
+    size_px = options.size_px or SVG_WIDTH_PX
+    root: Look = {
+        "xmlns": "http://www.w3.org/2000/svg",
+        "width": str(size_px),
+        "height": number(size_px * height / width),
+        "viewBox": f"0 0 {number(width)} {number(height)}",
+    }
+    paper = element("rect", {"width": width, "height": height, "fill": PAPER})
+    picture = element("svg", root, title(name or "camtool picture"), paper, *parts)
+    return (darkened(picture) if options.dark else picture) + "\n"

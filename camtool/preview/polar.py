@@ -13,10 +13,12 @@ import numpy as np
 
 from camtool.errors import OptionError
 from camtool.preview import legend, text
-from camtool.preview.colours import FEED, FEED_PALE, FRAME, GRID, INK, PAPER, PLOT, QUIET, darkened
+from camtool.preview.colours import FEED, FEED_PALE, FRAME, GRID, INK, PLOT, QUIET
+from camtool.preview.options import SVG_WIDTH_PX, Options
+from camtool.preview.page import sheet
 from camtool.preview.rounds import Floats, Round
 from camtool.preview.scene import Scene
-from camtool.preview.svg import Look, PathData, element, number, title
+from camtool.preview.svg import Look, PathData, element, number
 from camtool.preview.text import Style
 from camtool.preview.view import MARGIN, decimals_of, page_width, round_step
 from camtool.units import UM_PER_MM
@@ -54,7 +56,7 @@ class Dial:
         return x + radius * math.cos(angle), y - radius * math.sin(angle)
 
 
-def draw_polar(scene: Scene, which: int, size_px: int, *, dark: bool = False) -> str:
+def draw_polar(scene: Scene, which: int, options: Options) -> str:
     """SVG text of the `which`-th circle of the scene, from 1; OptionError when there is none."""
     if not 1 <= which <= len(scene.rounds):
         many = len(scene.rounds)
@@ -65,30 +67,22 @@ def draw_polar(scene: Scene, which: int, size_px: int, *, dark: bool = False) ->
         )
     one = scene.rounds[which - 1]
     errors = one.errors() * UM_PER_MM
-    page = page_width(size_px)
+    page = page_width(options.size_px or SVG_WIDTH_PX)
     dial = _dial(errors, page)
     head, down = legend.head(scene.title, _notes(one, which, dial), page)
     outer = 0.5 * page - MARGIN - ROOM
     dial = Dial((0.5 * page, down + ROOM + outer), dial.base, dial.per_um, dial.step_um)
     height = round(down + 2.0 * (ROOM + outer) + MARGIN)
-    root: Look = {
-        "xmlns": "http://www.w3.org/2000/svg",
-        "width": str(size_px),
-        "height": number(size_px * height / page),
-        "viewBox": f"0 0 {number(page)} {height}",
-    }
-    picture = element(
-        "svg",
-        root,
-        title(scene.title or "camtool picture"),
-        element("rect", {"width": page, "height": float(height), "fill": PAPER}),
+    return sheet(
+        scene.title,
+        (page, height),
+        options,
         head,
         _rings(dial, outer),
         _quadrants(dial, outer),
         _band(errors, dial),
         _labels(dial, outer),
     )
-    return (darkened(picture) if dark else picture) + "\n"
 
 
 def _dial(errors: Floats, page: float) -> Dial:
