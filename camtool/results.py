@@ -179,17 +179,9 @@ class Posted(_Shown, PostedRecord):
         return f"<Posted {name} for {target}: {made}, {_noticed(len(self.findings))}>"
 
     def _scene(self) -> Scene:
-        from camtool.pipeline import picture, posted_listing
+        from camtool.pipeline import posted_scene
 
-        return picture(
-            title=PurePath(self.drawing.file).name,
-            drawing=self.drawing,
-            job=self.job,
-            toolpath=self.decoded or self.wanted,
-            verification=self.verification,
-            machine=self.target.machine,
-            listing=posted_listing(self, self.target),
-        )
+        return posted_scene(self, self.target, drawing=self.drawing, job=self.job)
 
 
 def _noticed(count: int) -> str:

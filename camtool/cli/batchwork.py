@@ -115,19 +115,11 @@ class PostWork:
             yield ".json", posted.verification.report.to_json().encode()
 
     def _picture(self, drawing: Drawing, job: Job, posted: Posted) -> bytes:
-        from camtool.pipeline import picture
+        from camtool.pipeline import posted_scene
         from camtool.preview.render import render
 
-        name = Path(drawing.file).name
-        scene = picture(
-            title=name,
-            drawing=drawing,
-            job=job,
-            toolpath=posted.decoded,
-            verification=posted.verification,
-            machine=self.target.machine,
-        )
-        return render(scene, f"{name}{self.preview}")
+        scene = posted_scene(posted, self.target, drawing=drawing, job=job)
+        return render(scene, f"picture{self.preview}")
 
 
 def own_job(source: Path) -> Path | None:

@@ -83,14 +83,8 @@ def convert(
 
 
 def _picture(name: str, title: str, made: Posted, target: LoadedTarget) -> bytes:
-    from camtool.pipeline import picture, posted_listing
+    from camtool.pipeline import posted_scene
     from camtool.preview.render import render
 
-    scene = picture(
-        title=Path(title).name,
-        toolpath=made.decoded or made.wanted,
-        verification=made.verification,
-        machine=target.machine,
-        listing=posted_listing(made, target),
-    )
+    scene = posted_scene(made, target, title=Path(title).name)
     return render(scene, name)

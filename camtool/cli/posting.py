@@ -36,18 +36,10 @@ class Made:
 
     def picture(self, name: str) -> bytes:
         """The predicted result as a picture file of this name."""
-        from camtool.pipeline import picture, posted_listing
+        from camtool.pipeline import posted_scene
         from camtool.preview.render import render
 
-        scene = picture(
-            title=Path(self.drawing.file).name,
-            drawing=self.drawing,
-            job=self.job,
-            toolpath=self.posted.decoded or self.posted.wanted,
-            verification=self.posted.verification,
-            machine=self.target.machine,
-            listing=posted_listing(self.posted, self.target),
-        )
+        scene = posted_scene(self.posted, self.target, drawing=self.drawing, job=self.job)
         return render(scene, name)
 
 

@@ -88,7 +88,7 @@ def _scene(
         listing_of,
         picture,
         post_drawing,
-        posted_listing,
+        posted_scene,
         verify_program,
     )
     from camtool.planning.plan import plan
@@ -124,15 +124,7 @@ def _scene(
         )
     with job.blamed():
         posted = post_drawing(read, wanted, target)
-    return picture(
-        title=title,
-        drawing=read,
-        job=wanted,
-        toolpath=posted.decoded or posted.wanted,
-        verification=posted.verification,
-        machine=target.machine,
-        listing=posted_listing(posted, target),
-    )
+    return posted_scene(posted, target, title=title, drawing=read, job=wanted)
 
 
 def _refuse_program(source: str) -> None:

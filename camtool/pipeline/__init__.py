@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from camtool.pipeline.compare import Way, compare_picture, compare_program
 from camtool.pipeline.judge import Judging, Posted, convert_program, post_drawing, verify_program
-from camtool.pipeline.pictures import picture
-from camtool.pipeline.viewing import listing_of, posted_listing
+from camtool.pipeline.pictures import picture, posted_scene
+from camtool.pipeline.viewing import listing_of
 
 __all__ = [
     "Judging",
@@ -26,6 +26,6 @@ __all__ = [
     "listing_of",
     "picture",
     "post_drawing",
-    "posted_listing",
+    "posted_scene",
     "verify_program",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -10,6 +11,8 @@ if TYPE_CHECKING:
 
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
+    from camtool.machine.registry import LoadedTarget
+    from camtool.pipeline.judge import Posted
     from camtool.planning.job import Job
     from camtool.preview.draw import Scene
     from camtool.preview.rounds import Round
@@ -58,6 +61,30 @@ def picture(
         tool_mm=None if job is None else tool_mm(job),
         rounds=() if verification is None else rounds_of(verification),
         run=_run(toolpath, verification, machine, listing),
+    )
+
+
+def posted_scene(
+    posted: Posted,
+    target: LoadedTarget,
+    *,
+    title: str = "",
+    drawing: Drawing | None = None,
+    job: Job | None = None,
+) -> Scene:
+    """The scene of what was posted: the program's moves, or those that were planned where there is
+    none, with the slides' path where they were judged. The title is the drawing's name unless
+    another one is given."""
+    from camtool.pipeline.viewing import posted_listing
+
+    return picture(
+        title=title or ("" if drawing is None else PurePath(drawing.file).name),
+        drawing=drawing,
+        job=job,
+        toolpath=posted.decoded or posted.wanted,
+        verification=posted.verification,
+        machine=target.machine,
+        listing=posted_listing(posted, target),
     )
 
 
