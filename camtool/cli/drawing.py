@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.gather import decorate, gather
+from camtool.cli.gather import Command, decorate, gather
 from camtool.cli.sections import option
 from camtool.cli.types import length
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 FORMATS = ("dxf", "svg", "points", "solid")
 _READ, _CHOSEN = "How the drawing is read", "Which part of it"
 TEXTS = ("skip", "outline", "stroke")
@@ -82,7 +81,7 @@ def drawing_options(command: Command) -> Command:
     """Adds `drawing: DrawingFlags`."""
     names = (*_SELECTION_FLAGS, *_READ_FIELDS)
     wrapped = gather("drawing", _make_drawing, names)(command)
-    return decorate(wrapped, [*_read_flags(), *_selection_flags()])  # type: ignore[no-any-return]
+    return decorate(wrapped, [*_read_flags(), *_selection_flags()])
 
 
 def _make_drawing(

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camtool.cli.drawing import Command, DrawingFlags
-from camtool.cli.gather import decorate, gather
+from camtool.cli.drawing import DrawingFlags
+from camtool.cli.gather import Command, decorate, gather
 from camtool.cli.sections import option
 from camtool.errors import OptionError
 from camtool.jobs.given import Given, Key, Table
@@ -85,7 +85,7 @@ class JobFlags:
 def job_options(command: Command) -> Command:
     """Adds `job: JobFlags`."""
     wrapped = gather("job", _make_job, ("job", "operation", *_NAMES))(command)
-    return decorate(wrapped, [*_file_flags(), *_key_flags()])  # type: ignore[no-any-return]
+    return decorate(wrapped, [*_file_flags(), *_key_flags()])
 
 
 def _make_job(job: str | None, operation: tuple[str, ...], **given: Any) -> JobFlags:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.drawing import Command
-from camtool.cli.gather import decorate, gather
+from camtool.cli.gather import Command, with_flags
 from camtool.cli.options import INTERPOLATORS, MachineFlags
 from camtool.cli.sections import option
 from camtool.cli.types import duration, length
@@ -52,10 +51,10 @@ class GateFlags:
 
 def gate_options(command: Command) -> Command:
     """Adds `gates: GateFlags`."""
-    names = ("max_error", "max_reversals", "max_time")
-    wrapped = gather("gates", GateFlags, names)(command)
-    return decorate(  # type: ignore[no-any-return]
-        wrapped,
+    return with_flags(
+        command,
+        "gates",
+        GateFlags,
         [
             option(
                 _LIMITS,

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.drawing import Command
-from camtool.cli.gather import decorate, gather
+from camtool.cli.gather import Command, decorate, with_flags
 from camtool.cli.sections import option
 
 if TYPE_CHECKING:
@@ -53,9 +52,10 @@ class MachineFlags:
 
 def machine_options(command: Command) -> Command:
     """Adds `machine: MachineFlags`."""
-    wrapped = gather("machine", MachineFlags, ("target", "machine", "settings"))(command)
-    return decorate(  # type: ignore[no-any-return]
-        wrapped,
+    return with_flags(
+        command,
+        "machine",
+        MachineFlags,
         [
             option(
                 _MACHINE,
@@ -84,7 +84,7 @@ def machine_options(command: Command) -> Command:
 
 def talk_options(command: Command) -> Command:
     """Adds `quiet: bool` and `verbose: bool`, and `--debug`, which main() looks for itself."""
-    return decorate(  # type: ignore[no-any-return]
+    return decorate(
         command,
         [
             click.option("-q", "--quiet", is_flag=True, help="Only errors."),

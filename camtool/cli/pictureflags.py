@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.drawing import Command
-from camtool.cli.gather import decorate, gather
+from camtool.cli.gather import Command, with_flags
 from camtool.cli.sections import option
 from camtool.errors import OptionError
 from camtool.units import parse_length
@@ -50,13 +49,10 @@ class PictureFlags:
 
 def picture_options(command: Command) -> Command:
     """Adds `picture: PictureFlags`."""
-    wrapped = gather(
+    return with_flags(
+        command,
         "picture",
         PictureFlags,
-        ("size", "crop", "dark", "exaggerate", "layers", "no_layer", "polar"),
-    )(command)
-    return decorate(  # type: ignore[no-any-return]
-        wrapped,
         [
             option(
                 _PICTURE,

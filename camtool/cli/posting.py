@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.ahead import compiled_beside
-from camtool.cli.drawing import Command, DrawingFlags, drawing_options
-from camtool.cli.gather import decorate, gather
+from camtool.cli.drawing import DrawingFlags, drawing_options
+from camtool.cli.gather import Command, decorate, gather
 from camtool.cli.jobflags import JobFlags, job_options
 from camtool.cli.judging import GateFlags, gate_options
 from camtool.cli.options import MachineFlags, machine_options
@@ -115,6 +115,4 @@ def posting_options(command: Command) -> Command:
             help="Bend the path against the machine's play, scale and squareness.",
         ),
     )
-    return decorate(  # type: ignore[no-any-return]
-        machine_options(gate_options(job_options(inner))), [verify, bend]
-    )
+    return decorate(machine_options(gate_options(job_options(inner))), [verify, bend])
