@@ -18,6 +18,7 @@ from camtool.cli.jobflags import JobFlags, job_options
 from camtool.cli.judging import GateFlags, gate_options
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.cli.sections import SectionedCommand, option
+from camtool.cli.talk import say
 from camtool.cli.types import duration
 from camtool.errors import CamtoolError, OutputError
 
@@ -130,13 +131,35 @@ class Batched:
     ) -> int:
         """Find, make, say; the exit code."""
         from camtool.batch.inputs import find_tasks, refuse_overwriting
+        from camtool.batch.lock import alone_in
         from camtool.batch.manifest import Manifest
 
         begin = time.monotonic()
-        manifest = Manifest(self.out)
-        tasks = find_tasks(sources, self.out, manifest.outputs())
+        tasks = find_tasks(sources, self.out, Manifest(self.out).outputs())
         refuse_overwriting(tasks, self.out, self.work.extensions)
         _make_folder(self.out)
+        with alone_in(self.out) as locked:
+            if not locked:
+                say(
+                    "camtool: warning: the file system of --out has no locks: see that no other "
+                    "batch writes there",
+                    quiet=loudness.quiet,
+                )
+            return self._run(tasks, job, begin, own_jobs=own_jobs, loudness=loudness)
+
+    def _run(
+        self,
+        tasks: Sequence[Task],
+        job: JobFlags,
+        begin: float,
+        *,
+        own_jobs: bool,
+        loudness: Loudness,
+    ) -> int:
+        """The same with the output folder to itself."""
+        from camtool.batch.manifest import Manifest
+
+        manifest = Manifest(self.out)
         ordered, failed = self._ordered(tasks, job, own_jobs)
         outcomes, stopped = self._made(ordered, failed, manifest, loudness)
         seconds = time.monotonic() - begin

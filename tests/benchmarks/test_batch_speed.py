@@ -52,6 +52,7 @@ def test_five_hundred_drawings(tmp_path: Path) -> None:
     print(f"\n--jobs 1: {first:.1f} s, {COUNT / first:.1f} a second")
     print(f"--jobs 2: {both:.1f} s, {COUNT / both:.1f} a second: {first / both:.2f} times")
     print(f"again: {second:.2f} s, {100 * second / both:.1f} % of --jobs 2")
+    assert first / both >= 1.8
     assert second < 0.02 * both
 
 

@@ -1,11 +1,13 @@
 """`camtool batch` as a user runs it."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
 import pytest
 
+from camtool.batch.lock import alone_in
 from camtool.batch.records import Pool
 from camtool.cli import batch as command
 from camtool.cli import batchwork
@@ -177,3 +179,21 @@ def test_wrong_use_is_refused_before_anything_is_made(
     assert done.returncode == 2
     assert any(each in done.stderr.decode() for each in why.split("|"))
     assert not (tmp_path / "build").exists()
+
+
+@pytest.mark.usefixtures("pools")
+def test_a_second_batch_into_the_same_folder_is_refused(
+    camtool: Run, drawings: Path, tmp_path: Path
+) -> None:
+    build = tmp_path / "build"
+    assert camtool("batch", "drawings/letter.svg", *PIC, *QUICK).returncode == 0
+    before = {path: path.read_bytes() for path in build.iterdir()}
+    with alone_in(build):
+        held = files_in(build)
+        done = camtool("batch", "drawings/in", *PIC, *QUICK, "--force")
+        assert files_in(build) == held
+    assert done.returncode == 2
+    assert f"build: another batch writes there (process {os.getpid()} on ".encode() in done.stderr
+    assert {path: path.read_bytes() for path in build.iterdir()} == before
+    assert camtool("batch", "drawings/in", *PIC, *QUICK).returncode == 0
+    assert files_in(build) == {MANIFEST, "letter.pic", "square.pic"}
