@@ -14,16 +14,15 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.preview import axes, legend, marks
-from camtool.preview.axes import Ticks
 from camtool.preview.colours import FEED_PALE, LAYERS
 from camtool.preview.content import cropped
 from camtool.preview.legend import Entry, line_swatch
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options
 from camtool.preview.page import (
     BAR_ROOM,
-    GUESSED_LEFT,
     HEAD_GAP,
     LEGEND_DROP,
+    fitted,
     foot_of,
     sheet,
 )
@@ -31,15 +30,7 @@ from camtool.preview.render import rendered
 from camtool.preview.strokes import strokes_of
 from camtool.preview.svg import Look, PathData, element
 from camtool.preview.trace import FINEST_SHARE
-from camtool.preview.view import (
-    CROP_SHAPES,
-    MARGIN,
-    TALLEST,
-    WIDEST,
-    View,
-    fit,
-    page_width,
-)
+from camtool.preview.view import CROP_SHAPES, TALLEST, WIDEST, View, page_width
 from camtool.toolpath.moves import Toolpath
 
 Floats = npt.NDArray[np.float64]
@@ -70,7 +61,8 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
     page = page_width(size_px)
     head, down = legend.head(overlay.title, overlay.notes, page)
     window = overlay.window if options.crop_mm is None else cropped(*options.crop_mm)
-    view, ticks = _fitted(window, down + HEAD_GAP, page, cut=options.crop_mm is not None)
+    shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
+    view, ticks = fitted(window, down + HEAD_GAP, page, shapes)
     room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
     table = legend.rows(_entries(overlay), room, view.box.width)
     legend_y = view.box.bottom + LEGEND_DROP
@@ -88,17 +80,6 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
         legend.legend(table, box.left, legend_y),
         axes.scale_bar(view, box.right, legend_y),
     )
-
-
-def _fitted(window: Floats, top: float, page: float, *, cut: bool) -> tuple[View, Ticks]:
-    """The view and its ticks; fitted twice, since the room for numbers follows from the scale."""
-    left = MARGIN + GUESSED_LEFT
-    shapes = CROP_SHAPES if cut else (WIDEST, TALLEST)
-    for _ in range(2):
-        view = fit(window, left, top, page - MARGIN, shapes)
-        ticks = axes.ticks_of(view)
-        left = MARGIN + ticks.left_width + axes.TICK + axes.LABEL_GAP
-    return view, ticks
 
 
 def _colour(index: int) -> str:

@@ -3,7 +3,11 @@ page itself."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
 
 from camtool.preview import axes, legend
 from camtool.preview.axes import Ticks, ticks_of
@@ -23,6 +27,8 @@ from camtool.preview.view import (
     fit,
 )
 
+Floats = npt.NDArray[np.float64]
+
 HEAD_GAP = 50.0
 """Room between the head and the plot, for the names above it."""
 
@@ -32,6 +38,7 @@ LEGEND_DROP = 70.0
 FOOT = 32.0
 BAR_ROOM = 36.0
 GUESSED_LEFT = 52.0
+FITS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,24 +56,38 @@ class Page:
 
 
 def page_of(content: Content, width: float = PAGE) -> Page:
-    """Fit the plot twice: the room that its numbers need follows from its scale."""
+    """The page of a picture alone."""
     head, down = legend.head(content.scene.title, content.notes, width)
     top = down + HEAD_GAP
-    left, right = MARGIN + GUESSED_LEFT, width - MARGIN
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES
-    for _ in range(2):
-        view = fit(content.window, left, top, right, shapes)
-        ticks = ticks_of(view)
-        left = MARGIN + ticks.left_width + axes.TICK + axes.LABEL_GAP
-        right = width - MARGIN
-        if content.trace is not None:
-            right -= legend.bar_width(content.trace.top_um, view.box.height)
-    view = fit(content.window, left, top, right, shapes)
-    ticks = ticks_of(view)
+
+    def bar(view: View) -> float:
+        trace = content.trace
+        return 0.0 if trace is None else legend.bar_width(trace.top_um, view.box.height)
+
+    view, ticks = fitted(content.window, top, width, shapes, bar)
     room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
     table = legend.rows(entries_of(content, view), room, view.box.width)
     legend_y = view.box.bottom + LEGEND_DROP
     return Page(head, view, ticks, table, legend_y, foot_of(table, legend_y), width)
+
+
+def fitted(
+    window: Floats,
+    top: float,
+    width: float,
+    shapes: tuple[float, float],
+    beside: Callable[[View], float] = lambda view: 0.0,
+) -> tuple[View, Ticks]:
+    """The view of a window on a page so wide and its ticks; `beside` tells how much room a view
+    needs right of it. Fitted thrice: the room for numbers follows from the scale."""
+    left, right = MARGIN + GUESSED_LEFT, width - MARGIN
+    for _ in range(FITS):
+        view = fit(window, left, top, right, shapes)
+        ticks = ticks_of(view)
+        left = MARGIN + ticks.left_width + axes.TICK + axes.LABEL_GAP
+        right = width - MARGIN - beside(view)
+    return view, ticks
 
 
 def foot_of(rows: list[list[Entry]], legend_y: float) -> float:
