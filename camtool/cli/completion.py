@@ -169,6 +169,6 @@ def _flat(prefix: str, values: dict[str, Any]) -> Iterator[str]:
 
 
 def _effects(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    from camtool.cli.judging import EFFECTS
+    from camtool.pipeline.ways import EFFECTS
 
     return [CompletionItem(name) for name in EFFECTS if name.startswith(incomplete)]
