@@ -90,6 +90,19 @@ def test_no_kernel_is_compiled_for_targets() -> None:
     assert not warm("targets") & {"numba", "ezdxf", "shapely"}
 
 
+def test_a_short_run_does_not_look_for_garbage() -> None:
+    code = (
+        "import sys, atexit, gc; sys.argv = ['camtool', 'targets', '--json']; "
+        "atexit.register(lambda: print('KEPT', gc.get_freeze_count(), *gc.get_threshold())); "
+        "from camtool.cli.main import main; main()"
+    )
+    command = [sys.executable, "-c", code]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+    kept, often, *_ = map(int, result.stdout.rpartition("KEPT")[2].split())
+    assert kept > 10_000
+    assert often > 10_000
+
+
 def compiled_by(cache: Path, *arguments: str) -> set[str]:
     """The files of `camtool/kernels` of which a run compiled kernels, with an empty cache."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
