@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from camtool.errors import OptionError
-from camtool.jobs.file import Said
+from camtool.jobs.file import Said, read_job_file
 from camtool.jobs.given import Table, record_of, why_idle
 from camtool.jobs.keys import OPERATION, PLACE, STOCK, WHOLE
 from camtool.jobs.tools import Tools, refuse_bad_tools, with_table
@@ -47,6 +47,11 @@ def build_job(file: Said, flags: Said, chosen: tuple[str, ...] = ()) -> Job:
         placement=_placement(file, flags),
         stock=_stock(file.stock),
     )
+
+
+def job_of_file(path: Path, chosen: tuple[str, ...] = ()) -> Job:
+    """The job of a file alone; raises as `build_job` does."""
+    return build_job(read_job_file(path), Said(), chosen)
 
 
 def _tools(file: Said, whole: Table) -> Tools:

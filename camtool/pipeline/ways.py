@@ -48,6 +48,19 @@ def ways_of(what: str, load: Load, judging: Judging) -> list[Way]:
     ]
 
 
+def altered(target: LoadedTarget, settings: Sequence[str]) -> LoadedTarget:
+    """The target with settings over its machine; MachineError names the wrong one."""
+    from msgspec import to_builtins
+
+    from camtool.machine.loader import build_machine
+
+    if not settings:
+        return target
+    machine = build_machine(to_builtins(target.machine), str(target.file), None, settings)
+    target.post.check(machine)
+    return replace(target, machine=machine)
+
+
 def left_out(names: Sequence[str]) -> Effects:
     """The mechanics without these effects; OptionError for others."""
     from camtool.simulation.options import ALL

@@ -1,18 +1,15 @@
-"""What `camtool.api` gives back: the house's own records, with what they were made from.
-
-Each is its record and nothing else to whoever takes one; besides, it prints as a few lines
-(`print(posted)`) and shows itself in a notebook (`_repr_svg_`).
-"""
+"""Drawings, toolpaths, verdicts and programs, with what they were made from."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from camtool.errors import PostError
 from camtool.geometry.drawing import Drawing as DrawingRecord
 from camtool.pipeline.judge import Posted as PostedRecord
+from camtool.results.picture import Shown
 from camtool.toolpath.moves import Kind
 from camtool.toolpath.moves import Toolpath as ToolpathRecord
 from camtool.verify.verify import Verification as VerificationRecord
@@ -20,7 +17,6 @@ from camtool.verify.verify import Verification as VerificationRecord
 if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
-    from camtool.preview.options import Options
     from camtool.preview.scene import Scene
 
 Made = TypeVar("Made")
@@ -33,51 +29,7 @@ def extended(kind: type[Made], record: Any, **more: Any) -> Made:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Picture:
-    """A picture of `scene`, looking as `options` say; the same bytes for the same values."""
-
-    scene: Scene
-    options: Options
-
-    @property
-    def svg(self) -> str:
-        """The picture as SVG text; OptionError for options that make no picture."""
-        from camtool.preview.draw import draw
-
-        return draw(self.scene, options=self.options)
-
-    def render(self, name: str) -> bytes:
-        """The bytes of a file of this name: .svg, .png, or .html, which is the viewer (it has no
-        options). OutputError for any other."""
-        from camtool.preview.render import render
-
-        return render(self.scene, name, self.options)
-
-    def save(self, file: str | Path) -> None:
-        """Write the file, by its extension; raises as `render` does."""
-        Path(file).write_bytes(self.render(str(file)))
-
-    def __repr__(self) -> str:
-        return f"<Picture of {self.scene.title}>" if self.scene.title else "<Picture>"
-
-    def _repr_svg_(self) -> str:
-        return self.svg
-
-
-class _Shown:
-    """A value that has a picture."""
-
-    def _scene(self) -> Scene:
-        raise NotImplementedError
-
-    def _repr_svg_(self) -> str:
-        from camtool.preview.draw import draw
-
-        return draw(self._scene())
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Drawing(_Shown, DrawingRecord):
+class Drawing(Shown, DrawingRecord):
     """A drawing: exact lines and arcs, mm, Y up (`camtool.geometry.drawing.Drawing`)."""
 
     def __repr__(self) -> str:
@@ -90,7 +42,7 @@ class Drawing(_Shown, DrawingRecord):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Toolpath(_Shown, ToolpathRecord):
+class Toolpath(Shown, ToolpathRecord):
     """Moves in the work frame, mm and mm/min (`camtool.toolpath.moves.Toolpath`); `drawing`,
     `job` and `target` are what it was planned from."""
 
@@ -116,7 +68,7 @@ class Toolpath(_Shown, ToolpathRecord):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Verification(_Shown, VerificationRecord):
+class Verification(Shown, VerificationRecord):
     """The verdict on a program (`camtool.verify.verify.Verification`): `report` holds the
     figures, `findings` what is to be said. `decoded` is the toolpath that the controller makes of
     the program `data`; it was held against `drawing`, planned with `job`, where there is one."""
@@ -152,12 +104,16 @@ class Verification(_Shown, VerificationRecord):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Posted(_Shown, PostedRecord):
-    """A drawing as a program (`camtool.pipeline.Posted`), with what it was made from."""
+class Written(Shown, PostedRecord):
+    """A program for `target`, written, read back and judged (`camtool.pipeline.Posted`)."""
 
-    drawing: DrawingRecord
-    job: Job
+    verification: Verification | None
     target: LoadedTarget
+
+    @property
+    def source(self) -> str:
+        """What it was made of, as messages name it."""
+        return self.wanted.made_from
 
     @property
     def data(self) -> bytes:
@@ -165,7 +121,7 @@ class Posted(_Shown, PostedRecord):
         if self.program is None or self.failed:
             raise PostError(
                 "the program has errors and must not be run",
-                file=self.drawing.file,
+                file=self.source,
                 mend="see findings",
             )
         return self.program.data
@@ -174,14 +130,45 @@ class Posted(_Shown, PostedRecord):
         return repr(self) if self.verification is None else self.verification.report.to_text()
 
     def __repr__(self) -> str:
-        name, target = PurePath(self.drawing.file).name, self.target.machine.target.name
+        name, target = PurePath(self.source).name, self.target.machine.target.name
         made = "no program" if self.program is None else f"{len(self.program.data)} bytes"
-        return f"<Posted {name} for {target}: {made}, {_noticed(len(self.findings))}>"
+        noticed = _noticed(len(self.findings))
+        return f"<{type(self).__name__} {name} for {target}: {made}, {noticed}>"
+
+    def _scene(self) -> Scene:
+        from camtool.pipeline import posted_scene
+
+        return posted_scene(self, self.target, title=PurePath(self.source).name)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Posted(Written):
+    """A drawing as a program, with what it was made from."""
+
+    drawing: DrawingRecord
+    job: Job
+
+    @property
+    def source(self) -> str:
+        """The drawing's file."""
+        return self.drawing.file
 
     def _scene(self) -> Scene:
         from camtool.pipeline import posted_scene
 
         return posted_scene(self, self.target, drawing=self.drawing, job=self.job)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Converted(Written):
+    """A program of one machine as that of another; `file` names the first one's."""
+
+    file: str
+
+    @property
+    def source(self) -> str:
+        """The first program's file."""
+        return self.file
 
 
 def _noticed(count: int) -> str:

@@ -1,0 +1,128 @@
+"""Programs converted, compared, and machines calibrated from Python, as the commands do it."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import camtool
+from camtool.cli.main import cli
+from camtool.results import Comparison, Converted, extended
+
+CIRCLE = b"G00X00000.00Y00004.20;G02X00000.00Y00004.20I00000.00J00000.00F08;M30;"
+SAMPLES = Path("samples")
+
+
+@pytest.fixture(scope="module")
+def converted() -> Converted:
+    return camtool.convert(CIRCLE, "pic-mmh", "grbl")
+
+
+@pytest.fixture(scope="module")
+def compared() -> Comparison:
+    return camtool.compare(CIRCLE, "pic-mmh", "interpolators")
+
+
+def ran(*arguments: str | Path) -> str:
+    """What the command prints on stdout."""
+    done = CliRunner().invoke(
+        cli, [*map(str, arguments)], standalone_mode=False, catch_exceptions=False
+    )
+    return done.stdout
+
+
+def test_convert_gives_what_the_command_writes(converted: Converted, tmp_path: Path) -> None:
+    (tmp_path / "circle.pic").write_bytes(CIRCLE)
+    output = tmp_path / "circle.nc"
+    ran("convert", tmp_path / "circle.pic", "--from", "pic-mmh", "--to", "grbl", "-o", output)
+    assert converted.data == output.read_bytes()
+    assert converted.verification is not None
+    assert converted.verification.data == converted.data
+    assert "µm at most" in str(converted)
+
+
+def test_what_is_converted_prints_and_shows_itself(converted: Converted) -> None:
+    assert repr(converted).startswith("<Converted <bytes> for grbl: ")
+    assert converted._repr_svg_() == camtool.preview(converted).svg
+    assert b"<html" in camtool.preview(converted).render("circle.html")
+    broken = extended(Converted, converted, program=None)
+    with pytest.raises(camtool.CamtoolError, match=r"<bytes>.*must not be run"):
+        _ = broken.data
+
+
+def test_convert_from_a_file_with_a_feed_and_no_verdict(tmp_path: Path) -> None:
+    file = tmp_path / "circle.pic"
+    file.write_bytes(CIRCLE)
+    slow = camtool.convert(file, "pic-mmh", "grbl", feed_mm_min=5.0, check=False)
+    assert b"F5" in slow.data
+    assert slow.verification is None
+    assert slow.source == str(file)
+    with pytest.raises(camtool.CamtoolError, match=r"circle\.pic: block 1"):
+        camtool.convert(file, "valcnc", "grbl")
+
+
+def test_compare_gives_what_the_command_prints(compared: Comparison, tmp_path: Path) -> None:
+    (tmp_path / "circle.pic").write_bytes(CIRCLE)
+    arguments = ("verify", tmp_path / "circle.pic", "-t", "pic-mmh", "--compare")
+    assert f"{compared}\n" == ran(*arguments, "interpolators")
+    play = camtool.compare(CIRCLE, "pic-mmh", "backlash=0,0.001")
+    assert f"{play}\n" == ran(*arguments, "backlash=0,0.001")
+    assert len({row.total_max_um for row in play.rows}) == 2
+    shares = camtool.compare(CIRCLE, "pic-mmh", "mechanics")
+    assert [row.name for row in shares.rows][:2] == ["as it is", "without play"]
+
+
+def test_a_comparison_has_verdicts_and_a_picture(compared: Comparison) -> None:
+    assert repr(compared) == "<Comparison of <bytes>: dsm, dda, stairs>"
+    most = {name: each.report.error_um.total.max for name, each in compared.verdicts.items()}
+    assert most == {row.name: row.total_max_um for row in compared.rows}
+    assert compared._repr_svg_().startswith("<svg")
+    picture = camtool.preview(compared, dark=True)
+    assert picture.svg != compared._repr_svg_()
+    assert picture.render("x.png").startswith(b"\x89PNG")
+    with pytest.raises(camtool.CamtoolError, match=r"x\.html"):
+        picture.render("x.html")
+
+
+def test_targets_of_ones_own_are_compared() -> None:
+    worn = camtool.load_target("pic-mmh", settings={"axes.x.backlash_mm": 0.4})
+    found = camtool.compare(CIRCLE, worn, {"as built": "pic-mmh", "worn": worn})
+    built, old = found.rows
+    assert (built.name, old.name) == ("as built", "worn")
+    assert built.total_max_um != old.total_max_um
+    # Values are laid over the target that is given, not over the one that it extends.
+    other = camtool.compare(CIRCLE, worn, "axes.y.backlash_mm=0.1685")
+    assert other.rows[0].total_max_um == old.total_max_um
+
+
+@pytest.mark.parametrize(
+    ("ways", "words"),
+    [
+        ("nothing", "nothing to compare"),
+        ("backlash=", "nothing to compare"),
+        ("axes.x.backlsh_mm=1", "did you mean backlash_mm"),
+        ("backlash=-1", "backlash_mm"),
+    ],
+)
+def test_ways_that_are_none(ways: str, words: str) -> None:
+    with pytest.raises(camtool.CamtoolError, match=words):
+        camtool.compare(CIRCLE, "pic-mmh", ways)
+
+
+def test_calibrate_gives_what_the_command_writes(tmp_path: Path) -> None:
+    file = SAMPLES / "measured" / "pic-mmh-lines.toml"
+    found = camtool.calibrate(file)
+    text = ran("calibrate", file, "-o", tmp_path / "my.toml", "--json", tmp_path / "my.json")
+    assert f"{found}\n" == text
+    assert found.machine_file == (tmp_path / "my.toml").read_text(encoding="utf-8")
+    told = json.loads((tmp_path / "my.json").read_text(encoding="utf-8"))
+    assert [each.value for each in found.estimates] == [row["value"] for row in told["estimates"]]
+    assert repr(found).startswith(f"<Calibration of pic-mmh from {file}: step of x, ")
+    assert repr(found).endswith(", play of x, play of y>")
+    again = camtool.calibrate(file, machine=tmp_path / "my.toml")
+    play = again.estimate("play", "x")
+    assert play is not None
+    assert play.before == pytest.approx(play.value, abs=1e-3)
+    with pytest.raises(camtool.CamtoolError, match="was measured on pic-mmh"):
+        camtool.calibrate(file, "grbl")
