@@ -12,6 +12,7 @@ import click
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import talk_options
 from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.pictureflags import DRAWING, PictureFlags, picture_options
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import picture as picture_name
@@ -30,12 +31,14 @@ if TYPE_CHECKING:
     callback=picture_name,
     help="Picture of the drawing, .svg, .png or .html.",
 )
+@picture_options
 @drawing_options
 @talk_options
 def check(
     sources: tuple[str, ...],
     report: str | None,
     preview: str | None,
+    picture: PictureFlags,
     drawing: DrawingFlags,
     quiet: bool,
     verbose: bool,
@@ -45,7 +48,8 @@ def check(
     Units and why, size, layers, entities used and not used, gaps, and the smallest features. Of
     several drawings all are looked at, whatever is wrong with one of them.
     """
-    asked = Asked(report, preview, quiet, verbose)
+    picture.check([preview], DRAWING)
+    asked = Asked(report, preview, picture, quiet, verbose)
     if len(sources) == 1:
         return _checked(sources[0], drawing, asked)
     if report is not None or preview is not None:
@@ -60,6 +64,7 @@ class Asked:
 
     report: str | None
     preview: str | None
+    looks: PictureFlags
     quiet: bool
     verbose: bool
 
@@ -87,10 +92,12 @@ def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
         files[asked.report] = text.encode()
     if asked.preview is not None:
         from camtool.pipeline import picture
-        from camtool.preview.render import render
 
-        scene = picture(title=Path(read.file).name, drawing=read)
-        files[asked.preview] = render(scene, asked.preview)
+        title = Path(read.file).name
+        painted = asked.looks.painter(
+            lambda: [picture(title=title, drawing=read)], quiet=asked.quiet
+        )
+        files[asked.preview] = painted(asked.preview)
     write_all(files)
     if asked.report != STDOUT and not asked.quiet:
         from camtool.cli.check_table import table

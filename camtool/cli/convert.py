@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from camtool.cli.finish import Asked, finish
 from camtool.cli.options import MachineFlags, talk_options
-from camtool.cli.report import flags_given, report_option
+from camtool.cli.pictureflags import RESULT, UNVERIFIED, PictureFlags, picture_options
+from camtool.cli.report import flags_given, pictures_asked, report_option
+from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say_first_run
 from camtool.cli.types import feed
+from camtool.cli.types import picture as picture_name
 from camtool.cli.verify import read_bytes, shown
 
-if TYPE_CHECKING:
-    from camtool.machine.registry import LoadedTarget
-    from camtool.pipeline import Posted
 
-
-@click.command(short_help="A program of one machine as that of another.")
+@click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")
 @click.argument("program", metavar="PROGRAM")
 @click.option("--from", "source", metavar="NAME", required=True, help="The machine it is for.")
 @click.option("--to", "target", metavar="NAME", required=True, help="The machine it shall be for.")
@@ -31,9 +29,16 @@ if TYPE_CHECKING:
 @click.option(
     "--feed", "feed_mm_min", callback=feed, metavar="FEED", help="For all cuts, in mm/min."
 )
+@click.option(
+    "--preview",
+    metavar="FILE",
+    callback=picture_name,
+    help="Picture of the predicted result, .svg or .png; .html to pan, zoom and play.",
+)
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
+@picture_options
 @talk_options
 def convert(
     program: str,
@@ -45,9 +50,11 @@ def convert(
     from_machine: str | None,
     from_set: tuple[str, ...],
     feed_mm_min: float | None,
+    preview: str | None,
     report: str | None,
     page: str | None,
     no_verify: bool,
+    picture: PictureFlags,
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -56,12 +63,13 @@ def convert(
     The moves that the first controller decodes are written for the second one, read back,
     simulated and compared with them. Exit code 1 (and no file) when something is wrong.
     """
+    picture.check(pictures_asked(page, preview), UNVERIFIED if no_verify else RESULT)
     before = MachineFlags(source, from_machine, from_set).load()
     after = MachineFlags(target, machine, settings).load()
-    asked = Asked(program, output, report, page=page, flags=flags_given())
+    asked = Asked(program, output, report, preview, page, flags_given())
     asked.check(after.machine.target.extension, verified=not no_verify)
 
-    from camtool.pipeline import convert_program
+    from camtool.pipeline import convert_program, posted_scene
 
     say_first_run(quiet=quiet)
     made = convert_program(
@@ -72,19 +80,12 @@ def convert(
         feed_mm_min=feed_mm_min,
         check=not no_verify,
     )
+    title = Path(shown(program)).name
     return finish(
         made,
         asked,
         quiet=quiet,
         verbose=verbose,
-        picture=lambda name: _picture(name, shown(program), made, after),
+        picture=picture.painter(lambda: [posted_scene(made, after, title=title)], quiet=quiet),
         target=after,
     )
-
-
-def _picture(name: str, title: str, made: Posted, target: LoadedTarget) -> bytes:
-    from camtool.pipeline import posted_scene
-    from camtool.preview.render import render
-
-    scene = posted_scene(made, target, title=Path(title).name)
-    return render(scene, name)

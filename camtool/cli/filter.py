@@ -16,6 +16,7 @@ import click
 from camtool.cli.finish import Asked, finish
 from camtool.cli.options import talk_options
 from camtool.cli.output import STDOUT
+from camtool.cli.pictureflags import PictureFlags
 from camtool.cli.posting import posting_options
 from camtool.cli.sections import SectionedCommand
 
@@ -54,7 +55,7 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
         Asked(source, STDOUT, None),
         quiet=quiet,
         verbose=verbose,
-        picture=made.picture,
+        picture=PictureFlags().painter(lambda: [made.scene()], quiet=quiet),
         target=target,
     )
     if code == 0:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.report import Subject, picture_beside, report_files
+from camtool.cli.report import Subject, linked_picture, picture_beside, report_files
 from camtool.cli.talk import say, say_findings
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def finish(
     say_findings(made.findings, quiet=quiet, verbose=verbose)
     if made.failed or made.program is None:
         if asked.page is not None:
-            write_all(_page(made, asked, picture, target))
+            write_all(_page_alone(made, asked, picture, target))
         no = "nothing" if asked.page is None else "no program"
         say(
             f"camtool: error: {asked.source}: {no} was written; mend the errors above",
@@ -87,6 +87,14 @@ def finish(
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(made.program.data)} bytes)", quiet=quiet)
     return 0
+
+
+def _page_alone(
+    made: Posted, asked: Asked, picture: Callable[[str], bytes], target: LoadedTarget
+) -> dict[str, bytes]:
+    """The files of the page, and the picture of `--preview` if that is what the page shows."""
+    files, linked = _page(made, asked, picture, target), linked_picture(asked.page, asked.preview)
+    return files if linked is None or linked in files else {**files, linked: picture(linked)}
 
 
 def _page(

@@ -1,21 +1,56 @@
-"""The flags that say how a picture looks, for every command that makes one."""
+"""The flags that say how a picture looks, for every command that makes one.
+
+A command says with a `Canvas` what its pictures can show. What a picture cannot honour is refused
+by name before any work is done; a layer that was named and turns out to hold nothing is told.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import click
 
 from camtool.cli.gather import Command, with_flags
 from camtool.cli.sections import option
+from camtool.cli.talk import say
+from camtool.cli.types import is_viewer
 from camtool.errors import OptionError
 from camtool.units import parse_length
 
 if TYPE_CHECKING:
     from camtool.preview.options import Options
+    from camtool.preview.scene import Scene
 
 _PICTURE = "Picture"
+OF_ALL = ("--size", "--crop", "--dark")
+"""What every still picture has."""
+
+HINTS = {
+    "swept": "; --tool-diameter says how wide the tool is",
+    "travel": "; the path does not lie within the table's travel",
+    "drawing": "; there is no drawing in it",
+}
+"""Why a layer is empty, where that has a reason that is not in the drawing."""
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """What a command's pictures can show: moves of a machine or a drawing alone; with the
+    predicted path or without; in layers or without. `more` is what lets them show the rest."""
+
+    more: str = ""
+    moves: bool = True
+    predicted: bool = False
+    layered: bool = True
+
+
+DRAWING = Canvas("camtool preview --target NAME --simulate shows more", moves=False)
+RESULT = Canvas(predicted=True)
+UNVERIFIED = Canvas("drop --no-verify")
+OVERLAY = Canvas("drop --compare", layered=False)
 
 
 @dataclass(frozen=True)
@@ -23,28 +58,127 @@ class PictureFlags:
     """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`, `--layers`,
     `--no-layer`, `--polar`."""
 
-    size: int | None
-    crop: tuple[float, float, float, float] | None
-    dark: bool
-    exaggerate: float | None
-    layers: str | None
-    no_layer: tuple[str, ...]
-    polar: int | None
+    size: int | None = None
+    crop: tuple[float, float, float, float] | None = None
+    dark: bool = False
+    exaggerate: float | None = None
+    layers: str | None = None
+    no_layer: tuple[str, ...] = ()
+    polar: int | None = None
 
     @property
-    def given(self) -> bool:
-        """Whether anything is asked of the picture."""
-        return self != PictureFlags(None, None, False, None, None, (), None)
+    def given(self) -> tuple[str, ...]:
+        """The flags that were given, by name."""
+        return tuple(
+            f"--{name.replace('_', '-')}"
+            for name in FLAGS
+            if getattr(self, name) not in (None, False, ())
+        )
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The layers that `--layers` names."""
+        names = (name.strip() for name in (self.layers or "").split(","))
+        return tuple(dict.fromkeys(name for name in names if name))
 
     def options(self) -> Options:
-        """What `camtool.preview` is told."""
+        """What `camtool.preview` is told; OptionError for what makes no picture."""
         from camtool.preview.layers import chosen
         from camtool.preview.options import Options
 
         times = 1.0 if self.exaggerate is None else self.exaggerate
-        named = [name.strip() for name in (self.layers or "").split(",") if name.strip()]
-        layers = chosen(named, self.no_layer)
+        layers = chosen(self.named, self.no_layer)
         return Options(self.size, self.crop, self.dark, times, layers, self.polar)
+
+    def check(self, pictures: Sequence[str | None], canvas: Canvas) -> None:
+        """A usage error for flags that say nothing to any of the `pictures`, and for those that
+        contradict each other; OptionError as `options`."""
+        if not self.given:
+            return
+        names, flags = [name for name in pictures if name is not None], ", ".join(self.given)
+        if not names:
+            raise click.UsageError(f"{flags}: there is no picture to make; add --preview")
+        if all(map(is_viewer, names)):
+            raise click.UsageError(
+                f"{flags}: an .html page has switches of its own; name a .svg or .png, or drop it"
+            )
+        if self.layers is not None and not self.named:
+            raise click.UsageError("--layers names no layer")
+        options = self.options()
+        if not canvas.layered and not {*self.given} <= {*OF_ALL}:
+            others = ", ".join(flag for flag in self.given if flag not in OF_ALL)
+            raise click.UsageError(f"{others}: not for this picture; {canvas.more}")
+        self._check_errors(canvas)
+        self._check_layers(canvas, options)
+
+    def _check_errors(self, canvas: Canvas) -> None:
+        """Errors can be shown where they are known; a circle's plot shows nothing else."""
+        for flag in ("--exaggerate", "--polar"):
+            if flag in self.given and not canvas.predicted:
+                raise click.UsageError(f"{flag} needs the predicted path; {canvas.more}")
+        others = ", ".join(
+            flag for flag in self.given if flag not in ("--polar", "--size", "--dark")
+        )
+        if self.polar is not None and others:
+            raise click.UsageError(f"{others}: --polar plots a circle alone; drop one of them")
+
+    def _check_layers(self, canvas: Canvas, options: Options) -> None:
+        from camtool.preview.layers import NOT_UNDER_PATH, OF_DRAWINGS, OF_PREDICTIONS
+
+        covered = canvas.predicted and "path" in options.layers
+        for name in self.named:
+            if (name in OF_PREDICTIONS and not canvas.predicted) or (
+                name not in OF_DRAWINGS and not canvas.moves
+            ):
+                raise click.UsageError(f"--layers {name}: there is none here; {canvas.more}")
+            if name in NOT_UNDER_PATH and covered and name in options.layers:
+                raise click.UsageError(
+                    f"--layers {name}: it is left out where the predicted path is shown; "
+                    "name it without path"
+                )
+        if self.exaggerate is not None and canvas.predicted and not covered:
+            raise click.UsageError("--exaggerate moves the layer path, which is left out")
+
+    def painter(
+        self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False
+    ) -> Callable[[str], bytes]:
+        """What draws the scenes, several side by side, as a picture file of a name; they are made
+        when first asked for. Says which of the layers that were named hold nothing."""
+
+        @functools.cache
+        def made() -> Sequence[Scene]:
+            found = scenes()
+            for name in self._missing(found):
+                say(
+                    f"camtool: warning: --layers {name}: nothing in this picture"
+                    f"{HINTS.get(name, '')}",
+                    quiet=quiet,
+                )
+            return found
+
+        def painted(name: str) -> bytes:
+            from camtool.preview.render import render
+
+            drawn, options = made(), self.options()
+            if all(scene.trace_points is None for scene in drawn):
+                # Nothing could be judged: the findings say why, the picture shows what there is.
+                options = replace(options, polar=None)
+            return render(drawn[0], name, options)
+
+        return painted
+
+    def _missing(self, scenes: Sequence[Scene]) -> list[str]:
+        if not self.named:
+            return []
+        from camtool.preview.missing import missing_layers
+
+        options = self.options()
+        empty = [missing_layers(scene, options, self.named) for scene in scenes]
+        return [name for name in self.named if all(name in names for names in empty)]
+
+
+FLAGS = tuple(field.name for field in fields(PictureFlags))
+"""The names of the flags of pictures, as a command has them."""
 
 
 def picture_options(command: Command) -> Command:

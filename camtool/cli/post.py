@@ -9,8 +9,9 @@ import click
 from camtool.cli.finish import Asked, finish
 from camtool.cli.options import talk_options
 from camtool.cli.output import STDOUT
+from camtool.cli.pictureflags import RESULT, UNVERIFIED, PictureFlags, picture_options
 from camtool.cli.posting import posting_options
-from camtool.cli.report import flags_given, report_option
+from camtool.cli.report import flags_given, pictures_asked, report_option
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.types import picture as picture_name
 from camtool.cli.watch import watch
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
 @click.option("--watch", "watching", is_flag=True, help="Again when a file has changed.")
+@picture_options
 @posting_options
 @talk_options
 def post(
@@ -40,6 +42,7 @@ def post(
     report: str | None,
     page: str | None,
     watching: bool,
+    picture: PictureFlags,
     posting: Posting,
     quiet: bool,
     verbose: bool,
@@ -52,6 +55,8 @@ def post(
     """
     if watching and STDOUT in (source, output, report, page):
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
+    canvas = UNVERIFIED if posting.no_verify else RESULT
+    picture.check(pictures_asked(page, preview), canvas)
     flags = flags_given()
 
     def once() -> int:
@@ -64,7 +69,7 @@ def post(
             asked,
             quiet=quiet,
             verbose=verbose,
-            picture=made.picture,
+            picture=picture.painter(lambda: [made.scene()], quiet=quiet),
             target=target,
         )
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Posted
     from camtool.planning.job import Job
+    from camtool.preview.scene import Scene
 
 JOB_ENDING = ".toml"
 
@@ -34,13 +35,11 @@ class Made:
     posted: Posted
     target: LoadedTarget
 
-    def picture(self, name: str) -> bytes:
-        """The predicted result as a picture file of this name."""
+    def scene(self) -> Scene:
+        """The predicted result."""
         from camtool.pipeline import posted_scene
-        from camtool.preview.render import render
 
-        scene = posted_scene(self.posted, self.target, drawing=self.drawing, job=self.job)
-        return render(scene, name)
+        return posted_scene(self.posted, self.target, drawing=self.drawing, job=self.job)
 
 
 @dataclass(frozen=True)

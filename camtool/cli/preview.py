@@ -15,7 +15,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import check_writable, write_all
-from camtool.cli.pictureflags import PictureFlags, picture_options
+from camtool.cli.pictureflags import DRAWING, RESULT, Canvas, PictureFlags, picture_options
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import is_viewer
@@ -60,24 +60,25 @@ def preview(
     """
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
-    if picture.exaggerate is not None and not simulate:
-        raise click.UsageError("--exaggerate needs --simulate")
-    if picture.polar is not None and not simulate:
-        raise click.UsageError("--polar needs --simulate")
+    picture.check([output], _canvas(machine, simulate=simulate))
     check_writable([output], [source])
     # What is to be played needs its times, which only the machine's model knows.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
-    from camtool.preview.render import render
-
-    options = picture.options()
     say_first_run(quiet=quiet)
     scene = _scene(source, machine, simulate, job, drawing)
-    write_all({output: render(scene, output, options)})
+    write_all({output: picture.painter(lambda: [scene], quiet=quiet)(output)})
     findings = scene.drawing.findings if scene.drawing is not None else ()
     say_findings(findings, quiet=quiet, verbose=verbose)
     say(f"written: {output}", quiet=quiet)
     return 0
+
+
+def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:
+    """What the picture can show."""
+    if machine.name() is None:
+        return DRAWING
+    return RESULT if simulate else Canvas("add --simulate")
 
 
 def _scene(

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.output import STDOUT
-from camtool.cli.types import page
+from camtool.cli.pictureflags import FLAGS as PICTURE_FLAGS
+from camtool.cli.types import is_viewer, page
 
 if TYPE_CHECKING:
     from camtool.findings import Finding
@@ -26,10 +27,14 @@ if TYPE_CHECKING:
     from camtool.verify.report import Report
 
 Flags = tuple[tuple[str, str], ...]
+EMBEDDED = "picture.svg"
+"""The picture within a page of HTML."""
+
 _CAPTION = "The predicted result"
 _PLACES = ("target", "machine", "settings", "output", "preview", "report", "page")
-_NOT_TOLD = frozenset((*_PLACES, "quiet", "verbose", "watching"))
-"""What says where things are and how much is said; the machine tells of itself."""
+_NOT_TOLD = frozenset((*_PLACES, *PICTURE_FLAGS, "quiet", "verbose", "watching"))
+"""What says where things are, how pictures look and how much is said; the machine tells of
+itself."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +76,26 @@ def _said(context: click.Context, name: str) -> str:
     return "yes" if value is True else str(value)
 
 
-def picture_beside(name: str | None, preview: str | None) -> str | None:
-    """The picture that a page links to and that nobody else writes; None when there is none."""
+def linked_picture(name: str | None, preview: str | None) -> str | None:
+    """The picture that a page of this name links to: the one of `--preview`, unless that is a
+    viewer, or one of the page's own name. None where it links to none."""
     if name is None or name == STDOUT or PurePath(name).suffix.lower() != ".md":
         return None
-    return str(PurePath(name).with_suffix(".svg")) if preview is None else None
+    if preview is not None and not is_viewer(preview):
+        return preview
+    return str(PurePath(name).with_suffix(".svg"))
+
+
+def picture_beside(name: str | None, preview: str | None) -> str | None:
+    """The same where nobody else writes it."""
+    linked = linked_picture(name, preview)
+    return None if linked == preview else linked
+
+
+def pictures_asked(name: str | None, preview: str | None) -> list[str]:
+    """The pictures to be made for a page and a `--preview`, by names of their kind."""
+    held = EMBEDDED if name is not None and name.lower().endswith(".html") else None
+    return [each for each in (preview, picture_beside(name, preview), held) if each is not None]
 
 
 def report_files(
@@ -90,11 +110,10 @@ def report_files(
     if name != STDOUT and suffix == ".json":
         return {name: to_json(_page(subject, ())).encode()}
     if name != STDOUT and suffix == ".html":
-        data = base64.b64encode(picture("picture.svg")).decode()
+        data = base64.b64encode(picture(EMBEDDED)).decode()
         shown = ((_CAPTION, f"data:image/svg+xml;base64,{data}"),)
         return {name: html(_page(subject, shown)).encode()}
-    beside = picture_beside(name, preview)
-    linked = None if name == STDOUT else beside or preview
+    beside, linked = picture_beside(name, preview), linked_picture(name, preview)
     pictures = () if linked is None else ((_CAPTION, _from(name, linked)),)
     files = {name: markdown(_page(subject, pictures)).encode()}
     return files if beside is None else {**files, beside: picture(beside)}

@@ -19,11 +19,12 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.pictureflags import PictureFlags, picture_options
+from camtool.cli.pictureflags import OVERLAY, RESULT, PictureFlags, picture_options
 from camtool.cli.report import (
     Subject,
     flags_given,
     picture_beside,
+    pictures_asked,
     report_files,
     report_option,
 )
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Judging, Way
     from camtool.planning.job import Job
-    from camtool.preview.options import Options
+    from camtool.preview.scene import Scene
 
 
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")
@@ -115,13 +116,13 @@ def verify(
     """
     if compare is not None and page is not None:
         raise click.UsageError("--report is of one way to run a program; drop --compare")
+    picture.check(pictures_asked(page, preview), RESULT if compare is None else OVERLAY)
     beside = picture_beside(page, preview)
     inputs = [program, *([against] if against else [])]
     check_writable([preview, report, page, beside], inputs)
 
     from camtool.pipeline import Judging
 
-    looks = picture.options()
     judging = Judging(
         interpolator=cast("Interpolator | None", interpolator),
         effects=left_out(without) if without else None,
@@ -142,9 +143,9 @@ def verify(
             raise click.UsageError("--compare draws .svg and .png alone")
         ways = ways_to_compare(compare, machine, judging)
         with job.blamed():
-            return _compared(data, ways, goal, Wishes(preview, report, quiet, looks=looks))
+            return _compared(data, ways, goal, Wishes(preview, picture, report, quiet))
     with job.blamed():
-        wishes = Wishes(preview, report, quiet, verbose, page, looks)
+        wishes = Wishes(preview, picture, report, quiet, verbose, page)
         return _judged(data, target, judging, goal, wishes)
 
 
@@ -162,11 +163,11 @@ class Wishes:
     """What the user wants to have."""
 
     preview: str | None
+    looks: PictureFlags
     report: str | None
     quiet: bool
     verbose: bool = False
     page: str | None = None
-    looks: Options | None = None
 
 
 def _judged(
@@ -181,10 +182,7 @@ def _judged(
     )
     files: dict[str, bytes] = {}
 
-    def pictured(name: str) -> bytes:
-        from camtool.preview.options import AS_USUAL
-        from camtool.preview.render import render
-
+    def scenes() -> list[Scene]:
         scene = picture(
             title=Path(goal.name).name,
             drawing=goal.drawing,
@@ -194,8 +192,9 @@ def _judged(
             machine=target.machine,
             listing=listing_of(data, target, decoded),
         )
-        return render(scene, name, wishes.looks or AS_USUAL)
+        return [scene]
 
+    pictured = wishes.looks.painter(scenes, quiet=wishes.quiet)
     if wishes.preview is not None:
         files[wishes.preview] = pictured(wishes.preview)
     if wishes.report is not None:
@@ -231,11 +230,10 @@ def _compared(data: bytes, ways: list[Way], goal: Goal, wishes: Wishes) -> int:
     rows = [row_of(variant.name, variant.verification.report) for variant in variants]
     files: dict[str, bytes] = {}
     if wishes.preview is not None:
-        from camtool.preview.options import AS_USUAL
         from camtool.preview.overlay import render_overlay
 
         overlay = compare_picture(data, ways, variants, title=Path(goal.name).name)
-        files[wishes.preview] = render_overlay(overlay, wishes.preview, wishes.looks or AS_USUAL)
+        files[wishes.preview] = render_overlay(overlay, wishes.preview, wishes.looks.options())
     if wishes.report is not None:
         files[wishes.report] = to_json(rows).encode()
     write_all(files)

@@ -28,9 +28,19 @@ LAYERS = (
 USUAL = frozenset(LAYERS) - {"reversals"}
 """What is shown when nobody says."""
 
+OF_DRAWINGS = frozenset({"drawing", "zero", "doubts"})
+"""What a picture of a drawing alone can show."""
+
+OF_PREDICTIONS = frozenset({"path", "worst"})
+"""What a picture shows only where it is predicted how the slides move."""
+
+NOT_UNDER_PATH = frozenset({"rapids", "plunges", "starts", "order", "arrows"})
+"""What is left out where the predicted path is shown."""
+
 
 def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
-    """The layers `names` (none: the usual ones) but those `without`; OptionError for others."""
+    """The layers `names` (none: the usual ones) but those `without`; OptionError for others, and
+    when none is left."""
     shown, left_out = set(names), set(without)
     for name in sorted(shown | left_out):
         if name not in LAYERS:
@@ -39,4 +49,7 @@ def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
             raise OptionError(
                 f"{name!r} is no layer", mend=f"{meant}There are {', '.join(LAYERS)}"
             )
-    return frozenset(shown or USUAL) - left_out
+    left = frozenset(shown or USUAL) - left_out
+    if not left:
+        raise OptionError("no layer is left to show", mend="name others, or leave out fewer")
+    return left

@@ -1,5 +1,6 @@
-"""`--size`, `--crop` and `--dark` of the commands that make pictures."""
+"""`--size`, `--crop`, `--dark`, `--layers` ... of the commands that make pictures."""
 
+from base64 import b64encode
 from pathlib import Path
 
 import click
@@ -7,6 +8,7 @@ import pytest
 
 from camtool.cli.main import cli
 from camtool.errors import OptionError
+from tests.cli.conftest import Run
 from tests.oracles.png import decode
 
 
@@ -89,3 +91,105 @@ def test_a_circle_of_a_program_is_plotted(tmp_path: Path, monkeypatch: pytest.Mo
     assert "circle 1: radius 0.0042 mm" in Path("a.svg").read_text(encoding="utf-8")
     with pytest.raises(OptionError, match="no circle 2"):
         run("verify", circle, "-t", "pic-mmh", "--polar", "2", "--preview", "b.svg")
+
+
+LOOKS = ("--size", "300", "--dark", "--exaggerate", "3", "--no-layer", "worst")
+POST = ("-t", "grbl", "--tool-diameter", "0.2", "-o", "a.nc")
+
+
+def test_every_command_draws_the_same_picture(drawing: str) -> None:
+    run("post", drawing, *POST, *LOOKS, "--preview", "a.svg")
+    run("preview", drawing, *POST[:-2], *LOOKS, "--simulate", "-o", "b.svg")
+    assert Path("a.svg").read_bytes() == Path("b.svg").read_bytes()
+    run("convert", "a.nc", "--from", "grbl", "--to", "linuxcnc", *LOOKS, "-o", "c.ngc",
+        "--preview", "c.svg")  # fmt: skip
+    run("preview", "c.ngc", "-t", "linuxcnc", *LOOKS, "--simulate", "-o", "d.svg")
+    named = Path("d.svg").read_text(encoding="utf-8").replace("c.ngc", "a.nc")
+    # They differ by the title alone, which is of the program before.
+    assert "error × 3" in named
+    assert _path(Path("c.svg")) == _path(Path("d.svg"))
+    run("check", drawing, "--size", "300", "--layers", "drawing", "--preview", "e.svg")
+    run("preview", drawing, "--size", "300", "--layers", "drawing", "-o", "f.svg")
+    assert Path("e.svg").read_bytes() == Path("f.svg").read_bytes()
+    assert "part zero" not in Path("e.svg").read_text(encoding="utf-8")
+
+
+def _path(picture: Path) -> str:
+    text = picture.read_text(encoding="utf-8")
+    return text[text.index('<g id="slide-path"') : text.index('<g id="legend"')]
+
+
+SIMULATED = ("preview", "a.csv", "-t", "grbl", "--simulate", "-o", "x.svg")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (("post", "a.csv", *POST, "--dark"), "--dark: there is no picture .* add --preview"),
+        (("post", "a.csv", *POST, "--report", "-", "--polar", "1"), "no picture to make"),
+        (("post", "a.csv", *POST, "--report", "r.json", "--dark"), "no picture to make"),
+        (("check", "a.csv", "--size", "100"), "--size: there is no picture"),
+        (("verify", "a.nc", "-t", "grbl", "--no-layer", "path"), "--no-layer: there is no pict"),
+        (("convert", "a.nc", "--from", "grbl", "--to", "grbl", "--dark"), "no picture to make"),
+        (("preview", "a.csv", "-o", "x.html", "--dark", "--crop", "1,1,2,2"),
+         "--crop, --dark: an .html page has switches"),
+        (("post", "a.csv", *POST, "--no-verify", "--preview", "x.svg", "--polar", "1"),
+         "--polar needs the predicted path; drop --no-verify"),
+        (("post", "a.csv", *POST, "--no-verify", "--preview", "x.svg", "--layers", "worst"),
+         "--layers worst: .* drop --no-verify"),
+        (("preview", "a.csv", "-t", "grbl", "-o", "x.svg", "--layers", "path"),
+         "--layers path: .* add --simulate"),
+        (("preview", "a.csv", "-o", "x.svg", "--layers", "feeds"), "--layers feeds: .* --target"),
+        (("check", "a.csv", "--preview", "x.svg", "--exaggerate", "2"), "--simulate shows more"),
+        (("verify", "a.nc", "-t", "grbl", "--compare", "mechanics", "--preview", "x.svg",
+          "--layers", "feeds", "--polar", "1", "--dark"), "--layers, --polar: not for this"),
+        ((*SIMULATED, "--layers", "path,order"), "--layers order: it is left out"),
+        ((*SIMULATED, "--layers", ","), "--layers names no layer"),
+        ((*SIMULATED, "--layers", "feeds", "--no-layer", "feeds"), "no layer is left"),
+        ((*SIMULATED, "--polar", "1", "--crop", "1,1,2,2"), "--crop: --polar plots"),
+        ((*SIMULATED, "--exaggerate", "9", "--no-layer", "path"), "path, which is left out"),
+    ],
+)  # fmt: skip
+def test_what_no_picture_can_honour_is_refused_by_name(
+    drawing: str, line: tuple[str, ...], words: str
+) -> None:
+    with pytest.raises((click.UsageError, OptionError), match=words):
+        run(*line)
+    assert [path.name for path in Path().iterdir()] == ["a.csv"]
+
+
+def test_a_named_layer_that_holds_nothing_is_told(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("0,0\n4,0\n4,3\n0,0\n", encoding="utf-8")
+    line = ("preview", "a.csv", "-t", "grbl", "-o", "a.svg", "--layers")
+    done = camtool(*line, "feeds,swept,doubts,zero")
+    assert done.returncode == 0
+    told = [text for text in done.stderr.decode().splitlines() if "--layers" in text]
+    assert [text.split(": ")[2] for text in told] == ["--layers swept", "--layers doubts"]
+    assert "--tool-diameter" in told[0]
+    assert b"--layers" not in camtool(*line, "feeds,zero").stderr
+    assert b"--layers" not in camtool(*line, "feeds,swept", "-q").stderr
+
+
+def test_the_picture_of_a_page_takes_the_flags_and_the_page_says_nothing_of_them(
+    drawing: str,
+) -> None:
+    run("post", drawing, *POST, *LOOKS, "--report", "r.md", "--preview", "viewer.html")
+    run("preview", drawing, *POST[:-2], *LOOKS, "--simulate", "-o", "b.svg")
+    assert Path("r.svg").read_bytes() == Path("b.svg").read_bytes()
+    text = Path("r.md").read_text(encoding="utf-8")
+    assert "](r.svg)" in text  # a viewer is no picture to link to
+    assert "--tool-diameter" in text
+    assert not [flag for flag in LOOKS if flag.startswith("--") and flag in text]
+    run("post", drawing, *POST, *LOOKS, "--report", "r.html")
+    assert b64encode(Path("b.svg").read_bytes()) in Path("r.html").read_bytes()
+
+
+def test_a_page_about_a_spoilt_part_has_its_picture(drawing: str) -> None:
+    spoilt = ("post", drawing, *POST, "--report", "r.md", "--max-time", "1s")
+    run(*spoilt, "--preview", "p.svg", "--dark")
+    assert "](p.svg)" in Path("r.md").read_text(encoding="utf-8")
+    assert Path("p.svg").exists()
+    assert not Path("a.nc").exists()
+    # Where nothing can be judged there is no circle to plot: the page is what matters.
+    run("post", drawing, "-t", "pic-mmh", "--scale", "1000", "--report", "r.html", "--polar", "1")
+    assert "OUT_OF_TRAVEL" in Path("r.html").read_text(encoding="utf-8")
