@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from camtool.preview import marks, text
 from camtool.preview.axes import NAME_LIFT, TICK_CAP
 from camtool.preview.colours import BINS, FEED, FRAME, INK, PLUNGE, QUIET, RAPID, bin_colours
-from camtool.preview.svg import Look, PathData, element, number
+from camtool.preview.svg import Look, PathData, element, number, one_line
 from camtool.preview.text import Style
 from camtool.preview.view import MARGIN, PAGE, Box, decimals_of, multiples, round_step
 
 TITLE = Style(cap=22.0, colour=INK, weight=0.13)
 NOTE = Style(cap=14.5, colour=QUIET)
 ENTRY = Style(cap=14.5, colour=QUIET)
+TITLE_STEP = 34.0
 NOTE_STEP = 28.0
 ROW_STEP = 33.0
 SWATCH, SWATCH_GAP, ENTRY_GAP = 34.0, 11.0, 28.0
@@ -46,21 +47,40 @@ class Entry:
         return SWATCH + SWATCH_GAP + text.width(self.shown, ENTRY.cap) + ENTRY_GAP
 
 
-def head(name: str, notes: Sequence[str], page: float = PAGE) -> tuple[str, float]:
-    """Title and notes at the top of a page so wide, and the height at which they end."""
+def head(
+    name: str, notes: Sequence[str], page: float = PAGE, *, lines: int = 1
+) -> tuple[str, float]:
+    """Title, on at most so many lines, and notes at the top of a page so wide, and the height at
+    which they end."""
     room = page - 2.0 * MARGIN
     down = MARGIN
     parts = []
-    if name.strip():
-        down += TITLE.cap
-        shown = text.shortened(name, TITLE.cap, room)
-        parts.append(text.label(shown, (MARGIN, down), TITLE, full=name))
+    for index, line in enumerate(_title_lines(name, room, lines)):
+        down += TITLE.cap if index == 0 else TITLE_STEP
+        full = name if index == 0 else line
+        parts.append(text.label(line, (MARGIN, down), TITLE, full=full))
+    if parts:
         down += 6.0
     for note in notes:
         for line in text.wrapped(note, NOTE.cap, room):
             down += NOTE_STEP
             parts.append(text.label(line, (MARGIN, down), NOTE))
     return element("g", {"id": "head"}, *parts), down + 6.0
+
+
+def _title_lines(name: str, room: float, most: int) -> list[str]:
+    """The title broken at blanks, and what follows the last line on it as far as it goes."""
+    words = one_line(name).split()
+    lines: list[str] = []
+    while words and len(lines) < most - 1:
+        count = 1
+        while count < len(words) and text.width(" ".join(words[: count + 1]), TITLE.cap) <= room:
+            count += 1
+        lines.append(text.shortened(" ".join(words[:count]), TITLE.cap, room))
+        words = words[count:]
+    if words:
+        lines.append(text.shortened(" ".join(words), TITLE.cap, room))
+    return lines
 
 
 def rows(entries: Sequence[Entry], first: float, room: float) -> list[list[Entry]]:

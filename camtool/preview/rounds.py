@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,9 @@ Floats = npt.NDArray[np.float64]
 class Round:
     """A circle (x, y) mm of this radius mm and direction, with its bins (B, 9) as
     `camtool.kernels.circle_bins` fills them; circular error G, radial errors F max, F min and
-    their mean D, and the reversal values B of X and Y, mm, NaN where nobody knows."""
+    their mean D, and the reversal values B of X and Y, mm, NaN where nobody knows. `partner` is
+    the number, from 1, of the same circle gone round the other way, `both_circular_mm` the
+    bi-directional circular error G(b) of the two."""
 
     centre_mm: tuple[float, float]
     radius_mm: float
@@ -23,6 +26,8 @@ class Round:
     circular_mm: float
     radial_mm: tuple[float, float, float]
     reversal_mm: tuple[float, float]
+    partner: int | None = None
+    both_circular_mm: float = math.nan
 
     def errors(self) -> Floats:
         """(B, 3) mm: least, mean and largest radial error of each bin; NaN where nothing was."""
