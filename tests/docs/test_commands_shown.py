@@ -1,0 +1,230 @@
+"""Every command line that a page shows is one that camtool takes.
+
+Blocks `sh`, `console` and those without a language are read for lines that begin with `camtool`;
+what stands behind three spaces or more is a remark. The commands parse them, and nothing is run
+here; `test_examples.py` runs what pages show with its output, and
+`test_lines_about_samples_run` what is shown without.
+"""
+
+import re
+import shlex
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+
+from camtool.cli.main import cli
+from camtool.machine.registry import target_names
+from tests.docs.test_examples import ROOT, shell
+
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
+BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"(?<!`)`(camtool [^`\n]+)`(?!`)")
+LANGUAGES = ("", "sh", "console")
+REMARK = re.compile(r" {3,}(?=\S)")
+SHELL = set("|&;<>()")
+ARROW = "▶"
+"""A line with one is a drawing of the way that things go."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A command line of a page, whose whole text is `around` it. `remark`: something may stand
+    behind it; a line that `test_examples.py` runs has its output below it instead."""
+
+    page: str
+    text: str
+    remark: bool
+    around: str
+
+    def __str__(self) -> str:
+        return f"{self.page}: {self.text}"
+
+
+def lines_of(name: str, text: str) -> Iterator[Line]:
+    """The lines of a page's blocks that begin with camtool, continued ones as one."""
+    for match in BLOCK.finditer(text):
+        if match[2] not in LANGUAGES:
+            continue
+        block = match[3].replace("\\\n", " ")
+        for line in block.splitlines():
+            line = line.strip().removeprefix("$ ")
+            if line.startswith("camtool ") and ARROW not in line:
+                yield Line(name, line, match[2] != "console", text)
+
+
+def words_of(text: str) -> list[str]:
+    """The words of the first command of a shell line, without redirections."""
+    lexer = shlex.shlex(text, posix=True, punctuation_chars=True)
+    lexer.whitespace_split = True
+    words: list[str] = []
+    for word in lexer:
+        if set(word) <= SHELL:
+            if words and words[-1] in "12":  # 2> file
+                words.pop()
+            break
+        words.append(word)
+    return words[1:]
+
+
+def parsed(words: list[str], monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """The parameters of the commands in a line; click.ClickException when it is none."""
+    taken: list[dict[str, Any]] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(click.Command, "invoke", lambda _, ctx: taken.append(ctx.params))
+        cli.main(words, prog_name="camtool", standalone_mode=False)
+    return taken
+
+
+def readings(line: Line) -> list[str]:
+    """The line, and what stands before its remark."""
+    remarks = list(REMARK.finditer(line.text)) if line.remark else []
+    return [line.text, *(line.text[: each.start()] for each in remarks[-1:])]
+
+
+def refused(line: Line, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Why a line is not taken; "" when it is."""
+    why = ""
+    for text in readings(line):
+        try:
+            taken = parsed(words_of(text), monkeypatch)
+        except (click.ClickException, ValueError) as error:
+            why = f"{line}: {error}"
+        else:
+            return _unknown(line, taken)
+    return why
+
+
+def _unknown(line: Line, taken: list[dict[str, Any]]) -> str:
+    """A machine or a sample that there is not."""
+    named = {
+        name: str(value)
+        for params in taken
+        for name, value in params.items()
+        if name in ("target", "source", "extends") and value
+    }
+    if "--from" not in line.text:
+        named.pop("source", None)
+    for value in named.values():
+        own = f'name = "{value}"' in line.around  # a target that the page itself makes
+        if line.remark and not (value.isupper() or own or value in target_names()):
+            return f"{line}: there is no target {value}"
+    for name in re.findall(r"(?<![\w/.])samples/[\w./*-]*\w", line.text):
+        if not list(ROOT.glob(name)):
+            return f"{line}: there is no {name}"
+    return ""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_the_lines_of_blocks_are_taken(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    faults = [refused(line, monkeypatch) for line in lines_of(page.name, page.read_text("utf-8"))]
+    assert [fault for fault in faults if fault] == []
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the pages speak of."""
+    place = tmp_path_factory.mktemp("pages")
+    samples = place / "samples"
+    shutil.copytree(ROOT / "samples", samples)
+    for below in ("drawings", "parts/one", "docs/images"):
+        (place / below).mkdir(parents=True)
+    for below in (".", "drawings", "parts/one"):
+        shutil.copy(samples / "logo.dxf", place / below)
+    shutil.copy(samples / "logo.toml", place)
+    shutil.copy(samples / "measured" / "pic-mmh-lines.toml", place / "measured.toml")
+    assert shell("camtool post logo.dxf -t pic-mmh -q -o logo.pic", place, 0)[1] == 0
+    return place
+
+
+ELSEWHERE = {"calibration.md", "write-a-post.md"}
+"""Pages whose lines other tests run."""
+
+ENDLESS = ("--watch", "--scheduler")
+
+
+def lines_to_run() -> list[Line]:
+    every = [line for page in PAGES for line in lines_of(page.name, page.read_text("utf-8"))]
+    return [
+        line
+        for line in every
+        if line.remark
+        and line.page not in ELSEWHERE
+        and not any(flag in line.text for flag in ENDLESS)
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", lines_to_run(), ids=str)
+def test_lines_about_samples_run(
+    line: Line, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = next(
+        each
+        for each in reversed(readings(line))
+        if not refused(replace(line, text=each), monkeypatch)
+    )
+    before = dict.fromkeys(folder.rglob("*"))
+    printed, code = shell(f"GITHUB_STEP_SUMMARY=summary.md; {text}", folder, 0)
+    assert code == 0, printed
+    for made in set(folder.rglob("*")) - set(before):
+        assert made.is_dir() or made.stat().st_size, made
+
+
+def wrong_words(text: str) -> str:
+    """Why what stands in a line of text is no part of a command; "" when it is."""
+    try:
+        words = words_of(text)
+    except ValueError as error:
+        return f"{text}: {error}"
+    command: click.Command = cli
+    while isinstance(command, click.Group) and words and re.fullmatch(r"[a-z]+", words[0]):
+        found = command.commands.get(words[0])
+        if found is None:
+            return f"{text}: there is no command {words[0]}"
+        command, words = found, words[1:]
+    known = {name for each in command.params for name in (*each.opts, *each.secondary_opts)}
+    known |= {"-h", "--help", "--version"}
+    for before, word in pairwise(["", *words]):
+        flag = re.match(r"-{1,2}[a-z]", word) and before not in ("--set", "-o")
+        if flag and word.partition("=")[0] not in known:
+            return f"{text}: there is no flag {word}"
+    return ""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_commands_within_lines_of_text_exist(page: Path) -> None:
+    faults = [wrong_words(text) for text in INLINE.findall(page.read_text("utf-8"))]
+    assert [fault for fault in faults if fault] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "camtool post logo.dxf --bogus",
+        "camtool pst logo.dxf",
+        "camtool post logo.dxf --side nowhere",
+        "camtool post samples/nobody.dxf",
+        "camtool convert a.pic --from pic-mmh --to nobody",
+        "camtool post logo.dxf -t nobody    a remark",
+        "camtool post   --bogus",
+    ],
+)
+def test_lines_that_are_wrong_are_seen(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (line,) = lines_of("x.md", f"```\n{text}\n```\n")
+    assert refused(line, monkeypatch)
+    good = "camtool post samples/logo.dxf -t pic-mmh \\\n  -o a.pic 2> x | cat   # and more"
+    (line,) = lines_of("x.md", f"```sh\n{good}\n```\n")
+    assert refused(line, monkeypatch) == ""
+
+
+def test_words_that_are_wrong_are_seen() -> None:
+    assert wrong_words("camtool pst")
+    assert wrong_words("camtool post --bogus")
+    assert wrong_words("camtool targets new my-mill --extends grbl") == ""
+    assert wrong_words("camtool post DRAWING --set controller.model=path") == ""
