@@ -1,4 +1,5 @@
-"""The least distance from a vertex of any path to a segment of another path.
+"""The nearest segment to each of many points; the least distance from a vertex of any path to a
+segment of another path.
 
 A binary tree of boxes stands over the segments in their order; a path is one stretch of them, so
 a vertex leaves out the nodes that lie within its own path, and those farther than the best
@@ -42,6 +43,24 @@ def closest(
         if other >= 0:
             best, best_row, best_other = apart, row, other
     return best, best_row, best_other
+
+
+@kernel
+def nearest_rows(points: Floats, start: Floats, end: Floats, bulge: Floats, boxes: Floats) -> Ints:
+    """(P,) rows of the segments nearest to points (P, 2); quick when neighbours in the list are
+    near. `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4), K ≥ 1; where two are as near, the
+    last one keeps its place."""
+    tree = tree_of(boxes)
+    found = np.zeros(len(points), np.int64)
+    row = 0
+    for index in range(len(points)):
+        x, y = points[index, 0], points[index, 1]
+        ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
+        apart = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
+        _, other = _from_point(x, y, (start, end, bulge), tree, (0, -1, apart))
+        row = other if other >= 0 else row
+        found[index] = row
+    return found
 
 
 @inner

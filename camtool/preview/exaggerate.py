@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from camtool.geometry.distance import nearest
+from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
 
 Floats = npt.NDArray[np.float64]
@@ -26,7 +26,10 @@ def exaggerated(points: Floats, wanted: Segments, times: float) -> Floats:
 
 def nearest_points(points: Floats, wanted: Segments) -> Floats:
     """(T, 2) mm: of the lines and arcs of `wanted`, the point nearest to each of the points."""
-    row = nearest(points, wanted).segment
+    from camtool.kernels.closest import nearest_rows
+
+    boxes = segment_boxes(wanted)
+    row = nearest_rows(points, wanted.start, wanted.end, wanted.bulge, boxes)
     begin, end, sweep = wanted.start[row], wanted.end[row], wanted.sweep[row]
     chord = end - begin
     square = (chord**2).sum(axis=1)

@@ -16,7 +16,7 @@ from camtool.preview.options import Options
 from camtool.preview.page import page_of
 from camtool.preview.turns import turns_of
 from camtool.toolpath.builder import ToolpathBuilder
-from tests.oracles import svg_page
+from tests.oracles import literal_turns, svg_page
 from tests.preview.conftest import SCENES, circle, drawing_of, followed, plate
 
 MILLED = replace(scene_of_toolpath(followed(plate()), title="", drawing=plate()), tool_mm=0.5)
@@ -148,6 +148,25 @@ def test_turns_are_those_of_a_finely_sampled_path(ccw: bool) -> None:
         found += bool((step * last < 0).any())
         last = np.where(step == 0, last, step)
     assert len(turns_of(toolpath)) == found
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_turns_are_those_of_the_literal_loop(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    path, (x, y) = ToolpathBuilder(), (0.0, 0.0)
+    for kind in rng.integers(0, 5, 40).tolist():
+        if kind > 2:
+            radius = float(rng.integers(1, 3))
+            cx, cy = x + radius * (-1) ** int(rng.integers(2)), y
+            turn = float(rng.choice([0.5 * math.pi, math.pi, 2.0 * math.pi, 2.1]))
+            cos, sin = math.cos(turn), math.sin(turn)
+            x, y = cx + cos * (x - cx) - sin * (y - cy), cy + sin * (x - cx) + cos * (y - cy)
+            path.arc(x, y, centre=(cx, cy), ccw=bool(kind == 3), feed=1.0)
+        else:
+            x, y = rng.integers(-3, 4, 2).astype(float).tolist()
+            path.rapid(x, y) if kind == 0 else path.line(x, y, feed=1.0)
+    toolpath = path.finish()
+    assert turns_of(toolpath) == pytest.approx(literal_turns.turns_of(toolpath), abs=1e-12)
 
 
 def test_pictures_of_all_layers_are_drawn() -> None:

@@ -1,0 +1,72 @@
+"""The literal twin of `camtool.preview.turns`: piece by piece, each axis with its last sign.
+
+An arc goes one way in X and in Y between the multiples of 90°; each such piece, and each line, has
+a sign per axis. An axis turns where its sign is another than the last one that was not 0, rapids
+included; a turn counts where the piece behind it is a feed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.toolpath.moves import Toolpath
+
+Floats = npt.NDArray[np.float64]
+Piece = tuple[tuple[float, float], tuple[int, int]]
+
+LEAST_PIECE_RAD = 1e-9
+"""Of an arc that begins or ends at a multiple of 90°, no shorter piece is taken for its own."""
+
+
+def turns_of(toolpath: Toolpath) -> Floats:
+    """(R, 2) mm: the places, in order; both axes may turn at one."""
+    last = [0, 0]
+    places = []
+    is_feed = toolpath.is_feed.tolist()
+    for row in np.flatnonzero(toolpath.is_motion).tolist():
+        for place, signs in _pieces(toolpath, row):
+            turned = False
+            for axis, sign in enumerate(signs):
+                turned |= sign * last[axis] < 0
+                last[axis] = sign or last[axis]
+            if turned and is_feed[row]:
+                places.append(place)
+    return np.array(places).reshape(-1, 2)
+
+
+def _pieces(toolpath: Toolpath, row: int) -> Iterator[Piece]:
+    """Where each piece of a move begins, and the signs of X and Y on it."""
+    x0, y0 = toolpath.starts[row, :2].tolist()
+    x1, y1 = toolpath.end[row, :2].tolist()
+    sweep = float(toolpath.sweeps()[row]) if toolpath.is_arc[row] else 0.0
+    if sweep == 0.0:
+        yield (x0, y0), (_sign(x1 - x0), _sign(y1 - y0))
+        return
+    cx, cy = toolpath.centre[row].tolist()
+    radius, begin = math.hypot(x0 - cx, y0 - cy), math.atan2(y0 - cy, x0 - cx)
+    way = math.copysign(1.0, sweep)
+    angles = [begin, *_quarters(begin, begin + sweep), begin + sweep]
+    for low, high in pairwise(angles):
+        middle = 0.5 * (low + high)
+        signs = (_sign(-way * math.sin(middle)), _sign(way * math.cos(middle)))
+        yield (cx + radius * math.cos(low), cy + radius * math.sin(low)), signs
+
+
+def _quarters(begin: float, end: float) -> list[float]:
+    """The multiples of 90° strictly between two angles, in the order of travel."""
+    low, high = sorted((begin, end))
+    quarter = 0.5 * math.pi
+    first = math.ceil((low + LEAST_PIECE_RAD) / quarter)
+    last = math.floor((high - LEAST_PIECE_RAD) / quarter)
+    found = [k * quarter for k in range(first, last + 1)]
+    return found if end > begin else found[::-1]
+
+
+def _sign(length: float) -> int:
+    return (length > POSITION_EPS_MM) - (length < -POSITION_EPS_MM)
