@@ -157,12 +157,16 @@ class PictureFlags:
             return found
 
         def painted(name: str) -> bytes:
-            from camtool.preview.render import render
-
             drawn, options = made(), self.options()
             if all(scene.trace_points is None for scene in drawn):
                 # Nothing could be judged: the findings say why, the picture shows what there is.
                 options = replace(options, polar=None)
+            if len(drawn) > 1:
+                from camtool.preview.beside import render_beside
+
+                return render_beside(drawn, name, options)
+            from camtool.preview.render import render
+
             return render(drawn[0], name, options)
 
         return painted
@@ -179,6 +183,16 @@ class PictureFlags:
 
 FLAGS = tuple(field.name for field in fields(PictureFlags))
 """The names of the flags of pictures, as a command has them."""
+
+
+def check_beside(flag: str, pictures: Sequence[str | None]) -> None:
+    """A usage error where `flag` shall put two pictures side by side and they are not to be made,
+    or one of them is a viewer."""
+    names = [name for name in pictures if name is not None]
+    if not names:
+        raise click.UsageError(f"{flag}: there is no picture to make; add --preview")
+    if any(map(is_viewer, names)):
+        raise click.UsageError(f"{flag}: an .html viewer shows one alone; name a .svg or .png")
 
 
 def picture_options(command: Command) -> Command:

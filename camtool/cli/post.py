@@ -9,7 +9,13 @@ import click
 from camtool.cli.finish import Asked, finish
 from camtool.cli.options import talk_options
 from camtool.cli.output import STDOUT
-from camtool.cli.pictureflags import RESULT, UNVERIFIED, PictureFlags, picture_options
+from camtool.cli.pictureflags import (
+    RESULT,
+    UNVERIFIED,
+    PictureFlags,
+    check_beside,
+    picture_options,
+)
 from camtool.cli.posting import posting_options
 from camtool.cli.report import flags_given, pictures_asked, report_option
 from camtool.cli.sections import SectionedCommand
@@ -32,6 +38,11 @@ if TYPE_CHECKING:
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
 @click.option("--watch", "watching", is_flag=True, help="Again when a file has changed.")
+@click.option(
+    "--before-after",
+    is_flag=True,
+    help="With --compensate: the picture without it and with it, side by side.",
+)
 @picture_options
 @posting_options
 @talk_options
@@ -42,6 +53,7 @@ def post(
     report: str | None,
     page: str | None,
     watching: bool,
+    before_after: bool,
     picture: PictureFlags,
     posting: Posting,
     quiet: bool,
@@ -55,8 +67,10 @@ def post(
     """
     if watching and STDOUT in (source, output, report, page):
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
-    canvas = UNVERIFIED if posting.no_verify else RESULT
-    picture.check(pictures_asked(page, preview), canvas)
+    pictures = pictures_asked(page, preview)
+    picture.check(pictures, UNVERIFIED if posting.no_verify else RESULT)
+    if before_after:
+        _check_before_after(posting, pictures)
     flags = flags_given()
 
     def once() -> int:
@@ -69,8 +83,19 @@ def post(
             asked,
             quiet=quiet,
             verbose=verbose,
-            picture=picture.painter(lambda: [made.scene()], quiet=quiet),
+            picture=picture.painter(
+                lambda: made.before_and_after() if before_after else [made.scene()], quiet=quiet
+            ),
             target=target,
         )
 
     return watch(once, lambda: posting.files(source), quiet=quiet) if watching else once()
+
+
+def _check_before_after(posting: Posting, pictures: list[str]) -> None:
+    """A usage error where there are no two pictures to be made."""
+    if not posting.compensate:
+        raise click.UsageError("--before-after shows what --compensate does; add it")
+    if posting.no_verify:
+        raise click.UsageError("--before-after needs the predicted path; drop --no-verify")
+    check_beside("--before-after", pictures)

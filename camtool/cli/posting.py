@@ -35,11 +35,21 @@ class Made:
     posted: Posted
     target: LoadedTarget
 
-    def scene(self) -> Scene:
-        """The predicted result."""
+    def scene(self, how: str = "") -> Scene:
+        """The predicted result; `how` it was made stands in the title."""
         from camtool.pipeline import posted_scene
 
-        return posted_scene(self.posted, self.target, drawing=self.drawing, job=self.job)
+        title = f"{Path(self.drawing.file).name}{how}"
+        return posted_scene(
+            self.posted, self.target, title=title, drawing=self.drawing, job=self.job
+        )
+
+    def before_and_after(self) -> list[Scene]:
+        """What was compensated, as it would be without, and as it is."""
+        from camtool.pipeline import post_drawing
+
+        plain = replace(self, posted=post_drawing(self.drawing, self.job, self.target))
+        return [plain.scene(", uncompensated"), self.scene(", compensated")]
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,19 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.output import check_writable, write_all
-from camtool.cli.pictureflags import DRAWING, RESULT, Canvas, PictureFlags, picture_options
+from camtool.cli.pictureflags import (
+    DRAWING,
+    RESULT,
+    Canvas,
+    PictureFlags,
+    check_beside,
+    picture_options,
+)
+from camtool.cli.programs import read_bytes
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import is_viewer
 from camtool.cli.types import picture as picture_name
-from camtool.cli.verify import read_bytes
 from camtool.errors import CamtoolError
 
 if TYPE_CHECKING:
@@ -39,6 +46,11 @@ if TYPE_CHECKING:
 )
 @machine_options
 @click.option("--simulate", is_flag=True, help="Show the predicted path and its error too.")
+@click.option(
+    "--beside",
+    metavar="FILE",
+    help="Another file of the same flags, beside the first: one scale, one map of errors.",
+)
 @picture_options
 @job_options
 @drawing_options
@@ -48,6 +60,7 @@ def preview(
     output: str,
     machine: MachineFlags,
     simulate: bool,
+    beside: str | None,
     picture: PictureFlags,
     job: JobFlags,
     drawing: DrawingFlags,
@@ -61,15 +74,19 @@ def preview(
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
     picture.check([output], _canvas(machine, simulate=simulate))
-    check_writable([output], [source])
+    sources = [source] if beside is None else [source, beside]
+    if beside is not None:
+        check_beside("--beside", [output])
+    check_writable([output], sources)
     # What is to be played needs its times, which only the machine's model knows.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
     say_first_run(quiet=quiet)
-    scene = _scene(source, machine, simulate, job, drawing)
-    write_all({output: picture.painter(lambda: [scene], quiet=quiet)(output)})
-    findings = scene.drawing.findings if scene.drawing is not None else ()
-    say_findings(findings, quiet=quiet, verbose=verbose)
+    scenes = [_scene(name, machine, simulate, job, drawing) for name in sources]
+    write_all({output: picture.painter(lambda: scenes, quiet=quiet)(output)})
+    for scene in scenes:
+        findings = scene.drawing.findings if scene.drawing is not None else ()
+        say_findings(findings, quiet=quiet, verbose=verbose)
     say(f"written: {output}", quiet=quiet)
     return 0
 

@@ -32,7 +32,8 @@ EMBEDDED = "picture.svg"
 
 _CAPTION = "The predicted result"
 _PLACES = ("target", "machine", "settings", "output", "preview", "report", "page")
-_NOT_TOLD = frozenset((*_PLACES, *PICTURE_FLAGS, "quiet", "verbose", "watching"))
+_LOOKS = (*PICTURE_FLAGS, "beside", "before_after")
+_NOT_TOLD = frozenset((*_PLACES, *_LOOKS, "quiet", "verbose", "watching"))
 """What says where things are, how pictures look and how much is said; the machine tells of
 itself."""
 

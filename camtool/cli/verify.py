@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
@@ -18,29 +15,23 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
-from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.pictureflags import OVERLAY, RESULT, PictureFlags, picture_options
-from camtool.cli.report import (
-    Subject,
-    flags_given,
-    picture_beside,
-    pictures_asked,
-    report_files,
-    report_option,
+from camtool.cli.output import check_writable
+from camtool.cli.pictureflags import (
+    OVERLAY,
+    RESULT,
+    PictureFlags,
+    check_beside,
+    picture_options,
 )
+from camtool.cli.report import picture_beside, pictures_asked, report_option
 from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.talk import say_first_run
 from camtool.cli.types import is_viewer
 from camtool.cli.types import picture as picture_name
-from camtool.errors import ProgramError
+from camtool.cli.verdict import Case, Wishes, compared, judged
 
 if TYPE_CHECKING:
-    from camtool.geometry.drawing import Drawing
     from camtool.machine.controllers import Interpolator
-    from camtool.machine.registry import LoadedTarget
-    from camtool.pipeline import Judging, Way
-    from camtool.planning.job import Job
-    from camtool.preview.scene import Scene
 
 
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")
@@ -85,6 +76,11 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
+@click.option(
+    "--beside",
+    metavar="PROGRAM",
+    help="Another program beside it in the picture: one scale, one map of errors.",
+)
 @picture_options
 @gate_options
 @job_options
@@ -102,6 +98,7 @@ def verify(
     preview: str | None,
     report: str | None,
     page: str | None,
+    beside: str | None,
     picture: PictureFlags,
     gates: GateFlags,
     job: JobFlags,
@@ -114,12 +111,10 @@ def verify(
     With --against, the path is compared with what DRAWING would give, planned with the same flags
     (--tool-diameter, --side ...). Exit code 1 when a finding is an error.
     """
-    if compare is not None and page is not None:
-        raise click.UsageError("--report is of one way to run a program; drop --compare")
-    picture.check(pictures_asked(page, preview), RESULT if compare is None else OVERLAY)
-    beside = picture_beside(page, preview)
-    inputs = [program, *([against] if against else [])]
-    check_writable([preview, report, page, beside], inputs)
+    wishes = Wishes(preview, picture, report, page, beside, quiet, verbose)
+    _check(wishes, comparing=compare is not None, gated=gates.given)
+    inputs = [name for name in (program, against, beside) if name is not None]
+    check_writable([preview, report, page, picture_beside(page, preview)], inputs)
 
     from camtool.pipeline import Judging
 
@@ -132,128 +127,29 @@ def verify(
     )
     target = machine.load()
     say_first_run(quiet=quiet)
-    data = read_bytes(program)
     wanted = job.job(drawing)
     read = drawing.read(against, target.machine, wanted) if against else None
-    goal = Goal(shown(program), read, wanted)
-    if compare is not None:
-        if judging.gates is not None:
-            raise click.UsageError("limits hold for one way to run a program; drop --compare")
-        if preview is not None and is_viewer(preview):
-            raise click.UsageError("--compare draws .svg and .png alone")
-        ways = ways_to_compare(compare, machine, judging)
-        with job.blamed():
-            return _compared(data, ways, goal, Wishes(preview, picture, report, quiet))
+    case = Case(target, judging, read, wanted)
     with job.blamed():
-        wishes = Wishes(preview, picture, report, quiet, verbose, page)
-        return _judged(data, target, judging, goal, wishes)
+        if compare is not None:
+            return compared(program, ways_to_compare(compare, machine, judging), case, wishes)
+        return judged(program, case, wishes)
 
 
-@dataclass(frozen=True)
-class Goal:
-    """The program's name in messages, and what it is held against."""
-
-    name: str
-    drawing: Drawing | None
-    job: Job
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """What the user wants to have."""
-
-    preview: str | None
-    looks: PictureFlags
-    report: str | None
-    quiet: bool
-    verbose: bool = False
-    page: str | None = None
-
-
-def _judged(
-    data: bytes, target: LoadedTarget, judging: Judging, goal: Goal, wishes: Wishes
-) -> int:
-    """The verdict on one program; the exit code."""
-    from camtool.findings import Severity, worst
-    from camtool.pipeline import listing_of, picture, verify_program
-
-    decoded, verification = verify_program(
-        data, target, source=goal.name, drawing=goal.drawing, job=goal.job, judging=judging
-    )
-    files: dict[str, bytes] = {}
-
-    def scenes() -> list[Scene]:
-        scene = picture(
-            title=Path(goal.name).name,
-            drawing=goal.drawing,
-            job=goal.job,
-            toolpath=decoded,
-            verification=verification,
-            machine=target.machine,
-            listing=listing_of(data, target, decoded),
-        )
-        return [scene]
-
-    pictured = wishes.looks.painter(scenes, quiet=wishes.quiet)
-    if wishes.preview is not None:
-        files[wishes.preview] = pictured(wishes.preview)
-    if wishes.report is not None:
-        files[wishes.report] = verification.report.to_json().encode()
+def _check(wishes: Wishes, *, comparing: bool, gated: bool) -> None:
+    """A usage error for flags that contradict each other."""
+    pictures = pictures_asked(wishes.page, wishes.preview)
+    if not comparing:
+        wishes.looks.check(pictures, RESULT)
+        if wishes.beside is not None:
+            check_beside("--beside", pictures)
+        return
     if wishes.page is not None:
-        subject = Subject(
-            title=Path(goal.name).name,
-            target=target,
-            report=verification.report,
-            findings=verification.findings,
-            program=data,
-            flags=flags_given(),
-        )
-        files.update(report_files(wishes.page, subject, pictured, preview=wishes.preview))
-    write_all(files)
-    if STDOUT not in (wishes.report, wishes.page) and not wishes.quiet:
-        click.echo(verification.report.to_text(findings=False))
-        if judging.worst:
-            click.echo(verification.report.worst_text())
-    say_findings(verification.findings, quiet=wishes.quiet, verbose=wishes.verbose)
-    failed = worst(verification.findings) >= Severity.ERROR
-    if failed:
-        say(f"camtool: error: {goal.name}: the errors above would spoil the part", quiet=False)
-    return 1 if failed else 0
-
-
-def _compared(data: bytes, ways: list[Way], goal: Goal, wishes: Wishes) -> int:
-    """The table of all ways, and their picture; the exit code."""
-    from camtool.pipeline import compare_picture, compare_program
-    from camtool.verify.contrast import row_of, table, to_json
-
-    variants = compare_program(data, ways, source=goal.name, drawing=goal.drawing, job=goal.job)
-    rows = [row_of(variant.name, variant.verification.report) for variant in variants]
-    files: dict[str, bytes] = {}
-    if wishes.preview is not None:
-        from camtool.preview.overlay import render_overlay
-
-        overlay = compare_picture(data, ways, variants, title=Path(goal.name).name)
-        files[wishes.preview] = render_overlay(overlay, wishes.preview, wishes.looks.options())
-    if wishes.report is not None:
-        files[wishes.report] = to_json(rows).encode()
-    write_all(files)
-    if wishes.report != STDOUT and not wishes.quiet:
-        click.echo(table(rows))
-    return 0
-
-
-def shown(name: str) -> str:
-    """The name of a file in messages."""
-    return "<stdin>" if name == STDOUT else name
-
-
-def read_bytes(name: str) -> bytes:
-    """The bytes of a file, or of stdin for `-`; ProgramError when it cannot be read."""
-    if name == STDOUT:
-        return sys.stdin.buffer.read()
-    try:
-        return Path(name).read_bytes()
-    except OSError as error:
-        raise ProgramError(
-            f"cannot be read ({error.strerror})", file=name, mend="check the path"
-        ) from error
+        raise click.UsageError("--report is of one way to run a program; drop --compare")
+    if gated:
+        raise click.UsageError("limits hold for one way to run a program; drop --compare")
+    if wishes.beside is not None:
+        raise click.UsageError("--beside is for one way to run a program; drop --compare")
+    if wishes.preview is not None and is_viewer(wishes.preview):
+        raise click.UsageError("--compare draws .svg and .png alone")
+    wishes.looks.check(pictures, OVERLAY)

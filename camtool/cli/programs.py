@@ -1,0 +1,26 @@
+"""Programs as they come: files, or stdin for `-`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from camtool.cli.output import STDOUT
+from camtool.errors import ProgramError
+
+
+def shown(name: str) -> str:
+    """The name of a file in messages."""
+    return "<stdin>" if name == STDOUT else name
+
+
+def read_bytes(name: str) -> bytes:
+    """The bytes of a file, or of stdin for `-`; ProgramError when it cannot be read."""
+    if name == STDOUT:
+        return sys.stdin.buffer.read()
+    try:
+        return Path(name).read_bytes()
+    except OSError as error:
+        raise ProgramError(
+            f"cannot be read ({error.strerror})", file=name, mend="check the path"
+        ) from error
