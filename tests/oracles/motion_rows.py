@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,17 +27,26 @@ class RowMotion:
 
 def rows_of(chunks: Iterable[Chunk]) -> list[RowMotion]:
     """The rows of a motion from 0 to the last that is in a ledger; they must come in order."""
-    rows: list[RowMotion] = []
+    return list(each_row(chunks))
+
+
+def each_row(chunks: Iterable[Chunk]) -> Iterator[RowMotion]:
+    """The same, each as soon as it is whole: a long motion need not lie in memory."""
+    number, one = -1, RowMotion()
     for chunk in chunks:
         ledger = chunk.ledger
         assert (np.diff(ledger.row) > 0).all()
-        assert set(np.unique(chunk.row)) <= set(ledger.row.tolist())
         assert (np.diff(chunk.row) >= 0).all()
-        for k, number in enumerate(ledger.row.tolist()):
-            if number == len(rows):
-                rows.append(RowMotion())
-            assert number == len(rows) - 1, "a row is missing, or comes too late"
-            one, here = rows[number], chunk.row == number
+        first = np.searchsorted(chunk.row, ledger.row, "left").tolist()
+        last = np.searchsorted(chunk.row, ledger.row, "right").tolist()
+        assert sum(last) - sum(first) == len(chunk.row), "a sample's row is in no ledger"
+        for k, row in enumerate(ledger.row.tolist()):
+            if row == number + 1:
+                if number >= 0:
+                    yield one
+                number, one = row, RowMotion()
+            assert row == number, "a row is missing, or comes too late"
+            here = slice(first[k], last[k])
             one.commanded = np.concatenate([one.commanded, chunk.commanded[here]])
             one.slide = np.concatenate([one.slide, chunk.slide[here]])
             one.duration_s += float(ledger.duration_s[k])
@@ -47,4 +56,5 @@ def rows_of(chunks: Iterable[Chunk]) -> list[RowMotion]:
             one.reversals = one.reversals + ledger.reversals[k]
             one.ended = one.ended and bool(ledger.ended[k])
             one.parts += 1
-    return rows
+    if number >= 0:
+        yield one

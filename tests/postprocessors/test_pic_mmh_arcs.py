@@ -16,7 +16,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles import pic_mmh_program as oracle
-from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.oracles.motion_rows import RowMotion, each_row, rows_of
 
 STEP_MM = 0.00014
 SEED = 20240607
@@ -62,7 +62,7 @@ def last_of_rows(target: LoadedTarget, program: Program) -> Iterator[tuple[int, 
     """Each block's motion as the simulated controller makes it from the bytes: the row of the
     wanted toolpath, and what it did."""
     decoded = target.post.read(program.data, target.machine)
-    motion = rows_of(simulate(decoded, target.machine, Options(effects=IDEAL)))
+    motion = each_row(simulate(decoded, target.machine, Options(effects=IDEAL)))
     for number, row in enumerate(motion):
         yield int(program.row_of_block[decoded.block[number]]), row
 
