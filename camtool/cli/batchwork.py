@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from camtool.batch.digests import code_digest, content_digest, digest_of
 from camtool.batch.records import Made, Task
 from camtool.cli.drawing import DrawingFlags
 from camtool.cli.jobflags import JobFlags
+from camtool.cli.pictureflags import PictureFlags
 from camtool.cli.talk import one_line
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ class JobOrder:
 
 @dataclass(frozen=True)
 class PostWork:
-    """Post one drawing as `camtool post` does; `preview` is an extension, None for no picture."""
+    """Post one drawing as `camtool post` does; `preview` is an extension, None for no picture, and
+    `looks` says how pictures look."""
 
     target: LoadedTarget
     drawing: DrawingFlags
@@ -48,6 +50,7 @@ class PostWork:
     reports: bool = False
     check: bool = True
     compensate: bool = False
+    looks: PictureFlags = field(default_factory=PictureFlags)
 
     @property
     def extensions(self) -> tuple[str, ...]:
@@ -93,7 +96,7 @@ class PostWork:
         import msgspec
 
         target = self.target
-        options = (self.preview, self.reports, self.check, self.compensate, self.gates)
+        options = (self.preview, self.reports, self.check, self.compensate, self.gates, self.looks)
         return digest_of(
             __version__,
             code_digest(Path(__file__).parents[1].rglob("*.py")),
@@ -116,10 +119,9 @@ class PostWork:
 
     def _picture(self, drawing: Drawing, job: Job, posted: Posted) -> bytes:
         from camtool.pipeline import posted_scene
-        from camtool.preview.render import render
 
         scene = posted_scene(posted, self.target, drawing=drawing, job=job)
-        return render(scene, f"picture{self.preview}")
+        return self.looks.painter(lambda: [scene], quiet=True)(f"picture{self.preview}")
 
 
 def own_job(source: Path) -> Path | None:
