@@ -7,22 +7,26 @@ commands need not know of shells. No answer compiles a kernel or loads a library
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import click
-from click.shell_completion import CompletionItem, get_completion_class
+from click.shell_completion import CompletionItem
 from click.types import StringParamType
 
+from camtool.cli.shells import SHELLS
 from camtool.errors import CamtoolError
 
-SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_CAMTOOL_COMPLETE"
 """Where the shell says what it asks."""
 
 MAX_SCANNED_BYTES = 20_000_000
 """Layers of larger drawings are not looked for: the answer would take longer than typing."""
+
+UNREADABLE = "\ufffd"
+"""What stands for bytes that are not UTF-8."""
 
 _FILES = {"FILE", "DRAWING", "DRAWINGS", "PROGRAM", "PICTURE", "MEASUREMENTS"}
 _FOLDERS = {"FOLDER"}
@@ -33,7 +37,7 @@ _Answer = Callable[[click.Context, str], Iterable[CompletionItem]]
 
 
 @click.command(short_help="Completion for bash, zsh or fish.")
-@click.argument("shell", type=click.Choice(SHELLS))
+@click.argument("shell", type=click.Choice(tuple(SHELLS)))
 def completion(shell: str) -> int:
     """Print the script that completes camtool's commands, flags and values in SHELL.
 
@@ -42,9 +46,7 @@ def completion(shell: str) -> int:
     zsh:  eval "$(camtool completion zsh)"                in ~/.zshrc, after compinit
     fish: camtool completion fish | source                in ~/.config/fish/config.fish
     """
-    kind = get_completion_class(shell)
-    assert kind is not None, "click knows the three"
-    click.echo(kind(click.Group(), {}, "camtool", VARIABLE).source())
+    click.echo(SHELLS[shell](click.Group(), {}, "camtool", VARIABLE).source(), nl=False)
     return 0
 
 
@@ -117,7 +119,7 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     given = [Path(name) for names in said for name in _several(names)]
     for name in sorted({layer for file in given for layer in dxf_layers(file)}):
         if name.casefold().startswith(incomplete.casefold()):
-            yield CompletionItem(name)
+            yield CompletionItem(name.replace("[", "[[]"))  # a layer is given by a pattern
 
 
 def _several(names: str | tuple[str, ...]) -> tuple[str, ...]:
@@ -127,7 +129,7 @@ def _several(names: str | tuple[str, ...]) -> tuple[str, ...]:
 def dxf_layers(file: Path) -> set[str]:
     """The layers that entities of a DXF of text say they are on (group code 8); empty for others.
 
-    Names with characters that a shell would not take as text are left out.
+    Names that cannot be shown, or that are of an encoding other than UTF-8, are left out.
     """
     if file.suffix.lower() != ".dxf" or not file.is_file():
         return set()
@@ -142,7 +144,13 @@ def dxf_layers(file: Path) -> set[str]:
         elif code == "8" and not (section == "BLOCKS" and value == "0"):
             named.add(value)
         before = value
-    return {name for name in named if name.replace("_", "").replace("-", "").isalnum()}
+    names = map(_read, named)
+    return {name for name in names if name and name.isprintable() and UNREADABLE not in name}
+
+
+def _read(name: str) -> str:
+    r"""A name as it is meant: older files write \U+00F6 for what is not ASCII."""
+    return re.sub(r"\\U\+([0-9A-Fa-f]{4})", lambda found: chr(int(found[1], 16)), name).strip()
 
 
 def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:

@@ -26,6 +26,7 @@ from camtool.cli.filter import filter_command
 from camtool.cli.job import job
 from camtool.cli.post import post
 from camtool.cli.preview import preview
+from camtool.cli.shells import take_over
 from camtool.cli.stale import stale
 from camtool.cli.talk import tinted
 from camtool.cli.targets import targets
@@ -77,6 +78,7 @@ def main() -> NoReturn:
     debug = "--debug" in sys.argv[1:]
     if VARIABLE in os.environ:
         values_told(cli)
+        take_over()
     try:
         code = cli.main(prog_name="camtool", standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)
