@@ -104,12 +104,11 @@ class PictureFlags:
             )
         if self.layers is not None and not self.named:
             raise click.UsageError("--layers names no layer")
-        options = self.options()
         if not canvas.layered and not {*self.given} <= {*OF_ALL}:
             others = ", ".join(flag for flag in self.given if flag not in OF_ALL)
             raise click.UsageError(f"{others}: not for this picture; {canvas.more}")
         self._check_errors(canvas)
-        self._check_layers(canvas, options)
+        self._check_layers(canvas, self.options())
 
     def _check_errors(self, canvas: Canvas) -> None:
         """Errors can be shown where they are known; a circle's plot shows nothing else."""

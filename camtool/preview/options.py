@@ -25,7 +25,8 @@ class Options:
     the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
     ground. `exaggerate`: the predicted path is drawn so many times as far from the wanted one.
     `polar`: the plot of the radial errors of this circle, from 1, in place of the picture.
-    `layers` are the names of those to show. OptionError for sizes that make no picture."""
+    `layers` are the names of those to show. OptionError for sizes that make no picture, and for
+    a plot of a circle with what such a plot does not have: a part, a factor or layers."""
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None
@@ -49,6 +50,11 @@ class Options:
             raise OptionError(
                 f"a part of {crop[2]:g} × {crop[3]:g} mm cannot be shown",
                 mend="give X,Y,WIDTH,HEIGHT, the last two above 0",
+            )
+        if self.polar is not None and (crop, self.exaggerate, self.layers) != (None, 1.0, USUAL):
+            raise OptionError(
+                "a circle is plotted alone: it has no part, no layers, and a factor of its own",
+                mend="drop polar, or crop_mm, exaggerate and layers",
             )
 
 
