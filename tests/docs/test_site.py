@@ -9,6 +9,9 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
+import camtool
+from camtool.cli.main import cli
+
 ROOT = Path(__file__).parents[2]
 SETTINGS = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
 
@@ -43,9 +46,24 @@ def test_links_out_of_docs_become_words(hooks: ModuleType, text: str, made: str)
     assert hooks.on_page_markdown(text, page=page) == made
 
 
+def test_the_page_of_commands_has_their_help(hooks: ModuleType) -> None:
+    text = hooks.commands()
+    for name in ("camtool", *(f"camtool {name}" for name in cli.commands), "camtool job new"):
+        assert re.search(rf"^##+ {name}\n\n```text\nUsage: {name} ", text, re.MULTILINE), name
+    assert max(map(len, text.splitlines())) <= 100
+    page = SimpleNamespace(file=SimpleNamespace(src_uri=hooks.COMMANDS))
+    assert hooks.on_page_markdown("# Commands\n", page=page) == f"# Commands\n\n{text}"
+
+
+def test_the_reference_has_every_name() -> None:
+    page = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^::: camtool\.api\.(\w+)$", page, re.MULTILINE)
+    assert sorted(listed) == camtool.__all__
+
+
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path: Path) -> None:
-    for package in ("material", "mkdocs_click", "mkdocstrings"):
+    for package in ("material", "mkdocstrings"):
         if importlib.util.find_spec(package) is None:
             pytest.skip(f"{package} is not installed: pip install '.[docs]'")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
