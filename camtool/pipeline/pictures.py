@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING
@@ -106,21 +107,36 @@ def _run(
 
 
 def rounds_of(verification: Verification) -> tuple[Round, ...]:
-    """The full circles as polar plots show them."""
-    from camtool.preview.rounds import Round
+    """The full circles as polar plots show them, each with the same one gone round the other way
+    where there is that."""
+    import numpy as np
 
-    return tuple(
-        Round(
-            one.circle.centre_mm,
-            one.circle.radius_mm,
-            one.circle.ccw,
-            one.bins,
-            one.figures.circular_mm,
-            (one.figures.radial_max_mm, one.figures.radial_min_mm, one.figures.radial_mean_mm),
-            one.reversing.value,
+    from camtool.preview.rounds import Round
+    from camtool.verify.ballbar import Pairs, both_ways
+
+    seen = verification.circles
+    pairs = Pairs([one.circle for one in seen])
+    found = []
+    for index, one in enumerate(seen):
+        partner, both_mm = pairs.partner(index), math.nan
+        if partner is not None:
+            bins = np.concatenate([one.bins, seen[partner].bins])
+            both_mm = both_ways(one.circle, bins).circular_mm
+        figures = one.figures
+        found.append(
+            Round(
+                one.circle.centre_mm,
+                one.circle.radius_mm,
+                one.circle.ccw,
+                one.bins,
+                figures.circular_mm,
+                (figures.radial_max_mm, figures.radial_min_mm, figures.radial_mean_mm),
+                one.reversing.value,
+                None if partner is None else partner + 1,
+                both_mm,
+            )
         )
-        for one in verification.circles
-    )
+    return tuple(found)
 
 
 def worst_places(verification: Verification | None) -> tuple[tuple[float, float], ...]:

@@ -16,6 +16,7 @@ from camtool.errors import OptionError
 from camtool.preview import axes, legend, polar
 from camtool.preview.colours import DRAWING, LAYERS
 from camtool.preview.content import Content, content_of
+from camtool.preview.dial import ROOM, dial_of, plot
 from camtool.preview.draw import panel
 from camtool.preview.entries import entries_of
 from camtool.preview.grid import Grid, columns_of, grid_of, page_units, panel_width
@@ -24,7 +25,6 @@ from camtool.preview.marks import Group
 from camtool.preview.options import AS_USUAL, Options
 from camtool.preview.page import (
     BAR_ROOM,
-    FOOT,
     HEAD_GAP,
     LEGEND_DROP,
     Page,
@@ -34,7 +34,7 @@ from camtool.preview.page import (
 )
 from camtool.preview.render import rendered
 from camtool.preview.scene import Scene
-from camtool.preview.view import CROP_SHAPES, MARGIN, TALLEST, WIDEST, View, union
+from camtool.preview.view import CROP_SHAPES, TALLEST, WIDEST, View, union
 
 WIDE = 0.5
 """A window lower than this share of its width is wide."""
@@ -146,19 +146,17 @@ def _polars(scenes: Sequence[Scene], which: int, options: Options) -> str:
     columns = columns_of(len(plots), wide=False)
     page = page_units(columns, options)
     width = panel_width(columns, page)
-    dial = polar.dial_of(plots, width)
+    errors = [[circle.errors_um for circle in circles] for circles in plots]
+    dial = dial_of([each for circles in errors for each in circles], width)
     heads = [
         (scene.title, polar.notes(circles, dial))
         for scene, circles in zip(scenes, plots, strict=True)
     ]
-    grid = grid_of(heads, columns, page).with_bodies(2.0 * (dial.outer + polar.ROOM))
+    grid = grid_of(heads, columns, page).with_bodies(2.0 * (dial.outer + ROOM))
     panels = [
-        [head, *polar.plot(circles, polar.placed(dial, down, width))]
-        for circles, head, down in zip(plots, grid.heads, grid.downs, strict=True)
+        [head, *plot(shown, dial.placed(down, width))]
+        for shown, head, down in zip(errors, grid.heads, grid.downs, strict=True)
     ]
     entries = list(dict.fromkeys(entry for circles in plots for entry in polar.entries(circles)))
-    table = legend.rows(entries, page - 2.0 * MARGIN, page - 2.0 * MARGIN)
-    legend_y = grid.rows[-1] + 0.5 * legend.ROW_STEP
-    foot = foot_of(table, legend_y) if table else round(grid.rows[-1] + FOOT)
-    below = legend.legend(table, MARGIN, legend_y)
+    below, foot = polar.legend_below(entries, grid.rows[-1], page)
     return sheet(_title(scenes), (page, foot), options, *grid.placed(panels), below)

@@ -25,8 +25,9 @@ BODY = "#eef2f6"
 OUTLINE = "#2b4c6f"
 FEED = "#0f6ac4"
 FEED_PALE = "#8fbce8"
+SPREAD = "#90bde9"
 BACK = "#c2500a"
-BACK_PALE = "#f2c49b"
+BACK_SPREAD = "#f2c49b"
 RAPID = "#8b96a3"
 PLUNGE = "#f08a1d"
 TRAVEL = "#a99bc9"
@@ -54,9 +55,10 @@ _DARK = {
     DRAWING: "#55636f",
     BODY: "#1d2631",
     FEED: "#4aa3f0",
-    FEED_PALE: "#2f557a",
+    FEED_PALE: "#4277a8",
+    SPREAD: "#2f557a",
     BACK: "#f0803c",
-    BACK_PALE: "#6e4426",
+    BACK_SPREAD: "#6e4426",
     RAPID: "#78848f",
     PLUNGE: "#f5a03c",
     TRAVEL: "#7d6ca6",

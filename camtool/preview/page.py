@@ -3,6 +3,7 @@ page itself."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -106,6 +107,8 @@ def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) 
         "height": number(size_px * height / width),
         "viewBox": f"0 0 {number(width)} {number(height)}",
     }
-    paper = element("rect", {"width": width, "height": height, "fill": PAPER})
+    # Where the height is no whole number of pixels, the last row is paper all the same.
+    below = math.ceil(width / size_px)
+    paper = element("rect", {"width": width, "height": height + below, "fill": PAPER})
     picture = element("svg", root, title(name or "camtool picture"), paper, *parts)
     return (darkened(picture) if options.dark else picture) + "\n"

@@ -1,78 +1,24 @@
 """The polar plot of a circle: its radial error, magnified, about the programmed circle; both ways
 round in one plot where the path goes both, as a ball-bar does.
-
-A ring stands for each round number of µm; the thick one is the programmed circle. The band lies
-between the least and the largest radius of each half degree, the line is their mean.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from camtool.errors import OptionError
-from camtool.preview import legend, text
-from camtool.preview.colours import (
-    BACK,
-    BACK_PALE,
-    FEED,
-    FEED_PALE,
-    FRAME,
-    GRID,
-    INK,
-    PLOT,
-    QUIET,
-)
+from camtool.preview import legend
+from camtool.preview.dial import PENS, ROOM, Dial, dial_of, plot
 from camtool.preview.legend import Entry, line_swatch
 from camtool.preview.options import SVG_WIDTH_PX, Options
-from camtool.preview.page import sheet
+from camtool.preview.page import foot_of, sheet
 from camtool.preview.rounds import Floats, Round
 from camtool.preview.scene import Scene
-from camtool.preview.svg import Look, PathData, element, number
-from camtool.preview.text import Style
-from camtool.preview.view import MARGIN, decimals_of, page_width, round_step
+from camtool.preview.svg import number
+from camtool.preview.view import MARGIN, page_width
 from camtool.units import UM_PER_MM
-
-CAP = 14.5
-ROOM = 62.0
-"""Between the outermost ring and the edges of the page, for the names of the axes."""
-
-BASE_SHARE = 0.62
-"""The programmed circle lies at this share of the outermost radius, or farther in."""
-
-FEWEST_RINGS = 3
-"""At least so many rings fit between the programmed circle and the largest error."""
-
-LEAST_UM = 1e-3
-"""Errors smaller than this are not magnified further."""
-
-RING_LABELS_DEG = 22.5
-AXES = ("X+", "Y+", "X−", "Y−")
-
-
-PENS = ((FEED, FEED_PALE), (BACK, BACK_PALE))
-"""Line and band of the first circle of a plot and of the second."""
-
-
-@dataclass(frozen=True)
-class Dial:
-    """Middle of the plot, its radius, that of the programmed circle, units per µm, µm from ring
-    to ring."""
-
-    middle: tuple[float, float]
-    outer: float
-    base: float
-    per_um: float
-    step_um: float
-
-    def at(self, angle: float, error_um: float) -> tuple[float, float]:
-        """Page place of a radial error."""
-        radius = self.base + error_um * self.per_um
-        x, y = self.middle
-        return x + radius * math.cos(angle), y - radius * math.sin(angle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +27,7 @@ class Shown:
 
     which: int
     one: Round
-    errors: Floats
+    errors_um: Floats
 
     @property
     def way(self) -> str:
@@ -90,7 +36,7 @@ class Shown:
 
 def shown(scene: Scene, which: int) -> tuple[Shown, ...]:
     """The `which`-th circle of the scene, from 1, and the same one gone round the other way where
-    there is that; OptionError when there is no such circle."""
+    there is that, counterclockwise first; OptionError when there is no such circle."""
     if not 1 <= which <= len(scene.rounds):
         many = len(scene.rounds)
         raise OptionError(
@@ -101,6 +47,7 @@ def shown(scene: Scene, which: int) -> tuple[Shown, ...]:
     partner = scene.rounds[which - 1].partner
     numbers = [which] if partner is None else [which, partner]
     rounds = [(number, scene.rounds[number - 1]) for number in numbers]
+    rounds.sort(key=lambda found: not found[1].ccw)
     return tuple(Shown(number, one, one.errors() * UM_PER_MM) for number, one in rounds)
 
 
@@ -108,52 +55,23 @@ def draw_polar(scene: Scene, which: int, options: Options) -> str:
     """SVG text of the `which`-th circle of the scene, from 1; OptionError when there is none."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     circles = shown(scene, which)
-    dial = dial_of([circles], width)
+    errors = [circle.errors_um for circle in circles]
+    dial = dial_of(errors, width)
     head, down = legend.head(scene.title, notes(circles, dial), width)
-    dial = placed(dial, down, width)
-    table = legend.rows(entries(circles), width, width)
+    dial = dial.placed(down, width)
     foot = dial.middle[1] + dial.outer + ROOM
-    height = foot + MARGIN + (legend.ROW_STEP if table else 0.0)
-    return sheet(
-        scene.title,
-        (width, round(height)),
-        options,
-        head,
-        *plot(circles, dial),
-        legend.legend(table, MARGIN, foot + 0.5 * legend.ROW_STEP),
-    )
+    below, foot = legend_below(entries(circles), foot, width)
+    return sheet(scene.title, (width, foot), options, head, *plot(errors, dial), below)
 
 
-def dial_of(plots: Sequence[Sequence[Shown]], width: float) -> Dial:
-    """The dial of plots so wide, its middle at (0, 0): scaled so that the largest error of all,
-    out or in, just fits."""
-    outer = 0.5 * width - MARGIN - ROOM
-    errors = np.concatenate([circle.errors.ravel() for circles in plots for circle in circles])
-    seen = errors[np.isfinite(errors)]
-    out = max(float(seen.max(initial=0.0)), 0.0)
-    into = max(-float(seen.min(initial=0.0)), 0.0)
-    largest = max(out, into, LEAST_UM)
-    step = round_step(largest / FEWEST_RINGS / 2.0)
-    reach = step * math.ceil(largest / step)
-    share = (1.0 - BASE_SHARE) if out >= into else 0.5
-    base = (1.0 - share) * outer
-    return Dial((0.0, 0.0), outer, base, min(share * outer, 0.9 * base) / reach, step)
-
-
-def placed(dial: Dial, top: float, width: float) -> Dial:
-    """The dial below `top`, in the middle of the width."""
-    return replace(dial, middle=(0.5 * width, top + ROOM + dial.outer))
-
-
-def plot(circles: Sequence[Shown], dial: Dial) -> list[str]:
-    """Rings, the ends of the axes, and the error of each circle; bands lie below all lines."""
-    bands, lines = [], []
-    for circle, (line, pale) in zip(circles, PENS, strict=False):
-        band, mean = _band(circle.errors, dial, line, pale)
-        bands.append(band)
-        lines.append(mean)
-    error = element("g", {"id": "radial-error"}, *bands, *lines) if any(lines) else ""
-    return [_rings(dial), _quadrants(dial), error, _labels(dial)]
+def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[str, float]:
+    """The legend below `top` on a page so wide, and the height of that page."""
+    if not entries:
+        return "", round(top + MARGIN)
+    room = width - 2.0 * MARGIN
+    table = legend.rows(entries, room, room)
+    legend_y = top + 0.5 * legend.ROW_STEP
+    return legend.legend(table, MARGIN, legend_y), foot_of(table, legend_y)
 
 
 def entries(circles: Sequence[Shown]) -> list[Entry]:
@@ -171,117 +89,30 @@ def notes(circles: Sequence[Shown], dial: Dial) -> tuple[str, ...]:
     first = circles[0].one
     x, y = first.centre_mm
     magnified = dial.per_um * UM_PER_MM * first.radius_mm / dial.base
-    scale = f"radial error × {magnified:.3g}; from ring to ring {dial.step_um:g} µm"
+    times = number(float(f"{magnified:.3g}"), 3)
+    scale = f"radial error × {times}; from ring to ring {dial.step_um:g} µm"
     place = f"radius {first.radius_mm:.4g} mm about ({x:.4g}, {y:.4g}) mm"
     if len(circles) == 1:
         about = f"circle {circles[0].which}: {place}, {circles[0].way}"
-        return (about, *_figures(first), scale)
-    told = [f"{circle.way}: " + "; ".join(_figures(circle.one)) for circle in circles]
+        figures = f"{_iso(first)} (µm)", f"reversal values {_reversal(first)} (µm)"
+        return (about, *figures, scale)
+    told = [
+        f"{circle.way}: {_iso(circle.one)}, {_reversal(circle.one)} (µm)" for circle in circles
+    ]
     both = f"both ways together: G(b) {_um(first.both_circular_mm).lstrip('+')} (µm)"
-    return (f"circle {circles[0].which}: {place}, both ways round", *told, both, scale)
+    names = " and ".join(str(circle.which) for circle in circles)
+    return (f"circles {names}: {place}, both ways round", *told, both, scale)
 
 
-def _figures(one: Round) -> tuple[str, str]:
+def _iso(one: Round) -> str:
     largest, least, mean = one.radial_mm
     circular = _um(one.circular_mm).lstrip("+")
-    return (
-        f"G {circular}, F max {_um(largest)}, F min {_um(least)}, mean {_um(mean)} (µm)",
-        f"reversal values B: X {_um(one.reversal_mm[0])}, Y {_um(one.reversal_mm[1])} (µm)",
-    )
+    return f"G {circular}, F max {_um(largest)}, F min {_um(least)}, mean {_um(mean)}"
+
+
+def _reversal(one: Round) -> str:
+    return f"B: X {_um(one.reversal_mm[0])}, Y {_um(one.reversal_mm[1])}"
 
 
 def _um(length_mm: float) -> str:
     return f"{length_mm * UM_PER_MM:+.2f}" if math.isfinite(length_mm) else "unknown"
-
-
-def _ring_errors(dial: Dial) -> list[float]:
-    """µm of each ring on the plot."""
-    low = math.ceil(-0.95 * dial.base / dial.per_um / dial.step_um)
-    high = math.floor((dial.outer - dial.base + 1e-6) / dial.per_um / dial.step_um)
-    return [k * dial.step_um for k in range(low, high + 1)]
-
-
-def _rings(dial: Dial) -> str:
-    x, y = (number(place) for place in dial.middle)
-    line: Look = {"fill": "none", "stroke": GRID, "stroke-width": 1.2}
-    parts = [element("circle", {"cx": x, "cy": y, "r": number(dial.outer), "fill": PLOT})]
-    for error in _ring_errors(dial):
-        radius = number(dial.base + error * dial.per_um)
-        base: Look = {"stroke": QUIET, "stroke-width": 2.0} if error == 0.0 else {}
-        parts.append(element("circle", {"cx": x, "cy": y, "r": radius, **line, **base}))
-    return element("g", {"id": "rings"}, *parts)
-
-
-def _quadrants(dial: Dial) -> str:
-    """A line where each axis turns, with the name of its end."""
-    data, labels = PathData(), []
-    (x, y), outer, style = dial.middle, dial.outer, Style(CAP, INK, "middle")
-    for index, name in enumerate(AXES):
-        cos, sin = round(math.cos(index * math.pi / 2)), round(math.sin(index * math.pi / 2))
-        data.move(x, y)
-        data.line(x + outer * cos, y - outer * sin)
-        away = outer + 0.5 * ROOM
-        labels.append(text.label(name, (x + away * cos, y - away * sin + 0.5 * CAP), style))
-    line: Look = {"d": str(data), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
-    return element("g", {"id": "quadrants"}, element("path", line), *labels)
-
-
-def _band(errors: Floats, dial: Dial, colour: str, pale: str) -> tuple[str, str]:
-    """Least to largest as a filled band, the mean as a line; open where nothing was seen."""
-    step = 2.0 * math.pi / len(errors)
-    band, line = PathData(), PathData()
-    for run in _runs(np.isfinite(errors[:, 1])):
-        angles = [(k + 0.5) * step for k in run]
-        rows = [errors[k % len(errors)] for k in run]
-        outside = [dial.at(a, float(row[2])) for a, row in zip(angles, rows, strict=True)]
-        inside = [dial.at(a, float(row[0])) for a, row in zip(angles, rows, strict=True)]
-        _stroke(band, outside + inside[::-1])
-        band.close()
-        _stroke(line, [dial.at(a, float(row[1])) for a, row in zip(angles, rows, strict=True)])
-    if not line:
-        return "", ""
-    edge: Look = {"stroke": pale, "stroke-width": 1.6, "stroke-linejoin": "round"}
-    pen: Look = {"fill": "none", "stroke": colour, "stroke-width": 2.4, "stroke-linejoin": "round"}
-    return (
-        element("path", {"d": str(band), "fill": pale, **edge}),
-        element("path", {"d": str(line), **pen}),
-    )
-
-
-def _stroke(data: PathData, points: list[tuple[float, float]]) -> None:
-    for index, point in enumerate(points):
-        (data.line if index else data.move)(*point)
-
-
-def _runs(seen: np.ndarray) -> list[list[int]]:
-    """Runs of bins in a row, once round; a whole circle ends where it begins."""
-    count = len(seen)
-    if seen.all():
-        return [list(range(count + 1))]
-    if not seen.any():
-        return []
-    first = int(np.flatnonzero(~seen)[0])
-    turned = np.roll(seen, -first)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], turned, [False]]).astype(np.int8)))
-    return [
-        list(range(first + low, first + high))
-        for low, high in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    ]
-
-
-def _labels(dial: Dial) -> str:
-    """µm at the rings, as many as have room."""
-    angle = math.radians(RING_LABELS_DEG)
-    every = max(1, math.ceil(2.2 * CAP / (dial.step_um * dial.per_um)))
-    parts = []
-    shown = [e for e in _ring_errors(dial) if round(e / dial.step_um) % every == 0]
-    last = max(shown)
-    for error in shown:
-        x, y = dial.at(angle, error)
-        name = number(error, decimals_of(dial.step_um)) + (" µm" if error == last else "")
-        style = Style(0.85 * CAP, QUIET, "middle")
-        at = (x, y + 0.4 * CAP)
-        halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": 5.0}
-        parts.append(element("path", {"d": text.strokes(name, at, style), **halo}))
-        parts.append(text.label(name, at, style))
-    return element("g", {"id": "ring-labels"}, *parts)

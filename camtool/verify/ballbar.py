@@ -130,6 +130,10 @@ class Pairs:
                     free[second] = False
                     self._partner[first], self._partner[int(second)] = int(second), first
 
+    def partner(self, circle: int) -> int | None:
+        """The other circle of its pair; None where it has none."""
+        return self._partner.get(circle)
+
     def add(self, circle: int, bins: Floats) -> list[BothWays]:
         """Take the bins of a circle; what it and its partner make when that is done already."""
         partner = self._partner.get(circle)
@@ -138,10 +142,13 @@ class Pairs:
         if partner not in self._waiting:
             self._waiting[circle] = bins.copy()
             return []
-        return [_both(self._circles[circle], np.concatenate([self._waiting.pop(partner), bins]))]
+        return [
+            both_ways(self._circles[circle], np.concatenate([self._waiting.pop(partner), bins]))
+        ]
 
 
-def _both(circle: Circle, bins: Floats) -> BothWays:
+def both_ways(circle: Circle, bins: Floats) -> BothWays:
+    """The figures of a circle from the bins (2 B, 9) of both ways round."""
     seen = bins[bins[:, 0] > 0.0]
     mean = seen[:, 1:3] / seen[:, :1]
     centre = least_squares_centre(mean)

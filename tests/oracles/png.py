@@ -29,40 +29,42 @@ def decode(data: bytes) -> npt.NDArray[np.uint8]:
     if depth != 8 or colour not in (2, 6) or interlaced:
         raise ValueError("not 8-bit RGB or RGBA")
     channels = 3 if colour == 2 else 4
-    rows = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, 1 + width * channels)
-    out = np.zeros((height, width, channels), np.uint8)
-    above = np.zeros((width, channels), np.uint8)
-    for index, row in enumerate(rows):
-        line = row[1:].reshape(width, channels)
-        above = out[index] = _unfiltered(int(row[0]), line, above)
-    return out
+    packed, step = zlib.decompress(packed), 1 + width * channels
+    above = bytes(width * channels)
+    out = []
+    for begin in range(0, height * step, step):
+        above = _unfiltered(packed[begin], packed[begin + 1 : begin + step], above, channels)
+        out.append(above)
+    return np.frombuffer(b"".join(out), np.uint8).reshape(height, width, channels)
 
 
-def _unfiltered(
-    kind: int, line: npt.NDArray[np.uint8], above: npt.NDArray[np.uint8]
-) -> npt.NDArray[np.uint8]:
+def _unfiltered(kind: int, line: bytes, above: bytes, channels: int) -> bytes:
     """One row with its filter undone (PNG specification, §9.2); all arithmetic modulo 256."""
     if kind == 0:
         return line
-    if kind == 1:
-        return np.cumsum(line, axis=0, dtype=np.uint8)
-    if kind == 2:
-        return line + above
-    out = np.zeros_like(line).astype(np.int64)
-    left = np.zeros(line.shape[1], np.int64)
-    corner = np.zeros(line.shape[1], np.int64)
-    for x in range(len(line)):
-        up = above[x].astype(np.int64)
-        guess = (left + up) // 2 if kind == 3 else _paeth(left, up, corner)
-        left = (line[x] + guess) % 256
-        out[x], corner = left, up
-    return out.astype(np.uint8)
+    # The bytes of the pixels to the left and above left begin with those of an empty pixel.
+    left, corner = [0] * channels, [0] * channels
+    out = bytearray()
+    for index, (value, up) in enumerate(zip(line, above, strict=True)):
+        at = index % channels
+        a, c = left[at], corner[at]
+        if kind == 1:
+            guess = a
+        elif kind == 2:
+            guess = up
+        elif kind == 3:
+            guess = (a + up) // 2
+        else:
+            guess = _paeth(a, up, c)
+        left[at], corner[at] = (value + guess) & 255, up
+        out.append(left[at])
+    return bytes(out)
 
 
-def _paeth(
-    left: npt.NDArray[np.int64], up: npt.NDArray[np.int64], corner: npt.NDArray[np.int64]
-) -> npt.NDArray[np.int64]:
-    guess = left + up - corner
-    to_left, to_up, to_corner = abs(guess - left), abs(guess - up), abs(guess - corner)
-    near = np.where(to_up <= to_corner, up, corner)
-    return np.where((to_left <= to_up) & (to_left <= to_corner), left, near)
+def _paeth(a: int, b: int, c: int) -> int:
+    """Which of left, up and corner is nearest to left + up − corner."""
+    guess = a + b - c
+    to_a, to_b, to_c = abs(guess - a), abs(guess - b), abs(guess - c)
+    if to_a <= to_b and to_a <= to_c:
+        return a
+    return b if to_b <= to_c else c

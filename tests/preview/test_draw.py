@@ -362,6 +362,12 @@ def test_png_of_a_dark_picture_is_dark() -> None:
     assert (np.abs(image - top).max(axis=2) <= 24).sum() >= 5
 
 
+@pytest.mark.parametrize("width", [251, 400])
+def test_the_paper_covers_the_last_row_of_pixels(width: int) -> None:
+    svg = draw(SCENES["wide"], options=Options(size_px=width))
+    assert (decode(png(svg, width))[..., 3] == 255).all()
+
+
 @pytest.mark.parametrize("width", [0, -5, 15, 20_001])
 def test_senseless_widths_are_refused(width: int) -> None:
     with pytest.raises(OptionError, match="pixels wide"):

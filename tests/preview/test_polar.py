@@ -7,10 +7,14 @@ import pytest
 
 from camtool.errors import OptionError
 from camtool.kernels.circle_bins import bin_directions, empty_bins, fill_bins
+from camtool.pipeline.pictures import rounds_of
 from camtool.preview.draw import Scene, draw, png
 from camtool.preview.options import Options
 from camtool.preview.rounds import Round
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.verify.verify import verify
 from tests.oracles import svg_page
+from tests.oracles.dense_moves import pic_mmh
 from tests.oracles.png import decode
 
 CENTRE = np.array([10.0, -4.0])
@@ -115,3 +119,63 @@ def test_there_must_be_such_a_circle(which: int) -> None:
         draw(Scene("", rounds=(WAVY,)), options=Options(polar=which))
     with pytest.raises(OptionError, match="no full circle"):
         draw(Scene(""), options=Options(polar=1))
+
+
+def both_ways(ccw: Round, cw: Round) -> Scene:
+    """A small circle of another place, and one circle both ways round."""
+    pair = (replace(ccw, partner=3), replace(cw, ccw=False, partner=2))
+    return Scene("both", rounds=(WAVY, *(replace(one, both_circular_mm=0.03) for one in pair)))
+
+
+def strokes_of(svg: str) -> list[str]:
+    group = svg_page.group(svg_page.parse(svg), "radial-error")
+    assert group is not None
+    return [path.attrib["stroke"] for path in group]
+
+
+def test_both_ways_round_are_in_one_plot() -> None:
+    scene = both_ways(seen(lambda a: 0.002 + 0 * a), seen(lambda a: -0.004 + 0 * a))
+    svg = draw(scene, options=Options(polar=2))
+    strokes = strokes_of(svg)
+    assert len(strokes) == len(set(strokes)) == 4
+    assert len(strokes_of(draw(scene, options=Options(polar=1)))) == 2
+    labels = [g.get("aria-label") or "" for g in svg_page.parse(svg).iter()]
+    assert "counterclockwise (circle 2)" in labels
+    assert "clockwise (circle 3)" in labels
+    assert any("both ways together: G(b) 30.00" in label for label in labels)
+    assert sum(label.startswith("clockwise: G 20.00") for label in labels) == 1
+    assert svg == draw(scene, options=Options(polar=3))
+
+
+@pytest.mark.parametrize("size_px", [300, 1000])
+def test_the_legend_of_both_ways_lies_on_the_page(size_px: int) -> None:
+    scene = both_ways(seen(lambda a: 0.002 + 0 * a), seen(lambda a: -0.004 + 0 * a))
+    root = svg_page.parse(draw(scene, options=Options(polar=2, size_px=size_px)))
+    _, _, width, height = map(float, root.attrib["viewBox"].split())
+    for _, top, right, bottom in svg_page.label_boxes(root).values():
+        assert right < width
+        assert top <= bottom < height
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.2, 2.0, 3.5, 5.9])
+def test_numbers_of_rings_hide_nothing(angle: float) -> None:
+    one = seen(lambda a: 0.008 * np.cos(a - angle) ** 3)
+    svg = plot(one)
+    group = svg_page.group(svg_page.parse(svg), "ring-labels")
+    assert group is not None
+    for left, top, right, bottom in svg_page.label_boxes(group).values():
+        x, y = line_of(svg).T
+        assert not ((x > left) & (x < right) & (y > top) & (y < bottom)).any()
+
+
+def test_a_program_both_ways_round_knows_its_pairs() -> None:
+    b = ToolpathBuilder().rapid(z=1.0).rapid(6.0, 4.0).line(z=-0.1, feed=5.0)
+    for ccw in (True, False):
+        b.arc(2.0, 4.0, centre=(4.0, 4.0), ccw=ccw, feed=5.0)
+        b.arc(6.0, 4.0, centre=(4.0, 4.0), ccw=ccw, feed=5.0)
+    verified = verify(b.rapid(z=1.0).finish(), pic_mmh())
+    first, second = rounds_of(verified)
+    assert (first.partner, second.partner) == (2, 1)
+    both = verified.report.bidirectional[0].Gb_um
+    assert both is not None
+    assert first.both_circular_mm == second.both_circular_mm == pytest.approx(both / 1000.0)

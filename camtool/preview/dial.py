@@ -1,0 +1,232 @@
+"""The dial of a polar plot: rings, the ends of the axes, and the errors of one circle or of two.
+
+A ring stands for each round number of µm; the thick one is the programmed circle. The band lies
+between the least and the largest radius of each half degree, the line is their mean.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camtool.preview import text
+from camtool.preview.colours import (
+    BACK,
+    BACK_SPREAD,
+    FEED,
+    FRAME,
+    GRID,
+    INK,
+    PLOT,
+    QUIET,
+    SPREAD,
+)
+from camtool.preview.rounds import Floats
+from camtool.preview.svg import Look, PathData, element, number
+from camtool.preview.text import Style
+from camtool.preview.view import MARGIN, Box, decimals_of, round_step
+
+CAP, LABEL_CAP = 14.5, 12.3
+HALO = 2.5
+ROOM = 62.0
+"""Between the outermost ring and the edges of the page, for the names of the axes."""
+
+BASE_SHARE = 0.62
+"""The programmed circle lies at this share of the outermost radius, or farther in."""
+
+FEWEST_RINGS = 3
+"""At least so many rings fit between the programmed circle and the largest error."""
+
+LEAST_UM = 1e-3
+"""Errors smaller than this are not magnified further."""
+
+LABELS_DEG = (22.5, 67.5, 112.5, 157.5, 202.5, 247.5, 292.5, 337.5)
+"""The rings have their numbers along one of these directions, where they hide least."""
+
+FEWEST_LABELS = 2
+
+FIRST_LABEL = 40.0
+"""Rings smaller than this have no number: it would lie on the middle."""
+
+AXES = ("X+", "Y+", "X−", "Y−")
+
+PENS = ((FEED, SPREAD), (BACK, BACK_SPREAD))
+"""Line and band of the first circle of a plot and of the second."""
+
+
+@dataclass(frozen=True)
+class Dial:
+    """Middle of the plot, its radius, that of the programmed circle, units per µm, µm from ring
+    to ring."""
+
+    middle: tuple[float, float]
+    outer: float
+    base: float
+    per_um: float
+    step_um: float
+
+    def at(self, angle: float, error_um: float) -> tuple[float, float]:
+        """Page place of a radial error."""
+        radius = self.base + error_um * self.per_um
+        x, y = self.middle
+        return x + radius * math.cos(angle), y - radius * math.sin(angle)
+
+    def placed(self, top: float, width: float) -> Dial:
+        """The same below `top`, in the middle of the width."""
+        return replace(self, middle=(0.5 * width, top + ROOM + self.outer))
+
+
+def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
+    """The dial of errors (B, 3) of circles on a plot so wide, its middle at (0, 0): scaled so
+    that the largest error of all, out or in, just fits."""
+    outer = 0.5 * width - MARGIN - ROOM
+    errors = np.concatenate([each.ravel() for each in errors_um])
+    seen = errors[np.isfinite(errors)]
+    out = max(float(seen.max(initial=0.0)), 0.0)
+    into = max(-float(seen.min(initial=0.0)), 0.0)
+    largest = max(out, into, LEAST_UM)
+    step = round_step(largest / FEWEST_RINGS / 2.0)
+    reach = step * math.ceil(largest / step)
+    share = (1.0 - BASE_SHARE) if out >= into else 0.5
+    base = (1.0 - share) * outer
+    return Dial((0.0, 0.0), outer, base, min(share * outer, 0.9 * base) / reach, step)
+
+
+def plot(errors_um: Sequence[Floats], dial: Dial) -> list[str]:
+    """Rings, the ends of the axes, and the errors (B, 3) of each circle; bands lie below lines."""
+    bands, lines = [], []
+    for errors, (line, pale) in zip(errors_um, PENS, strict=False):
+        band, mean = _band(errors, dial, line, pale)
+        bands.append(band)
+        lines.append(mean)
+    error = element("g", {"id": "radial-error"}, *bands, *lines) if any(lines) else ""
+    return [_rings(dial), _quadrants(dial), error, _labels(errors_um, dial)]
+
+
+def _ring_errors(dial: Dial) -> list[float]:
+    """µm of each ring on the plot."""
+    low = math.ceil(-0.95 * dial.base / dial.per_um / dial.step_um)
+    high = math.floor((dial.outer - dial.base + 1e-6) / dial.per_um / dial.step_um)
+    return [k * dial.step_um for k in range(low, high + 1)]
+
+
+def _rings(dial: Dial) -> str:
+    x, y = (number(place) for place in dial.middle)
+    line: Look = {"fill": "none", "stroke": GRID, "stroke-width": 1.2}
+    parts = [element("circle", {"cx": x, "cy": y, "r": number(dial.outer), "fill": PLOT})]
+    for error in _ring_errors(dial):
+        radius = number(dial.base + error * dial.per_um)
+        base: Look = {"stroke": QUIET, "stroke-width": 2.0} if error == 0.0 else {}
+        parts.append(element("circle", {"cx": x, "cy": y, "r": radius, **line, **base}))
+    return element("g", {"id": "rings"}, *parts)
+
+
+def _quadrants(dial: Dial) -> str:
+    """A line where each axis turns, with the name of its end."""
+    data, labels = PathData(), []
+    (x, y), outer, style = dial.middle, dial.outer, Style(CAP, INK, "middle")
+    for index, name in enumerate(AXES):
+        cos, sin = round(math.cos(index * math.pi / 2)), round(math.sin(index * math.pi / 2))
+        data.move(x, y)
+        data.line(x + outer * cos, y - outer * sin)
+        away = outer + 0.5 * ROOM
+        labels.append(text.label(name, (x + away * cos, y - away * sin + 0.5 * CAP), style))
+    line: Look = {"d": str(data), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
+    return element("g", {"id": "quadrants"}, element("path", line), *labels)
+
+
+def _band(errors: Floats, dial: Dial, colour: str, pale: str) -> tuple[str, str]:
+    """Least to largest as a filled band, the mean as a line; open where nothing was seen."""
+    step = 2.0 * math.pi / len(errors)
+    band, line = PathData(), PathData()
+    for run in _runs(np.isfinite(errors[:, 1])):
+        angles = [(k + 0.5) * step for k in run]
+        rows = [errors[k % len(errors)] for k in run]
+        outside = [dial.at(a, float(row[2])) for a, row in zip(angles, rows, strict=True)]
+        inside = [dial.at(a, float(row[0])) for a, row in zip(angles, rows, strict=True)]
+        _stroke(band, outside + inside[::-1])
+        band.close()
+        _stroke(line, [dial.at(a, float(row[1])) for a, row in zip(angles, rows, strict=True)])
+    if not line:
+        return "", ""
+    edge: Look = {"stroke": pale, "stroke-width": 1.6, "stroke-linejoin": "round"}
+    pen: Look = {"fill": "none", "stroke": colour, "stroke-width": 2.4, "stroke-linejoin": "round"}
+    return (
+        element("path", {"d": str(band), "fill": pale, **edge}),
+        element("path", {"d": str(line), **pen}),
+    )
+
+
+def _stroke(data: PathData, points: list[tuple[float, float]]) -> None:
+    for index, point in enumerate(points):
+        (data.line if index else data.move)(*point)
+
+
+def _runs(seen: np.ndarray) -> list[list[int]]:
+    """Runs of bins in a row, once round; a whole circle ends where it begins."""
+    count = len(seen)
+    if seen.all():
+        return [list(range(count + 1))]
+    if not seen.any():
+        return []
+    first = int(np.flatnonzero(~seen)[0])
+    turned = np.roll(seen, -first)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], turned, [False]]).astype(np.int8)))
+    return [
+        list(range(first + low, first + high))
+        for low, high in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    ]
+
+
+def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
+    """µm at the rings, as many as have room, along the direction where they hide least; what
+    would hide an error is left out while others tell the scale."""
+    places = np.array([_places(errors, dial) for errors in errors_um]).reshape(-1, 2)
+    clear, numbers = [], []
+    for degrees in LABELS_DEG:
+        numbers.append(_numbers(dial, math.radians(degrees)))
+        clear.append([one for one in numbers[-1] if not _hides(one[2], places)])
+    best = max(range(len(clear)), key=lambda index: len(clear[index]))
+    shown = clear[best] if len(clear[best]) >= FEWEST_LABELS else numbers[best]
+    style, parts = Style(LABEL_CAP, QUIET), []
+    for name, at, _ in shown:
+        halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": 2.0 * HALO}
+        parts.append(element("path", {"d": text.strokes(name, at, style), **halo}))
+        parts.append(text.label(name, at, style))
+    return element("g", {"id": "ring-labels"}, *parts)
+
+
+def _places(errors_um: Floats, dial: Dial) -> Floats:
+    """(3 B, 2) page places of the least, mean and largest errors; NaN where nothing was seen."""
+    angle = (np.arange(len(errors_um)) + 0.5) * (2.0 * np.pi / len(errors_um))
+    radius = dial.base + errors_um * dial.per_um
+    x = dial.middle[0] + radius * np.cos(angle)[:, None]
+    y = dial.middle[1] - radius * np.sin(angle)[:, None]
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], Box]]:
+    """(number, where its baseline begins, its box) of each ring with a number."""
+    every = max(1, math.ceil(2.2 * CAP / (dial.step_um * dial.per_um)))
+    shown = [e for e in _ring_errors(dial) if round(e / dial.step_um) % every == 0]
+    found = []
+    for error in shown:
+        if dial.base + error * dial.per_um < FIRST_LABEL:
+            continue
+        x, y = dial.at(angle, error)
+        name = number(error, decimals_of(dial.step_um))
+        half, base = 0.5 * text.width(name, LABEL_CAP), y + 0.5 * LABEL_CAP
+        name += " µm" if error == shown[-1] else ""
+        left, right = x - half, x - half + text.width(name, LABEL_CAP)
+        around = Box(left - HALO, base - LABEL_CAP - HALO, right + HALO, base + HALO)
+        found.append((name, (left, base), around))
+    return found
+
+
+def _hides(box: Box, places: Floats) -> bool:
+    x, y = places.T
+    inside = (x > box.left) & (x < box.right) & (y > box.top) & (y < box.bottom)
+    return bool(inside.any())
