@@ -18,6 +18,7 @@ from camtool.cli.sections import option
 from camtool.cli.talk import say
 from camtool.cli.types import is_viewer
 from camtool.errors import OptionError
+from camtool.preview.layers import LAYERS, NOT_UNDER_PATH, OF_DRAWINGS, OF_PREDICTIONS, chosen
 from camtool.units import parse_length
 
 if TYPE_CHECKING:
@@ -69,10 +70,11 @@ class PictureFlags:
     @property
     def given(self) -> tuple[str, ...]:
         """The flags that were given, by name."""
+        values = {name: getattr(self, name) for name in FLAGS}
         return tuple(
             f"--{name.replace('_', '-')}"
-            for name in FLAGS
-            if getattr(self, name) not in (None, False, ())
+            for name, value in values.items()
+            if not (value is None or value is False or value == ())
         )
 
     @property
@@ -83,7 +85,6 @@ class PictureFlags:
 
     def options(self) -> Options:
         """What `camtool.preview` is told; OptionError for what makes no picture."""
-        from camtool.preview.layers import chosen
         from camtool.preview.options import Options
 
         times = 1.0 if self.exaggerate is None else self.exaggerate
@@ -122,8 +123,6 @@ class PictureFlags:
             raise click.UsageError(f"{others}: --polar plots a circle alone; drop one of them")
 
     def _check_layers(self, canvas: Canvas, options: Options) -> None:
-        from camtool.preview.layers import NOT_UNDER_PATH, OF_DRAWINGS, OF_PREDICTIONS
-
         covered = canvas.predicted and "path" in options.layers
         for name in self.named:
             if (name in OF_PREDICTIONS and not canvas.predicted) or (
@@ -227,7 +226,7 @@ def picture_options(command: Command) -> Command:
                 _PICTURE,
                 "--layers",
                 metavar="NAME,...",
-                help="Only these layers; those of docs/pictures.md.",
+                help=f"Only these layers: {', '.join(LAYERS)}.",
             ),
             option(
                 _PICTURE,

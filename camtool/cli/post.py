@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     is_flag=True,
     help="With --compensate: the picture without it and with it, side by side.",
 )
-@picture_options
 @posting_options
+@picture_options
 @talk_options
 def post(
     source: str,

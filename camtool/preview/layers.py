@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 
 from camtool.errors import OptionError
+from camtool.patterns import guess
 
 LAYERS = (
     "drawing",
@@ -44,10 +44,9 @@ def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
     shown, left_out = set(names), set(without)
     for name in sorted(shown | left_out):
         if name not in LAYERS:
-            near = get_close_matches(name, LAYERS, 1)
-            meant = f"did you mean {near[0]}? " if near else ""
             raise OptionError(
-                f"{name!r} is no layer", mend=f"{meant}There are {', '.join(LAYERS)}"
+                f"{name!r} is no layer",
+                mend=f"{guess(name, LAYERS)}There are {', '.join(LAYERS)}",
             )
     left = frozenset(shown or USUAL) - left_out
     if not left:
