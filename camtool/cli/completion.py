@@ -32,6 +32,7 @@ _FILES = {"FILE", "DRAWING", "DRAWINGS", "PROGRAM", "PICTURE", "MEASUREMENTS"}
 _FOLDERS = {"FOLDER"}
 _TARGET_FLAGS = {"--target", "--from", "--to", "--extends"}
 _LAYER_FLAGS = {"--layer", "--exclude-layer"}
+_PICTURE_FLAGS = {"--layers", "--no-layer"}
 _DRAWINGS = ("source", "sources", "against")
 _Answer = Callable[[click.Context, str], Iterable[CompletionItem]]
 
@@ -83,6 +84,8 @@ def _answer_for(param: click.Parameter) -> _Answer | None:
         return _targets
     if flags & _LAYER_FLAGS:
         return _layers
+    if flags & _PICTURE_FLAGS:
+        return _picture_layers
     if "--set" in flags:
         return _keys
     if "--without" in flags:
@@ -120,6 +123,16 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     for name in sorted({layer for file in given for layer in dxf_layers(file)}):
         if name.casefold().startswith(incomplete.casefold()):
             yield CompletionItem(name.replace("[", "[[]"))  # a layer is given by a pattern
+
+
+def _picture_layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
+    """The layers of pictures; of several, the one after the last comma."""
+    from camtool.preview.layers import LAYERS
+
+    before, comma, last = incomplete.rpartition(",")
+    for name in LAYERS:
+        if name.startswith(last):
+            yield CompletionItem(f"{before}{comma}{name}")
 
 
 def _several(names: str | tuple[str, ...]) -> tuple[str, ...]:

@@ -52,6 +52,8 @@ def values(told: click.Command, *line: str) -> list[str]:
         (("post", LOGO, "-t", "pic-mmh", "--set", "axes.x.back"), ["axes.x.backlash_mm="]),
         (("post", LOGO, "-t", "none", "--set", ""), []),
         (("verify", "x.pic", "--without", "pl"), ["play"]),
+        (("preview", LOGO, "--layers", "feeds,pl"), ["feeds,plunges"]),
+        (("post", LOGO, "--no-layer", "w"), ["worst"]),
         (("post", LOGO, "--side", "in"), ["inside"]),
         (("post", LOGO, "--minim"), ["--minimise"]),
         (("completion", "z"), ["zsh"]),
