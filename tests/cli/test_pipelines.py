@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -188,118 +187,7 @@ def test_the_makefile_posts_what_has_changed(tmp_path: Path) -> None:
     assert "camtool post" in make()
 
 
-# the action
-
-
-def step() -> dict[str, Any]:
-    (found,) = [step for step in ACTION["runs"]["steps"] if step.get("id") == "run"]
-    return found
-
-
-def git(folder: Path, *arguments: str) -> str:
-    who = ("-c", "user.name=t", "-c", "user.email=t@example.org")
-    done = subprocess.run(
-        ["git", *who, *arguments], cwd=folder, capture_output=True, text=True, check=True
-    )
-    return done.stdout.strip()
-
-
-def run_action(folder: Path, **values: str) -> tuple[int, str, dict[str, str]]:
-    """(exit code, summary, outputs) of the action's own step in this repository."""
-    there = folder.parent / "runner"
-    shutil.rmtree(there, ignore_errors=True)
-    there.mkdir()
-    inputs = {name.upper(): value.get("default", "") for name, value in ACTION["inputs"].items()}
-    env = {key: str(inputs.get(key, "")) for key in step()["env"]} | values
-    env |= {"OUT": str(there / "out"), "PATH": PATH}
-    env |= {"GITHUB_STEP_SUMMARY": str(there / "summary"), "GITHUB_OUTPUT": str(there / "output")}
-    command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", step()["run"]]
-    done = subprocess.run(
-        command, cwd=folder, env={**os.environ, **env}, capture_output=True, check=False
-    )
-    read = [there / name for name in ("summary", "output")]
-    summary, output = (file.read_text() if file.exists() else "" for file in read)
-    return done.returncode, summary, dict(line.split("=") for line in output.splitlines())
-
-
-@pytest.fixture
-def repository(tmp_path: Path) -> Path:
-    """A repository of two drawings; its second commit changes one and adds another."""
-    folder = tmp_path / "repository"
-    ring(folder / "old.svg")
-    ring(folder / "parts" / "changed.svg")
-    git(folder, "init", "-q")
-    git(folder, "add", ".")
-    git(folder, "commit", "-qm", "one")
-    ring(folder / "parts" / "changed.svg", 9.0)
-    ring(folder / "parts" / "$(touch owned) `x`;.svg", 8.0)
-    (folder / "parts" / "changed.toml").write_text('depth = "0.7mm"\n')
-    git(folder, "add", ".")
-    git(folder, "commit", "-qm", "two")
-    return folder
-
-
-def test_the_action_posts_changed_drawings(repository: Path) -> None:
-    base = git(repository, "rev-parse", "HEAD~1")
-    code, summary, outputs = run_action(repository, TARGET="grbl", BASE=base)
-    assert code == 0
-    assert outputs == {"checked": "2", "failed": "0"}
-    assert "# changed.svg" in summary
-    assert "old.svg" not in summary
-    assert "![" not in summary
-    made = repository.parent / "runner" / "out" / "parts"
-    assert b"Z-0.7" in (made / "changed.nc").read_bytes()
-    assert (made / "changed.svg").read_bytes().startswith(b"<svg")
-    assert (made / "$(touch owned) `x`;.nc").exists()
-    assert not list(repository.rglob("owned"))
-    assert git(repository, "status", "--porcelain") == ""
-
-
-@pytest.mark.parametrize("base", ["0" * 40, "1" * 40])
-def test_the_action_takes_all_where_the_base_cannot_be_had(repository: Path, base: str) -> None:
-    _, _, outputs = run_action(repository, TARGET="grbl", BASE=base, FLAGS="--no-verify -q")
-    assert outputs["checked"] == "3"
-    assert outputs["failed"] == "3"  # a page is of a verification: the flags were wrong
-
-
-def test_the_action_fails_with_a_page_of_why(repository: Path) -> None:
-    base = git(repository, "rev-parse", "HEAD~1")
-    flags = "--max-time 1s --quiet"
-    code, summary, outputs = run_action(repository, TARGET="grbl", BASE=base, FLAGS=flags)
-    assert code == 1
-    assert outputs == {"checked": "2", "failed": "2"}
-    assert "ABOVE_GATE" in summary
-
-
-def test_the_action_verifies_programs_against_their_drawings(
-    camtool: Run, repository: Path
-) -> None:
-    camtool("post", repository / "old.svg", "-t", "grbl", "-o", repository / "old.nc")
-    git(repository, "add", ".")
-    git(repository, "commit", "-qm", "three")
-    base = git(repository, "rev-parse", "HEAD~1")
-    values = {"TARGET": "grbl", "BASE": base, "MODE": "verify", "FILES": "*.nc"}
-    code, summary, outputs = run_action(repository, **values)
-    assert (code, outputs) == (0, {"checked": "1", "failed": "0"})
-    assert "# old.nc" in summary
-    assert "| --against | ./old.svg |" in summary
-
-
-def test_the_action_passes_over_pictures_of_programs(repository: Path) -> None:
-    (repository / "old.dxf").write_text(HOLE)
-    git(repository, "add", ".")
-    git(repository, "commit", "-qm", "three")
-    values = {"TARGET": "grbl", "ALL": "true", "FILES": "old.*", "FLAGS": "--units mm"}
-    code, summary, outputs = run_action(repository, **values)
-    assert (code, outputs) == (0, {"checked": "1", "failed": "0"})
-    assert "# old.dxf" in summary
-
-
-def test_nothing_of_a_pull_request_stands_in_the_script() -> None:
-    assert "${{" not in "".join(step.get("run", "") for step in ACTION["runs"]["steps"])
-    assert set(step()["env"]) >= {"MODE", "TARGET", "FILES", "FLAGS", "ALL", "BASE", "OUT"}
-    assert ACTION["runs"]["using"] == "composite"
-    assert all("shell" in step for step in ACTION["runs"]["steps"] if "run" in step)
+# the page
 
 
 def test_the_page_names_every_input_of_the_action_and_every_hook() -> None:
