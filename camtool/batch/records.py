@@ -51,6 +51,9 @@ class Work(Protocol):
     def make(self, task: Task, data: bytes | None) -> Made:
         """The outputs of a drawing; `data` is its content, None where the file can be read."""
 
+    def digest(self) -> str:
+        """The digest of all that outputs depend on but the drawing and its order: our code too."""
+
 
 class Pool(Protocol):
     """Workers: tasks in, results out in any order. None is a moment in which nothing came."""

@@ -19,13 +19,16 @@ class Stop:
 
 @contextmanager
 def stoppable() -> Iterator[Stop]:
-    """Within, the first signal is only noted, so that no file is left half-written."""
+    """Within, the first signal is only noted, so that no file is left half-written; a second
+    Ctrl-C is a KeyboardInterrupt, for whoever will not wait."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
 
     def note(number: int, frame: FrameType | None) -> None:
+        if stop.signal is not None and number == signal.SIGINT:
+            raise KeyboardInterrupt
         stop.signal = number
 
     old = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}

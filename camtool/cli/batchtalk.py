@@ -29,6 +29,9 @@ class Talk(Protocol):
     def heard(self, outcome: Outcome) -> None:
         """Say so."""
 
+    def noted(self, text: str) -> None:
+        """Say something else, unless quiet."""
+
 
 @dataclass(frozen=True)
 class Loudness:
@@ -65,6 +68,10 @@ class Lines:
             place = f"{self._done:>{len(str(self._total))}}/{self._total}"
             say(f"{place} {one_line(_line(outcome))}", quiet=self._loudness.quiet)
 
+    def noted(self, text: str) -> None:
+        """One line."""
+        say(f"camtool: {one_line(text)}", quiet=self._loudness.quiet)
+
 
 class Bar:
     """A bar with rate and time left; what goes wrong stands above it."""
@@ -82,6 +89,10 @@ class Bar:
         self._failed += outcome.state is State.FAILED
         failed = f"{self._failed} failed" if self._failed else ""
         self._progress.update(self._bar, advance=1, failed=failed)
+
+    def noted(self, text: str) -> None:
+        """One line above the bar."""
+        self._progress.console.print(f"camtool: {one_line(text)}", markup=False, highlight=False)
 
 
 def said_of(outcome: Outcome, loudness: Loudness) -> list[str]:

@@ -9,8 +9,7 @@ import pytest
 
 from camtool.batch.lock import alone_in
 from camtool.batch.records import Pool
-from camtool.cli import batch as command
-from camtool.cli import batchwork
+from camtool.cli import batchrun, batchwork
 from tests.cli.conftest import Run
 from tests.oracles.batch_works import HerePool
 
@@ -23,11 +22,11 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[HerePool]:
     """The drawings are made in this process; the pool of each run, to see what it was asked."""
     made: list[HerePool] = []
 
-    def here(batched: command.Batched, loudness: object) -> Pool:
+    def here(batched: batchrun.Batched, note: object) -> Pool:
         made.append(HerePool(batched.work))
         return made[-1]
 
-    monkeypatch.setattr(command.Batched, "_pool", here)
+    monkeypatch.setattr(batchrun.Batched, "_pool", here)
     monkeypatch.setattr(batchwork, "code_digest", lambda files: "of no matter here")
     return made
 

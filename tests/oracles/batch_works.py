@@ -24,6 +24,9 @@ class Obedient:
         if self.dies_warm:
             os.kill(os.getpid(), signal.SIGKILL)
 
+    def digest(self) -> str:
+        return "of no matter"
+
     def make(self, task: Task, data: bytes | None) -> Made:
         data = task.path.read_bytes() if data is None else data
         word, _, number = data.decode().partition(" ")

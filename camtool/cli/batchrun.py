@@ -1,0 +1,205 @@
+"""One run of `camtool batch`: find the drawings, make what is not up to date, say what became."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.batch.manifest import Manifest
+from camtool.batch.records import Outcome, Pool, State, Task
+from camtool.cli.batchstop import Stop, stoppable
+from camtool.cli.batchtalk import Loudness, say_summary, summary_json, talking
+from camtool.cli.batchwork import JobOrder, PostWork, own_job
+from camtool.cli.output import write_all
+from camtool.cli.talk import say
+from camtool.errors import CamtoolError, OutputError
+
+if TYPE_CHECKING:
+    from camtool.cli.jobflags import JobFlags
+
+EXIT_SIGNAL = 128
+"""Added to the number of the signal that ended a run."""
+
+
+@dataclass(frozen=True)
+class Running:
+    """How a batch runs: processes here or a cluster, what stops it, what is made anew."""
+
+    jobs: int | None
+    scheduler: str | None
+    timeout: float | None
+    force: bool
+    fail_fast: bool
+
+
+@dataclass(frozen=True)
+class Ordered:
+    """Tasks with their jobs, the text by which each job (by stem) is told from others, and the
+    drawings whose own job is wrong."""
+
+    tasks: list[Task]
+    jobs: dict[str, str]
+    failed: list[Outcome]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The outcome of every drawing, sorted, and what kept the run from its end, if anything."""
+
+    outcomes: Sequence[Outcome]
+    error: CamtoolError | None
+
+
+@dataclass(frozen=True)
+class Batched:
+    """One run of the command."""
+
+    work: PostWork
+    out: Path
+    running: Running
+    summary: str | None
+    loudness: Loudness
+
+    def run(self, sources: Sequence[str], job: JobFlags, *, own_jobs: bool) -> int:
+        """Find, make, say; the exit code. CamtoolError for what is no single drawing's fault."""
+        try:
+            ended, number = self._run(sources, job, own_jobs=own_jobs)
+        except KeyboardInterrupt:  # before the first drawing, or for the second time
+            ended, number = Ended((), None), int(signal.SIGINT)
+        if number is not None:
+            text = "interrupted; what is written is whole, and the same command goes on"
+            click.echo(f"camtool: {text}", err=True)
+            return EXIT_SIGNAL + number
+        if ended.error is not None:
+            raise ended.error
+        return int(any(outcome.error is not None for outcome in ended.outcomes))
+
+    def _run(
+        self, sources: Sequence[str], job: JobFlags, *, own_jobs: bool
+    ) -> tuple[Ended, int | None]:
+        """What became of them, and the signal that stopped the run."""
+        from camtool.batch.inputs import find_tasks, refuse_overwriting
+        from camtool.batch.lock import alone_in
+
+        begin = time.monotonic()
+        tasks = find_tasks(sources, self.out, Manifest(self.out).outputs())
+        refuse_overwriting(tasks, self.out, self.work.extensions)
+        _make_folder(self.out)
+        with alone_in(self.out) as locked, stoppable() as stop:
+            if not locked:
+                self._note("warning: --out has no locks: see that no other batch writes there")
+            ordered = self._ordered(tasks, job, own_jobs)
+            manifest = Manifest(self.out)  # again: until now it may have been another one's
+            ended = self._made(ordered, manifest, stop)
+            self._end(ended.outcomes, manifest, time.monotonic() - begin)
+        return ended, stop.signal
+
+    def _note(self, text: str) -> None:
+        say(f"camtool: {text}", quiet=self.loudness.quiet)
+
+    def _ordered(self, tasks: Sequence[Task], job: JobFlags, own_jobs: bool) -> Ordered:
+        """A wrong job beside a drawing fails that drawing, a wrong one of --job or of the flags
+        the whole command; flags count over both."""
+        ordered = Ordered([], {}, [])
+        common: tuple[JobOrder, str] | None = None
+        for task in tasks:
+            own = own_job(task.path) if own_jobs else None
+            try:
+                if own is not None:
+                    wanted = _order(replace(job, file=str(own)), self.work)
+                else:
+                    wanted = common = common or _order(job, self.work)
+            except CamtoolError as error:
+                if own is None:
+                    raise
+                text = f"{task.source}: {error}"
+                ordered.failed.append(Outcome(task.source, task.stem, State.FAILED, error=text))
+            else:
+                ordered.tasks.append(replace(task, order=wanted[0]))
+                ordered.jobs[task.stem] = wanted[1]
+        return ordered
+
+    def _made(self, ordered: Ordered, manifest: Manifest, stop: Stop) -> Ended:
+        done: dict[str, Outcome] = {}
+        fault: CamtoolError | None = None
+        total = len(ordered.tasks) + len(ordered.failed)
+        with (
+            talking(total, self.loudness) as talk,
+            closing(self._outcomes(ordered, manifest, stop, talk.noted)) as outcomes,
+        ):
+            try:
+                for outcome in outcomes:
+                    done[outcome.stem] = outcome
+                    talk.heard(outcome)
+            except CamtoolError as error:
+                fault = error
+        for task in ordered.tasks:
+            done.setdefault(task.stem, Outcome(task.source, task.stem, State.NOT_RUN))
+        return Ended([done[stem] for stem in sorted(done)], fault)
+
+    def _outcomes(
+        self, ordered: Ordered, manifest: Manifest, stop: Stop, note: Callable[[str], None]
+    ) -> Generator[Outcome]:
+        """Those that come until something stops the run."""
+        from camtool.batch.run import Order, run_batch
+
+        force = self.running.force
+        order = Order(self.out, write_all, self.work.digest(), ordered.jobs, force)
+        with closing(run_batch(ordered.tasks, order, manifest, self._pool(note))) as outcomes:
+            for outcome in chain(ordered.failed, outcomes):
+                if outcome is not None:
+                    yield outcome
+                    if self.running.fail_fast and outcome.state is State.FAILED:
+                        return
+                if stop.signal is not None:
+                    return
+
+    def _pool(self, note: Callable[[str], None]) -> Pool:
+        if self.running.scheduler is not None:
+            from camtool.batch.cluster import ClusterPool
+
+            return ClusterPool(self.work, self.running.scheduler, note)
+        from camtool.batch.pool import LocalPool, PoolOptions
+        from camtool.cli.talk import first_run, say_first_run
+
+        say_first_run(quiet=self.loudness.quiet)
+        options = PoolOptions(
+            jobs=self.running.jobs or os.cpu_count() or 1,
+            timeout_s=self.running.timeout,
+            first_alone=first_run(),
+        )
+        return LocalPool(self.work, options)
+
+    def _end(self, outcomes: Sequence[Outcome], manifest: Manifest, seconds: float) -> None:
+        try:
+            manifest.tidy(write_all)
+        except OutputError as error:  # its lines so far are there
+            click.echo(f"camtool: warning: {error}", err=True)
+        say_summary(outcomes, seconds, quiet=self.loudness.quiet)
+        if self.summary is not None:
+            target = self.work.target.machine.target.name
+            write_all({self.summary: summary_json(outcomes, target, seconds).encode()})
+
+
+def _order(job: JobFlags, work: PostWork) -> tuple[JobOrder, str]:
+    """A job, and the text by which it is told from others."""
+    wanted = job.job(work.drawing)
+    return JobOrder(wanted, job.file), repr(wanted)
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"cannot be made ({error.strerror})", file=str(out), mend="choose another --out"
+        ) from error
