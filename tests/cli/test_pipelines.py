@@ -147,14 +147,23 @@ def test_files_of_others_are_nothing_to_it(camtool: Run, tmp_path: Path) -> None
     assert stale(camtool, "readme.txt", "pyproject.toml") == (0, "")
 
 
-def test_hooks_take_the_files_that_they_are_for() -> None:
-    check, both = (re.compile(HOOKS[name]["files"]) for name in ("camtool-check", "camtool-stale"))
-    assert all(check.search(name) for name in ("a.dxf", "b/c.svg", "d.step"))
-    assert not check.search("a.nc")
+def taken(hook: str, name: str, **said: str) -> bool:
+    """Whether pre-commit gives this file to the hook, where a configuration says so much."""
+    chosen = HOOKS[hook] | said
+    return bool(re.search(chosen["files"], name)) and not re.search(chosen["exclude"], name)
+
+
+@pytest.mark.parametrize("said", [{}, {"files": "^parts/"}, {"exclude": "^x/"}])
+def test_hooks_take_the_files_that_they_are_for(said: dict[str, str]) -> None:
+    """A configuration's own `files` or `exclude` takes the place of the hook's, not of both."""
+    drawings = ("parts/a.dxf", "parts/b/c.svg", "parts/d.STEP")
+    assert all(taken("camtool-check", name, **said) for name in drawings)
+    assert not any(taken("camtool-check", f"parts/a{e}", **said) for e in (".nc", ".toml", ""))
     from camtool.machine.registry import list_target, target_names
 
-    endings = {list_target(name).target.extension for name in target_names()}
-    assert [e for e in endings if not both.search(f"part{e}")] == []
+    endings = {list_target(name).target.extension for name in target_names()} | {".toml", ".dxf"}
+    assert [e for e in endings if not taken("camtool-stale", f"parts/a{e}", **said)] == []
+    assert not taken("camtool-stale", "parts/readme.md", **said)
     assert {hook["language"] for hook in HOOKS.values()} == {"python"}
 
 
