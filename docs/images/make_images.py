@@ -1,11 +1,12 @@
 """Draws the pictures of the pages anew:  python docs/images/make_images.py
 
-The pages themselves say how each is made (its lines "camtool … docs/images/NAME"); only the
-stages of an offset have no command, and are drawn here.
+The pages themselves say how each is made (their lines "camtool … docs/images/NAME", and the
+README's first one); only the stages of an offset have no command, and are drawn here.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -23,16 +24,35 @@ from camtool.preview.render import render
 from camtool.preview.scene import Scene
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("docs/toolpaths.md", "docs/reversals.md", "docs/verifying.md", "docs/pictures.md")
+PAGES = (
+    "docs/tutorial.md",
+    "docs/toolpaths.md",
+    "docs/reversals.md",
+    "docs/verifying.md",
+    "docs/pictures.md",
+)
+FIRST = "logo.png"
 DISTANCE_MM = 1.6
 
 
-def commands() -> list[list[str]]:
-    """The commands of the pages that make pictures, without the name of the program."""
+def commands() -> dict[str, list[str]]:
+    """The commands of the pages by the picture that they make, last the name of that, without the
+    name of the program."""
     text = "".join((ROOT / page).read_text(encoding="utf-8") for page in PAGES)
-    makes = r"^camtool (.*(?:-o|--preview) docs/images/.*)$"
+    makes = r"^camtool (.* (?:-o|--preview) docs/images/(\S+))$"
     lines = re.findall(makes, text.replace("\\\n", " "), re.MULTILINE)
-    return [shlex.split(line) for line in lines]
+    return {name: shlex.split(line) for line, name in lines} | {FIRST: first_command()}
+
+
+def first_command() -> list[str]:
+    """What the README lets people try: its program goes nowhere here."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    found = re.search(
+        rf"camtool (post .*) -o \S+ --preview {re.escape(FIRST)}$", text, re.MULTILINE
+    )
+    if found is None:
+        raise ValueError(f"the README says no more how {FIRST} is made")
+    return [*shlex.split(found[1]), "-o", os.devnull, "--preview", f"docs/images/{FIRST}"]
 
 
 def shape() -> Polylines:
@@ -89,7 +109,7 @@ def main() -> None:
     """Make all pictures."""
     name = "docs/images/offset-stages.png"
     (ROOT / name).write_bytes(render(stages_picture(), name))
-    for arguments in commands():
+    for arguments in commands().values():
         subprocess.run([sys.executable, "-m", "camtool", *arguments], cwd=ROOT, check=True)
 
 
