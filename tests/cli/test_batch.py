@@ -105,6 +105,7 @@ def test_only_what_has_changed_is_made_again(
     assert asked(camtool, pools) == ["square"]
     for flags in (
         ("--preview", "svg"),
+        ("--preview", "svg", "--layers", "feeds"),
         ("--feed", "0.5"),
         ("--set", "axes.x.backlash_mm=0.004"),
         ("--tolerance", "0.002"),

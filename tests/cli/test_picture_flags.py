@@ -6,9 +6,12 @@ from pathlib import Path
 import click
 import pytest
 
+from camtool.cli.batchrun import Batched
 from camtool.cli.main import cli
 from camtool.errors import OptionError
+from camtool.preview.options import Options
 from tests.cli.conftest import Run
+from tests.oracles.batch_works import HerePool
 from tests.oracles.png import decode
 
 
@@ -114,6 +117,18 @@ def test_every_command_draws_the_same_picture(drawing: str) -> None:
     assert "part zero" not in Path("e.svg").read_text(encoding="utf-8")
 
 
+def test_a_batch_draws_the_same_pictures_and_again_when_they_shall_look_otherwise(
+    drawing: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Batched, "_pool", lambda batched, note: HerePool(batched.work))
+    run("post", drawing, *POST, *LOOKS, "--preview", "a.svg")
+    batch = ("batch", drawing, *POST[:-2], "-o", "build", "--preview", "svg")
+    run(*batch, "--size", "300")
+    assert Path("build/a.svg").read_bytes() != Path("a.svg").read_bytes()
+    run(*batch, *LOOKS)
+    assert Path("build/a.svg").read_bytes() == Path("a.svg").read_bytes()
+
+
 def _path(picture: Path) -> str:
     text = picture.read_text(encoding="utf-8")
     return text[text.index('<g id="slide-path"') : text.index('<g id="legend"')]
@@ -128,7 +143,7 @@ SIMULATED = ("preview", "a.csv", "-t", "grbl", "--simulate", "-o", "x.svg")
         (("post", "a.csv", *POST, "--dark"), "--dark: there is no picture .* add --preview"),
         (("post", "a.csv", *POST, "--report", "-", "--polar", "1"), "no picture to make"),
         (("post", "a.csv", *POST, "--report", "r.json", "--dark"), "no picture to make"),
-        (("check", "a.csv", "--size", "100"), "--size: there is no picture"),
+        (("check", "a.csv", "--size", "0"), "--size: there is no picture"),
         (("verify", "a.nc", "-t", "grbl", "--no-layer", "path"), "--no-layer: there is no pict"),
         (("convert", "a.nc", "--from", "grbl", "--to", "grbl", "--dark"), "no picture to make"),
         (("preview", "a.csv", "-o", "x.html", "--dark", "--crop", "1,1,2,2"),
@@ -143,6 +158,9 @@ SIMULATED = ("preview", "a.csv", "-t", "grbl", "--simulate", "-o", "x.svg")
         (("check", "a.csv", "--preview", "x.svg", "--exaggerate", "2"), "--simulate shows more"),
         (("verify", "a.nc", "-t", "grbl", "--compare", "mechanics", "--preview", "x.svg",
           "--layers", "feeds", "--polar", "1", "--dark"), "--layers, --polar: not for this"),
+        (("batch", "a.csv", "-t", "grbl", "-o", "b", "--dark"), "--dark: there is no picture"),
+        (("batch", "a.csv", "-t", "grbl", "-o", "b", "--preview", "svg", "--no-verify", "--polar",
+          "1"), "drop --no-verify"),
         ((*SIMULATED, "--layers", "path,order"), "--layers order: it is left out"),
         ((*SIMULATED, "--layers", ","), "--layers names no layer"),
         ((*SIMULATED, "--layers", "feeds", "--no-layer", "feeds"), "no layer is left"),
@@ -193,3 +211,10 @@ def test_a_page_about_a_spoilt_part_has_its_picture(drawing: str) -> None:
     # Where nothing can be judged there is no circle to plot: the page is what matters.
     run("post", drawing, "-t", "pic-mmh", "--scale", "1000", "--report", "r.html", "--polar", "1")
     assert "OUT_OF_TRAVEL" in Path("r.html").read_text(encoding="utf-8")
+
+
+def test_a_circle_has_no_part_and_no_layers_for_nobody() -> None:
+    for more in ({"crop_mm": (0.0, 0.0, 1.0, 1.0)}, {"exaggerate": 2.0}, {"layers": {"path"}}):
+        with pytest.raises(OptionError, match="plotted alone"):
+            Options(polar=1, **more)
+    assert Options(polar=1, dark=True, size_px=400).polar == 1
