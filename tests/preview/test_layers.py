@@ -11,6 +11,7 @@ from camtool.errors import OptionError
 from camtool.preview.content import content_of
 from camtool.preview.draw import Scene, draw, scene_of_toolpath
 from camtool.preview.layers import LAYERS, USUAL, chosen
+from camtool.preview.missing import missing_layers
 from camtool.preview.numbers import CLEAR, placed
 from camtool.preview.options import Options
 from camtool.preview.page import page_of
@@ -70,6 +71,22 @@ def test_names_of_layers_are_checked() -> None:
     assert "did you mean reversals?" in str(found.value)
     with pytest.raises(OptionError, match="no layer"):
         chosen([], ["x"])
+    with pytest.raises(OptionError, match="no layer is left"):
+        chosen(["feeds"], ["feeds"])
+
+
+def test_layers_that_hold_nothing_are_known() -> None:
+    every = Options(layers=frozenset(LAYERS))
+    empty = ["travel", "starts", "path", "worst", "doubts"]  # each contour begins with a plunge
+    assert missing_layers(MILLED, every, LAYERS) == empty
+    assert missing_layers(replace(MILLED, tool_mm=None), every, ["swept"]) == ["swept"]
+    below = missing_layers(JUDGED, every, LAYERS)
+    assert {"rapids", "plunges", "starts", "order", "arrows"} <= set(below)
+    assert not {"path", "worst", "feeds", "zero"} & set(below)
+    alone = Options(layers=frozenset({"order", "arrows"}))  # without the path they are drawn
+    assert missing_layers(JUDGED, alone, ["order", "arrows"]) == []
+    groups = {g for name in LAYERS if name not in empty for g in GROUPS.get(name, ())}
+    assert groups <= ids(MILLED, *LAYERS)
 
 
 def test_the_tool_is_drawn_at_its_true_width() -> None:
