@@ -4,17 +4,21 @@
     'parts/**/*.dxf'     what the pattern matches    parts/x/y.dxf    → OUT/x/y.*
     one.dxf              this file                   one.dxf          → OUT/one.*
 
-Outputs keep the path below the folder, or below the part of a pattern that has no wildcard.
+Outputs keep the path below the folder, or below the part of a pattern that has no wildcard. Names
+that differ only in case, or in how accents are coded, are taken for one: they are one file on
+other computers, and programs travel.
 """
 
 from __future__ import annotations
 
 import glob
-import os
+import unicodedata
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path, PurePath
 
+from camtool.batch.places import Places
 from camtool.batch.records import Task
+from camtool.batch.search import files_below, files_matching
 from camtool.errors import InputError, OutputError
 
 SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
@@ -31,10 +35,11 @@ def find_tasks(
     source gives none; OutputError, which names both, when two drawings have one output.
     """
     tasks: dict[Path, Task] = {}
+    places = Places()
     for source in sources:
         found = False
-        for path, stem in _found(source, out):
-            place = path.resolve()
+        for path, stem in _found(source, places.of(out)):
+            place = places.of(path)
             if place not in made:
                 found = True
                 tasks.setdefault(place, Task(str(path), stem))
@@ -51,10 +56,11 @@ def find_tasks(
 
 def refuse_overwriting(tasks: Sequence[Task], out: Path, extensions: Sequence[str]) -> None:
     """OutputError when an output would take the place of a drawing."""
-    drawings = {task.path.resolve(): task.source for task in tasks}
+    places = Places()
+    drawings = {places.of(task.source): task.source for task in tasks}
     for task in tasks:
         for extension in extensions:
-            place = (out / f"{task.stem}{extension}").resolve()
+            place = places.of(out / f"{task.stem}{extension}")
             if place in drawings:
                 raise OutputError(
                     f"an output of {task.source} would take the place of {drawings[place]}",
@@ -64,35 +70,21 @@ def refuse_overwriting(tasks: Sequence[Task], out: Path, extensions: Sequence[st
 
 
 def _found(source: str, out: Path) -> Iterator[tuple[Path, str]]:
-    """(drawing, stem) of one argument."""
+    """(drawing, stem) of one argument; `out` is a real path."""
     path = Path(source)
     if path.is_dir():
-        for found in _below(path, out):
-            yield found, _stem(found.relative_to(path))
+        for found in files_below(path, out):
+            if found.suffix.lower() in SUFFIXES:
+                yield found, _stem(found.relative_to(path))
     elif path.exists() or not glob.has_magic(source):
         if not path.exists():
             raise InputError("there is no such file or folder", file=source, mend="check the path")
         yield path, _stem(PurePath(path.name))
     else:
         base = _fixed_part(source)
-        for name in sorted(glob.iglob(source, recursive=True)):  # noqa: PTH207 - may be absolute
-            if Path(name).is_file():
-                yield Path(name), _stem(Path(name).relative_to(base))
-
-
-def _below(folder: Path, out: Path) -> Iterator[Path]:
-    """Drawings in a folder and those below it, but for hidden ones and the output folder."""
-    apart = out.resolve()
-    for parent, folders, names in os.walk(folder):
-        here = Path(parent)
-        folders[:] = sorted(
-            name
-            for name in folders
-            if not name.startswith(".") and (here / name).resolve() != apart
-        )
-        for name in sorted(names):
-            if not name.startswith(".") and PurePath(name).suffix.lower() in SUFFIXES:
-                yield here / name
+        if base.is_dir():
+            for found in files_matching(base, path.relative_to(base).parts, out):
+                yield found, _stem(found.relative_to(base))
 
 
 def _fixed_part(pattern: str) -> Path:
@@ -110,9 +102,19 @@ def _stem(relative: PurePath) -> str:
 def _refuse_collisions(tasks: Collection[Task]) -> None:
     places: dict[str, Task] = {}
     for task in tasks:
-        other = places.setdefault(os.path.normcase(task.stem), task)
+        other = places.setdefault(_folded(task.stem), task)
         if other is not task:
+            as_what = f"as {task.stem}.*"
+            if other.stem != task.stem:
+                as_what = (
+                    f"to one file where case or the coding of accents does not count, {as_what}"
+                )
             raise OutputError(
-                f"{other.source} and {task.source} would both be written as {task.stem}.*",
+                f"{other.source} and {task.source} would both be written {as_what}",
                 mend="rename one, or make them by two batches with an --out for each",
             )
+
+
+def _folded(name: str) -> str:
+    """What a name is on a computer that knows no case."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())

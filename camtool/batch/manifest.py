@@ -2,7 +2,8 @@
 
 A line of JSON for each drawing, appended when its files are in place, so that a run which ends
 in any way leaves a manifest that can be used: a line that was cut short is passed over, and of
-several for one drawing the last counts. A run that ends well writes it anew, sorted.
+several for one drawing the last counts. A run that ends well writes it anew, sorted, without those
+whose files are all gone: it never holds more than the folder does.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from camtool.batch.digests import file_digest
+from camtool.batch.places import Places
 
 NAME = ".camtool-batch.jsonl"
 """The manifest's name in the output folder."""
@@ -36,7 +38,7 @@ class Manifest:
     def __init__(self, out: Path) -> None:
         self._out = out
         self._place = out / NAME
-        self._entries = _read(self._place)
+        self._entries, self._tidy = _read(self._place)
 
     def up_to_date(self, stem: str, key: str) -> Entry | None:
         """The entry if it was made of just this and its files are as they were written."""
@@ -48,11 +50,13 @@ class Manifest:
     def outputs(self) -> frozenset[Path]:
         """All files that it knows of, resolved."""
         names = (name for entry in self._entries.values() for name in entry.files)
-        return frozenset((self._out / name).resolve() for name in names)
+        places = Places()
+        return frozenset(places.of(self._out / name) for name in names)
 
     def add(self, stem: str, entry: Entry) -> None:
         """Append an entry; OSError when the disk does not take it."""
         self._entries[stem] = entry
+        self._tidy = False
         # The line break comes first too: what a full disk cut short must not take this line along.
         line = f"\n{_line(stem, entry)}\n".encode()
         handle = os.open(self._place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
@@ -63,9 +67,16 @@ class Manifest:
             os.close(handle)
 
     def tidy(self, write: Callable[[dict[str, bytes]], None]) -> None:
-        """Write it anew, one line for each drawing."""
-        lines = [_line(stem, self._entries[stem]) for stem in sorted(self._entries)]
+        """Write it anew, one line for each drawing that has files, unless it is so already."""
+        kept = [stem for stem in sorted(self._entries) if self._there(self._entries[stem])]
+        if self._tidy and len(kept) == len(self._entries):
+            return
+        lines = [_line(stem, self._entries[stem]) for stem in kept]
         write({str(self._place): ("\n".join(lines) + "\n").encode()})
+        self._entries, self._tidy = {stem: self._entries[stem] for stem in kept}, True
+
+    def _there(self, entry: Entry) -> bool:
+        return any(os.path.lexists(self._out / name) for name in entry.files)
 
     def _is(self, name: str, digest: str) -> bool:
         try:
@@ -75,15 +86,18 @@ class Manifest:
 
 
 def _line(stem: str, entry: Entry) -> str:
-    return json.dumps({"stem": stem, **asdict(entry)}, ensure_ascii=True, sort_keys=True)
+    row = {"stem": stem, "key": entry.key, "files": dict(entry.files)}
+    row |= {"warnings": entry.warnings, "figures": dict(entry.figures)}
+    return json.dumps(row, ensure_ascii=True, sort_keys=True)
 
 
-def _read(place: Path) -> dict[str, Entry]:
-    """The entries of the lines that are whole; none when there is no manifest."""
+def _read(place: Path) -> tuple[dict[str, Entry], bool]:
+    """The entries of the lines that are whole, none when there is no manifest; whether it is as
+    `tidy` writes it."""
     try:
         lines = place.read_bytes().splitlines()
     except OSError:
-        return {}
+        return {}, True
     entries: dict[str, Entry] = {}
     for line in lines:
         try:
@@ -94,4 +108,4 @@ def _read(place: Path) -> dict[str, Entry]:
             continue
         if isinstance(stem, str) and isinstance(entry.files, dict):
             entries[stem] = entry
-    return entries
+    return entries, len(lines) == len(entries) and list(entries) == sorted(entries)

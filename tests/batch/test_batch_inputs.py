@@ -1,10 +1,13 @@
 """Which drawings a batch takes, and where their outputs go."""
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
 
 from camtool.batch.inputs import find_tasks, refuse_overwriting
+from camtool.batch.places import Places
 from camtool.errors import InputError, OutputError
 
 
@@ -88,3 +91,90 @@ def test_an_output_never_takes_the_place_of_a_drawing() -> None:
         refuse_overwriting(tasks, Path(), [".pic", ".svg"])
     refuse_overwriting(tasks, Path(), [".pic", ".png"])
     refuse_overwriting(tasks, Path("build"), [".pic", ".svg"])
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("source", ["d", "d/**/*.dxf", "d/**"])
+def test_links_that_lead_round_in_circles(source: str) -> None:
+    drawn("d/a.dxf", "d/x/z.dxf")
+    Path("d/loop").symlink_to(".")
+    Path("d/x/a-loop").symlink_to("..", target_is_directory=True)
+    Path("d/x/linked.dxf").symlink_to("../../other.dxf")
+    drawn("other.dxf")
+    assert stems(source) == ["a", "x/linked", "x/z"]
+
+
+@pytest.mark.usefixtures("here")
+def test_patterns_hide_what_is_hidden_and_leave_the_output_folder_alone() -> None:
+    drawn("d/a.svg", "d/.b.svg", "d/.git/c.svg", "d/build/e.svg", "d/x/build/f.svg")
+    assert stems("d/**/*.svg", out="d/build") == ["a", "x/build/f"]
+    assert stems("**/*.svg", out="d/build") == ["d/a", "d/x/build/f"]
+    assert stems("d/.*.svg") == [".b"]
+    assert stems("d/*/*.svg", out="d/build") == ["build/e"]  # by its name it is wanted
+    assert stems("d/**/[ae].svg") == ["a", "build/e"]
+
+
+@pytest.mark.usefixtures("here")
+def test_odd_names_are_names() -> None:
+    names = ("-a.dxf", "a b.dxf", "new\nline.dxf", "é.dxf", "\udcff.dxf", "%s.dxf", "'q'.dxf")
+    drawn(*(f"d/{name}" for name in names))
+    wanted = sorted(name.removesuffix(".dxf") for name in names)
+    assert stems("d") == wanted
+    assert stems("d/*") == wanted
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("one", "two"),
+    [("A.dxf", "a.DXF"), ("x/é.dxf", "x/e\u0301.dxf"), ("Straße.svg", "STRASSE.svg")],
+)
+def test_names_that_are_one_file_elsewhere_are_refused(one: str, two: str) -> None:
+    drawn(f"d/{one}", f"d/{two}")
+    if len(list(Path("d").rglob("*.*"))) < 2:
+        pytest.skip("they are one file here")
+    with pytest.raises(OutputError, match="to one file where case or the coding of accents"):
+        stems("d")
+
+
+@pytest.mark.usefixtures("here")
+def test_what_is_no_file_is_no_drawing() -> None:
+    drawn("d/a.dxf", "d/b.dxf/c.txt")
+    os.mkfifo("d/pipe.dxf")
+    Path("d/gone.dxf").symlink_to("nowhere")
+    assert stems("d") == ["a", "gone"]  # the link to nothing fails by its name when it is made
+    assert stems("d/*.dxf") == ["a", "gone"]
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("source", ["d", "d/**/*.dxf"])
+def test_a_folder_that_cannot_be_searched_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, source: str
+) -> None:
+    drawn("d/a.dxf", "d/closed/b.dxf")
+    scan = os.scandir
+
+    def denied(place: str | Path) -> object:
+        if Path(place).name == "closed":
+            raise PermissionError(errno.EACCES, "Permission denied", str(place))
+        return scan(place)
+
+    monkeypatch.setattr(os, "scandir", denied)
+    with pytest.raises(InputError, match=r"d/closed: cannot be searched \(Permission denied\)"):
+        stems(source)
+
+
+@pytest.mark.usefixtures("here")
+def test_real_places_are_those_of_resolve() -> None:
+    drawn("d/a.svg", "e/b.svg")
+    Path("d/link.svg").symlink_to("../e/b.svg")
+    Path("f").symlink_to("e")
+    places = Places()
+    for name in ("d/a.svg", "d/link.svg", "f/b.svg", "f/../e/b.svg", "f/none", ".", "f", "d/.."):
+        assert places.of(name) == Path(name).resolve(), name
+        assert places.of(Path(name).absolute()) == Path(name).resolve(), name
+    Path("out").mkdir()
+    Path("out/a.svg").symlink_to("../d/a.svg")
+    with pytest.raises(
+        OutputError, match=r"an output of d/a\.svg would take the place of d/a\.svg"
+    ):
+        refuse_overwriting(find_tasks(["d/a.svg"], Path("out")), Path("out"), [".svg"])

@@ -68,3 +68,38 @@ def test_digests_tell_parts_apart(tmp_path: Path) -> None:
     assert digest_of("\udcff") != digest_of("")
     (tmp_path / "a").write_bytes(b"x" * 3_000_000)
     assert file_digest(tmp_path / "a") == content_digest(b"x" * 3_000_000)
+
+
+def test_it_never_holds_more_than_the_folder_does(tmp_path: Path) -> None:
+    sizes = []
+    for run in range(100):
+        manifest = Manifest(tmp_path)
+        for stem in "abc":
+            manifest.add(stem, entry(tmp_path, f"{stem}.out", f"key {run:03}"))
+        manifest.add("once", entry(tmp_path, f"{run}.out", "key"))  # another file each time
+        (tmp_path / f"{run}.out").unlink()
+        manifest.tidy(write_all)
+        sizes.append((tmp_path / NAME).stat().st_size)
+    assert len(set(sizes)) == 1
+    assert len((tmp_path / NAME).read_text().splitlines()) == 3
+    assert Manifest(tmp_path).outputs() == {tmp_path / f"{stem}.out" for stem in "abc"}
+
+
+def test_what_is_tidy_is_not_written_again(tmp_path: Path) -> None:
+    written: list[str] = []
+
+    def write(files: dict[str, bytes]) -> None:
+        written.extend(files)
+        write_all(files)
+
+    manifest = Manifest(tmp_path)
+    manifest.add("b", entry(tmp_path, "b.out", "key"))
+    manifest.add("a", entry(tmp_path, "a.out", "key"))
+    Manifest(tmp_path).tidy(write)
+    assert len(written) == 1
+    Manifest(tmp_path).tidy(write)
+    manifest.tidy(lambda files: None)
+    assert len(written) == 1
+    (tmp_path / "a.out").unlink()
+    Manifest(tmp_path).tidy(write)
+    assert len(written) == 2
