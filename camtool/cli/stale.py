@@ -1,4 +1,4 @@
-"""`camtool stale`: are the programs beside drawings what camtool would write of them now?"""
+"""`camtool stale`: are the programs of drawings what camtool would write of them now?"""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from camtool.findings import Severity
 if TYPE_CHECKING:
     from camtool.cli.posting import Posting
     from camtool.machine.registry import LoadedTarget
+    from camtool.toolpath.program import Program
 
 DRAWINGS = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
 """What a folder is searched for, and what a program or a job file is taken to belong to."""
@@ -28,27 +29,41 @@ DRAWINGS = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
 @click.command(cls=SectionedCommand, short_help="Programs that are not of their drawings now.")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @posting_options
+@click.option(
+    "--programs",
+    metavar="FOLDER",
+    help="Where the programs are, in folders as the drawings: what camtool batch has as --out.  "
+    "[beside the drawings]",
+)
 @click.option("--missing", is_flag=True, help="A drawing without a program is an error too.")
 @talk_options
 def stale(
-    files: tuple[str, ...], posting: Posting, missing: bool, quiet: bool, verbose: bool
+    files: tuple[str, ...],
+    posting: Posting,
+    programs: str | None,
+    missing: bool,
+    quiet: bool,
+    verbose: bool,
 ) -> int:
-    """Compare programs with what camtool would write now of the drawings beside them.
+    """Compare programs with what camtool would write now of their drawings.
 
     Each FILE is a drawing, its program or its job file (part.dxf, part.nc, part.toml), or a folder
-    to search for drawings. Give the flags that the programs were posted with. Nothing is written;
-    exit code 1 when a program is not byte for byte what it should be.
+    to search for drawings; with --programs a drawing or folder. Give the flags that the programs
+    were posted with. Nothing is written; exit code 1 when a program is not byte for byte what it
+    should be.
     """
     target = posting.load()
     posting = replace(posting, no_verify=not posting.gates.given)
+    found = named_drawings(files) if programs is None else drawings_of(files, Path(programs))
     worst = 0
-    for name, drawings in named_drawings(files).items():
+    for name, drawings in found.items():
         if not missing and not _has_program(name):
             say(f"camtool: {one_line(str(name))}: has no program", quiet=not verbose)
             continue
         faults: list[Fault] = []
         for drawing in drawings:
-            fault = _fault(drawing, posting, target, missing=missing, quiet=quiet)
+            expected = _posted(drawing, posting, target, quiet=quiet)
+            fault = _fault(drawing, name, expected, missing=missing)
             faults += [] if fault is None else [fault]
             if fault is None:  # of several drawings of one name the program is of one
                 break
@@ -77,6 +92,18 @@ def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
     return {name: drawings for name, drawings in found.items() if drawings}
 
 
+def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:
+    """The drawings that a batch of these would take, by the names of their programs in a folder.
+
+    InputError for what is no drawing or not there, OutputError for two of one name, as of a batch.
+    """
+    from camtool.batch.inputs import find_tasks
+
+    if not programs.is_dir():
+        raise InputError("is no folder", file=str(programs), mend="give the --out of the batch")
+    return {programs / task.stem: [task.path] for task in find_tasks(files, programs)}
+
+
 def _names(file: Path) -> Iterator[Path]:
     if file.is_dir():
         for folder, folders, names in os.walk(file):
@@ -99,6 +126,8 @@ def _ordered(files: list[Path]) -> list[Path]:
 
 def _beside(name: Path) -> list[Path]:
     """The files of this name, whatever their ending, sorted."""
+    if not name.parent.is_dir():
+        return []
     return sorted(other for other in name.parent.iterdir() if other.with_suffix("") == name)
 
 
@@ -107,10 +136,10 @@ def _has_program(name: Path) -> bool:
     return any(file.suffix.lower() not in (*DRAWINGS, JOB_ENDING) for file in _beside(name))
 
 
-def _fault(
-    drawing: Path, posting: Posting, target: LoadedTarget, *, missing: bool, quiet: bool
-) -> Fault | None:
-    """What is wrong with the program beside a drawing; None when it is as it should be."""
+def _posted(
+    drawing: Path, posting: Posting, target: LoadedTarget, *, quiet: bool
+) -> Program | Fault:
+    """What would be written of a drawing now, or why nothing would be."""
     try:
         made = posting.of(str(drawing)).make(str(drawing), target, quiet=quiet)
     except CamtoolError as error:
@@ -119,9 +148,16 @@ def _fault(
     if made.posted.failed or program is None:
         grave = next(each for each in made.posted.findings if each.severity >= Severity.ERROR)
         return Fault(1, f"{drawing}: cannot be posted any more: {grave}")
-    place = drawing.with_suffix(program.extension)
+    return program
+
+
+def _fault(drawing: Path, name: Path, expected: Program | Fault, *, missing: bool) -> Fault | None:
+    """What is wrong with a drawing's program; None when it is as it should be."""
+    if isinstance(expected, Fault):
+        return expected
+    place = Path(f"{name}{expected.extension}")
     if not place.is_file():
         return Fault(1, f"{place}: is not there; post {drawing}") if missing else None
-    if place.read_bytes() == program.data:
+    if place.read_bytes() == expected.data:
         return None
     return Fault(1, f"{place}: is not what camtool writes of {drawing} now; post it again")

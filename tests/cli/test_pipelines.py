@@ -147,6 +147,53 @@ def test_files_of_others_are_nothing_to_it(camtool: Run, tmp_path: Path) -> None
     assert stale(camtool, "readme.txt", "pyproject.toml") == (0, "")
 
 
+@pytest.fixture
+def batched(camtool: Run, tmp_path: Path) -> Path:
+    """Drawings in folders, and their programs in folders of the same names, as of a batch."""
+    (tmp_path / "build" / "deep").mkdir(parents=True)
+    for name, radius in (("a", 10.0), ("deep/two words.v2", 8.0)):
+        drawing = ring(tmp_path / "drawings" / f"{name}.svg", radius)
+        flags = ("--no-verify", "--preview", f"build/{name}.svg")
+        camtool("post", drawing, "-t", "grbl", "-o", f"build/{name}.nc", *flags)
+    return tmp_path / "drawings"
+
+
+def test_programs_in_a_folder_of_their_own_are_fine(camtool: Run, batched: Path) -> None:
+    for given in ("drawings", "drawings/**/*.svg", "."):
+        asked = (given, "--programs", "build", "--missing")
+        assert stale(camtool, *asked)[0] == (given == ".")  # as of `batch .`: build/drawings/a.nc
+
+
+@pytest.mark.slow
+def test_programs_of_a_batch_are_fine(camtool: Run, batched: Path, tmp_path: Path) -> None:
+    asked = ("batch", "drawings", "-t", "grbl", "-o", "out", "--preview", "svg", "-q")
+    assert camtool(*asked).returncode == 0
+    assert stale(camtool, "drawings", "--programs", "out", "--missing") == (0, "")
+
+
+def test_programs_of_a_batch_that_are_stale_or_missing(camtool: Run, batched: Path) -> None:
+    ring(batched / "deep" / "two words.v2.svg", 7.0)
+    ring(batched / "new" / "c.svg")
+    asked = ("drawings", "--programs", "build")
+    code, said = stale(camtool, *asked)
+    changed = (
+        "camtool: error: build/deep/two words.v2.nc: is not what camtool writes of "
+        "drawings/deep/two words.v2.svg now; post it again\n"
+    )
+    assert (code, said) == (1, changed)
+    code, said = stale(camtool, *asked, "--missing")
+    assert (code, said) == (
+        1, changed + "camtool: error: build/new/c.nc: is not there; post drawings/new/c.svg\n"
+    )  # fmt: skip
+    assert stale(camtool, "drawings/a.svg", "--programs", "build") == (0, "")
+
+
+def test_programs_must_be_somewhere(camtool: Run, batched: Path) -> None:
+    code, said = stale(camtool, "drawings", "--programs", "none")
+    assert code == 2
+    assert "none: is no folder; give the --out of the batch" in said
+
+
 def taken(hook: str, name: str, **said: str) -> bool:
     """Whether pre-commit gives this file to the hook, where a configuration says so much."""
     chosen = HOOKS[hook] | said
