@@ -27,6 +27,8 @@ from camtool.results import (
     Toolpath,
     Verification,
 )
+from camtool.simulation.options import Effects
+from camtool.verify.gates import Gates
 
 __all__ = [
     "Calibration",
@@ -34,6 +36,8 @@ __all__ = [
     "Comparison",
     "Converted",
     "Drawing",
+    "Effects",
+    "Gates",
     "Job",
     "Judging",
     "ListedTarget",

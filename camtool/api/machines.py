@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from camtool.errors import MachineError
+from camtool.machine.loader import extended_by
 from camtool.machine.registry import ListedTarget, LoadedTarget, list_target, target_names
 
 
@@ -24,12 +25,13 @@ def targets() -> list[ListedTarget]:
 
 
 def load_target(
-    name: str,
+    name: str | None = None,
     *,
     machine: str | Path | None = None,
     settings: Mapping[str, Any] | Sequence[str] = (),
 ) -> LoadedTarget:
-    """The target `name`, with a user's `machine` file and `settings` over it.
+    """The target `name`, with a user's `machine` file and `settings` over it; without a name, the
+    one that this file extends.
 
     `settings`: {"axes.x.backlash_mm": 0.2}, or as `--set` takes them. Units are those that the
     keys end on. Raises UnknownTargetError (with the nearest names) and MachineError.
@@ -39,6 +41,10 @@ def load_target(
     if isinstance(settings, Mapping):
         settings = [f"{key}={_as_toml(value)}" for key, value in settings.items()]
     file = None if machine is None else Path(machine)
+    if name is None:
+        if file is None:
+            raise TypeError("load_target needs a name, or a machine file that extends one")
+        name = extended_by(file)
     return loaded(name, machine_file=file, settings=settings)
 
 

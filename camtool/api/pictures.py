@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, TypedDict, Unpack
 
 from camtool.geometry.drawing import Drawing as DrawingRecord
 from camtool.pipeline.judge import Posted as PostedRecord
+from camtool.preview.scene import Scene
 from camtool.results import Drawing, Picture, Shown, Toolpath, extended
 from camtool.toolpath.moves import Toolpath as ToolpathRecord
 
@@ -26,16 +29,29 @@ class Looks(TypedDict, total=False):
 
 def preview(
     what: DrawingRecord | ToolpathRecord | PostedRecord | Shown,
+    *beside: DrawingRecord | ToolpathRecord | PostedRecord | Shown,
+    titles: Sequence[str] = (),
     **looks: Unpack[Looks],
 ) -> Picture:
     """The picture of what any of these calls gave: the drawing, its toolpath, the path that the
     slides are predicted to take, coloured by its error (µm, with scale), or several such paths.
 
-    Raises OptionError for looks that make no picture. Source: docs/pictures.md, docs/viewer.md.
+    Of several values: `beside` each other, at one scale, by one map of errors. `titles` take the
+    place of their own, in order. Raises OptionError for looks that make no picture. Source:
+    docs/pictures.md, docs/viewer.md.
     """
     from camtool.preview.options import Options
 
-    return Picture(_shown(what)._scene(), Options(**looks))
+    scenes = [_shown(each)._scene() for each in (what, *beside)]
+    for row, title in enumerate(titles):
+        scenes[row] = replace(scenes[row], title=title)
+    options = Options(**looks)
+    if not beside:
+        return Picture(scenes[0], options)
+    for value, scene in zip((what, *beside), scenes, strict=True):
+        if not isinstance(scene, Scene):
+            raise TypeError(f"a {type(value).__name__} stands beside no other picture")
+    return Picture(tuple(scene for scene in scenes if isinstance(scene, Scene)), options)
 
 
 def _shown(what: Any) -> Shown:

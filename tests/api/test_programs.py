@@ -110,6 +110,32 @@ def test_ways_that_are_none(ways: str, words: str) -> None:
         camtool.compare(CIRCLE, "pic-mmh", ways)
 
 
+def test_values_stand_beside_each_other(compared: Comparison, tmp_path: Path) -> None:
+    (tmp_path / "square.csv").write_text("0,0\n4,0\n4,4\n0,4\n0,0\n")
+    drawing = camtool.read_drawing(tmp_path / "square.csv")
+    plain = camtool.post(drawing, "pic-mmh")
+    bent = camtool.post(drawing, "pic-mmh", compensate=True)
+    both = camtool.preview(plain, bent, titles=("before", "after"), size_px=500)
+    assert repr(both) == "<Picture of before and after>"
+    assert "before, after" in both.svg
+    assert both.svg == both._repr_svg_() == both.render("both.svg").decode()
+    with pytest.raises(camtool.CamtoolError, match=r"both\.html"):
+        both.render("both.html")
+    assert "mine" in camtool.preview(drawing, titles=["mine"]).svg
+    with pytest.raises(TypeError, match="a Comparison stands beside no other picture"):
+        camtool.preview(plain, compared)
+
+
+def test_limits_and_parts_of_the_mechanics() -> None:
+    judging = camtool.Judging(gates=camtool.Gates(error_mm=0.001), effects=camtool.Effects())
+    kept = camtool.verify(CIRCLE, "pic-mmh", judging=judging)
+    assert "ABOVE_GATE" in {finding.code.name for finding in kept.findings}
+    ideal = camtool.Judging(effects=camtool.Effects(play=False, compensation=False))
+    without = camtool.verify(CIRCLE, "pic-mmh", judging=ideal).report.error_um.total.max
+    assert without is not None
+    assert without < (kept.report.error_um.total.max or 0.0)
+
+
 def test_calibrate_gives_what_the_command_writes(tmp_path: Path) -> None:
     file = SAMPLES / "measured" / "pic-mmh-lines.toml"
     found = camtool.calibrate(file)
@@ -124,5 +150,10 @@ def test_calibrate_gives_what_the_command_writes(tmp_path: Path) -> None:
     play = again.estimate("play", "x")
     assert play is not None
     assert play.before == pytest.approx(play.value, abs=1e-3)
+    mine = camtool.load_target(machine=tmp_path / "my.toml").machine
+    assert mine.target.name == "pic-mmh"
+    assert mine.axes.x.backlash_mm == pytest.approx(play.value, abs=1e-3)
+    with pytest.raises(TypeError, match="needs a name"):
+        camtool.load_target()
     with pytest.raises(camtool.CamtoolError, match="was measured on pic-mmh"):
         camtool.calibrate(file, "grbl")
