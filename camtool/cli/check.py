@@ -15,6 +15,7 @@ from camtool.cli.output import STDOUT, check_writable, write_all
 from camtool.cli.pictureflags import DRAWING, PictureFlags, picture_options
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.terminal import DRAWING_MARKS, show_facts
 from camtool.cli.types import picture as picture_name
 from camtool.errors import CamtoolError
 
@@ -100,9 +101,9 @@ def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
         files[asked.preview] = painted(asked.preview)
     write_all(files)
     if asked.report != STDOUT and not asked.quiet:
-        from camtool.cli.check_table import table
+        from camtool.cli.check_table import NAME_WIDTH, table
 
-        click.echo(table(facts, verbose=asked.verbose))
+        show_facts(table(facts, verbose=asked.verbose), NAME_WIDTH, DRAWING_MARKS)
     say_findings(read.findings, quiet=asked.quiet, verbose=asked.verbose)
     return 1 if worst(read.findings) >= Severity.ERROR else 0
 

@@ -13,14 +13,15 @@ from camtool.cli.talk import one_line
 SHOWN = 10
 """So many rows of a list are shown, unless asked for all."""
 
-_NAME_WIDTH = 10
+NAME_WIDTH = 10
+"""Columns before the values."""
 
 
 def table(facts: dict[str, Any], *, verbose: bool) -> str:
     """The facts of `camtool check`; `verbose` shows long lists whole."""
     most = None if verbose else SHOWN
     rows = [*_head(facts), *_layers(facts, most), *_entities(facts), *_places(facts, most)]
-    return "\n".join(one_line(f"{name:<{_NAME_WIDTH}}{value}".rstrip()) for name, value in rows)
+    return "\n".join(one_line(f"{name:<{NAME_WIDTH}}{value}".rstrip()) for name, value in rows)
 
 
 _Rows = Iterator[tuple[str, str]]

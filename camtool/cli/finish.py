@@ -12,6 +12,7 @@ import click
 from camtool.cli.output import STDOUT, check_writable, write_all
 from camtool.cli.report import Subject, linked_picture, picture_beside, report_files
 from camtool.cli.talk import say, say_findings
+from camtool.cli.terminal import REPORT_NAMES, report_marks, show_facts
 
 if TYPE_CHECKING:
     from camtool.cli.report import Flags
@@ -82,8 +83,9 @@ def finish(
     if asked.page is not None:
         files.update(_page(made, asked, picture, target))
     write_all(files)
-    if made.verification is not None:
-        say(made.verification.report.to_text(findings=False), quiet=quiet)
+    if made.verification is not None and not quiet:
+        said = made.verification.report.to_text(findings=False)
+        show_facts(said, REPORT_NAMES, report_marks(made.findings), err=True)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(made.program.data)} bytes)", quiet=quiet)
     return 0

@@ -28,7 +28,7 @@ from camtool.cli.post import post
 from camtool.cli.preview import preview
 from camtool.cli.shells import take_over
 from camtool.cli.stale import stale
-from camtool.cli.talk import tinted
+from camtool.cli.talk import say_error
 from camtool.cli.targets import targets
 from camtool.cli.verify import verify
 from camtool.errors import CamtoolError
@@ -93,7 +93,7 @@ def main() -> NoReturn:
     except CamtoolError as error:
         if debug:
             traceback.print_exc()
-        click.echo(tinted(f"camtool: error: {error}"), err=True)
+        say_error(error)
         sys.exit(error.exit_code)
     except BrokenPipeError:
         # The reader of our stdout went away; say nothing when Python flushes at exit.

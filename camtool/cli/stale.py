@@ -68,7 +68,7 @@ def stale(
             if fault is None:  # of several drawings of one name the program is of one
                 break
         else:
-            click.echo(one_line(f"camtool: error: {faults[0].words}"), err=True)
+            say(one_line(f"camtool: error: {faults[0].words}"), quiet=False)
             worst = max(worst, faults[0].code)
     return worst
 

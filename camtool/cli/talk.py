@@ -13,6 +13,7 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from camtool.errors import CamtoolError
     from camtool.findings import Finding
 
 
@@ -27,8 +28,23 @@ def say(text: str, *, quiet: bool) -> None:
 
 
 def in_colour(stream: TextIO) -> bool:
-    """Whether a stream is a terminal of somebody who has not said NO_COLOR (no-color.org)."""
-    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    """Whether a stream is a terminal of somebody who has said neither NO_COLOR (no-color.org)
+    nor CLICOLOR=0 (bixense.com/clicolors)."""
+    said = os.environ.get
+    return (
+        stream.isatty()
+        and not said("NO_COLOR")
+        and said("CLICOLOR") != "0"
+        and said("TERM") != "dumb"
+    )
+
+
+def say_error(error: CamtoolError) -> None:
+    """One line for what went wrong; how to mend it stands out on a terminal."""
+    text, mend = str(error), " ".join(error.mend.split())
+    if mend and text.endswith(mend) and in_colour(sys.stderr):
+        text = text.removesuffix(mend) + click.style(mend, bold=True)
+    say(f"camtool: error: {text}", quiet=False)
 
 
 def tinted(text: str) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.options import talk_options
-from camtool.cli.talk import in_colour
+from camtool.cli.talk import in_colour, say
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -83,7 +83,6 @@ def show(
 def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool) -> None:
     """Write a machine file for NAME that extends TARGET, with every value as a comment."""
     from camtool.cli.output import STDOUT, write_all
-    from camtool.cli.talk import say
     from camtool.errors import OutputError
     from camtool.machine.registry import list_target
     from camtool.machine.template import machine_template
@@ -106,7 +105,7 @@ def _list(as_json: bool) -> None:
         try:
             listed = list_target(name)
         except MachineError as error:  # a broken plug-in is named and harms nothing else
-            click.echo(f"camtool: warning: {error}", err=True)
+            say(f"camtool: warning: {error}", quiet=False)
             continue
         target = listed.target
         row = {"name": name, "title": target.title, "extension": target.extension}

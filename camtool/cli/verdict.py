@@ -12,6 +12,7 @@ from camtool.cli.output import STDOUT, write_all
 from camtool.cli.programs import read_bytes, shown
 from camtool.cli.report import Subject, flags_given, report_files
 from camtool.cli.talk import say, say_findings
+from camtool.cli.terminal import REPORT_NAMES, report_marks, show_compared, show_facts
 
 if TYPE_CHECKING:
     from camtool.cli.pictureflags import PictureFlags
@@ -119,7 +120,7 @@ def judged(file: str, case: Case, wishes: Wishes) -> int:
         files.update(report_files(wishes.page, one.subject(), painted, preview=wishes.preview))
     write_all(files)
     if STDOUT not in (wishes.report, wishes.page) and not wishes.quiet:
-        click.echo(report.to_text(findings=False))
+        show_facts(report.to_text(findings=False), REPORT_NAMES, report_marks(findings))
         if case.judging.worst:
             click.echo(report.worst_text())
     say_findings(findings, quiet=wishes.quiet, verbose=wishes.verbose)
@@ -147,5 +148,5 @@ def compared(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
         files[wishes.report] = to_json(rows).encode()
     write_all(files)
     if wishes.report != STDOUT and not wishes.quiet:
-        click.echo(table(rows))
+        show_compared(table(rows), rows)
     return 0

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from camtool.cli.talk import say
+from camtool.cli.talk import say, say_error
 from camtool.errors import CamtoolError
 
 POLL_S = 0.4
@@ -57,7 +57,7 @@ def _tried(again: Callable[[], int]) -> None:
     try:
         again()
     except CamtoolError as error:
-        say(f"camtool: error: {error}", quiet=False)
+        say_error(error)
 
 
 def _settled(files: Files, seen: Digests, wait: Callable[[float], None]) -> Digests:
