@@ -55,7 +55,7 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
         Asked(source, STDOUT, None),
         quiet=quiet,
         verbose=verbose,
-        picture=PictureFlags().painter(lambda: [made.scene()], quiet=quiet),
+        picture=PictureFlags().painter(made.scenes, quiet=quiet),
         target=target,
     )
     if code == 0:

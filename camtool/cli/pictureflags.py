@@ -7,7 +7,7 @@ by name before any work is done; a layer that was named and turns out to hold no
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
@@ -141,24 +141,17 @@ class PictureFlags:
         self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False
     ) -> Callable[[str], bytes]:
         """What draws the scenes, several side by side, as a picture file of a name; they are made
-        when first asked for. Says which of the layers that were named hold nothing."""
+        when first asked for. Says what of the flags they turn out not to show."""
 
         @functools.cache
-        def made() -> Sequence[Scene]:
-            found = scenes()
-            for name in self._missing(found):
-                say(
-                    f"camtool: warning: --layers {name}: nothing in this picture"
-                    f"{HINTS.get(name, '')}",
-                    quiet=quiet,
-                )
-            return found
+        def made() -> tuple[Sequence[Scene], Options]:
+            found, options = scenes(), self.options()
+            for line in self._not_shown(found):
+                say(f"camtool: warning: {line}", quiet=quiet)
+            return found, options if _judged(found) else replace(options, polar=None)
 
         def painted(name: str) -> bytes:
-            drawn, options = made(), self.options()
-            if all(scene.trace_points is None for scene in drawn):
-                # Nothing could be judged: the findings say why, the picture shows what there is.
-                options = replace(options, polar=None)
+            drawn, options = made()
             if len(drawn) > 1:
                 from camtool.preview.beside import render_beside
 
@@ -169,6 +162,14 @@ class PictureFlags:
 
         return painted
 
+    def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
+        """What to say of layers that hold nothing, and where nothing could be judged."""
+        for name in self._missing(scenes):
+            yield f"--layers {name}: nothing in this picture{HINTS.get(name, '')}"
+        for flag in ("--exaggerate", "--polar"):
+            if flag in self.given and not _judged(scenes):
+                yield f"{flag}: the part cannot be judged; the picture shows what is planned"
+
     def _missing(self, scenes: Sequence[Scene]) -> list[str]:
         if not self.named:
             return []
@@ -177,6 +178,11 @@ class PictureFlags:
         options = self.options()
         empty = [missing_layers(scene, options, self.named) for scene in scenes]
         return [name for name in self.named if all(name in names for names in empty)]
+
+
+def _judged(scenes: Sequence[Scene]) -> bool:
+    """Whether all have a predicted path."""
+    return all(scene.trace_points is not None for scene in scenes)
 
 
 FLAGS = tuple(field.name for field in fields(PictureFlags))

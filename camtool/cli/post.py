@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 @click.option(
     "--before-after",
     is_flag=True,
-    help="With --compensate: the picture without it and with it, side by side.",
+    help="The picture without and with --compensate, --minimise reversals and --approach.",
 )
 @posting_options
 @picture_options
@@ -70,7 +70,9 @@ def post(
     pictures = pictures_asked(page, preview)
     picture.check(pictures, UNVERIFIED if posting.no_verify else RESULT)
     if before_after:
-        _check_before_after(posting, pictures)
+        if posting.no_verify:
+            raise click.UsageError("--before-after needs the predicted path; drop --no-verify")
+        check_beside("--before-after", pictures)
     flags = flags_given()
 
     def once() -> int:
@@ -83,19 +85,8 @@ def post(
             asked,
             quiet=quiet,
             verbose=verbose,
-            picture=picture.painter(
-                lambda: made.before_and_after() if before_after else [made.scene()], quiet=quiet
-            ),
+            picture=picture.painter(lambda: made.scenes(before=before_after), quiet=quiet),
             target=target,
         )
 
     return watch(once, lambda: posting.files(source), quiet=quiet) if watching else once()
-
-
-def _check_before_after(posting: Posting, pictures: list[str]) -> None:
-    """A usage error where there are no two pictures to be made."""
-    if not posting.compensate:
-        raise click.UsageError("--before-after shows what --compensate does; add it")
-    if posting.no_verify:
-        raise click.UsageError("--before-after needs the predicted path; drop --no-verify")
-    check_beside("--before-after", pictures)

@@ -15,6 +15,7 @@ from camtool.cli.gather import Command, decorate, gather
 from camtool.cli.jobflags import JobFlags, job_options
 from camtool.cli.judging import GateFlags, gate_options
 from camtool.cli.options import MachineFlags, machine_options
+from camtool.errors import OptionError
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -35,21 +36,24 @@ class Made:
     posted: Posted
     target: LoadedTarget
 
-    def scene(self, how: str = "") -> Scene:
-        """The predicted result; `how` it was made stands in the title."""
+    def scenes(self, *, before: bool = False) -> list[Scene]:
+        """The predicted result; `before` it that of the job without what it does against reversals
+        and play. OptionError where it does nothing of that kind."""
+        if not before or self.posted.failed:
+            return [self._scene(self.posted)]
+        if self.posted.before is None:
+            raise OptionError(
+                "the job does nothing against reversals or play",
+                where="--before-after",
+                mend="add --compensate, --minimise reversals or --approach, or drop it",
+            )
+        return [self._scene(self.posted.before, ", before"), self._scene(self.posted, ", after")]
+
+    def _scene(self, posted: Posted, when: str = "") -> Scene:
         from camtool.pipeline import posted_scene
 
-        title = f"{Path(self.drawing.file).name}{how}"
-        return posted_scene(
-            self.posted, self.target, title=title, drawing=self.drawing, job=self.job
-        )
-
-    def before_and_after(self) -> list[Scene]:
-        """What was compensated, as it would be without, and as it is."""
-        from camtool.pipeline import post_drawing
-
-        plain = replace(self, posted=post_drawing(self.drawing, self.job, self.target))
-        return [plain.scene(", uncompensated"), self.scene(", compensated")]
+        title = f"{Path(self.drawing.file).name}{when}"
+        return posted_scene(posted, self.target, title=title, drawing=self.drawing, job=self.job)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,14 @@ Nothing here reads or writes a file.
 from __future__ import annotations
 
 from camtool.pipeline.compare import Way, compare_picture, compare_program
-from camtool.pipeline.judge import Judging, Posted, convert_program, post_drawing, verify_program
+from camtool.pipeline.judge import (
+    Judging,
+    Posted,
+    convert_program,
+    post_drawing,
+    read_program,
+    verify_program,
+)
 from camtool.pipeline.pictures import picture, posted_scene
 from camtool.pipeline.viewing import listing_of
 
@@ -27,5 +34,6 @@ __all__ = [
     "picture",
     "post_drawing",
     "posted_scene",
+    "read_program",
     "verify_program",
 ]

@@ -51,13 +51,15 @@ class Goal:
 @dataclass(frozen=True, eq=False)
 class Posted:
     """What `post_drawing` made. `program` is None when planning found an error; `verification`
-    is None then, and when it was not asked for. `findings` are those of all stages."""
+    is None then, and when it was not asked for. `findings` are those of all stages. `before` is
+    the same job without what it does against reversals and play, where it does any of that."""
 
     wanted: Toolpath
     program: Program | None
     decoded: Toolpath | None
     verification: Verification | None
     findings: tuple[Finding, ...]
+    before: Posted | None = None
 
     @property
     def failed(self) -> bool:
@@ -115,7 +117,8 @@ def post_drawing(
         ),
         _before(plain),
     )
-    return Posted(wanted, program, decoded, verification.with_findings(findings), findings)
+    judged = verification.with_findings(findings)
+    return Posted(wanted, program, decoded, judged, findings, plain)
 
 
 def verify_program(
@@ -135,7 +138,7 @@ def verify_program(
     from camtool.verify.verify import VerifyOptions
 
     judging = judging or Judging()
-    decoded = _read(data, target, source)
+    decoded = read_program(data, target, source)
     goal = Goal()
     if drawing is not None:
         from camtool.planning.plan import planned
@@ -173,7 +176,7 @@ def convert_program(
     from camtool.toolpath.carried import at_feed, carried_over
     from camtool.verify.verify import VerifyOptions
 
-    decoded = _read(data, source, file)
+    decoded = read_program(data, source, file)
     same = source.machine.target.dialect == target.machine.target.dialect
     wanted = decoded if same else carried_over(decoded)
     if feed_mm_min is not None:
@@ -233,7 +236,7 @@ def _before(plain: Posted | None) -> Before | None:
     return Before(cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s)
 
 
-def _read(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
+def read_program(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     """The decoded program; ProgramError names the file too."""
     try:
         toolpath: Toolpath = target.post.read(data, target.machine)

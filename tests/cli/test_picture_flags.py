@@ -208,9 +208,19 @@ def test_a_page_about_a_spoilt_part_has_its_picture(drawing: str) -> None:
     assert "](p.svg)" in Path("r.md").read_text(encoding="utf-8")
     assert Path("p.svg").exists()
     assert not Path("a.nc").exists()
-    # Where nothing can be judged there is no circle to plot: the page is what matters.
-    run("post", drawing, "-t", "pic-mmh", "--scale", "1000", "--report", "r.html", "--polar", "1")
-    assert "OUT_OF_TRAVEL" in Path("r.html").read_text(encoding="utf-8")
+
+
+def test_where_nothing_can_be_judged_the_page_is_what_matters(
+    camtool: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "a.csv").write_text("0,0\n4,0\n4,3\n0,0\n", encoding="utf-8")
+    wide = ("a.csv", "-t", "pic-mmh", "--scale", "1000", "--polar", "1")
+    done = camtool("post", *wide, "--report", "r.html")
+    assert done.returncode == 1
+    assert b"--polar: the part cannot be judged" in done.stderr
+    assert "OUT_OF_TRAVEL" in (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert b"--polar: the part cannot" in camtool("preview", *wide, "--simulate", "-o",
+                                                  "x.svg").stderr  # fmt: skip
 
 
 def test_a_circle_has_no_part_and_no_layers_for_nobody() -> None:
