@@ -4,17 +4,15 @@ import math
 import re
 import subprocess
 import sys
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from camtool.cli.drawing import DrawingFlags
+from camtool.cli.jobflags import JobFlags
 from camtool.jobs.build import build_job
 from camtool.jobs.file import Said, read_job_file
-from camtool.cli.jobflags import JobFlags
-from camtool.jobs.keys import OPERATION, PLACE, STOCK, TOOL, TOOL_KEYS, WHOLE
-from camtool.jobs.values import ENTRY, LEAD, TABS
+from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE
 from camtool.planning.job import (
     Entry,
     Job,
@@ -350,18 +348,6 @@ def test_paths_are_relative_to_the_file(tmp_path: Path, monkeypatch: pytest.Monk
     assert made.operations[0].tool == Tool(0.125, number=3, name="1/8 end mill")
 
 
-def test_every_field_of_a_job_has_a_key() -> None:
-    def missing(record: type, keys: object) -> set[str]:
-        assert isinstance(keys, dict)
-        return {each.name for each in fields(record)} - {key.field for key in keys.values()}
-
-    assert missing(Operation, OPERATION) == {"tool"}
-    assert missing(Placement, PLACE) == missing(Stock, STOCK) == set()
-    assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()
-    assert missing(Tool, TOOL) == {"name"}
-    assert missing(Job, WHOLE) == {"operations", "placement", "stock"}
-
-
 def test_help_shows_every_key_under_its_heading(camtool: Run) -> None:
     text = camtool("post", "--help").stdout.decode()
     flags = {*WHOLE, *PLACE, *TOOL_KEYS, *(name for name, key in OPERATION.items() if key.help)}
@@ -384,23 +370,6 @@ def test_flags_reach_the_program(camtool: Run, tmp_path: Path) -> None:
 
 
 PAGE = (ROOT / "docs" / "jobs.md").read_text(encoding="utf-8")
-
-
-def test_the_page_has_every_key_and_no_other() -> None:
-    parts = re.split(r"^## ", PAGE, flags=re.MULTILINE)
-    tables = {"The job": WHOLE, "`[place]`": PLACE, "`[stock]`": STOCK, "`[tools": TOOL}
-    tables["`[[operations]]`"] = {**OPERATION, "tool": None}
-    for heading, keys in tables.items():
-        (part,) = (part for part in parts if part.startswith(heading))
-        cells = re.findall(r"^\| (`.*?) \|", part, re.MULTILINE)
-        assert sorted(re.findall(r"`(\w+)`", " ".join(cells))) == sorted(keys)
-    (operations,) = (part for part in parts if part.startswith("`[[operations]]`"))
-    for names, kinds in re.findall(r"^\| (`.*?) \| (.*?) \|", operations, re.MULTILINE):
-        for name in re.findall(r"`(\w+)`", names):
-            if name != "tool":
-                known = set(OPERATION[name].kinds)
-                told = set(re.findall(r"profile|pocket|engrave|drill|vcarve", kinds))
-                assert (told or set(OPERATION["kind"].kinds)) == known, name
 
 
 @pytest.mark.parametrize("text", re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL))

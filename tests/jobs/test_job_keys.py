@@ -1,0 +1,40 @@
+"""The keys of job files: every field of a job has one, and the page has all of them."""
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+from camtool.jobs.keys import OPERATION, PLACE, STOCK, TOOL, WHOLE
+from camtool.jobs.values import ENTRY, LEAD, TABS
+from camtool.planning.job import Entry, Job, Lead, Operation, Placement, Stock, Tabs, Tool
+
+PAGE = Path("docs/jobs.md").read_text(encoding="utf-8")
+
+
+def test_every_field_of_a_job_has_a_key() -> None:
+    def missing(record: type, keys: object) -> set[str]:
+        assert isinstance(keys, dict)
+        return {each.name for each in fields(record)} - {key.field for key in keys.values()}
+
+    assert missing(Operation, OPERATION) == {"tool"}
+    assert missing(Placement, PLACE) == missing(Stock, STOCK) == set()
+    assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()
+    assert missing(Tool, TOOL) == {"name"}
+    assert missing(Job, WHOLE) == {"operations", "placement", "stock"}
+
+
+def test_the_page_has_every_key_and_no_other() -> None:
+    parts = re.split(r"^## ", PAGE, flags=re.MULTILINE)
+    tables = {"The job": WHOLE, "`[place]`": PLACE, "`[stock]`": STOCK, "`[tools": TOOL}
+    tables["`[[operations]]`"] = {**OPERATION, "tool": None}
+    for heading, keys in tables.items():
+        (part,) = (part for part in parts if part.startswith(heading))
+        cells = re.findall(r"^\| (`.*?) \|", part, re.MULTILINE)
+        assert sorted(re.findall(r"`(\w+)`", " ".join(cells))) == sorted(keys)
+    (operations,) = (part for part in parts if part.startswith("`[[operations]]`"))
+    for names, kinds in re.findall(r"^\| (`.*?) \| (.*?) \|", operations, re.MULTILINE):
+        for name in re.findall(r"`(\w+)`", names):
+            if name != "tool":
+                known = set(OPERATION[name].kinds)
+                told = set(re.findall(r"profile|pocket|engrave|drill|vcarve", kinds))
+                assert (told or set(OPERATION["kind"].kinds)) == known, name
