@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
-import numpy as np
-import numpy.typing as npt
 from msgspec import Meta
 
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 Positive = Annotated[float, Meta(gt=0.0)]
 
@@ -49,5 +51,7 @@ def scales_of(machine: Machine, dialect: Dialect) -> npt.NDArray[np.float64]:
     The controller makes 1 / (coord_scale · nominal_step_mm) steps of a unit, whatever the axis;
     where a step is coded_step_mm, a millimetre is coord_scale · nominal_step_mm / coded_step_mm.
     """
+    import numpy as np
+
     steps = np.array([axis.coded_step_mm for axis in machine.axes])
     return np.asarray(dialect.coord_scale * dialect.nominal_step_mm / steps)

@@ -5,9 +5,12 @@ docs/dialects/flashcut.md explains the format, its contradictions and what was c
 
 from __future__ import annotations
 
-from camtool.machine.model import Machine
-from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.program import Listing, Program
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from camtool.machine.model import Machine
+    from camtool.toolpath.moves import Toolpath
+    from camtool.toolpath.program import Listing, Program
 
 
 class FlashcutPost:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from camtool.machine.model import Machine
-from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.program import Listing, Program
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from camtool.machine.model import Machine
+    from camtool.toolpath.moves import Toolpath
+    from camtool.toolpath.program import Listing, Program
 
 
 class GrblPost:

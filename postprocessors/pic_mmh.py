@@ -5,9 +5,12 @@ docs/dialects/pic-mmh.md explains the format, its contradictions and what was ch
 
 from __future__ import annotations
 
-from camtool.machine.model import Machine
-from camtool.toolpath.moves import Move, Toolpath
-from camtool.toolpath.program import Listing, Program
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from camtool.machine.model import Machine
+    from camtool.toolpath.moves import Move, Toolpath
+    from camtool.toolpath.program import Listing, Program
 
 
 class PicMmhPost:
@@ -41,6 +44,8 @@ class PicMmhPost:
 
     def listing(self, data: bytes, machine: Machine) -> Listing:
         """What stands before each semicolon, with it."""
+        from camtool.toolpath.program import Listing
+
         from ._pic_mmh_read import BLANKS
 
         *blocks, _ = data.decode("ascii").split(";")

@@ -1,32 +1,12 @@
 """Many drawings: which ones, what is up to date, and processes that make the rest.
 
-    find_tasks     folders, patterns and files → one Task for each drawing, no two to one output
-    Manifest       what an output folder holds, and of what it was made
-    LocalPool      processes of this computer: one may die, and the others go on
-    cluster_pool   the same on a Dask cluster
-    run_batch      tasks → outcomes: writes what is made, skips what is up to date
+    inputs.find_tasks     folders, patterns and files → a Task for each drawing, no two to one output
+    lock.alone_in         one batch at a time in an output folder
+    manifest.Manifest     what an output folder holds, and of what it was made
+    pool.LocalPool        processes of this computer: one may die, and the others go on
+    cluster.ClusterPool   the same on a Dask cluster
+    run.run_batch         tasks → outcomes: writes what is made, skips what is up to date
 
 What is made of one drawing is a `Work` that the caller brings; nothing here knows of machines.
+Nothing is loaded before it is needed: a batch that is up to date needs no processes.
 """
-
-from __future__ import annotations
-
-from camtool.batch.inputs import find_tasks
-from camtool.batch.manifest import Manifest
-from camtool.batch.pool import LocalPool, PoolOptions
-from camtool.batch.records import Made, Outcome, State, Task, Work
-from camtool.batch.run import Order, run_batch
-
-__all__ = [
-    "LocalPool",
-    "Made",
-    "Manifest",
-    "Order",
-    "Outcome",
-    "PoolOptions",
-    "State",
-    "Task",
-    "Work",
-    "find_tasks",
-    "run_batch",
-]

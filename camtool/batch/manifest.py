@@ -86,8 +86,13 @@ class Manifest:
 
 
 def _line(stem: str, entry: Entry) -> str:
-    row = {"stem": stem, "key": entry.key, "files": dict(entry.files)}
-    row |= {"warnings": entry.warnings, "figures": dict(entry.figures)}
+    row = {
+        "stem": stem,
+        "key": entry.key,
+        "files": dict(entry.files),
+        "warnings": entry.warnings,
+        "figures": dict(entry.figures),
+    }
     return json.dumps(row, ensure_ascii=True, sort_keys=True)
 
 

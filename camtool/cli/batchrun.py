@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.batch.manifest import Manifest
-from camtool.batch.records import Outcome, Pool, State, Task
+from camtool.batch.records import Made, Outcome, Pool, State, Task
 from camtool.cli.batchstop import Stop, stoppable
 from camtool.cli.batchtalk import Loudness, say_summary, summary_json, talking
 from camtool.cli.batchwork import JobOrder, PostWork, own_job
@@ -57,6 +57,17 @@ class Ended:
 
     outcomes: Sequence[Outcome]
     error: CamtoolError | None
+
+
+@dataclass(frozen=True)
+class Later:
+    """A pool that is not there before it has something to do."""
+
+    pool: Callable[[], Pool]
+
+    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
+        """Those of the pool."""
+        yield from self.pool().results(tasks)
 
 
 @dataclass(frozen=True)
@@ -154,7 +165,8 @@ class Batched:
 
         force = self.running.force
         order = Order(self.out, write_all, self.work.digest(), ordered.jobs, force)
-        with closing(run_batch(ordered.tasks, order, manifest, self._pool(note))) as outcomes:
+        pool = Later(lambda: self._pool(note))
+        with closing(run_batch(ordered.tasks, order, manifest, pool)) as outcomes:
             for outcome in chain(ordered.failed, outcomes):
                 if outcome is not None:
                     yield outcome

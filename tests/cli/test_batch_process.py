@@ -74,6 +74,21 @@ def test_an_interrupted_run_leaves_whole_files_and_goes_on(
     assert done.returncode == 0
     assert b"up to date" in done.stderr
     assert assert_whole(tmp_path / "build") == 12
+    if number == signal.SIGTERM:
+        assert_little_is_loaded(tmp_path)
+
+
+def assert_little_is_loaded(folder: Path) -> None:
+    """A batch that has nothing to do needs neither numbers nor drawings nor processes."""
+    heavy = {"numpy", "numba", "ezdxf", "shapely", "rich", "multiprocessing", "distributed"}
+    code = (
+        "import sys\nfrom camtool.cli.main import main\n"
+        f"try:\n    main()\nfinally:\n    print(sorted({heavy} & sys.modules.keys()))"
+    )
+    command = [sys.executable, "-c", code, *COMMAND[3:]]
+    done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+    assert "12 up to date" in done.stderr
+    assert done.stdout == "[]\n"
 
 
 def test_a_terminal_gets_a_bar(tmp_path: Path, many: Path) -> None:
