@@ -53,6 +53,19 @@ def test_names_of_the_overview_exist() -> None:
             pkgutil.resolve_name(name)
 
 
+def test_functions_of_the_overview_exist() -> None:
+    """Those that are called by their module's name alone: `link.link`."""
+    sources = [*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/*.py")]
+    names = set(re.findall(r"`(_?[a-z_]+)\.([A-Za-z_]+)`", OVERVIEW)) - {
+        ("camtool", "postprocessors")
+    }
+    names = {(stem, name) for stem, name in names if name not in ("md", "py", "reader")}
+    assert len(names) > 10
+    for stem, name in names:
+        text = "".join(each.read_text("utf-8") for each in sources if each.stem == stem)
+        assert re.search(rf"^\s*(?:def|class) {name}\b", text, re.MULTILINE), f"{stem}.{name}"
+
+
 def test_every_room_has_a_row() -> None:
     rooms = {
         path.parent.relative_to(ROOT).as_posix() + "/"
