@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,11 @@ from camtool.cli.types import picture as picture_name
 from camtool.errors import CamtoolError
 
 if TYPE_CHECKING:
-    from camtool.preview.draw import Scene
+    from camtool.findings import Finding
+    from camtool.machine.registry import LoadedTarget
+    from camtool.preview.scene import Scene
+
+    Findings = tuple[Finding, ...]
 
 
 @click.command(cls=SectionedCommand, short_help="Picture of a drawing, toolpath or program.")
@@ -82,10 +87,11 @@ def preview(
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
     say_first_run(quiet=quiet)
-    scenes = [_scene(name, machine, simulate, job, drawing) for name in sources]
-    write_all({output: picture.painter(lambda: scenes, quiet=quiet)(output)})
-    for scene in scenes:
-        findings = scene.drawing.findings if scene.drawing is not None else ()
+    seen = Seen(machine, simulate, job, drawing)
+    found = [seen.scene(name) for name in sources]
+    painted = picture.painter(lambda: [scene for scene, _ in found], quiet=quiet)
+    write_all({output: painted(output)})
+    for _, findings in found:
         say_findings(findings, quiet=quiet, verbose=verbose)
     say(f"written: {output}", quiet=quiet)
     return 0
@@ -98,51 +104,63 @@ def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:
     return RESULT if simulate else Canvas("add --simulate")
 
 
-def _scene(
-    source: str, machine: MachineFlags, simulate: bool, job: JobFlags, drawing: DrawingFlags
-) -> Scene:
-    """What to draw: a drawing, a program, or the toolpath planned from a drawing."""
-    from camtool.pipeline import (
-        listing_of,
-        picture,
-        post_drawing,
-        posted_scene,
-        verify_program,
-    )
-    from camtool.planning.plan import plan
+@dataclass(frozen=True)
+class Seen:
+    """How files are made into scenes, each with what was noticed in its drawing; where no part can
+    be made of it, what stands against that."""
 
-    title = Path(source).name
-    if machine.name() is None:
+    machine: MachineFlags
+    simulate: bool
+    job: JobFlags
+    drawing: DrawingFlags
+
+    def scene(self, source: str) -> tuple[Scene, Findings]:
+        """A drawing, a program, or the toolpath planned from a drawing."""
+        if self.machine.name() is None:
+            return self._of_drawing(source)
+        target = self.machine.load()
+        if Path(source).suffix.lower() == target.machine.target.extension:
+            return self._of_program(source, target), ()
+        return self._of_job(source, target)
+
+    def _of_drawing(self, source: str) -> tuple[Scene, Findings]:
+        from camtool.pipeline import picture
+
         _refuse_program(source)
-        read = drawing.read(source)
-        return picture(title=Path(read.file).name, drawing=read)
-    target = machine.load()
-    if Path(source).suffix.lower() == target.machine.target.extension:
-        data = read_bytes(source)
-        decoded, verification = verify_program(data, target, source=source)
-        judged = verification if simulate else None
+        read = self.drawing.read(source)
+        return picture(title=Path(read.file).name, drawing=read), read.findings
+
+    def _of_program(self, source: str, target: LoadedTarget) -> Scene:
+        from camtool.pipeline import listing_of, picture, read_program, verify_program
+
+        data, judged = read_bytes(source), None
+        if self.simulate:
+            decoded, judged = verify_program(data, target, source=source)
+        else:
+            decoded = read_program(data, target, source)
         return picture(
-            title=title,
+            title=Path(source).name,
             toolpath=decoded,
             verification=judged,
             machine=target.machine,
             listing=listing_of(data, target, decoded),
         )
-    wanted = job.job(drawing)
-    read = drawing.read(source, target.machine, wanted)
-    if not simulate:
-        with job.blamed():
-            toolpath = plan(read, wanted, target.machine)
-        return picture(
-            title=title,
-            drawing=read,
-            job=wanted,
-            toolpath=toolpath,
-            machine=target.machine,
-        )
-    with job.blamed():
-        posted = post_drawing(read, wanted, target)
-    return posted_scene(posted, target, title=title, drawing=read, job=wanted)
+
+    def _of_job(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
+        from camtool.pipeline import picture, post_drawing, posted_scene
+        from camtool.planning.plan import plan
+
+        title, job = Path(source).name, self.job.job(self.drawing)
+        read = self.drawing.read(source, target.machine, job)
+        with self.job.blamed():
+            if self.simulate:
+                posted = post_drawing(read, job, target)
+                scene = posted_scene(posted, target, title=title, drawing=read, job=job)
+                return scene, posted.findings if posted.failed else read.findings
+            moves = plan(read, job, target.machine)
+        machine = target.machine
+        made = picture(title=title, drawing=read, job=job, toolpath=moves, machine=machine)
+        return made, read.findings
 
 
 def _refuse_program(source: str) -> None:
