@@ -119,7 +119,7 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
         groups=groups,
         outlines=outlines,
         strokes=strokes,
-        starts=_bare_starts(strokes),
+        starts=bare_starts(strokes),
         places=places,
         trace=trace,
         window=(
@@ -223,7 +223,7 @@ def _window(
     return window(whole, union(around))
 
 
-def _bare_starts(strokes: Strokes | None) -> Floats:
+def bare_starts(strokes: Strokes | None) -> Floats:
     """(S, 2) starts of contours where no plunge is marked."""
     if strokes is None:
         return np.empty((0, 2))

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import re
 import tomllib
+from dataclasses import replace
 from html.parser import HTMLParser
 from importlib import resources
 from pathlib import Path
@@ -11,14 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camtool.geometry.polylines import Polylines, Segments
+from camtool.preview.colours import BINS
 from camtool.preview.draw import Scene
+from camtool.preview.exaggerate import exaggerated
 from camtool.preview.render import render
+from camtool.preview.trace import bins_of, trace_of
 from camtool.preview.viewer.columns import columns_of, packed
 from camtool.preview.viewer.page import SCRIPTS, viewer_page
 from camtool.preview.viewer.run import Line, Run, Table, by_feed
+from camtool.preview.viewer.traced import traced_of
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
-from tests.preview.conftest import NASTY, circle, drawing_of, followed
+from tests.preview.conftest import NASTY, SCENES, circle, drawing_of, followed, line
 from tests.preview.viewer_pages import (
     HOSTILE,
     busy,
@@ -26,6 +32,7 @@ from tests.preview.viewer_pages import (
     large,
     run_of,
     text_of,
+    traced,
     with_run,
 )
 
@@ -124,18 +131,56 @@ def test_columns_come_back_as_they_went_in(scenes: dict[str, Scene]) -> None:
         scene.run().error_mm,
         np.arange(len(scene.trace_points if scene.trace_points is not None else ())),
     )
-    columns = columns_of(scene, run)
+    wide = {"wide": np.array([7, -70_000], dtype="<i4"), "short": np.array([0, 900], dtype="<i4")}
+    columns = {**columns_of(scene, run), **traced_of(scene, run, 20.0).columns, **wide}
     named, data = packed(columns)
     for name, (kind, offset, count) in named.items():
         assert offset % 4 == 0
-        held = np.frombuffer(data, dtype=kind, count=count, offset=offset)
+        stepped = kind == "d1"
+        held = np.frombuffer(data, dtype="i1" if stepped else kind, count=count, offset=offset)
+        held = held.cumsum() if stepped else held
         np.testing.assert_array_equal(held, columns[name].ravel())
+    assert [named[name][0] for name in ("trace_row", "short", "wide")] == ["d1", "i2", "i4"]
     np.testing.assert_allclose(columns["move_end"], scene.toolpath.end, atol=1e-6)
-    assert len(columns["trace_row"]) == len(columns["trace_error"]) > 100
+    assert len(columns["trace_row"]) == len(columns["trace_bin"]) > 100
     page = text_of(scene)
     block = re.search(r'id="columns">([^<]*)<', page)
     assert block is not None
     assert base64.b64decode(block[1])
+
+
+def test_the_page_draws_deviations_as_pictures_do() -> None:
+    ring = Segments.of(Polylines.of([circle(2.5, 2.5, 2.0)]))
+    scene = traced(busy(replace(SCENES["result"], wanted=ring)))
+    assert scene.run is not None
+    assert scene.trace_points is not None
+    assert scene.trace_cutting is not None
+    found = traced_of(scene, scene.run(), 20.0)
+    off = found.columns["trace_off"].astype(float) * found.count_mm
+    assert np.abs(found.columns["trace_off"]).max() == 32_000
+    cut = scene.trace_cutting
+    drawn = scene.trace_points + 49.0 * off
+    wanted = exaggerated(scene.trace_points, ring, 50.0)
+    np.testing.assert_allclose(drawn[cut], wanted[cut], atol=50.0 * found.count_mm)
+    worst = np.array([one.at_mm for one in scene.run().worst])
+    moved = exaggerated(worst, ring, 50.0)
+    np.testing.assert_allclose(worst + 49.0 * found.worst_off, moved, atol=1e-9)
+    picture = trace_of(scene)
+    assert picture is not None
+    shown = found.columns["trace_bin"][1:].astype(int)
+    np.testing.assert_array_equal(
+        np.where(shown == BINS, -1, shown), bins_of(replace(picture, top_um=20.0))
+    )
+
+
+def test_the_wanted_path_breaks_where_it_does() -> None:
+    paths = [line((0.0, 0.0), (1.0, 0.0, 1.0), (1.0, 2.0)), line((5.0, 5.0), (6.0, 5.0))]
+    wanted = Segments.of(Polylines.of(paths))
+    toolpath = followed(drawing_of(paths, ["a", "b"]))
+    columns = columns_of(Scene("t", toolpath=toolpath, wanted=wanted), run_of(toolpath))
+    assert columns["wanted_break"].tolist() == [0, 2]
+    assert columns["wanted_begin"].tolist() == [[0.0, 0.0], [5.0, 5.0]]
+    assert columns["wanted_arc"].tolist() == [1]
 
 
 def test_a_run_by_feeds_takes_the_time_of_the_way() -> None:

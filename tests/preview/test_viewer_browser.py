@@ -2,14 +2,16 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from camtool.geometry.polylines import Polylines, Segments
 from camtool.preview.draw import Scene
-from tests.preview.conftest import SCENES
-from tests.preview.viewer_pages import HOSTILE, busy, large, text_of
+from tests.preview.conftest import SCENES, circle
+from tests.preview.viewer_pages import HOSTILE, busy, large, text_of, traced
 
 CHROMIUM = "/usr/bin/chromium"
 # Without the last ones it keeps looking for its maker's hosts.
@@ -52,7 +54,7 @@ class Shown:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", self._asked)
         self.page.goto(file.as_uri())
-        self.page.wait_for_selector("body[data-painted]", timeout=60_000)
+        self.page.wait_for_selector("body[data-painted]", timeout=10_000)
 
     def _asked(self, request: Any) -> None:
         if not request.url.startswith("file:"):
@@ -175,16 +177,68 @@ def test_layers_and_colours(shown: Any) -> None:
     plan, done = view.pixels("plan"), view.pixels("done")
     view.page.locator("#layers input").nth(0).uncheck()
     assert view.pixels("plan") < plan
-    view.press("3")  # rapids
+    view.press("r")
     fewer = view.pixels("done")
     assert 0 < fewer < done
-    view.press("3", "1")
+    view.press("r", "1")
     assert view.pixels("done") == done
     assert view.pixels("plan") == plan
     assert view.page.locator("#scale").is_hidden()
     view.press("e")
     assert view.text("#scale-high") == "20 µm"
     assert view.page.locator("#colour-by").input_value() == "error"
+
+
+def _signs(scene: Scene) -> Scene:
+    """The scene with a tool, a table, and a circle that it should have gone round."""
+    circles = Polylines.of([circle(2.5, 2.5, 2.0)])
+    return replace(scene, tool_mm=0.3, travel_mm=(9.0, 7.0), wanted=Segments.of(circles))
+
+
+def test_every_layer_is_switched_by_its_key(shown: Any) -> None:
+    scene = replace(_signs(busy(SCENES["toolpath"])), trace_points=None)
+    view = shown(scene)
+    whole = {name: view.pixels(name) for name in ("ground", "plan", "signs")}
+    on = view.page.locator("#layers input:checked").count()
+    assert view.page.locator("#layers input").count() == on + 1  # reversals alone are off
+    for canvas, keys in (("signs", "boazx"), ("ground", "st"), ("plan", "w")):
+        for key in keys:
+            view.press(key)
+            assert 0 <= view.pixels(canvas) < whole[canvas], key
+            view.press(key)
+            assert view.pixels(canvas) == whole[canvas], key
+    view.press("v")
+    assert view.pixels("signs") > whole["signs"]
+
+
+def test_beside_a_predicted_path_signs_are_off(shown: Any) -> None:
+    view = shown(traced(_signs(busy(SCENES["result"]))))
+    names = view.page.locator("#layers label:not(:has(:checked))").all_inner_texts()
+    assert [name.split("\n")[0] for name in names] == [
+        "starts", "order of contours", "directions", "reversals of X and Y",
+    ]  # fmt: skip
+
+
+def test_what_the_tool_covers_grows_with_the_time(shown: Any) -> None:
+    view = shown(_signs(busy(SCENES["toolpath"])))
+    view.press("t")
+    whole = view.pixels("ground")
+    view.page.locator("#slider").fill("6000")
+    assert 0 < view.pixels("ground") < whole
+    view.press("Home")
+    assert view.pixels("ground") == 0
+
+
+def test_deviations_are_drawn_larger_and_the_factor_is_shown(shown: Any) -> None:
+    view = shown(traced(_signs(busy(SCENES["result"]))))
+    assert view.page.locator("#factor").is_hidden()
+    before = view.pixels("done")
+    view.press("m", "m", "m", "m")
+    assert view.page.locator("#factor").inner_text().endswith("× 20")
+    assert view.pixels("done") != before
+    view.press("M", "M", "M", "M", "M")
+    assert view.page.locator("#factor").is_hidden()
+    assert view.pixels("done") == before
 
 
 def test_keys_zoom_pan_fit_and_step(shown: Any) -> None:
@@ -247,8 +301,6 @@ def _paper(view: Any) -> int:
 
 
 def test_hostile_names_stay_names(shown: Any) -> None:
-    from dataclasses import replace
-
     scene = busy(SCENES["toolpath"])
     view = shown(replace(scene, title=HOSTILE, notes=(HOSTILE,)))
     assert "hack()" in view.text("h1")

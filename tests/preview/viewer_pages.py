@@ -40,6 +40,15 @@ def busy(scene: Scene) -> Scene:
     return with_run(replace(scene, toolpath=numbered), run)
 
 
+def traced(scene: Scene) -> Scene:
+    """The scene with a run that knows the rows of its trace."""
+    assert scene.run is not None
+    assert scene.toolpath is not None
+    assert scene.trace_points is not None
+    rows = np.linspace(0, len(scene.toolpath) - 1, len(scene.trace_points)).astype(np.int64)
+    return with_run(scene, replace(scene.run(), trace_row=rows))
+
+
 def spiral(count: int) -> Toolpath:
     """A toolpath of many short lines on a spiral that fills 60 × 60 mm."""
     turn = np.linspace(0.0, 400.0, count)

@@ -1,8 +1,8 @@
 """A scene as columns of numbers, packed for the page.
 
 All columns follow each other in one block of bytes, little-endian, each beginning at a multiple of
-four: f4 (float), i4 (integer), u1 (byte). Floats of 32 bits hold a place on a table of 8 m to a
-micrometre.
+four: f4 (float), u1 (byte), i2 and i4 (integer), d1 (integers as the small steps from each to the
+next, from 0 to the first). Floats of 32 bits hold a place on a table of 8 m to a micrometre.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ import numpy.typing as npt
 
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.preview.content import bare_starts
 from camtool.preview.scene import Scene
+from camtool.preview.strokes import strokes_of
+from camtool.preview.turns import turns_of
 from camtool.preview.viewer.run import Run
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
@@ -20,6 +23,7 @@ from camtool.units import UM_PER_MM
 Columns = dict[str, npt.NDArray[np.generic]]
 
 FLOAT, INT, BYTE = np.dtype("<f4"), np.dtype("<i4"), np.dtype("u1")
+SHORT, STEP = np.dtype("<i2"), np.dtype("i1")
 
 ALIGN_BYTES = 4
 """Every column begins at a multiple of this: browsers refuse others."""
@@ -27,7 +31,12 @@ ALIGN_BYTES = 4
 
 def columns_of(scene: Scene, run: Run | None) -> Columns:
     """All columns of the page; those of what the scene does not have are empty."""
-    return {**_drawing(scene.drawing), **_moves(scene.toolpath, run), **_trace(scene, run)}
+    return {
+        **_drawing(scene.drawing),
+        **_moves(scene.toolpath, run),
+        **_marks(scene.toolpath),
+        **_wanted(scene.wanted if run is not None else None),
+    }
 
 
 def packed(columns: Columns) -> tuple[dict[str, tuple[str, int, int]], bytes]:
@@ -36,12 +45,25 @@ def packed(columns: Columns) -> tuple[dict[str, tuple[str, int, int]], bytes]:
     parts: list[bytes] = []
     at = 0
     for name, column in columns.items():
-        data = column.tobytes()
+        kind, narrow = _narrow(column)
+        data = narrow.tobytes()
         data += bytes(-len(data) % ALIGN_BYTES)
-        named[name] = (column.dtype.str.lstrip("<|"), at, column.size)
+        named[name] = (kind, at, column.size)
         parts.append(data)
         at += len(data)
     return named, b"".join(parts)
+
+
+def _narrow(column: npt.NDArray[np.generic]) -> tuple[str, npt.NDArray[np.generic]]:
+    """A column in the smallest of the types that hold it, and the name of that type."""
+    if column.dtype != INT:
+        return column.dtype.str.lstrip("<|"), column
+    steps = np.diff(column.astype(np.int64), prepend=0)
+    for kind, values, dtype in (("d1", steps, STEP), ("i2", column, SHORT)):
+        limits = np.iinfo(dtype)
+        if not column.size or (values.min() >= limits.min and values.max() <= limits.max):
+            return kind, values.astype(dtype)
+    return "i4", column
 
 
 def layer_names(drawing: Drawing) -> list[str]:
@@ -107,18 +129,37 @@ def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
     return np.where(toolpath.is_motion, sorts, 0).astype(BYTE)
 
 
-def _trace(scene: Scene, run: Run | None) -> Columns:
-    points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
-    if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
-        none = np.empty(0, dtype=FLOAT)
-        row = np.empty(0, dtype=INT)
-        return {"trace_point": none, "trace_error": none, "trace_row": row}
-    if len(run.trace_row) != len(points):
-        raise ValueError("the trace's rows are not those of its points")
+def _marks(toolpath: Toolpath | None) -> Columns:
+    """Places (x, y) mm: where contours begin, where no plunge marks that, where the tool goes
+    straight down, and where X or Y turns back."""
+    none = np.empty((0, 2))
+    starts = bare = plunges = turns = none
+    if toolpath is not None:
+        strokes = strokes_of(toolpath)
+        starts, bare, plunges = strokes.starts, bare_starts(strokes), strokes.plunges
+        turns = np.unique(turns_of(toolpath), axis=0)
+    places = {"start_at": starts, "bare_at": bare, "plunge_at": plunges, "turn_at": turns}
+    return {name: points.astype(FLOAT) for name, points in places.items()}
+
+
+def _wanted(wanted: Segments | None) -> Columns:
+    """The wanted path: where each line or arc ends, and where those begin that do not go on from
+    the one before."""
+    if wanted is None or not len(wanted):
+        none = np.empty(0)
+        return {
+            **_bends("wanted", none.astype(np.bool_), none.reshape(0, 2), none),
+            "wanted_to": none.astype(FLOAT),
+            "wanted_begin": none.astype(FLOAT),
+            "wanted_break": none.astype(INT),
+        }
+    apart = np.hypot(*(wanted.start[1:] - wanted.end[:-1]).T) > POSITION_EPS_MM
+    breaks = np.concatenate([[0], np.flatnonzero(apart) + 1])
     return {
-        "trace_point": points.astype(FLOAT),
-        "trace_error": np.where(cutting, np.abs(error) * UM_PER_MM, np.nan).astype(FLOAT),
-        "trace_row": run.trace_row.astype(INT),
+        **_bends("wanted", wanted.bulge != 0.0, wanted.centre, wanted.sweep),
+        "wanted_to": wanted.end.astype(FLOAT),
+        "wanted_begin": wanted.start[breaks].astype(FLOAT),
+        "wanted_break": breaks.astype(INT),
     }
 
 

@@ -89,11 +89,12 @@ function pressed(event, { stage, player, panel }) {
     0: () => stage.fit(),
     f: () => stage.fit(),
     e: () => panel.nextColour(),
+    m: () => panel.nextTimes(1),
+    M: () => panel.nextTimes(-1),
     "?": () => { find("help").hidden = !find("help").hidden; },
     Escape: () => { find("help").hidden = true; },
   };
-  if (/^[1-9]$/.test(event.key)) panel.toggle(Number(event.key) - 1);
-  else if (deeds[event.key]) deeds[event.key]();
-  else return false;
+  if (deeds[event.key]) deeds[event.key]();
+  else return panel.toggle(event.key);
   return true;
 }

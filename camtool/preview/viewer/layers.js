@@ -1,13 +1,15 @@
 // What is to be seen and in which colour: the layers, the ways to colour moves, their styles.
 
 const SORTS = ["rapid", "feed", "plunge"];
+const COLOURS = [
+  "paper", "ink", "quiet", "grid", "drawing", "feed", "rapid", "plunge", "pale", "tool", "pick",
+  "swept", "travel", "turn", "wanted",
+];
 
 /** The colours of the page as they are now: the system's preference, or paper. */
 function palette() {
   const style = getComputedStyle(document.documentElement);
-  const colour = (name) => style.getPropertyValue(`--${name}`).trim();
-  const names = ["ink", "quiet", "grid", "drawing", "feed", "rapid", "plunge", "pale", "tool", "pick"];
-  return Object.fromEntries(names.map((name) => [name, colour(name)]));
+  return Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
 class Layers {
@@ -16,33 +18,61 @@ class Layers {
     this.columns = columns;
     this.on = new Map();
     this.list = [];
-    head.layers.forEach((layer, index) => {
-      this.add(`drawing ${index}`, layer.name ? `drawing: ${layer.name}` : "drawing");
-    });
-    if (columns.move_kind.length) {
-      this.add("rapid", "rapids");
-      this.add("feed", "feeds");
-      this.add("plunge", "slopes and plunges");
-    }
-    if (columns.trace_row.length) this.add("trace", "predicted path, by error");
-    if (head.worst.length) this.add("worst", "worst places");
+    this.times = 1;
+    this.points = columns.trace_point;
+    this.listAll();
     this.by = "kind";
     this.sortOf = columns.move_sort;
     this.binOf = this.bins();
-    this.traceBin = Uint8Array.from(columns.trace_error, (um) => this.bin(um));
   }
 
-  add(key, name) {
-    this.list.push({ key, name });
-    this.on.set(key, true);
+  /** What there is, from the ground up; with a predicted path little beside it is on at first. */
+  listAll() {
+    const { head, columns } = this, plain = !columns.trace_row.length;
+    head.layers.forEach((layer, index) => {
+      const name = layer.name ? `drawing: ${layer.name}` : "drawing";
+      this.add(`drawing ${index}`, name, index < 9 ? String(index + 1) : "");
+    });
+    const moves = columns.move_kind.length > 0, travel = head.travel_mm;
+    const width = head.tool_mm === null ? "" : Number(head.tool_mm.toPrecision(4));
+    if (moves && width) this.add("swept", `tool's width, ${width} mm`, "s");
+    if (travel) this.add("travel", `travel, ${travel[0]} × ${travel[1]} mm`, "t");
+    if (moves) {
+      this.add("rapid", "rapids", "r");
+      this.add("feed", "feeds", "c");
+      this.add("plunge", "slopes and plunges", "p");
+    }
+    if (columns.wanted_to.length) this.add("wanted", "wanted path", "w");
+    if (!plain) this.add("trace", "predicted path, by error", "d");
+    if (columns.start_at.length) {
+      this.add("start", "starts", "b", plain);
+      this.add("order", "order of contours", "o", plain);
+      this.add("arrow", "directions", "a", plain);
+    }
+    if (columns.turn_at.length) this.add("turn", "reversals of X and Y", "v", false);
+    if (head.worst.length) this.add("worst", "worst places", "x");
+    if (head.doubts.length) this.add("doubt", "open ends, crossings", "u");
+    this.add("zero", "part zero", "z");
+  }
+
+  add(key, name, letter, isOn = true) {
+    this.list.push({ key, name, letter });
+    this.on.set(key, isOn);
+  }
+
+  /** From now on deviations are drawn so many times as large. */
+  exaggerate(times) {
+    this.times = times;
+    const { trace_point: points, trace_off: off } = this.columns, more = (times - 1) * this.head.off_mm;
+    this.points = times === 1 ? points : points.map((at, k) => at + more * off[k]);
   }
 
   /** [left, low, right, high] mm of the predicted path where it cuts; null without one. */
   traced() {
-    const { trace_point: points, trace_error: errors } = this.columns;
+    const { points } = this, bins = this.columns.trace_bin, none = this.head.map.light.length;
     const box = [Infinity, Infinity, -Infinity, -Infinity];
-    for (let at = 0; at < errors.length; at++) {
-      if (!(errors[at] >= 0)) continue;
+    for (let at = 0; at < bins.length; at++) {
+      if (bins[at] === none) continue;
       const x = points[2 * at], y = points[2 * at + 1];
       box[0] = Math.min(box[0], x);
       box[1] = Math.min(box[1], y);
@@ -116,6 +146,13 @@ class Layers {
   traceStyles() {
     if (!this.on.get("trace")) return [];
     return [...this.mapColours().map((colour) => ({ colour, width: 2 })), null];
+  }
+
+  /** The tool's true width, of what is cut. */
+  sweptStyles(colours, scale) {
+    if (!this.on.get("swept")) return [null, null, null];
+    const wide = { colour: colours.swept, width: this.head.tool_mm * scale };
+    return [null, wide, wide];
   }
 
   drawingStyles(colours) {

@@ -5,7 +5,9 @@ function begin() {
   const columns = readColumns(head.columns, find("columns").textContent);
   find("columns").textContent = "";
   if (head.blocks !== null) head.blocks = head.blocks.split("\n");
-  const tracks = { moves: movesTrack(columns), drawing: drawingTrack(columns) };
+  const tracks = {
+    moves: movesTrack(columns), drawing: drawingTrack(columns), wanted: wantedTrack(columns),
+  };
   const layers = new Layers(head, columns), run = new Run(columns.move_seconds);
   const stage = new Stage(find("stage"), tracks, layers, run);
   stage.grids = lazyGrids(tracks);

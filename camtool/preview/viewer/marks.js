@@ -1,4 +1,4 @@
-// What is drawn beside moves: the grid with its numbers, points, worst places, the tool.
+// What is drawn beside moves: the grid with its numbers, points of the drawing, travel, the tool.
 
 const GRID_PX = 90;
 const TOOL_PX = 5;
@@ -32,18 +32,14 @@ function paintGrid(ctx, view, colours) {
     ctx.fillText((n * step).toFixed(decimals), 3, y - 3);
   }
   ctx.stroke();
-  paintZero(ctx, view, colours);
 }
 
-function paintZero(ctx, view, colours) {
-  const x = view.px(0), y = view.py(0);
-  ctx.strokeStyle = colours.ink;
-  ctx.beginPath();
-  ctx.moveTo(x - 9, y);
-  ctx.lineTo(x + 9, y);
-  ctx.moveTo(x, y - 9);
-  ctx.lineTo(x, y + 9);
-  ctx.stroke();
+/** The table's travel from part zero. */
+function paintTravel(ctx, view, [width, height], colours) {
+  ctx.strokeStyle = colours.travel;
+  ctx.lineWidth = 2;
+  ctx.setLineDash([]);
+  ctx.strokeRect(view.px(0), view.py(height), width * view.scale, height * view.scale);
 }
 
 /** Single points of the drawing. */
@@ -56,20 +52,6 @@ function paintMarks(ctx, view, layers, colours) {
     ctx.arc(view.px(at[2 * index]), view.py(at[2 * index + 1]), 3, 0, TURN);
     ctx.fill();
   }
-}
-
-function paintWorst(ctx, view, worst, colours) {
-  ctx.font = "bold 12px system-ui, sans-serif";
-  ctx.lineWidth = 1.5;
-  ctx.strokeStyle = ctx.fillStyle = colours.tool;
-  ctx.setLineDash([]);
-  worst.forEach((place, index) => {
-    const x = view.px(place.at[0]), y = view.py(place.at[1]);
-    ctx.beginPath();
-    ctx.arc(x, y, 8, 0, TURN);
-    ctx.stroke();
-    ctx.fillText(String(index + 1), x + 10, y - 8);
-  });
 }
 
 /** The tool where it is now, and the part of its move that is done. */

@@ -19,10 +19,12 @@ from itertools import cycle
 
 import numpy as np
 
+from camtool.geometry.drawing import Drawing
 from camtool.preview.colours import LAYERS, bin_colours, on_dark
 from camtool.preview.scene import Scene
 from camtool.preview.viewer.columns import columns_of, layer_names, packed
 from camtool.preview.viewer.run import Run, Table, by_feed
+from camtool.preview.viewer.traced import Traced, traced_of
 from camtool.units import UM_PER_MM
 
 SCRIPTS = (
@@ -32,6 +34,7 @@ SCRIPTS = (
     "view.js",
     "paint.js",
     "marks.js",
+    "signs.js",
     "run.js",
     "layers.js",
     "stage.js",
@@ -53,7 +56,8 @@ def viewer_page(scene: Scene) -> bytes:
     """The HTML file of a scene, UTF-8. Where the scene does not tell how its toolpath runs, every
     move takes as long as its feed says. ValueError when that is the run of another toolpath."""
     run = _run(scene)
-    named, data = packed(columns_of(scene, run))
+    traced = traced_of(scene, run, _top_um(scene, run))
+    named, data = packed({**columns_of(scene, run), **traced.columns})
     script = '(() => {\n"use strict";\n' + "\n".join(map(_file, SCRIPTS)) + "})();\n"
     style = _file("viewer.css")
     title = _printable(scene.title) or "camtool"
@@ -64,7 +68,7 @@ def viewer_page(scene: Scene) -> bytes:
         "label": html.escape(f"picture of {title}"),
         "style": style,
         "script": script,
-        "head": _json({"columns": named, **_head(scene, run)}),
+        "head": _json({"columns": named, **_head(scene, run, traced)}),
         "columns": base64.b64encode(data).decode("ascii"),
     }
     # One pass: what stands in a slot is never looked through for slots.
@@ -78,7 +82,7 @@ def _run(scene: Scene) -> Run | None:
     return by_feed(scene.toolpath, np.inf) if scene.run is None else scene.run()
 
 
-def _head(scene: Scene, run: Run | None) -> dict[str, object]:
+def _head(scene: Scene, run: Run | None, traced: Traced) -> dict[str, object]:
     drawing, toolpath = scene.drawing, scene.toolpath
     names = [] if drawing is None else layer_names(drawing)
     blocks = None if run is None or run.blocks is None else run.blocks
@@ -95,8 +99,24 @@ def _head(scene: Scene, run: Run | None) -> dict[str, object]:
         "top_um": _top_um(scene, run),
         "map": {"light": bin_colours(), "dark": bin_colours(dark=True)},
         "tables": [] if run is None else [_table(table) for table in run.tables],
-        "worst": [] if run is None else [{"at": place.at_mm} for place in run.worst],
+        "off_mm": traced.count_mm,
+        "worst": [
+            {"at": place.at_mm, "off": off}
+            for place, off in zip(
+                () if run is None else run.worst, traced.worst_off.tolist(), strict=True
+            )
+        ],
+        "travel_mm": scene.travel_mm,
+        "doubts": [] if drawing is None else _doubts(drawing),
     }
+
+
+def _doubts(drawing: Drawing) -> list[tuple[float, float]]:
+    """Open ends, crossings and branches."""
+    healing = drawing.healing
+    places = [gap.at_mm for gap in drawing.gaps]
+    places += [one.at_mm for one in healing.crossings] + [one.at_mm for one in healing.branches]
+    return [(float(x), float(y)) for x, y in places]
 
 
 def _table(table: Table) -> dict[str, object]:

@@ -1,11 +1,14 @@
 // Moves on a canvas: all of one style as one path, and what is smaller than a pixel as one line.
 
 const MERGED_PX = 0.7;
+/** The same as a share of a wide line's width: its edge stays true to half a hundredth of that. */
+const MERGED_SHARE = 0.1;
 
 /** One growing path of one style, which leaves out points nearer than a pixel to the last. */
 class Pen {
-  constructor() {
+  constructor(width) {
     this.path = new Path2D();
+    this.merged = Math.max(MERGED_PX, width * MERGED_SHARE);
     this.row = -2;
     this.waiting = false;
   }
@@ -24,7 +27,7 @@ class Pen {
   to(x, y) {
     this.lastX = x;
     this.lastY = y;
-    if (Math.abs(x - this.x) + Math.abs(y - this.y) < MERGED_PX) {
+    if (Math.abs(x - this.x) + Math.abs(y - this.y) < this.merged) {
       this.waiting = true;
       return;
     }
@@ -54,8 +57,9 @@ class Pen {
 /** Stroke the rows from … to−1 of a track; `styles[styleOf[row]]` is {colour, width, dash}, or
  * null where the row is not to be seen. */
 function paintTrack(ctx, view, track, rows, styleOf, styles) {
-  const [left, low, right, high] = view.box(), { boxes } = track;
-  const pens = styles.map((style) => (style ? new Pen() : null));
+  const reach = Math.max(...styles.map((style) => (style ? style.width : 0))) / 2 / view.scale;
+  const [left, low, right, high] = view.box(reach), { boxes } = track;
+  const pens = styles.map((style) => (style ? new Pen(style.width) : null));
   for (let row = rows.from; row < rows.to; row++) {
     const pen = pens[styleOf[row]], at = 4 * row;
     if (!pen || boxes[at] > right || boxes[at + 2] < left) continue;
@@ -70,7 +74,7 @@ function paintTrack(ctx, view, track, rows, styleOf, styles) {
 
 /** Stroke points first … last of a line of points (2 T) mm, each piece in the style of its end. */
 function paintPoints(ctx, view, points, range, styleOf, styles) {
-  const pens = styles.map((style) => (style ? new Pen() : null));
+  const pens = styles.map((style) => (style ? new Pen(style.width) : null));
   for (let at = Math.max(1, range.from); at < range.to; at++) {
     const pen = pens[styleOf[at]];
     if (!pen) continue;

@@ -6,19 +6,43 @@ class LayerPanel {
   constructor(layers, changed) {
     this.layers = layers;
     this.changed = changed;
-    layers.list.forEach((layer, index) => {
-      const box = element("input", undefined, { type: "checkbox", id: `layer-${index}` });
-      box.checked = true;
-      box.addEventListener("change", () => {
-        layers.on.set(layer.key, box.checked);
-        changed();
-      });
-      const label = element("label", undefined, { for: box.id });
-      const number = index < 9 ? element("kbd", String(index + 1)) : "";
-      label.append(box, element("span", layer.name), number);
-      find("layers").append(label);
-    });
+    this.boxes = new Map();
+    for (const layer of layers.list) find("layers").append(this.label(layer));
     this.colourChoice();
+    this.timesChoice();
+  }
+
+  label({ key, name, letter }) {
+    const box = element("input", undefined, { type: "checkbox" }), label = element("label");
+    box.checked = this.layers.on.get(key);
+    box.addEventListener("change", () => {
+      this.layers.on.set(key, box.checked);
+      this.changed();
+    });
+    label.append(box, element("i", undefined, { class: `swatch ${key.split(" ")[0]}` }), element("span", name));
+    if (!letter) return label;
+    box.setAttribute("aria-keyshortcuts", letter);
+    label.append(element("kbd", letter.toUpperCase(), { "aria-hidden": "true" }));
+    this.boxes.set(letter, box);
+    return label;
+  }
+
+  /** How many times as large deviations of the predicted path are drawn. */
+  timesChoice() {
+    const choice = find("times");
+    find("exaggeration").hidden = !this.layers.head.off_mm;
+    choice.addEventListener("change", () => {
+      const times = Number(choice.value), said = find("factor");
+      this.layers.exaggerate(times);
+      said.hidden = times === 1;
+      said.textContent = `predicted path: deviation × ${times}`;
+      this.changed();
+    });
+  }
+
+  nextTimes(way) {
+    if (find("exaggeration").hidden) return;
+    step(find("times"), way);
   }
 
   colourChoice() {
@@ -35,16 +59,16 @@ class LayerPanel {
     this.scale();
   }
 
-  toggle(index) {
-    const box = find(`layer-${index}`);
+  /** Switch the layer of a key; false when there is none. */
+  toggle(letter) {
+    const box = this.boxes.get(letter);
     if (box) box.click();
+    return Boolean(box);
   }
 
   nextColour() {
     const choice = find("colour-by");
-    if (!choice.options.length) return;
-    choice.selectedIndex = (choice.selectedIndex + 1) % choice.options.length;
-    choice.dispatchEvent(new Event("change"));
+    if (choice.options.length) step(choice, choice.selectedIndex === choice.options.length - 1 ? -choice.selectedIndex : 1);
   }
 
   /** The map's colours with the numbers that they stand for. */
@@ -63,6 +87,12 @@ class LayerPanel {
     find("scale-high").textContent = height
       ? `${heights[0].toFixed(3)} mm` : `${Number(layers.head.top_um.toPrecision(4))} µm`;
   }
+}
+
+/** Choose another one of a list, not beyond its ends. */
+function step(choice, way) {
+  choice.selectedIndex = Math.min(choice.options.length - 1, Math.max(0, choice.selectedIndex + way));
+  choice.dispatchEvent(new Event("change"));
 }
 
 /** The program's lines around one of them; a click goes there. */

@@ -4,15 +4,19 @@
 const SLOW_MS = 40;
 const REST_MS = 120;
 
+/** From the ground up: travel and what the tool covers, the plan, what is done, signs, the tool. */
+const CANVASES = ["ground", "plan", "done", "signs", "over"];
+
 class Stage {
   constructor(place, tracks, layers, run) {
     this.place = place;
     this.moves = tracks.moves;
     this.drawing = tracks.drawing;
+    this.wanted = tracks.wanted;
     this.layers = layers;
     this.run = run;
     this.view = new View();
-    this.contexts = Object.fromEntries(["plan", "done", "over"].map((name) => (
+    this.contexts = Object.fromEntries(CANVASES.map((name) => (
       [name, document.getElementById(name).getContext("2d")]
     )));
     this.done = { row: 0, trace: 0 };
@@ -88,11 +92,12 @@ class Stage {
     if (this.wantsAll) {
       this.wantsAll = false;
       this.paintPlan(colours);
-      this.done = { row: 0, trace: 0 };
-      this.clear("done");
+      this.clearDone(colours);
       for (const ctx of Object.values(this.contexts)) ctx.canvas.style.transform = "";
       this.painted = this.view.copy();
       this.paintDone(colours);
+      this.clear("signs");
+      paintSigns(this.contexts.signs, this.view, this.moves, this.layers, colours);
       this.slowest = performance.now() - begin;
     } else this.paintDone(colours);
     this.paintOver(colours);
@@ -102,6 +107,15 @@ class Stage {
 
   clear(name) {
     this.contexts[name].clearRect(0, 0, this.view.width, this.view.height);
+  }
+
+  /** Nothing is done yet. */
+  clearDone(colours) {
+    this.done = { row: 0, trace: 0 };
+    this.clear("done");
+    this.clear("ground");
+    const { on, head } = this.layers;
+    if (on.get("travel")) paintTravel(this.contexts.ground, this.view, head.travel_mm, colours);
   }
 
   paintPlan(colours) {
@@ -114,6 +128,9 @@ class Stage {
     if (!moves.count) return;
     const pale = layers.paleStyles(colours);
     paintTrack(ctx, view, moves, { from: 0, to: moves.count }, pale.of, pale.styles);
+    if (!layers.on.get("wanted")) return;
+    const every = new Uint8Array(this.wanted.count), line = { colour: colours.wanted, width: 1 };
+    paintTrack(ctx, view, this.wanted, { from: 0, to: every.length }, every, [line]);
   }
 
   /** What has been done since the last time; all of it when time went back. */
@@ -121,32 +138,30 @@ class Stage {
     if (!this.moves.count) return;
     const ctx = this.contexts.done, { view, moves, layers, run } = this;
     const whole = run.row + (run.share === 1 ? 1 : 0);
-    if (whole < this.done.row) {
-      this.clear("done");
-      this.done = { row: 0, trace: 0 };
-    }
+    if (whole < this.done.row) this.clearDone(colours);
     if (whole === this.done.row) return;
     const { of, styles } = layers.moveStyles(colours), rows = { from: this.done.row, to: whole };
     const traced = layers.on.get("trace") && layers.columns.trace_row.length;
     const plain = traced && layers.by === "kind" ? { ...layers.paleStyles(colours) } : { of, styles };
+    const swept = layers.sweptStyles(colours, view.scale);
+    paintTrack(this.contexts.ground, view, moves, rows, layers.sortOf, swept);
     paintTrack(ctx, view, moves, rows, plain.of, plain.styles);
     this.paintTrace(ctx, whole);
     this.done.row = whole;
   }
 
   paintTrace(ctx, whole) {
-    const { trace_row: row, trace_point: points } = this.layers.columns;
+    const { points, columns: { trace_row: row, trace_bin: bins } } = this.layers;
     let to = this.done.trace;
     while (to < row.length && row[to] < whole) to++;
     const range = { from: this.done.trace, to };
-    paintPoints(ctx, this.view, points, range, this.layers.traceBin, this.layers.traceStyles());
+    paintPoints(ctx, this.view, points, range, bins, this.layers.traceStyles());
     this.done.trace = to;
   }
 
   paintOver(colours) {
     const ctx = this.contexts.over, { view, moves, drawing, run } = this;
     this.clear("over");
-    if (this.layers.on.get("worst")) paintWorst(ctx, view, this.layers.head.worst, colours);
     const picked = { colour: colours.pick, width: 4 };
     const drawn = this.hover.moves < 0 ? this.hover.drawing : -1;
     for (const [track, row] of [[moves, this.hover.moves], [drawing, drawn]]) {
@@ -160,8 +175,8 @@ class Stage {
    * canvas would hide those below it. */
   paintForPrint() {
     this.paintNow();
-    const { plan, done, over } = this.contexts, { width, height } = this.view;
-    for (const ctx of [done, over]) plan.drawImage(ctx.canvas, 0, 0, width, height);
+    const { width, height } = this.view, [lowest, ...others] = Object.values(this.contexts);
+    for (const ctx of others) lowest.drawImage(ctx.canvas, 0, 0, width, height);
   }
 
   /** All anew, and now. */

@@ -23,6 +23,12 @@ class Track {
     return { x, y, radius, angle: Math.atan2(outY, outX), sweep: this.bends[3 * index + 2] };
   }
 
+  length(row) {
+    const arc = this.arc(row), { from, to } = this;
+    if (arc) return arc.radius * Math.abs(arc.sweep);
+    return Math.hypot(to[2 * row] - from[2 * row], to[2 * row + 1] - from[2 * row + 1]);
+  }
+
   setBox(row) {
     const { from, to, boxes } = this, x0 = from[2 * row], y0 = from[2 * row + 1];
     const x1 = to[2 * row], y1 = to[2 * row + 1];

@@ -2,6 +2,7 @@
 
 const FIT_MARGIN = 0.06;
 const LEAST_MM_ACROSS = 1e-4;
+const NEAR_PX = 12;
 
 class View {
   constructor() {
@@ -48,8 +49,14 @@ class View {
 
   copy() { return Object.assign(new View(), this); }
 
-  /** [left, low, right, high] mm. */
-  box() {
-    return [this.mmX(0), this.mmY(this.height), this.mmX(this.width), this.mmY(0)];
+  /** [left, low, right, high] mm, and so many mm more on each side. */
+  box(more = 0) {
+    const { width, height } = this;
+    return [this.mmX(0) - more, this.mmY(height) - more, this.mmX(width) + more, this.mmY(0) + more];
+  }
+
+  /** Whether a place on the canvas is to be seen, or not far from that. */
+  shows(px, py) {
+    return px > -NEAR_PX && py > -NEAR_PX && px < this.width + NEAR_PX && py < this.height + NEAR_PX;
   }
 }
