@@ -16,10 +16,10 @@ from camtool.preview import axes, legend, marks, numbers, text
 from camtool.preview.colours import QUIET
 from camtool.preview.content import Content, content_of
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options, check_width
-from camtool.preview.page import Page, page_of, sheet
+from camtool.preview.page import Page, mat, page_of, sheet
 from camtool.preview.polar import draw_polar
 from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
-from camtool.preview.svg import Look, element, number
+from camtool.preview.svg import Look, element
 from camtool.preview.text import Style
 from camtool.preview.trace import trace_layer
 from camtool.preview.view import View, page_width
@@ -43,22 +43,29 @@ def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUA
         return draw_polar(scene, options.polar, options)
     content = content_of(scene, options)
     page = page_of(content, page_width(size_px))
-    beside = _beside(content, page)
-    return sheet(scene.title, (page.width, page.height), options, *panel(content, page), *beside)
+    view, sizes = page.view, (page.width, page.height)
+    return sheet(
+        scene.title,
+        sizes,
+        options,
+        axes.frame(view, page.ticks),
+        element("g", {"id": "plot"}, *_plot(content, view)),
+        mat(view.box, *sizes),
+        page.head,
+        axes.axes(view, page.ticks),
+        *_beside(content, page),
+    )
 
 
 def panel(content: Content, page: Page) -> list[str]:
-    """Head and plot with its axes."""
+    """Head and plot with its axes, clipped: it covers nothing of its neighbours."""
     box = page.view.box
-    sides = (box.left, box.top, box.width, box.height)
-    plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
-    # Named after its own sides: two pictures in one page share it only when it is the same.
-    clip = "plot-" + "-".join(number(side, 0) for side in sides)
+    plot: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
     return [
         page.head,
         axes.frame(page.view, page.ticks),
-        element("clipPath", {"id": clip}, element("rect", plot)),
-        element("g", {"clip-path": f"url(#{clip})"}, *_plot(content, page.view)),
+        element("clipPath", {"id": "clip"}, element("rect", plot)),
+        element("g", {"clip-path": "url(#clip)"}, *_plot(content, page.view)),
         axes.axes(page.view, page.ticks),
     ]
 
@@ -75,7 +82,7 @@ def png(svg: str, width_px: int) -> bytes:
 
 
 def _plot(content: Content, view: View) -> list[str]:
-    """What is clipped to the plot, from the ground up."""
+    """What lies in the plot, from the ground up."""
     lines = [layer for layer in _lines(content, view) if layer]
     layers = [element("g", {"id": "mm", "transform": view.matrix()}, *lines)] if lines else []
     strokes, trace = content.strokes, content.trace

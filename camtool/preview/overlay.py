@@ -24,6 +24,7 @@ from camtool.preview.page import (
     LEGEND_DROP,
     fitted,
     foot_of,
+    mat,
     sheet,
 )
 from camtool.preview.render import rendered
@@ -66,19 +67,18 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
     room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
     table = legend.rows(_entries(overlay), room, view.box.width)
     legend_y = view.box.bottom + LEGEND_DROP
-    box = view.box
-    plot: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
+    sizes = (page, foot_of(table, legend_y))
     return sheet(
         overlay.title,
-        (page, foot_of(table, legend_y)),
+        sizes,
         options,
-        head,
         axes.frame(view, ticks),
-        element("clipPath", {"id": "plot-overlay"}, element("rect", plot)),
-        element("g", {"clip-path": "url(#plot-overlay)"}, _paths(overlay, view)),
+        element("g", {"id": "plot"}, _paths(overlay, view)),
+        mat(view.box, *sizes),
+        head,
         axes.axes(view, ticks),
-        legend.legend(table, box.left, legend_y),
-        axes.scale_bar(view, box.right, legend_y),
+        legend.legend(table, view.box.left, legend_y),
+        axes.scale_bar(view, view.box.right, legend_y),
     )
 
 

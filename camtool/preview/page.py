@@ -16,14 +16,15 @@ from camtool.preview.colours import PAPER, darkened
 from camtool.preview.content import Content
 from camtool.preview.entries import entries_of
 from camtool.preview.legend import Entry
-from camtool.preview.options import SVG_WIDTH_PX, Options
-from camtool.preview.svg import Look, element, number, title
+from camtool.preview.options import SMALLEST_PX, SVG_WIDTH_PX, Options
+from camtool.preview.svg import Look, PathData, element, number, title
 from camtool.preview.view import (
     CROP_SHAPES,
     MARGIN,
     PAGE,
     TALLEST,
     WIDEST,
+    Box,
     View,
     fit,
 )
@@ -94,6 +95,21 @@ def fitted(
 def foot_of(rows: list[list[Entry]], legend_y: float) -> float:
     """Height of a page whose legend of these rows begins at `legend_y`."""
     return round(legend_y + max(len(rows) - 1, 0) * legend.ROW_STEP + FOOT)
+
+
+def mat(box: Box, width: float, height: float) -> str:
+    """Paper round the plot of a page, which hides what leaves it. A clip would do the same, but
+    takes the renderer as long again as all lines together."""
+    path = PathData()
+    paper = Box(0.0, 0.0, width, height + math.ceil(width / SMALLEST_PX))
+    for each in (paper, box):
+        path.move(each.left, each.top)
+        path.line(each.right, each.top)
+        path.line(each.right, each.bottom)
+        path.line(each.left, each.bottom)
+        path.close()
+    look: Look = {"d": str(path), "fill": PAPER, "fill-rule": "evenodd"}
+    return element("path", look)
 
 
 def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) -> str:

@@ -14,7 +14,7 @@ import pytest
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Branch, Gap, Healing, Mark, SelfCrossing
 from camtool.preview.axes import TICK_CAP
-from camtool.preview.colours import FEED, PAPER, PLUNGE, RAPID, bin_colours
+from camtool.preview.colours import FEED, PAPER, PLUNGE, RAPID, bin_colours, on_dark
 from camtool.preview.content import content_of
 from camtool.preview.draw import ALONE_PEN, TRACE_PEN, Scene, draw, png
 from camtool.preview.options import Options
@@ -36,8 +36,8 @@ def ids(root: Element) -> set[str]:
 
 
 def plot_box(root: Element) -> Box:
-    (clip,) = root.iter(f"{svg_page.SVG}clipPath")
-    x, y, width, height = (float(clip[0].attrib[key]) for key in ("x", "y", "width", "height"))
+    ground = named(root, "grid")[0]
+    x, y, width, height = (float(ground.attrib[key]) for key in ("x", "y", "width", "height"))
     return x, y, x + width, y + height
 
 
@@ -208,7 +208,7 @@ def test_there_are_no_fonts_no_scripts_and_no_links(scene: Scene) -> None:
     tags = {
         element.tag.removeprefix(svg_page.SVG) for element in svg_page.parse(draw(scene)).iter()
     }
-    assert tags <= {"svg", "title", "clipPath", "g", "rect", "path", "circle"}
+    assert tags <= {"svg", "title", "g", "rect", "path", "circle"}
 
 
 def test_coordinates_in_the_picture_are_those_of_the_part_in_mm() -> None:
@@ -366,6 +366,20 @@ def test_png_of_a_dark_picture_is_dark() -> None:
 def test_the_paper_covers_the_last_row_of_pixels(width: int) -> None:
     svg = draw(SCENES["wide"], options=Options(size_px=width))
     assert (decode(png(svg, width))[..., 3] == 255).all()
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_what_leaves_the_plot_is_not_seen(dark: bool) -> None:
+    part = Options(crop_mm=(1.0, 1.0, 1.0, 1.0), dark=dark, size_px=400)
+    svg = draw(replace(SCENES["toolpath"], tool_mm=2.0), options=part)
+    root = svg_page.parse(svg)
+    pixels = 400 / float(root.attrib["viewBox"].split()[2])
+    _, top, right, bottom = (pixels * side for side in plot_box(root))
+    image = decode(png(svg, 400)).astype(int)
+    beside = image[int(top) : int(bottom), int(right) + 3 :]
+    paper = rgb(on_dark(PAPER) if dark else PAPER)
+    assert (np.abs(beside[..., :3] - paper).max(axis=2) <= 2).all()
+    assert (np.abs(image[int(top) + 9, int(right) - 9, :3] - paper) > 2).any()
 
 
 @pytest.mark.parametrize("width", [0, -5, 15, 20_001])
