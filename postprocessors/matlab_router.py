@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Program
+    from camtool.toolpath.program import Listing, Program
 
 
 class MatlabRouterPost:
@@ -36,6 +36,12 @@ class MatlabRouterPost:
         from ._matlab_router_read import read_program
 
         return read_program(data, machine)
+
+    def listing(self, data: bytes, machine: Machine) -> Listing:
+        """The columns of the arrays that each block is."""
+        from ._matlab_router_listing import listing
+
+        return listing(data, machine)
 
 
 POST = MatlabRouterPost()
