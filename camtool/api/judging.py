@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from camtool.api.machines import as_target, load_target
 from camtool.api.reading import as_bytes, as_drawing
+from camtool.errors import OptionError
 from camtool.geometry.drawing import Drawing as DrawingRecord
 from camtool.machine.registry import LoadedTarget
 from camtool.pipeline import Judging
@@ -71,6 +72,8 @@ def compare(
         chosen = ways_of(ways, lambda settings: altered(loaded, settings), how)
     else:
         chosen = [Way(name, as_target(each), how) for name, each in ways.items()]
+    if not chosen:
+        raise OptionError("there is nothing to compare", mend="give a target for each way")
     found = compare_program(data, chosen, source=source, drawing=read, job=wanted)
     return Comparison(data, source, tuple(chosen), tuple(found))
 
@@ -87,7 +90,7 @@ def calibrate(
     `measurements`: the TOML file that `camtool coupon --measurements` begins; it names its target
     unless one is given. `machine`: what is known so far, a file that extends the target.
     `machine_file` of the result is the text of a new one. Raises InputError, which names file,
-    table and key, and MachineError. Source: docs/calibration.md.
+    table and key, OptionError and MachineError. Source: docs/calibration.md.
     """
     from camtool.calibration.calibrate import calibrate as calibrated
     from camtool.calibration.measurements import Measurements, read_measurements
@@ -98,6 +101,10 @@ def calibrate(
     if not isinstance(said, Measurements):
         said = read_measurements(Path(said))
     name = target or (said.target if own is None else extended_by(own))
+    if not name:
+        raise OptionError(
+            "no machine is named", file=said.file, mend="give target, or name it in the file"
+        )
     known = load_target(name, machine=own).machine
     return extended(
         Calibration,

@@ -43,6 +43,8 @@ def preview(
     from camtool.preview.options import Options
 
     scenes = [_shown(each)._scene() for each in (what, *beside)]
+    if len(titles) > len(scenes):
+        raise TypeError(f"{len(titles)} titles for {len(scenes)} values")
     for row, title in enumerate(titles):
         scenes[row] = replace(scenes[row], title=title)
     options = Options(**looks)

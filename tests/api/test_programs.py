@@ -1,6 +1,7 @@
 """Programs converted, compared, and machines calibrated from Python, as the commands do it."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -110,6 +111,17 @@ def test_ways_that_are_none(ways: str, words: str) -> None:
         camtool.compare(CIRCLE, "pic-mmh", ways)
 
 
+def test_nothing_to_compare_and_no_machine_are_said(tmp_path: Path) -> None:
+    with pytest.raises(camtool.CamtoolError, match="nothing to compare"):
+        camtool.compare(CIRCLE, "pic-mmh", {})
+    text = (SAMPLES / "measured" / "pic-mmh-lines.toml").read_text(encoding="utf-8")
+    file = tmp_path / "lines.toml"
+    file.write_text(re.sub(r"^target = .*$", "", text, flags=re.MULTILINE), encoding="utf-8")
+    with pytest.raises(camtool.CamtoolError, match=r"lines\.toml: no machine is named"):
+        camtool.calibrate(file)
+    assert camtool.calibrate(file, "pic-mmh").target == "pic-mmh"
+
+
 def test_values_stand_beside_each_other(compared: Comparison, tmp_path: Path) -> None:
     (tmp_path / "square.csv").write_text("0,0\n4,0\n4,4\n0,4\n0,0\n")
     drawing = camtool.read_drawing(tmp_path / "square.csv")
@@ -122,6 +134,8 @@ def test_values_stand_beside_each_other(compared: Comparison, tmp_path: Path) ->
     with pytest.raises(camtool.CamtoolError, match=r"both\.html"):
         both.render("both.html")
     assert "mine" in camtool.preview(drawing, titles=["mine"]).svg
+    with pytest.raises(TypeError, match="2 titles for 1 values"):
+        camtool.preview(drawing, titles=["mine", "yours"])
     with pytest.raises(TypeError, match="a Comparison stands beside no other picture"):
         camtool.preview(plain, compared)
 

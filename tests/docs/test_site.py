@@ -1,9 +1,12 @@
 """The site: its pages are there, links out of docs/ become words, mkdocs builds it strictly."""
 
+import functools
+import http.server
 import importlib.util
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -13,7 +16,21 @@ import camtool
 from camtool.cli.main import cli
 
 ROOT = Path(__file__).parents[2]
+CHROMIUM = "/usr/bin/chromium"
+PHONE_PX = 420
+FAULTS = """() => {
+  const wide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
+  const gone = [...document.images].filter(one => one.complete && !one.naturalWidth);
+  return [...gone.map(one => one.src), ...(wide ? ["wider than the window"] : [])];
+}"""
 SETTINGS = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+
+
+class Silent(http.server.SimpleHTTPRequestHandler):
+    """Serves files, and says nothing of it."""
+
+    def log_message(self, *_: object) -> None:
+        return
 
 
 @pytest.fixture(scope="module")
@@ -61,20 +78,57 @@ def test_the_reference_has_every_name() -> None:
     assert sorted(listed) == camtool.__all__
 
 
-@pytest.mark.slow
-def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built without a warning."""
     for package in ("material", "mkdocstrings"):
         if importlib.util.find_spec(package) is None:
             pytest.skip(f"{package} is not installed: pip install '.[docs]'")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
-    functions = (tmp_path / "reference" / "api" / "index.html").read_text(encoding="utf-8")
-    assert 'id="camtool.api.read_drawing"' in functions
-    commands = (tmp_path / "reference" / "commands" / "index.html").read_text(encoding="utf-8")
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_has_its_references_and_needs_no_network(site: Path) -> None:
+    functions = (site / "reference" / "api" / "index.html").read_text(encoding="utf-8")
+    assert [name for name in camtool.__all__ if f'id="camtool.api.{name}"' not in functions] == []
+    commands = (site / "reference" / "commands" / "index.html").read_text(encoding="utf-8")
     assert "--minimise" in commands
-    for page in tmp_path.rglob("*.html"):
+    for page in site.rglob("*.html"):
         loaded = re.findall(
             r'<(?:script|img|link)[^>]*(?:src|href)="(https?:[^"]+)"', page.read_text()
         )
         assert loaded == [], page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path(CHROMIUM).exists(), reason=f"{CHROMIUM} is not installed")
+def test_pages_are_whole_in_a_browser(site: Path) -> None:
+    """Every page as a phone shows it: no error, no picture missing, nothing wider than that."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    handler = functools.partial(Silent, directory=str(site))
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    root = f"http://127.0.0.1:{server.server_address[1]}"
+    faults: list[str] = []
+    with playwright.sync_playwright() as tool:
+        browser = tool.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": PHONE_PX, "height": 900})
+        page.set_content('<img src="data:,none"><div style="width: 900px">wide</div>')
+        assert page.evaluate(FAULTS) == ["data:,none", "wider than the window"]
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on(
+            "response",
+            lambda answer: faults.append(answer.url) if answer.status >= 400 else None,
+        )
+        for file in sorted(site.rglob("index.html")):
+            place = file.relative_to(site).as_posix()
+            page.goto(f"{root}/{place}")
+            faults += [f"{place}: {each}" for each in page.evaluate(FAULTS)]
+        browser.close()
+    server.shutdown()
+    server.server_close()
+    assert faults == []
