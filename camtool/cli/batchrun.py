@@ -17,7 +17,7 @@ import click
 from camtool.batch.manifest import Manifest
 from camtool.batch.records import Made, Outcome, Pool, State, Task
 from camtool.cli.batchstop import Stop, stoppable
-from camtool.cli.batchtalk import Loudness, say_summary, summary_json, talking
+from camtool.cli.batchtalk import Loudness, Talk, say_summary, summary_json, talking
 from camtool.cli.batchwork import JobOrder, PostWork, own_job
 from camtool.cli.output import write_all
 from camtool.cli.talk import say
@@ -64,10 +64,13 @@ class Later:
     """A pool that is not there before it has something to do."""
 
     pool: Callable[[], Pool]
+    begins: Callable[[], None]
 
     def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
         """Those of the pool."""
-        yield from self.pool().results(tasks)
+        pool = self.pool()
+        self.begins()
+        yield from pool.results(tasks)
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,7 @@ class Batched:
         total = len(ordered.tasks) + len(ordered.failed)
         with (
             talking(total, self.loudness) as talk,
-            closing(self._outcomes(ordered, manifest, stop, talk.noted)) as outcomes,
+            closing(self._outcomes(ordered, manifest, stop, talk)) as outcomes,
         ):
             try:
                 for outcome in outcomes:
@@ -158,14 +161,14 @@ class Batched:
         return Ended([done[stem] for stem in sorted(done)], fault)
 
     def _outcomes(
-        self, ordered: Ordered, manifest: Manifest, stop: Stop, note: Callable[[str], None]
+        self, ordered: Ordered, manifest: Manifest, stop: Stop, talk: Talk
     ) -> Generator[Outcome]:
         """Those that come until something stops the run."""
         from camtool.batch.run import Order, run_batch
 
         force = self.running.force
         order = Order(self.out, write_all, self.work.digest(), ordered.jobs, force)
-        pool = Later(lambda: self._pool(note))
+        pool = Later(lambda: self._pool(talk.noted), talk.begins)
         with closing(run_batch(ordered.tasks, order, manifest, pool)) as outcomes:
             for outcome in chain(ordered.failed, outcomes):
                 if outcome is not None:
@@ -199,7 +202,7 @@ class Batched:
         say_summary(outcomes, seconds, quiet=self.loudness.quiet)
         if self.summary is not None:
             target = self.work.target.machine.target.name
-            write_all({self.summary: summary_json(outcomes, target, seconds).encode()})
+            write_all({self.summary: summary_json(outcomes, target, seconds)})
 
 
 def _order(job: JobFlags, work: PostWork) -> tuple[JobOrder, str]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Protocol
 
 import click
@@ -22,9 +24,15 @@ if TYPE_CHECKING:
 LISTED = 50
 """So many rows of the table are shown; the JSON summary has all."""
 
+COLOUR = {State.FAILED: "red", State.MADE: "yellow", State.UP_TO_DATE: "yellow"}
+"""Of a row of the table: what was made stands there for its warnings."""
+
 
 class Talk(Protocol):
     """Hears of every outcome as it comes."""
+
+    def begins(self) -> None:
+        """What is not up to date begins to be made."""
 
     def heard(self, outcome: Outcome) -> None:
         """Say so."""
@@ -47,8 +55,11 @@ def talking(total: int, loudness: Loudness) -> Iterator[Talk]:
     if loudness.quiet or not sys.stderr.isatty():
         yield Lines(total, loudness)
         return
-    with _progress() as progress:
-        yield Bar(progress, total, loudness)
+    bar = Bar(total, loudness)
+    try:
+        yield bar
+    finally:
+        bar.close()
 
 
 class Lines:
@@ -58,6 +69,9 @@ class Lines:
         self._total = total
         self._loudness = loudness
         self._done = 0
+
+    def begins(self) -> None:
+        """Nothing: the first line will tell."""
 
     def heard(self, outcome: Outcome) -> None:
         """One line, and those of its findings."""
@@ -74,25 +88,54 @@ class Lines:
 
 
 class Bar:
-    """A bar with rate and time left; what goes wrong stands above it."""
+    """A bar with rate and time left, once there is something to do; what goes wrong stands above
+    it in one line, and in full in the table."""
 
-    def __init__(self, progress: Progress, total: int, loudness: Loudness) -> None:
-        self._progress = progress
+    def __init__(self, total: int, loudness: Loudness) -> None:
+        self._total = total
         self._loudness = loudness
+        self._done = 0
         self._failed = 0
-        self._bar = progress.add_task("", total=total, failed="")
+        self._progress: Progress | None = None
+
+    def begins(self) -> None:
+        """Show the bar."""
+        self._shown()
 
     def heard(self, outcome: Outcome) -> None:
         """One step further."""
-        for line in said_of(outcome, self._loudness):
-            self._progress.console.print(line, markup=False, highlight=False)
+        self._done += 1
         self._failed += outcome.state is State.FAILED
+        if outcome.state is State.UP_TO_DATE and self._progress is None:
+            return
+        progress = self._shown()
+        if outcome.error is not None:
+            line = f"failed: {one_line(outcome.source)}: {_why(outcome)}"
+            progress.console.print(line, style="red", no_wrap=True, overflow="ellipsis", **_PLAIN)
+        for remark in outcome.remarks if self._loudness.verbose else ():
+            progress.console.print(one_line(remark), **_PLAIN)
         failed = f"{self._failed} failed" if self._failed else ""
-        self._progress.update(self._bar, advance=1, failed=failed)
+        progress.update(progress.task_ids[0], completed=self._done, failed=failed)
 
     def noted(self, text: str) -> None:
         """One line above the bar."""
-        self._progress.console.print(f"camtool: {one_line(text)}", markup=False, highlight=False)
+        self._shown().console.print(f"camtool: {one_line(text)}", **_PLAIN)
+
+    def close(self) -> None:
+        """Leave the terminal as it was."""
+        if self._progress is not None:
+            self._progress.stop()
+
+    def _shown(self) -> Progress:
+        if self._progress is None:
+            self._progress = _progress()
+            self._progress.add_task("", total=self._total, completed=self._done, failed="")
+            self._progress.start()
+        return self._progress
+
+
+_PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False}
+"""Text that comes from files is no markup."""
 
 
 def said_of(outcome: Outcome, loudness: Loudness) -> list[str]:
@@ -104,18 +147,18 @@ def said_of(outcome: Outcome, loudness: Loudness) -> list[str]:
 
 
 def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> None:
-    """The table of what failed, and a line of counts."""
+    """The table of what failed (and on a terminal of warnings), and a line of counts."""
     failed = [each for each in outcomes if each.state is State.FAILED]
-    if failed:
-        _table(failed[:LISTED])
-        if len(failed) > LISTED:
-            click.echo(f"… and {len(failed) - LISTED} more; --json FILE names all", err=True)
+    warned = [each for each in outcomes if each.warnings and each.state is not State.FAILED]
+    if sys.stderr.isatty():
+        _table(failed if quiet else [*failed, *warned], outcomes)
+    else:
+        _lines(failed)
     counts = Counter(each.state for each in outcomes)
     parts = [f"{counts[state]} {state.value}" for state in State if counts[state]]
     made = counts[State.MADE]
     rate = f", {made / seconds:.1f} made a second" if made and seconds > 0.0 else ""
-    warned = sum(each.warnings > 0 for each in outcomes)
-    warnings = f"; {warned} with warnings (-v shows them)" if warned else ""
+    warnings = f"; {len(warned)} with warnings (-v shows them)" if warned else ""
     say(
         f"{_counted(len(outcomes), 'drawing')}: {', '.join(parts)}; {seconds:.1f} s{rate}"
         f"{warnings}",
@@ -123,8 +166,8 @@ def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> 
     )
 
 
-def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> str:
-    """The whole batch as JSON."""
+def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> bytes:
+    """The whole batch as JSON; names that are no text keep their bytes as \\udcXX."""
     counts = Counter(each.state for each in outcomes)
     rows: list[dict[str, Any]] = []
     for outcome in outcomes:
@@ -139,7 +182,8 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> st
         **{state.name.lower(): counts[state] for state in State},
         "drawings": rows,
     }
-    return json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
+    text = json.dumps(whole, indent=2, ensure_ascii=False)
+    return f"{text}\n".encode("utf-8", "backslashreplace")
 
 
 def _line(outcome: Outcome) -> str:
@@ -155,27 +199,58 @@ def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _table(failed: Sequence[Outcome]) -> None:
-    """Drawing and reason; as lines with a bar between where there is no terminal."""
-    if not sys.stderr.isatty():
-        width = max(len(one_line(each.source)) for each in failed)
-        click.echo(f"{'failed':<{width}} | why", err=True)
-        for each in failed:
-            click.echo(f"{one_line(each.source):<{width}} | {_why(each)}", err=True)
+def _lines(failed: Sequence[Outcome]) -> None:
+    """Drawing and reason with a bar between."""
+    if not failed:
+        return
+    listed = failed[:LISTED]
+    width = max(len(one_line(each.source)) for each in listed)
+    click.echo(f"{'failed':<{width}} | why", err=True)
+    for each in listed:
+        click.echo(f"{one_line(each.source):<{width}} | {_why(each)}", err=True)
+    _say_more(len(failed))
+
+
+def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
+    """Drawing and reason in colours, without the folders that all drawings have in common."""
+    if not rows:
         return
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    table = Table("failed", "why")
-    for each in failed:
-        table.add_row(Text(one_line(each.source)), Text(_why(each)))
+    base = _common(outcomes)
+    table = Table(title=Text(one_line(base)) if base else None, title_justify="left")
+    table.add_column("drawing", ratio=1, overflow="fold")
+    table.add_column("")
+    table.add_column("why", ratio=2, overflow="fold")
+    for each in rows[:LISTED]:
+        failed = each.state is State.FAILED
+        what = "failed" if failed else _counted(each.warnings, "warning")
+        name = PurePath(each.source).relative_to(base) if base else each.source
+        # What failed is told in full; warnings in one line, for there may be many alike.
+        why = Text(_why(each)) if failed else Text(_why(each), no_wrap=True, overflow="ellipsis")
+        table.add_row(Text(one_line(str(name))), what, why, style=COLOUR[each.state])
     Console(stderr=True).print(table)
+    _say_more(len(rows))
+
+
+def _common(outcomes: Sequence[Outcome]) -> str:
+    """The folders that all drawings have in common, "" for none."""
+    try:
+        return os.path.commonpath([PurePath(each.source).parent for each in outcomes])
+    except ValueError:  # some are told from the root, some from here
+        return ""
+
+
+def _say_more(rows: int) -> None:
+    if rows > LISTED:
+        click.echo(f"… and {rows - LISTED} more; --json FILE names all", err=True)
 
 
 def _why(outcome: Outcome) -> str:
-    """The error without the drawing's name, which stands before it."""
-    why = one_line(outcome.error or "")
+    """The error, or else the first remark, without the drawing's name, which stands before it."""
+    why = one_line(outcome.error or next(iter(outcome.remarks), ""))
     return why.removeprefix(f"{one_line(outcome.source)}: ")
 
 

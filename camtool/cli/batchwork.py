@@ -75,7 +75,9 @@ class PostWork:
 
         data = file_bytes(task.path) if data is None else data
         order: JobOrder = task.order
-        drawing = self.drawing.read(task.source, self.target.machine, order.job, data)
+        # Reports and pictures are UTF-8, which names of files need not be.
+        name = task.source.encode("utf-8", "backslashreplace").decode()
+        drawing = self.drawing.read(name, self.target.machine, order.job, data)
         with JobFlags(order.file, (), {}).blamed():
             posted = post_drawing(
                 drawing,

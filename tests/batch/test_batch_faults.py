@@ -1,6 +1,7 @@
 """Full disks, folders that nobody may write, broken drawings: errors of one drawing."""
 
 import os
+import resource
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -62,6 +63,31 @@ def test_a_full_disk_is_the_error_of_that_drawing(tmp_path: Path, small_disk: Pa
     assert files_in(small_disk) == {"a.out", "c.out", ".camtool-batch.jsonl"}
     again = states(run(tasks, small_disk))
     assert again == {"a": "up to date", "b": "failed", "c": "up to date"}
+
+
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """Where no disk can be filled: no file may become larger."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_file_that_grows_too_large_is_the_error_of_that_drawing(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "b.out").write_text("old")
+    tasks = tasks_of(tmp_path, a="a", b="large 100000", c="c")
+    with files_of_at_most(50_000):
+        outcomes = run(tasks, out)
+    assert states(outcomes) == {"a": "made", "b": "failed", "c": "made"}
+    assert "cannot be written (File too large)" in (outcomes["b"].error or "")
+    assert files_in(out) == {"a.out", "b.out", "c.out", ".camtool-batch.jsonl"}
+    assert (out / "b.out").read_text() == "old"
+    assert Manifest(out).outputs() == {out / "a.out", out / "c.out"}
 
 
 def fill(filler: Path) -> None:

@@ -1,5 +1,6 @@
 """`camtool batch` as a user runs it."""
 
+import errno
 import json
 import os
 import shutil
@@ -87,7 +88,7 @@ def asked(camtool: Run, pools: list[HerePool], *flags: str) -> list[str]:
     sources = ("drawings/letter.svg", "drawings/in/square.dxf")
     done = camtool("batch", *sources, *target, "-o", "build", *QUICK, *flags)
     assert done.returncode == 0, done.stderr.decode()
-    return pools[before].asked
+    return pools[before].asked if len(pools) > before else []  # no pool where nothing is to do
 
 
 def test_only_what_has_changed_is_made_again(
@@ -197,3 +198,61 @@ def test_a_second_batch_into_the_same_folder_is_refused(
     assert {path: path.read_bytes() for path in build.iterdir()} == before
     assert camtool("batch", "drawings/in", *PIC, *QUICK).returncode == 0
     assert files_in(build) == {MANIFEST, "letter.pic", "square.pic"}
+
+
+@pytest.mark.usefixtures("pools")
+def test_odd_names_are_only_names(camtool: Run, tmp_path: Path, samples: Path) -> None:
+    stems = ("-a b", "[red]é", "new\nline", "\udcff")
+    (tmp_path / "d").mkdir()
+    for stem in stems:
+        shutil.copy(samples / "letter.svg", tmp_path / "d" / f"{stem}.svg")
+    flags = ("--preview", "svg", "--reports", "--json", "-")
+    done = camtool("batch", "d", *PIC, *flags)
+    assert done.returncode == 0, done.stderr.decode()
+    whole = json.loads(done.stdout.decode())
+    assert [row["source"] for row in whole["drawings"]] == [f"d/{stem}.svg" for stem in stems]
+    made = {f"{stem}{extension}" for stem in stems for extension in (".pic", ".svg", ".json")}
+    assert files_in(tmp_path / "build") == {MANIFEST, *made}
+    assert (
+        json.loads((tmp_path / "build" / "\udcff.json").read_text())["source"] == "d/\\udcff.svg"
+    )
+    assert all(line.isprintable() for line in done.stderr.decode().splitlines())
+    again = camtool("batch", "d", *PIC, *flags)
+    assert json.loads(again.stdout.decode())["up_to_date"] == 4
+
+
+@pytest.mark.usefixtures("pools")
+def test_an_output_folder_that_is_none(
+    camtool: Run, drawings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "build").write_text("a file")
+    done = camtool("batch", "drawings/in", *PIC, *QUICK)
+    assert done.returncode == 2
+    assert b"camtool: error: build: cannot be made (File exists); choose another" in done.stderr
+    assert (tmp_path / "build").read_text() == "a file"
+    (tmp_path / "build").unlink()
+    assert camtool("batch", "drawings/in", *PIC, *QUICK).returncode == 0
+    opened = os.open
+
+    def read_only(path: str | Path, flags: int, *rest: int, **more: int) -> int:
+        if flags & (os.O_WRONLY | os.O_RDWR) and "build" in str(path):
+            raise OSError(errno.EROFS, "Read-only file system", str(path))
+        return opened(path, flags, *rest, **more)
+
+    monkeypatch.setattr(os, "open", read_only)
+    done = camtool("batch", "drawings/in", *PIC, *QUICK)
+    assert done.returncode == 2
+    assert b"cannot be written (Read-only file system); choose another --out" in done.stderr
+
+
+@pytest.mark.usefixtures("pools")
+def test_an_output_folder_within_the_drawings(camtool: Run, drawings: Path) -> None:
+    flags = ("batch", "drawings/in", "drawings/in/*.dxf", "-t", "pic-mmh", "-o", "drawings/in/out")
+    more = ("--preview", "svg", "--json", "-", *QUICK)
+    for state in ("made", "up_to_date"):
+        whole = json.loads(camtool(*flags, *more).stdout)
+        assert (whole[state], len(whole["drawings"])) == (1, 1)
+    assert files_in(drawings / "in") == {
+        "square.dxf",
+        *(f"out/{name}" for name in (MANIFEST, "square.pic", "square.svg")),
+    }

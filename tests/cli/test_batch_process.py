@@ -6,9 +6,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -110,3 +112,64 @@ def test_a_terminal_gets_a_bar(tmp_path: Path, many: Path) -> None:
     assert "/s" in text
     assert "13 drawings: 12 made, 1 failed" in text
     assert "made: drawings" not in text
+
+
+def outputs_in(out: Path) -> dict[str, bytes]:
+    """Programs and pictures by name, and whatever else is there but the manifest."""
+    if not out.is_dir():
+        return {}
+    return {path.name: path.read_bytes() for path in out.iterdir() if path.name != NAME}
+
+
+def interrupted(folder: Path, number: signal.Signals, moment: Random, *, all_of_it: bool) -> str:
+    """A run that gets a signal after some drawings, and a little later; what it said."""
+    command, pipe = [*COMMAND, "--jobs", "2", "--preview", "svg"], subprocess.PIPE
+    with running_in(folder, args=command, stderr=pipe, start_new_session=True) as running:
+        assert running.stderr is not None
+        said = ""
+        for _ in range(moment.randrange(12)):
+            said += running.stderr.readline()
+        time.sleep(moment.uniform(0.0, 0.1 if said else 2.0))
+        if all_of_it:
+            os.killpg(running.pid, number)
+        else:
+            running.send_signal(number)
+        said += running.communicate(timeout=60)[1]
+        ways = {0, -number, 128 + number}  # it may have been ready, or not yet have begun
+        assert running.returncode in ways or "KeyboardInterrupt" in said, said
+        return said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_interrupted_again_and_again_it_comes_to_the_same_end(
+    tmp_path: Path, many: Path, camtool_process: Run, number: signal.Signals
+) -> None:
+    for more in range(12, 60):
+        shutil.copy(many / "00.dxf", many / f"{more}.dxf")
+    undisturbed = camtool_process(*COMMAND[3:-1], "whole", "--preview", "svg")
+    assert undisturbed.returncode == 0
+    whole = outputs_in(tmp_path / "whole")
+    assert len(whole) == 120
+    random = Random(number)
+    counts = []
+    for turn in range(10):
+        said = interrupted(tmp_path, number, random, all_of_it=bool(turn % 2))
+        assert "fault in camtool" not in said
+        there = outputs_in(tmp_path / "build")
+        if number == signal.SIGKILL:  # it cannot take away what it was just writing, nor its lock
+            there = {name: data for name, data in there.items() if not name.startswith(".")}
+        assert there.items() <= whole.items(), (turn, said)
+        known = {path.name for path in Manifest(tmp_path / "build").outputs()}
+        assert known <= there.keys()
+        if number != signal.SIGKILL:
+            assert known == there.keys(), (turn, said)
+        counts.append(len(there))
+        if turn == 4:
+            shutil.rmtree(tmp_path / "build", ignore_errors=True)
+    print(number.name, counts)
+    assert any(0 < count < 120 for count in counts), counts
+    done = camtool_process(*COMMAND[3:], "--preview", "svg")
+    assert done.returncode == 0, done.stderr
+    there = outputs_in(tmp_path / "build")
+    assert {name: data for name, data in there.items() if not name.startswith(".")} == whole
