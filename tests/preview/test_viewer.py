@@ -17,7 +17,9 @@ from camtool.preview.colours import BINS
 from camtool.preview.draw import Scene
 from camtool.preview.exaggerate import exaggerated
 from camtool.preview.render import render
+from camtool.preview.rounds import Round
 from camtool.preview.trace import bins_of, trace_of
+from camtool.preview.viewer.circles import MOST_PLOTS
 from camtool.preview.viewer.columns import columns_of, packed
 from camtool.preview.viewer.page import SCRIPTS, viewer_page
 from camtool.preview.viewer.run import Line, Run, Table, by_feed
@@ -181,6 +183,40 @@ def test_the_wanted_path_breaks_where_it_does() -> None:
     assert columns["wanted_break"].tolist() == [0, 2]
     assert columns["wanted_begin"].tolist() == [[0.0, 0.0], [5.0, 5.0]]
     assert columns["wanted_arc"].tolist() == [1]
+
+
+def test_full_circles_are_plotted_in_the_colours_of_the_page() -> None:
+    rounds = tuple(lobed(1e-3 * size) for size in range(20))
+    page = text_of(Scene("t", rounds=rounds))
+    figures = re.findall(r"<figure>.*?</figure>", page, re.S)
+    assert len(figures) == MOST_PLOTS == 16
+    assert "16 of 20 with the largest" in page
+    # The least ones are left out, the order is that of the report.
+    assert [int(found) for found in re.findall(r"of circle (\d+)", page)] == [*range(5, 21)]
+    assert max(map(len, figures)) < 12_000
+    for colour in re.findall(r'(?:fill|stroke)="([^"]*)"', "".join(figures)):
+        assert colour == "none" or re.fullmatch(r"var\(--[a-z-]+\)", colour)
+    assert set(re.findall(r"var\((--[a-z-]+)\)", page)) <= set(re.findall(r"(--[a-z-]+):", page))
+    ids = re.findall(r'id="([^"]*)"', page)
+    assert len(set(ids)) == len(ids)
+    assert "<figure>" not in text_of(SCENES["toolpath"])
+
+
+def test_a_circle_gone_round_both_ways_is_plotted_once() -> None:
+    both = (replace(lobed(0.01), partner=2), replace(lobed(0.01), ccw=True, partner=1))
+    assert text_of(Scene("t", rounds=both)).count("<figure>") == 1
+
+
+def lobed(size_mm: float) -> Round:
+    """A circle whose radius is off by three lobes, seen over three quarters of it."""
+    angle = (np.arange(720) + 0.5) * np.pi / 360.0
+    radius = 2.0 + size_mm * np.sin(3.0 * angle)
+    point = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    square = radius[:, None] ** 2
+    bins = np.hstack([np.ones((720, 1)), point, square, point, square, point])
+    bins[:180] = 0.0
+    error = 2.0 * size_mm
+    return Round((0.0, 0.0), 2.0, False, bins, error, (size_mm, -size_mm, 0.0), (0.0, 0.0))
 
 
 def test_a_run_by_feeds_takes_the_time_of_the_way() -> None:

@@ -22,6 +22,7 @@ import numpy as np
 from camtool.geometry.drawing import Drawing
 from camtool.preview.colours import LAYERS, bin_colours, on_dark
 from camtool.preview.scene import Scene
+from camtool.preview.viewer.circles import circles_of
 from camtool.preview.viewer.columns import columns_of, layer_names, packed
 from camtool.preview.viewer.run import Run, Table, by_feed
 from camtool.preview.viewer.traced import Traced, traced_of
@@ -68,6 +69,7 @@ def viewer_page(scene: Scene) -> bytes:
         "label": html.escape(f"picture of {title}"),
         "style": style,
         "script": script,
+        "circles": circles_of(scene),
         "head": _json({"columns": named, **_head(scene, run, traced)}),
         "columns": base64.b64encode(data).decode("ascii"),
     }
