@@ -26,7 +26,7 @@ from camtool.preview.view import View, page_width
 
 __all__ = ["Scene", "draw", "png", "scene_of_drawing", "scene_of_toolpath"]
 
-PNG_DPI = 96.0
+PNG_DPI = 96
 """resvg's own default of 0 makes lengths in mm vanish."""
 
 TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8

@@ -107,6 +107,7 @@ def _beyond(one: Any, other: Any, tolerance: float) -> tuple[float, float]:
     tree = shapely.STRtree(_pieces(other)) if len(edges) else None
     if tree is None:
         return float(rest.area), math.inf
+    shapely.prepare(other)  # which newer shapely does by itself
     outside = ~shapely.intersects_xy(other, *shapely.get_coordinates(rest).T)
     _, distance = tree.query_nearest(points[outside], return_distance=True, all_matches=False)
     depth = float(distance.max(initial=0.0))
