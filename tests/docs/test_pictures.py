@@ -38,7 +38,14 @@ def compare(name: str, made: bytes, shown: bytes) -> None:
     assert (np.abs(new - old).max(axis=2) > CHANGED).mean() <= MOST_CHANGED, mend
 
 
-@pytest.mark.parametrize("name", list(COMMANDS))
+QUICK = {"layers.png", "outline.png", "polar.png"}
+"""A drawing, a job and a prediction: the default run looks at these, the nightly one at all."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in COMMANDS],
+)
 def test_the_picture_is_what_its_command_draws(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
