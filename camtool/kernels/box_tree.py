@@ -2,7 +2,8 @@
 
 Nodes are in heap order, the root is 1; node i has the children 2i and 2i + 1, and each leaf holds
 `LEAF` rows that follow each other. Along a path neighbours in the list are neighbours in the
-plane, so no row needs to be moved. What makes it exact: comparisons of the given numbers.
+plane, so no row needs to be moved; over paths that surround each other stands a tree of
+`camtool.kernels.move_tree`. What makes it exact: comparisons of the given numbers.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 LEAF = 4
 """Rows in a leaf."""
@@ -64,6 +66,20 @@ def apart_square(tree: Floats, node: int, x: float, y: float) -> float:
     dx = max(tree[node, 0] - x, 0.0, x - tree[node, 2])
     dy = max(tree[node, 1] - y, 0.0, y - tree[node, 3])
     return float(dx * dx + dy * dy)
+
+
+@inner
+def wait_for_children(
+    tree: Floats, node: int, point: tuple[float, float], stack: Ints, height: int
+) -> int:
+    """Put the children of a node on a stack of `height` nodes, the one nearer to a point on top;
+    returns the new height."""
+    x, y = point
+    left, right = 2 * node, 2 * node + 1
+    if apart_square(tree, left, x, y) < apart_square(tree, right, x, y):
+        left, right = right, left
+    stack[height], stack[height + 1] = left, right
+    return height + 2
 
 
 @inner

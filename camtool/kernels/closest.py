@@ -12,7 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.kernels.biarc import distance_to_arc
-from camtool.kernels.box_tree import DEPTH, apart_square, rows_under, tree_of
+from camtool.kernels.box_tree import (
+    DEPTH,
+    apart_square,
+    rows_under,
+    tree_of,
+    wait_for_children,
+)
 from camtool.kernels.compiled import inner, kernel
 
 Floats = npt.NDArray[np.float64]
@@ -87,11 +93,7 @@ def _from_point(
         if low >= high or own or apart_square(tree, node, x, y) >= best * best:
             continue
         if node < leaves:
-            left, right = 2 * node, 2 * node + 1
-            if apart_square(tree, left, x, y) < apart_square(tree, right, x, y):
-                left, right = right, left
-            stack[height], stack[height + 1] = left, right
-            height += 2
+            height = wait_for_children(tree, node, (x, y), stack, height)
             continue
         for row in range(low, high):
             if first <= row <= last:

@@ -26,7 +26,7 @@ from camtool.kernels.circle_bins import fill_bins
 from camtool.kernels.compiled import kernel
 from camtool.kernels.error_bins import BEFORE_FIRST, BINS, SHIFT
 from camtool.kernels.move_errors import lower_errors
-from camtool.kernels.near_moves import COUNT, nearest_errors
+from camtool.kernels.near_moves import COUNT, Moves, Near, nearest_errors
 from camtool.kernels.thin_trace import trace_block
 from camtool.kernels.wide import first_of, larger, smaller, wide
 
@@ -74,17 +74,15 @@ OWN, FIRST, LAST, CIRCLE, SLOT = range(5)
 class Task(NamedTuple):
     """What N rows are judged by.
 
-    own (J, 16) moves of the rows that cut (`move_errors`), moves (K, 16) wanted with their
-    heights (K, 2) and the tree over them; rows (N, 5): which of `own` a row is, −1 where nothing
-    is cut, first and last of the moves that it is compared with, the circle that it goes round or
-    −1, and the bins of that; window (N, 2) between which heights moves are compared; centre (C, 2)
-    mm of circles; directions (721, 2) of `circle_bins`.
+    own (J, 16) moves of the rows that cut (`move_errors`), the K moves that are wanted; rows
+    (N, 5): which of `own` a row is, −1 where nothing is cut, first and last of the moves that it
+    is compared with, the circle that it goes round or −1, and the bins of that; window (N, 2)
+    between which heights moves are compared; centre (C, 2) mm of circles; directions (721, 2) of
+    `circle_bins`.
     """
 
     own: Floats
-    moves: Floats
-    heights: Floats
-    tree: Floats
+    moves: Moves
     rows: Ints
     window: Floats
     centre: Floats
@@ -94,15 +92,14 @@ class Task(NamedTuple):
 class Sums(NamedTuple):
     """What is found: rows (N, 19); histograms (2, 4 BINS) of interpolation and total, every
     fourth sample in the same place of its four; bins (S, 720, 9); trace (T, 4) x, y, error, row,
-    and its pen; found (K,) and memo, the list of near moves."""
+    and its pen; the list of near moves."""
 
     rows: Floats
     histograms: Ints
     bins: Floats
     trace: Floats
     pen: Floats
-    found: Ints
-    memo: Floats
+    near: Near
 
 
 X, Y, SLIDE_X, SLIDE_Y, ERRORS, SIZE, PLACES, SPOT = range(8)
@@ -203,9 +200,8 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> 
         _inner(figures, _sizes(errors, size, places))
         _count(places, sums.histograms[0])
         only = about[FIRST], about[LAST], task.window[row, 0], task.window[row, 1]
-        moves = task.moves, task.heights, task.tree
-        nearest_errors((slide_x, slide_y), only, moves, sums.found, sums.memo, bench[SPOT], errors)
-        if sums.memo[COUNT] > 0.0:
+        nearest_errors(slide_x, slide_y, only, task.moves, sums.near, bench[SPOT], errors)
+        if sums.near.memo[COUNT] > 0.0:
             found = _sizes(errors, size, places)
             _total(figures, found, slide_x, slide_y, size)
             _count(places, sums.histograms[1])

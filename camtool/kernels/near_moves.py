@@ -13,18 +13,25 @@ and halves when it cost more. The search goes down a tree of the moves' boxes.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.box_tree import DEPTH, apart_square, rows_under
+from camtool.kernels.box_tree import DEPTH, LEAF, apart_square, wait_for_children
 from camtool.kernels.move_errors import COLUMNS, lower_errors
+from camtool.kernels.move_tree import FIRST as FIRST_BELOW
+from camtool.kernels.move_tree import LAST as LAST_BELOW
 from camtool.kernels.wide import larger, wide
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-SEARCH_COST = 400.0
-"""A search for a list costs about as much as so many distances."""
+Only = tuple[int, int, float, float]
+"""Moves that may be the nearest: first:last, as far as their heights overlap low … high."""
+
+NODE_COST, MOVE_COST = 4.0, 20.0
+"""A node, and a move, that a search looks at cost about as much as so many distances of a list."""
 
 FIRST_REACH_MM = 0.05
 """ρ of the first list."""
@@ -38,23 +45,41 @@ SLACK = 1e-12
 SLACK_MM = 1e-12
 """See `SLACK`."""
 
-QX, QY, REACH, FIRST, LAST, Z_LOW, Z_HIGH, COUNT, LEAST, USED = range(10)
+QX, QY, REACH, FIRST, LAST, Z_LOW, Z_HIGH, COUNT, LEAST, USED, COST = range(11)
 """The memo of a list, float64: the point q, ρ (−1: there is no list), which moves first:last and
-heights it holds, how many moves are in it, how many of these are as near to q as any, and for how
-many points it was used."""
+heights it holds, how many moves are in it, how many of these are as near to q as any, for how
+many points it was used, and how many distances the search for it cost."""
 
-MEMO = 10
+MEMO = 11
 """Numbers in a memo."""
 
 SPOT = 3 + DEPTH
 """Numbers that a search needs room for: a point with its error, and the nodes that wait."""
 
 
-def new_memo() -> Floats:
-    """The memo of no list."""
+class Moves(NamedTuple):
+    """K moves: their table (K, 16) of `move_errors`, heights (K, 2), and the nodes (2L, 6) and
+    order (K,) of `move_tree`."""
+
+    table: Floats
+    heights: Floats
+    nodes: Floats
+    order: Ints
+
+
+class Near(NamedTuple):
+    """A list: the moves found (K,), how far from q each is (K,) mm, and its memo (11,)."""
+
+    found: Ints
+    apart: Floats
+    memo: Floats
+
+
+def no_list(moves: int) -> Near:
+    """Room for a list of so many moves, that is none yet."""
     memo = np.zeros(MEMO)
     memo[REACH] = -1.0
-    return memo
+    return Near(np.empty(moves, dtype=np.int64), np.empty(moves), memo)
 
 
 @wide
@@ -78,47 +103,40 @@ def _is_there(table: Floats, found: Ints, move: int) -> bool:
 
 
 @wide
-def _search(
-    q: tuple[float, float],
-    only: tuple[int, int, float, float],
-    moves: tuple[Floats, Floats, Floats],
-    limit: float,
-    found: Ints,
-    spot: Floats,
-) -> tuple[float, int]:
-    """With `limit` < 0 the least distance of q; else the number of moves within it, in `found`.
-
-    `only`: the moves first:last whose heights overlap low … high. `moves`: table, heights (K, 2),
-    tree. `spot` (`SPOT`,) is room.
-    """
-    x, y = q
+def _search(only: Only, moves: Moves, near: Near, spot: Floats) -> tuple[float, int]:
+    """The least distance of q, and how many moves were found: all that are no farther than that
+    and 2ρ, and some that are. `spot` (`SPOT`,) is room."""
     first, last, z_low, z_high = only
-    table, heights, tree = moves
-    leaves = len(tree) // 2
-    best, count = (np.inf if limit < 0.0 else limit), 0
+    memo = near.memo
+    x, y, beyond = memo[QX], memo[QY], 2.0 * memo[REACH]
+    nodes, order = moves.nodes, moves.order
+    leaves = len(nodes) // 2
+    best, limit, count = np.inf, np.inf, 0
     stack = spot[3 : 3 + DEPTH].view(np.int64)
     height, stack[0] = 1, 1
     while height > 0:
         height -= 1
         node = stack[height]
-        low, high = rows_under(tree, node, len(table))
-        if low >= last or high <= first or apart_square(tree, node, x, y) > best * best:
+        memo[COST] += NODE_COST
+        if nodes[node, FIRST_BELOW] >= last or nodes[node, LAST_BELOW] <= first:
+            continue
+        if apart_square(nodes, node, x, y) > limit * limit:
             continue
         if node < leaves:
-            left, right = 2 * node, 2 * node + 1
-            if apart_square(tree, left, x, y) < apart_square(tree, right, x, y):
-                left, right = right, left
-            stack[height], stack[height + 1] = left, right
-            height += 2
+            height = wait_for_children(nodes, node, (x, y), stack, height)
             continue
-        for k in range(max(low, first), min(high, last)):
-            if heights[k, 0] > z_high or heights[k, 1] < z_low:
+        low = (node - leaves) * LEAF
+        for k in order[low : low + LEAF]:
+            if k < first or k >= last:
                 continue
-            apart = _apart(table[k], x, y, spot)
-            if limit < 0.0:
-                best = min(best, apart)
-            elif apart <= limit and not _is_there(table, found[:count], k):
-                found[count] = k
+            if moves.heights[k, 0] > z_high or moves.heights[k, 1] < z_low:
+                continue
+            apart = _apart(moves.table[k], x, y, spot)
+            memo[COST] += MOVE_COST
+            if apart < best:
+                best, limit = apart, _looser(apart + beyond)
+            if apart <= limit:
+                near.found[count], near.apart[count] = k, apart
                 count += 1
     return best, count
 
@@ -129,32 +147,38 @@ def _looser(limit: float) -> float:
 
 
 @wide
-def renew(
-    q: tuple[float, float],
-    only: tuple[int, int, float, float],
-    moves: tuple[Floats, Floats, Floats],
-    found: Ints,
-    memo: Floats,
-    spot: Floats,
-) -> None:
-    """Make the list `found` (K,) around q anew, with a ρ from how well the last one did."""
-    reach = memo[REACH]
-    if reach < 0.0:
-        reach = FIRST_REACH_MM
-    elif memo[USED] * (memo[COUNT] - memo[LEAST]) > SEARCH_COST:
-        reach *= 0.5
+def _keep(nearest: float, count: int, table: Floats, near: Near) -> None:
+    """Leave in the list, of the first `count` moves, those that must be in it, each once."""
+    memo = near.memo
+    limit, least = _looser(nearest + 2.0 * memo[REACH]), _looser(nearest)
+    kept = 0
+    memo[LEAST] = 0.0
+    for k in range(count):
+        move, apart = near.found[k], near.apart[k]
+        if apart <= limit and not _is_there(table, near.found[:kept], move):
+            near.found[kept] = move
+            kept += 1
+            if apart <= least:
+                memo[LEAST] += 1.0
+    memo[COUNT] = kept
+
+
+@wide
+def renew(x: float, y: float, only: Only, moves: Moves, near: Near, spot: Floats) -> None:
+    """Make the list around q = (x, y) anew, with a ρ from how well the last one did."""
+    memo = near.memo
+    if memo[REACH] < 0.0:
+        memo[REACH] = FIRST_REACH_MM
+    elif memo[USED] * (memo[COUNT] - memo[LEAST]) > memo[COST]:
+        memo[REACH] *= 0.5
     else:
-        reach = min(2.0 * reach, MOST_REACH_MM)
-    nearest, _ = _search(q, only, moves, -1.0, found, spot)
-    if nearest == np.inf:  # nothing at this height: any height
+        memo[REACH] = min(2.0 * memo[REACH], MOST_REACH_MM)
+    memo[QX], memo[QY], memo[USED], memo[COST] = x, y, 0.0, 0.0
+    nearest, count = _search(only, moves, near, spot)
+    if count == 0:  # nothing at this height: any height
         only = only[0], only[1], -np.inf, np.inf
-        nearest, _ = _search(q, only, moves, -1.0, found, spot)
-    count, least = 0, 0
-    if nearest < np.inf:
-        _, least = _search(q, only, moves, _looser(nearest), found, spot)
-        _, count = _search(q, only, moves, _looser(nearest + 2.0 * reach), found, spot)
-    memo[QX], memo[QY], memo[REACH] = q[0], q[1], reach
-    memo[COUNT], memo[LEAST], memo[USED] = count, least, 0.0
+        nearest, count = _search(only, moves, near, spot)
+    _keep(nearest, count, moves.table, near)
 
 
 @wide
@@ -175,18 +199,12 @@ def _within(memo: Floats, x: Floats, y: Floats) -> int:
 
 @wide
 def nearest_errors(
-    points: tuple[Floats, Floats],
-    only: tuple[int, int, float, float],
-    moves: tuple[Floats, Floats, Floats],
-    found: Ints,
-    memo: Floats,
-    spot: Floats,
-    out: Floats,
+    x: Floats, y: Floats, only: Only, moves: Moves, near: Near, spot: Floats, out: Floats
 ) -> None:
-    """The error of each of n points (x, y) against the nearest of the moves `only`, signed as
-    `lower_errors` does; inf where there is none. The list and its memo serve the next call too."""
-    x, y = points
+    """The error of each of the points x, y (n,) against the nearest of the moves `only`, signed
+    as `lower_errors` does; inf where there is none. The list serves the next call too."""
     first, last, z_low, z_high = only
+    memo, found = near.memo, near.found
     same = memo[FIRST] == first and memo[LAST] == last
     same = same and memo[Z_LOW] == z_low and memo[Z_HIGH] == z_high and memo[REACH] >= 0.0
     memo[FIRST], memo[LAST], memo[Z_LOW], memo[Z_HIGH] = first, last, z_low, z_high
@@ -194,16 +212,16 @@ def nearest_errors(
     while done < len(x):
         run = _within(memo, x[done:], y[done:]) if same else 0
         if run == 0:
-            renew((x[done], y[done]), only, moves, found, memo, spot)
+            renew(x[done], y[done], only, moves, near, spot)
             run, same = max(1, _within(memo, x[done:], y[done:])), True
         here_x, here_y = x[done : done + run], y[done : done + run]
         here = out[done : done + run]
         if memo[COUNT] > 0.0:
-            lower_errors(moves[0][found[0]], here_x, here_y, here, True)
+            lower_errors(moves.table[found[0]], here_x, here_y, here, True)
         else:
             for k in range(len(here)):
                 here[k] = np.inf
         for k in range(1, int(memo[COUNT])):
-            lower_errors(moves[0][found[k]], here_x, here_y, here, False)
+            lower_errors(moves.table[found[k]], here_x, here_y, here, False)
         memo[USED] += run
         done += run

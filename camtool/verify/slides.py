@@ -66,7 +66,7 @@ class SlidePass:
         self._closing = seen[np.argsort(self._last[seen], kind="stable")].tolist()
         self._task = _task(decoded, goal, match, self._slot)
         slots = int(self._slot.max(initial=-1)) + 1
-        self._sums = _sums(len(match.contour), slots, len(self._task.moves), trace)
+        self._sums = _sums(len(match.contour), slots, len(self._task.moves.table), trace)
         self._start, self._most = trace.start, trace.most
 
     def add(self, chunk: Chunk) -> None:
@@ -162,17 +162,16 @@ def largest(errors: Floats, which: Bools) -> float:
 
 
 def _task(decoded: Target, goal: Goal, match: Match, slot: Ints) -> Task:
-    from camtool.kernels.box_tree import tree_of
     from camtool.kernels.circle_bins import bin_directions
     from camtool.kernels.judge import Task
+    from camtool.kernels.move_tree import move_tree
+    from camtool.kernels.near_moves import Moves
 
     own = move_table(decoded.cuts)
     wanted = own if goal.target is decoded else move_table(goal.target.cuts)
     return Task(
         own=own.moves,
-        moves=wanted.moves,
-        heights=wanted.heights,
-        tree=tree_of(wanted.boxes),
+        moves=Moves(wanted.moves, wanted.heights, *move_tree(wanted.boxes)),
         rows=np.column_stack(
             [own.of_row, wanted.ranges(match.only), match.circle, slot[match.circle]]
             if len(slot)
@@ -188,7 +187,7 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
     from camtool.kernels.circle_bins import empty_bins
     from camtool.kernels.error_bins import BINS
     from camtool.kernels.judge import Sums
-    from camtool.kernels.near_moves import new_memo
+    from camtool.kernels.near_moves import no_list
     from camtool.kernels.thin_trace import new_pen
 
     room = 2 * trace.most + rows
@@ -198,8 +197,7 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
         bins=empty_bins(slots),
         trace=np.empty((room + rows + 1, 4)),
         pen=new_pen(trace.stride, room),
-        found=np.empty(moves, dtype=np.int64),
-        memo=new_memo(),
+        near=no_list(moves),
     )
 
 

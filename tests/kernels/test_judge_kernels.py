@@ -1,13 +1,15 @@
 """The kernels of the judge against plain loops."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from camtool.kernels.box_tree import tree_of
+from camtool.kernels.box_tree import LEAF
 from camtool.kernels.circle_bins import ANGLE_BINS, bin_directions, empty_bins
-from camtool.kernels.near_moves import COUNT, new_memo
+from camtool.kernels.move_tree import FIRST, LAST, hilbert_order, move_tree
+from camtool.kernels.near_moves import COST, COUNT, Moves, no_list
 from camtool.kernels.thin_trace import WRITTEN, new_pen, unwritten
 from tests.oracles.kernel_doors import (
     fill_bins_,
@@ -93,11 +95,11 @@ def walk(rng: np.random.Generator, count: int, size: float) -> tuple[np.ndarray,
 @pytest.mark.parametrize("count", [1, 2, 60])
 def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
     rng = np.random.default_rng(count)
-    found, memo = np.empty(count, dtype=np.int64), new_memo()
+    near = no_list(count)
     moves: list[Move] = [random_move(rng) for _ in range(count)]
     moves[-1] = moves[0]  # twice the same
     table = np.array([move.row() for move in moves], dtype=np.float64)
-    tree = tree_of(np.array([move.box() for move in moves], dtype=np.float64))
+    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
     low = rng.uniform(-1.0, 0.0, count)
     heights = np.column_stack([low, low + rng.uniform(0.0, 0.3, count)])
     for _ in range(25):
@@ -106,16 +108,62 @@ def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
         x, y = walk(rng, 40, size)
         out = np.empty(40)
         only = (first, last, *window)
-        nearest_errors_(x, y, only, (table, heights, tree), found, memo, out)
+        nearest_errors_(x, y, only, Moves(table, heights, *tree), near, out)
         high = [
             k
             for k in range(first, last)
             if heights[k, 0] <= window[1] and heights[k, 1] >= window[0]
         ]
         some = [moves[k] for k in (high or range(first, last))]
-        assert (memo[COUNT] == 0) == (not some)
+        assert (near.memo[COUNT] == 0) == (not some)
         wanted = [nearest(some, *point) for point in zip(x.tolist(), y.tolist(), strict=True)]
         assert np.abs(out) == pytest.approx(np.abs(wanted), abs=EPS)
+
+
+def test_the_curve_fills_a_square_by_steps_of_one() -> None:
+    rng = np.random.default_rng(4)
+    square = rng.permutation(np.argwhere(np.ones((16, 16))).astype(np.float64))
+    along = square[hilbert_order(square)]
+    assert np.abs(np.diff(along, axis=0)).sum(axis=1).tolist() == [1.0] * 255
+
+
+@pytest.mark.parametrize("count", [0, 1, 4, 5, 61])
+def test_nodes_know_what_is_below_them(count: int) -> None:
+    rng = np.random.default_rng(count)
+    low = rng.uniform(-9.0, 9.0, (count, 2))
+    boxes = np.column_stack([low, low + rng.uniform(0.0, 2.0, (count, 2))])
+    nodes, order = move_tree(boxes)
+    leaves = len(nodes) // 2
+    assert sorted(order.tolist()) == list(range(count))
+    for node in range(1, 2 * leaves):
+        leaf, last = node, node
+        while leaf < leaves:
+            leaf, last = 2 * leaf, 2 * last + 1
+        rows = order[(leaf - leaves) * LEAF : (last + 1 - leaves) * LEAF]
+        if len(rows) == 0:
+            assert nodes[node, FIRST] == np.inf
+            continue
+        assert nodes[node, :2].tolist() == boxes[rows, :2].min(axis=0).tolist()
+        assert nodes[node, 2:4].tolist() == boxes[rows, 2:].max(axis=0).tolist()
+        assert (nodes[node, FIRST], nodes[node, LAST]) == (rows.min(), rows.max() + 1)
+
+
+def test_a_search_in_a_spiral_looks_at_few_of_its_turns() -> None:
+    """In the order of the path each turn is a box about the point, and all would be looked at."""
+    turn = np.arange(8001) * (2.0 * math.pi / 40.0)
+    places = np.column_stack([turn * np.cos(turn), turn * np.sin(turn)]).tolist()
+    lines = [Line(tuple(a), tuple(b)) for a, b in pairwise(places)]
+    table = np.array([line.row() for line in lines], dtype=np.float64)
+    heights, out = np.zeros((len(lines), 2)), np.empty(1)
+    moves = Moves(table, heights, *move_tree(np.array([line.box() for line in lines])))
+    costs = []
+    for k in range(100, 8000, 700):
+        near = no_list(len(lines))
+        at = np.array([[places[k][0]], [places[k][1]]])
+        nearest_errors_(at[0], at[1], (0, len(lines), 0.0, 0.0), moves, near, out)
+        assert abs(out[0]) < EPS
+        costs.append(near.memo[COST])
+    assert max(costs) < 1500.0
 
 
 def test_the_bins_of_a_circle_are_those_of_a_loop() -> None:

@@ -26,8 +26,8 @@ def set_errors_(move, x, y, best):
 
 
 @njit
-def nearest_errors_(x, y, only, moves, found, memo, out):
-    nearest_errors((x, y), only, moves, found, memo, np.empty(SPOT), out)
+def nearest_errors_(x, y, only, moves, near, out):
+    nearest_errors(x, y, only, moves, near, np.empty(SPOT), out)
 
 
 @njit

@@ -1,0 +1,68 @@
+"""A tree of boxes over moves that lie about the plane in any order, as spirals and hatches do.
+
+The rows of a spiral that follow each other surround all that lies inside, so the upper nodes of a
+tree in their order (`camtool.kernels.box_tree`) all hold every point. Here the leaves take the
+moves along Hilbert's curve through their middles, which stays in a square until it is filled: what
+is near in the list is near in the plane. A node also knows the first and the last row below it.
+
+Nodes are in heap order as there: the root is 1, node i has the children 2i and 2i + 1, each leaf
+holds `LEAF` moves of the order. Made by numpy, in a few turns for each level.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.kernels.box_tree import LEAF
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+FIRST, LAST = 4, 5
+"""Columns of a node after its box: the first row below it, and one past the last."""
+
+LEVELS = 16
+"""Squares are halved so often: the middles are told apart to a 65,536th of the whole."""
+
+
+def move_tree(boxes: Floats) -> tuple[Floats, Ints]:
+    """(2L, 6) nodes over `boxes` (K, 4), and the order (K,) of the rows in their L leaves."""
+    order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))
+    leaves = 1
+    while leaves * LEAF < len(boxes):
+        leaves *= 2
+    # Largest numbers are the least of those with the other sign.
+    lows = np.full((leaves * LEAF, 6), np.inf)
+    lows[: len(order)] = np.column_stack(
+        [boxes[order, :2], -boxes[order, 2:], order, -1.0 - order]
+    )
+    level = lows.reshape(leaves, LEAF, 6).min(axis=1)
+    tree = np.full((2 * leaves, 6), np.inf)
+    while True:
+        tree[len(level) : 2 * len(level)] = level
+        if len(level) == 1:
+            break
+        level = np.minimum(level[::2], level[1::2])
+    return tree * (1.0, 1.0, -1.0, -1.0, 1.0, -1.0), order
+
+
+def hilbert_order(points: Floats) -> Ints:
+    """(K,) rows of `points` (K, 2) as Hilbert's curve through their extents comes to them.
+
+    The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the
+    last the curve is that of the whole with X and Y exchanged, in the last it is mirrored besides.
+    """
+    if len(points) == 0:
+        return np.empty(0, dtype=np.int64)
+    low = points.min(axis=0)
+    size = max(float((points.max(axis=0) - low).max()), np.finfo(np.float64).tiny)
+    x, y = np.minimum((points - low) / size * 2.0**LEVELS, 2.0**LEVELS - 1.0).astype(np.int64).T
+    place = np.zeros(len(points), dtype=np.int64)
+    for level in reversed(range(LEVELS)):
+        right, above = (x >> level) & 1, (y >> level) & 1
+        place = 4 * place + (3 * right ^ above)
+        mirror = -(right & ~above & 1)
+        x, y = x ^ mirror, y ^ mirror
+        x, y = np.where(above == 1, x, y), np.where(above == 1, y, x)
+    return np.argsort(place, kind="stable")
