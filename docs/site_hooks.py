@@ -13,7 +13,7 @@ import click
 
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)#\s]+)[^)]*\)")
 COMMANDS = "reference/commands.md"
-WIDTH = 100
+WIDTH = 92
 """Characters of a line of help."""
 
 
