@@ -50,7 +50,7 @@ def ink(svg: str, zoom: int) -> Picture:
     data = bytes(
         resvg_py.svg_to_bytes(
             svg_string=svg,
-            dpi=96.0,
+            dpi=96,
             zoom=zoom,
             skip_system_fonts=True,
             shape_rendering="crisp_edges",

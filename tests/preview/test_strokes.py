@@ -15,6 +15,9 @@ from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.svg_page import Arc, Line, pieces
 
 FULL = 2.0 * math.pi
+EQUAL_MM = 1e-6
+"""Positions are equal within this (docs/numerics.md): so far an arc may bend beside its box."""
+
 BULGES = st.just(0.0) | st.floats(1e-9, 1.0) | st.floats(-1.0, -1e-9)
 
 
@@ -109,8 +112,8 @@ def test_the_box_holds_all_points_and_is_touched(
         box = chains_box(chains_of(Polylines.of([shape])))
         assert box is not None
         points = sample(shape, 0.05)
-        assert (points >= box[:, 0] - 1e-9).all()
-        assert (points <= box[:, 1] + 1e-9).all()
+        assert (points >= box[:, 0] - EQUAL_MM).all()
+        assert (points <= box[:, 1] + EQUAL_MM).all()
         assert points.min(axis=0) == pytest.approx(box[:, 0], abs=0.05)
         assert points.max(axis=0) == pytest.approx(box[:, 1], abs=0.05)
 
