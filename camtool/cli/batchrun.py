@@ -108,7 +108,7 @@ class Batched:
         tasks = find_tasks(sources, self.out, Manifest(self.out).outputs())
         refuse_overwriting(tasks, self.out, self.work.extensions)
         _make_folder(self.out)
-        with alone_in(self.out) as locked, stoppable() as stop:
+        with stoppable() as stop, alone_in(self.out) as locked:
             if not locked:
                 self._note("warning: --out has no locks: see that no other batch writes there")
             ordered = self._ordered(tasks, job, own_jobs)
