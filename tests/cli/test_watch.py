@@ -94,6 +94,29 @@ def test_a_file_that_is_replaced_is_waited_for(file: Path) -> None:
     ]
 
 
+def test_an_editor_that_saves_by_renaming_is_seen(file: Path, tmp_path: Path) -> None:
+    def saved() -> None:
+        other = tmp_path / ".a.txt.swp"
+        other.write_text("two")
+        other.replace(file)
+
+    assert rounds(file, saved, nothing, nothing) == ["one", "two"]
+
+
+def test_a_file_that_goes_and_one_that_comes_are_changes(file: Path, tmp_path: Path) -> None:
+    job, held = tmp_path / "job.toml", []
+
+    def again() -> int:
+        held.append((file.exists(), job.exists()))
+        return 0
+
+    steps = (file.unlink, nothing, lambda: file.write_text("one"), nothing)
+    days = Days(*steps, lambda: job.write_text(""), nothing, job.unlink, nothing)
+    watch(again, lambda: [str(file), str(job)], quiet=True, wait=days)
+    there, gone, with_job = (True, False), (False, False), (True, True)
+    assert held == [there, gone, there, with_job, there]
+
+
 def test_a_change_while_it_runs_is_seen(file: Path) -> None:
     held: list[str] = []
 
