@@ -1,6 +1,6 @@
 """Many drawings: which ones, what is up to date, and processes that make the rest.
 
-    inputs.find_tasks     folders, patterns and files → a Task for each drawing, no two to one output
+    inputs.find_tasks     folders, patterns, files → a Task for each drawing, no two to one output
     lock.alone_in         one batch at a time in an output folder
     manifest.Manifest     what an output folder holds, and of what it was made
     pool.LocalPool        processes of this computer: one may die, and the others go on

@@ -31,7 +31,8 @@ class Task:
 class Made:
     """What a Work made of a drawing. `files` by extension, none when there is an `error`;
     `content` is the digest of the drawing's bytes that it was made of; `figures` are a few
-    numbers for the summary; `remarks` are findings, one line each, errors first."""
+    numbers for the summary; `remarks` are findings, one line each, errors first; `code` is that
+    of the finding which is the error, "" for another one."""
 
     content: str = ""
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -40,6 +41,7 @@ class Made:
     warnings: int = 0
     figures: Mapping[str, float] = field(default_factory=dict)
     seconds: float = 0.0
+    code: str = ""
 
 
 class Work(Protocol):
@@ -84,3 +86,4 @@ class Outcome:
     warnings: int = 0
     figures: Mapping[str, float] = field(default_factory=dict)
     seconds: float = 0.0
+    code: str = ""

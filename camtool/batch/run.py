@@ -102,6 +102,7 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
         made.warnings,
         made.figures,
         made.seconds,
+        made.code,
     )
 
 

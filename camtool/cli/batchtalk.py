@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 LISTED = 50
 """So many rows of the table are shown; the JSON summary has all."""
 
+CODES = 3
+"""So many of the findings that made drawings fail are counted in the last line."""
+
 COLOUR = {State.FAILED: "red", State.MADE: "yellow", State.UP_TO_DATE: "yellow"}
 """Of a row of the table: what was made stands there for its warnings."""
 
@@ -156,6 +159,10 @@ def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> 
         _lines(failed)
     counts = Counter(each.state for each in outcomes)
     parts = [f"{counts[state]} {state.value}" for state in State if counts[state]]
+    codes = Counter(each.code for each in failed if each.code).most_common(CODES)
+    if codes:
+        why = ", ".join(f"{number} {code}" for code, number in codes)
+        parts = [f"{part} ({why})" if part.endswith(" failed") else part for part in parts]
     made = counts[State.MADE]
     rate = f", {made / seconds:.1f} made a second" if made and seconds > 0.0 else ""
     warnings = f"; {len(warned)} with warnings (-v shows them)" if warned else ""
@@ -251,7 +258,8 @@ def _say_more(rows: int) -> None:
 def _why(outcome: Outcome) -> str:
     """The error, or else the first remark, without the drawing's name, which stands before it."""
     why = one_line(outcome.error or next(iter(outcome.remarks), ""))
-    return why.removeprefix(f"{one_line(outcome.source)}: ")
+    why = why.removeprefix(f"{one_line(outcome.source)}: ")
+    return why.removeprefix("error " if outcome.code else "warning ")
 
 
 def _progress() -> Progress:

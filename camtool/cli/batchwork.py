@@ -151,7 +151,9 @@ def _said(task: Task, posted: Posted) -> Made:
     if not posted.failed and posted.program is not None:
         return made
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return replace(made, error=f"{remarks[0]}{more}" if errors else f"{task.source}: no program")
+    if not errors:
+        return replace(made, error=f"{task.source}: no program")
+    return replace(made, error=f"{remarks[0]}{more}", code=errors[0].code.name)
 
 
 def _figures(posted: Posted) -> dict[str, float]:

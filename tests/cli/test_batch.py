@@ -157,8 +157,11 @@ def test_findings_are_failures_and_old_files_stay(
     flags = ("batch", "drawings/letter.svg", *PIC)
     assert camtool(*flags).returncode == 0
     before = (tmp_path / "build" / "letter.pic").read_bytes()
-    done = camtool(*flags, "--max-error", "0.001um")
+    done = camtool(*flags, "--max-error", "0.001um", "--json", "-")
     assert done.returncode == 1
+    (row,) = json.loads(done.stdout)["drawings"]
+    assert f"1 drawing: 1 failed (1 {row['code']}); " in done.stderr.decode()
+    assert f"drawings/letter.svg | {row['code']} " in done.stderr.decode()
     assert (tmp_path / "build" / "letter.pic").read_bytes() == before
 
 
