@@ -24,13 +24,13 @@ from camtool.preview.legend import Entry
 from camtool.preview.marks import Group
 from camtool.preview.options import AS_USUAL, Options
 from camtool.preview.page import (
-    BAR_ROOM,
     HEAD_GAP,
     LEGEND_DROP,
     Page,
     fitted,
     foot_of,
     sheet,
+    table_of,
 )
 from camtool.preview.render import rendered
 from camtool.preview.scene import Scene
@@ -63,12 +63,11 @@ def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
     grid, views = _views(contents, options)
     view, ticks = views[0], axes.ticks_of(views[0])
     panels = [
-        panel(content, Page(head, own, ticks, [], 0.0, 0.0))
+        panel(content, Page(head, own, ticks, [], 0.0, 0.0, 0.0))
         for content, head, own in zip(contents, grid.heads, views, strict=True)
     ]
     plots = grid.around([own.box for own in views])
-    room = plots.width - axes.scale_bar_width(view) - BAR_ROOM
-    table = legend.rows(_entries(contents, view), room, plots.width)
+    table, bar_y = table_of(_entries(contents, view), view, plots)
     legend_y = plots.bottom + LEGEND_DROP
     top_um = _top_um(contents)
     return sheet(
@@ -78,7 +77,7 @@ def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
         *grid.placed(panels),
         "" if top_um is None else legend.colour_bar(top_um, plots),
         legend.legend(table, plots.left, legend_y),
-        axes.scale_bar(view, plots.right, legend_y),
+        axes.scale_bar(view, plots.right, bar_y),
     )
 
 

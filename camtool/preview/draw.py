@@ -93,12 +93,13 @@ def _plot(content: Content, view: View) -> list[str]:
         layers.append(marks.dots("starts", content.starts.tolist(), view, marks.start_look()))
         plunges = strokes.plunges.tolist()
         layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
-        if "order" in content.shown:
-            layers.append(numbers.order(numbers.placed(strokes.starts.tolist(), view)))
     if content.zero_shown(view):
         layers.append(marks.origin(view.page(0.0, 0.0)))
     for name, _, places, look in content.places.looks():
         layers.append(marks.dots(name, places.tolist(), view, look))
+    if strokes is not None and trace is None and "order" in content.shown:
+        starts = strokes.starts.tolist()
+        layers.append(numbers.order(numbers.placed(starts, view, numbers.every(len(starts)))))
     layers.append(numbers.worst(numbers.placed(content.worst.tolist(), view)))
     if content.is_empty:
         middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
@@ -142,5 +143,5 @@ def _beside(content: Content, page: Page) -> list[str]:
     if content.trace is not None:
         parts.append(legend.colour_bar(content.trace.top_um, box))
     parts.append(legend.legend(page.rows, box.left, page.legend_y))
-    parts.append(axes.scale_bar(page.view, box.right, page.legend_y))
+    parts.append(axes.scale_bar(page.view, box.right, page.bar_y))
     return parts

@@ -100,6 +100,19 @@ def rows(entries: Sequence[Entry], first: float, room: float) -> list[list[Entry
     return found
 
 
+def table_of(entries: Sequence[Entry], bar: float, room: float) -> tuple[list[list[Entry]], int]:
+    """The rows, and which of them ends with something `bar` wide: the first where an entry fits
+    beside it, else the last with room for it, else one of its own."""
+    first = room - bar
+    if not entries or entries[0].width - ENTRY_GAP <= first:
+        return rows(entries, first, room), 0
+    found = rows(entries, room, room)
+    for row in reversed(range(len(found))):
+        if sum(entry.width for entry in found[row]) - ENTRY_GAP <= first:
+            return found, row
+    return [[], *found], 0
+
+
 def legend(table: Sequence[Sequence[Entry]], left: float, middle: float) -> str:
     """The rows of the legend, the first centred on height `middle`."""
     parts = []
@@ -162,7 +175,7 @@ def bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
         for value in multiples(0.0, top_um, step)
         if value <= top_um - room
     ]
-    return [*labels, (top_um, number(top_um, max(0, 2 - math.floor(math.log10(top_um)))))]
+    return [*labels, (top_um, number(top_um, max(2, 2 - math.floor(math.log10(top_um)))))]
 
 
 def bar_width(top_um: float, height: float) -> float:

@@ -41,6 +41,10 @@ THINNEST = 0.5
 
 ARROW_LENGTH, ARROW_WIDTH = 18.0, 6.5
 ARROW_EVERY = 900.0
+ARROWS_APART = 60.0
+"""An arrow nearer than this to another is left out: passes at several depths lie over each
+other."""
+
 SHORTEST_WITH_ARROW = 90.0
 MOST_WITH_ARROW, MOST_ON_ONE = 150, 4
 MARKS_OF_FULL_SIZE = 120
@@ -170,6 +174,8 @@ def dots(name: str, points: Iterable[tuple[float, float]], view: View, look: Loo
         return ""
     shrink = max(math.sqrt(min(MARKS_OF_FULL_SIZE / len(shown), 1.0)), SMALLEST_MARK)
     line = {key: value for key, value in look.items() if key != "r"}
+    if "stroke-width" in line:
+        line["stroke-width"] = round(float(line["stroke-width"]) * shrink, 3)
     radius = number(float(look["r"]) * shrink)
     marks = [element("circle", {"cx": number(x), "cy": number(y), "r": radius}) for x, y in shown]
     return element("g", {"id": name, **line}, *marks)
@@ -204,13 +210,15 @@ def arrows(chains: Sequence[Chain], view: View) -> str:
     """Few arrows, in the direction of travel: none on short chains, four at most on one."""
     lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
     long = [index for index, length in enumerate(lengths) if length >= SHORTEST_WITH_ARROW]
-    data = PathData()
+    data, taken = PathData(), list[tuple[float, float]]()
     for index in long[:: 1 + len(long) // MOST_WITH_ARROW]:
         wanted = min(1 + int(lengths[index] / ARROW_EVERY), MOST_ON_ONE)
         for place in range(wanted):
             point, heading = _along(chains[index], place / wanted, (place + 1) / wanted)
-            if view.shows(*point):
-                _arrow(data, view.page(*point), -heading)
+            at = view.page(*point)
+            if view.shows(*point) and all(math.dist(at, one) >= ARROWS_APART for one in taken):
+                _arrow(data, at, -heading)
+                taken.append(at)
     if not data:
         return ""
     return element("g", {"id": "arrows"}, element("path", {"d": str(data), "fill": FEED}))

@@ -6,14 +6,14 @@ that finds no room is left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from camtool.preview import text
 from camtool.preview.colours import GAP, INK, PLOT
 from camtool.preview.svg import Look, element, number
 from camtool.preview.text import Style
-from camtool.preview.view import View
+from camtool.preview.view import View, round_step
 
 CAP = 12.0
 """Height of the digits on the page."""
@@ -25,6 +25,9 @@ AWAY = 9.0
 CLEAR = 3.0
 MOST = 400
 """No more numbers are tried."""
+
+MOST_ALL = 100
+"""Of more contours than this only every 2nd, 5th, 10th … has its number."""
 
 DIRECTIONS = ((1.0, -1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 RING = 8.0
@@ -40,13 +43,19 @@ class Number:
     box: tuple[float, float, float, float]
 
 
-def placed(
-    places: Iterable[tuple[float, float]], view: View, taken: Iterable[Number] = ()
-) -> list[Number]:
-    """Numbers from 1 at places in mm, none over another or over those that are `taken`."""
+def every(count: int) -> int:
+    """How far apart the numbers of so many contours are."""
+    return 1 if count <= MOST_ALL else round(round_step(count / MOST_ALL))
+
+
+def placed(places: Sequence[tuple[float, float]], view: View, step: int = 1) -> list[Number]:
+    """Numbers from 1 at places in mm, or the first and each that `step` divides, none over
+    another."""
     found: list[Number] = []
-    boxes = [one.box for one in taken]
-    for index, place in zip(range(MOST), places, strict=False):
+    boxes: list[tuple[float, float, float, float]] = []
+    indices = [k for k in range(len(places)) if k == 0 or (k + 1) % step == 0]
+    for index in indices[:MOST]:
+        place = places[index]
         if not view.shows(*place):
             continue
         name, at = str(index + 1), view.page(*place)

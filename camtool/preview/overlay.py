@@ -19,13 +19,13 @@ from camtool.preview.content import cropped
 from camtool.preview.legend import Entry, line_swatch
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options
 from camtool.preview.page import (
-    BAR_ROOM,
     HEAD_GAP,
     LEGEND_DROP,
     fitted,
     foot_of,
     mat,
     sheet,
+    table_of,
 )
 from camtool.preview.render import rendered
 from camtool.preview.strokes import strokes_of
@@ -64,8 +64,7 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
     window = overlay.window if options.crop_mm is None else cropped(*options.crop_mm)
     shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
     view, ticks = fitted(window, down + HEAD_GAP, page, shapes)
-    room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
-    table = legend.rows(_entries(overlay), room, view.box.width)
+    table, bar_y = table_of(_entries(overlay), view, view.box)
     legend_y = view.box.bottom + LEGEND_DROP
     sizes = (page, foot_of(table, legend_y))
     return sheet(
@@ -78,7 +77,7 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
         head,
         axes.axes(view, ticks),
         legend.legend(table, view.box.left, legend_y),
-        axes.scale_bar(view, view.box.right, legend_y),
+        axes.scale_bar(view, view.box.right, bar_y),
     )
 
 

@@ -4,7 +4,7 @@ page itself."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,14 +45,15 @@ FITS = 3
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """`head` is ready; the legend's first row is centred on `legend_y`; `width` and
-    `height` of the whole."""
+    """`head` is ready; the legend's first row is centred on `legend_y`, the
+    scale bar on `bar_y`; `width` and `height` of the whole."""
 
     head: str
     view: View
     ticks: Ticks
     rows: list[list[Entry]]
     legend_y: float
+    bar_y: float
     height: float
     width: float = PAGE
 
@@ -68,10 +69,16 @@ def page_of(content: Content, width: float = PAGE) -> Page:
         return 0.0 if trace is None else legend.bar_width(trace.top_um, view.box.height)
 
     view, ticks = fitted(content.window, top, width, shapes, bar)
-    room = view.box.width - axes.scale_bar_width(view) - BAR_ROOM
-    table = legend.rows(entries_of(content, view), room, view.box.width)
+    table, bar_y = table_of(entries_of(content, view), view, view.box)
     legend_y = view.box.bottom + LEGEND_DROP
-    return Page(head, view, ticks, table, legend_y, foot_of(table, legend_y), width)
+    return Page(head, view, ticks, table, legend_y, bar_y, foot_of(table, legend_y), width)
+
+
+def table_of(entries: Sequence[Entry], view: View, plots: Box) -> tuple[list[list[Entry]], float]:
+    """The rows of the legend below the plots, and the middle of the view's scale bar in them."""
+    bar = axes.scale_bar_width(view) + BAR_ROOM
+    table, row = legend.table_of(entries, bar, plots.width)
+    return table, plots.bottom + LEGEND_DROP + row * legend.ROW_STEP
 
 
 def fitted(

@@ -6,11 +6,15 @@ The true text always stays in the label's `<title>` and `aria-label`.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from camtool.geometry.strokes import BASELINE, BOX, CAP_UNITS, Glyph, glyph
 from camtool.preview.colours import INK
 from camtool.preview.svg import Look, PathData, element, one_line, title
+
+_UNIT = re.compile(r" (?!\(?(?:µm|mm|h)\b)")
+"""Blanks to break at: not those between a number and its unit."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +47,10 @@ def shortened(text: str, cap: float, limit: float) -> str:
 
 
 def wrapped(text: str, cap: float, limit: float) -> list[str]:
-    """`text` as lines no wider than `limit`, broken at blanks; a longer word is shortened."""
+    """`text` as lines no wider than `limit`, broken at blanks but not before a unit; a longer word
+    is shortened."""
     lines: list[str] = []
-    for word in one_line(text).split():
+    for word in _UNIT.split(one_line(text)):
         longer = f"{lines[-1]} {word}" if lines else word
         if lines and width(longer, cap) <= limit:
             lines[-1] = longer

@@ -407,3 +407,18 @@ def test_points_alone_are_a_picture() -> None:
     alone = replace(drawing_of([], []), marks=(Mark((1.0, 2.0), "0", "", "POINT 1"),))
     root = svg_page.parse(draw(Scene(drawing=alone)))
     assert len(named(root, "points")) == 1
+
+
+@pytest.mark.parametrize("size", [400, 1000])
+def test_the_scale_bar_has_a_row_to_itself_only_when_it_must(size: int) -> None:
+    root = svg_page.parse(draw(SCENES["no error"], size_px=size))
+    bar, legend = named(root, "scale-bar"), named(root, "legend")
+    rows = {
+        float(g.attrib["transform"].split()[1][:-1]) for g in legend if "transform" in g.attrib
+    }
+    ends = svg_page.pieces(bar[1].attrib["d"])
+    middle = next(piece.begin[1] for piece in ends if piece.begin[1] == piece.end[1])
+    assert middle in rows
+    boxes = svg_page.label_boxes(legend).values()
+    left = min(piece.begin[0] for piece in ends)
+    assert all(box[2] < left for box in boxes if abs(box[1] + box[3] - 2.0 * middle) < 30.0)

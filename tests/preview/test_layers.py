@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from camtool.errors import OptionError
+from camtool.geometry.drawing import Gap
 from camtool.preview.content import content_of
 from camtool.preview.draw import Scene, draw, scene_of_toolpath
 from camtool.preview.layers import LAYERS, USUAL, chosen
 from camtool.preview.missing import missing_layers
-from camtool.preview.numbers import CLEAR, placed
+from camtool.preview.numbers import CLEAR, every, placed
 from camtool.preview.options import Options
 from camtool.preview.page import page_of
 from camtool.preview.turns import turns_of
@@ -189,3 +190,49 @@ def test_turns_are_those_of_the_literal_loop(seed: int) -> None:
 def test_pictures_of_all_layers_are_drawn() -> None:
     scene = scene_of_toolpath(followed(drawing_of([circle(1.0, 1.0, 1.0)], ["0"])), title="all")
     assert draw(scene, options=Options(layers=frozenset(LAYERS)))
+
+
+def rows_of_marks(count: int) -> Scene:
+    b = ToolpathBuilder().rapid(z=1.0)
+    for k in range(count):
+        b.rapid(float(k % 40), float(k // 40)).line(z=-1.0, feed=5.0)
+        b.line(k % 40 + 0.5, feed=5.0).rapid(z=1.0)
+    return Scene("marks", toolpath=b.finish())
+
+
+def test_of_very_many_contours_some_are_numbered() -> None:
+    root = svg_page.parse(draw(rows_of_marks(1200), options=Options(size_px=4000)))
+    order = svg_page.group(root, "order")
+    assert order is not None
+    shown = [int(g.attrib["aria-label"]) for g in order if "aria-label" in g.attrib]
+    assert shown[0] == 1
+    assert len(shown) > 30
+    assert all(number % 20 == 0 for number in shown[1:])
+    assert (every(100), every(101), every(7000)) == (1, 2, 100)
+
+
+def test_rims_of_marks_shrink_with_them() -> None:
+    root = svg_page.parse(draw(rows_of_marks(1200)))
+    plunges = svg_page.group(root, "plunges")
+    assert plunges is not None
+    radius, rim = float(plunges[0].attrib["r"]), float(plunges.attrib["stroke-width"])
+    assert radius / rim == pytest.approx(5.0 / 1.6, rel=0.02)
+
+
+def test_numbers_lie_over_all_other_marks() -> None:
+    gapped = drawing_of([circle(2.5, 2.5, 1.0)], ["0"], (Gap((3.5, 2.5), 0.1, ""),))
+    svg = draw(
+        replace(SCENES["toolpath"], drawing=gapped), options=Options(layers=frozenset(LAYERS))
+    )
+    marks = ("plunges", "reversals", "arrows", "part-zero", "gaps")
+    assert svg.index('id="order"') > max(svg.index(f'id="{name}"') for name in marks)
+
+
+def test_arrows_of_passes_over_each_other_are_left_out() -> None:
+    b = ToolpathBuilder()
+    for depth, (low, high) in enumerate([(0.0, 10.0), (0.1, 9.9), (0.2, 9.8)]):
+        b.rapid(z=1.0).rapid(low, 0.0).line(z=-1.0 - depth, feed=5.0).line(high, 0.0, feed=5.0)
+    svg = draw(Scene("passes", toolpath=b.rapid(z=1.0).finish()))
+    arrows = svg_page.group(svg_page.parse(svg), "arrows")
+    assert arrows is not None
+    assert arrows[0].attrib["d"].count("M") == 1

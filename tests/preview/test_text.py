@@ -74,3 +74,11 @@ def test_shortened_and_wrapped_text_fits(words: str, limit: float) -> None:
 
 def test_blank_text_has_no_strokes() -> None:
     assert "<path" not in text.label(" \n", (0.0, 0.0), Style())
+
+
+def test_a_unit_stays_with_its_number() -> None:
+    words = "error 14.95 µm at most, 3 mm, about (1, 2) (µm) and 2:10 h"
+    for limit in range(80, 700, 10):
+        lines = text.wrapped(words, 13.0, float(limit))
+        assert not any(line.lstrip("(").startswith(("µm", "mm", "h ")) for line in lines)
+        assert " ".join(lines).count("…") or " ".join(lines) == words
