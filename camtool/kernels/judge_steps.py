@@ -1,8 +1,8 @@
 """Whole rows of the PIC18F8720's program, run and judged in one go, block by block.
 
-A leg is what one interpolator makes: a line of X and Y, an arc, or a line of Z. Its positions go
-to a small buffer, the slides follow (`camtool.kernels.play_blocks`), and the block is judged
-(`camtool.kernels.judge`) before the next one is made: nothing is kept of the steps themselves.
+The positions of a leg (`camtool.kernels.leg_steps`) go to a small buffer, the slides follow
+(`camtool.kernels.play_blocks`), and the block is judged (`camtool.kernels.judge`) before the next
+one is made: nothing is kept of the steps themselves.
 
 An arc runs until it stands on its end. One that passes it must stop at its nearest approach, so
 near the end, on the turn that is expected, the arc is first run ahead to see what becomes of it
@@ -23,31 +23,36 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.kernels.approach import approach_scan, expected_quadrants
-from camtool.kernels.compiled import bare, inner, kernel
-from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
-from camtool.kernels.direct_search import direct_search_fill, direct_search_start
-from camtool.kernels.heading import rounded_radius
+from camtool.kernels.compiled import bare, kernel
 from camtool.kernels.judge import BENCH_ROWS, BLOCK, SLIDE_X, Sums, Task, X, judge_block
+from camtool.kernels.leg_steps import (
+    ARC,
+    CW,
+    DDA,
+    DEPTH,
+    DSM,
+    END_X,
+    END_Y,
+    FROM_X,
+    FROM_Y,
+    KIND,
+    LINE,
+    ORIGIN_X,
+    ORIGIN_Y,
+    ROW,
+    SIGN_X,
+    SIGN_Y,
+    STATE,
+    A,
+    B,
+    fill_leg,
+    start_leg,
+    turn_round,
+)
 from camtool.kernels.play_blocks import STILL, TURNING, play_block, way_of
-from camtool.kernels.stairs import stairs_fill, stairs_start
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
-
-ROW, KIND, FROM_X, FROM_Y, A, B, ORIGIN_X, ORIGIN_Y, SIGN_X, SIGN_Y, END_X, END_Y, CW = range(13)
-"""Columns of a leg, in steps: the row; what it is; where X and Y stand before; how far a line
-goes (of Z: in A, its sign in CW), or where an arc starts about its centre; the start of a
-line or the centre of an arc, and the signs that its positions are taken with; the end of an arc
-about its centre; whether it is clockwise."""
-
-LEG_COLUMNS = 13
-"""How many columns."""
-
-LINE, ARC, DEPTH = range(3)
-"""Kinds of legs."""
-
-DSM, STAIRS, DDA = range(3)
-"""Methods of arcs."""
 
 SAMPLES, PASSES, STEPS, REVERSALS, ENDED = 0, 1, 2, 5, 8
 """Columns of the counts of a leg: samples, passes, steps X Y Z, reversals X Y Z, ended."""
@@ -68,10 +73,6 @@ RUN_AHEAD = 1 << 12
 """Positions that are looked at in one go when an arc is run ahead."""
 
 
-STATE = 8
-"""Numbers of a state: as many as the method with the longest one has."""
-
-
 class Room(NamedTuple):
     """Arrays to work in: bench of the judge; path (2 · `RUN_AHEAD`,) steps; the state (8,) of an
     interpolator and a copy of it; tracker (6,) and registers (2,) of what runs."""
@@ -90,43 +91,6 @@ def _copy(from_: Ints, to: Ints) -> None:
         to[k] = from_[k]
 
 
-@inner
-def _start(leg: Ints, method: int, rounded: bool, state: Ints) -> None:
-    """Set the state (8,) to the start of a leg; that of a line is where its counters are."""
-    for k in range(len(state)):
-        state[k] = 0
-    if leg[KIND] != ARC:
-        return
-    x, y, clockwise = leg[A], leg[B], leg[CW] != 0
-    error = x * x + y * y - rounded_radius(x, y) ** 2 if rounded else 0
-    if method == DSM:
-        begun = direct_search_start(x, y, clockwise, error)
-    elif method == STAIRS:
-        begun = stairs_start(x, y, clockwise, error)
-    else:
-        begun = dda_arc_start(x, y, clockwise)
-    for k in range(len(begun)):
-        state[k] = begun[k]
-
-
-@bare
-def _fill(
-    leg: Ints, method: int, state: Ints, registers: Floats, out: Ints
-) -> tuple[int, int, bool]:
-    """Rows filled, passes run, whether the last one is the end."""
-    if leg[KIND] != ARC:
-        filled, passes, met = dda_line_fill(leg[A], leg[B], registers, state, out)
-    elif method == DDA:
-        filled, passes, met = dda_arc_fill(state, leg[END_X], leg[END_Y], out)
-    elif method == DSM:
-        filled, met = direct_search_fill(state, leg[END_X], leg[END_Y], out)
-        passes = filled
-    else:
-        filled, met = stairs_fill(state, leg[END_X], leg[END_Y], out)
-        passes = filled
-    return filled, passes, met
-
-
 @bare
 def _run_ahead(
     leg: Ints, method: int, entered: int, window: tuple[int, int], room: Room
@@ -142,7 +106,7 @@ def _run_ahead(
     size = min(RUN_AHEAD, 8 * (max(abs(leg[A]), abs(leg[B])) + 1))
     buffer, registers = room.path[: 2 * size].reshape(2, size).T, room.registers
     while True:
-        filled, _, met = _fill(leg, method, state, registers, buffer)
+        filled, _, met = fill_leg(leg, method, state, registers, buffer)
         approach_scan(buffer[:filled], end, tracker, low, high)
         if tracker[2] > high:
             return tracker[4], False
@@ -227,18 +191,6 @@ def _follow(
 
 
 @bare
-def _turn_round(leg: Ints, path_x: Ints, path_y: Ints) -> None:
-    """Give the positions of a line their signs; a line of Z leaves X and Y where they are."""
-    sign_x, sign_y = leg[SIGN_X], leg[SIGN_Y]
-    if leg[KIND] == DEPTH:
-        sign_x = sign_y = 0
-    for k in range(len(path_x)):
-        path_x[k] *= sign_x
-    for k in range(len(path_y)):
-        path_y[k] *= sign_y
-
-
-@bare
 def _deepen(leg: Ints, state: Floats, counts: Ints) -> None:
     """Count a leg of Z, whose `state` (6,) need not say where the slide is."""
     counts[STEPS + 2] = leg[A]
@@ -274,7 +226,7 @@ def judge_legs(
     for number in range(len(legs)):
         leg, count = legs[number], counts[number]
         if leg[KIND] != ARC or leg[A] != 0 or leg[B] != 0:
-            _start(leg, method, rounded, room.state)
+            start_leg(leg, method, rounded, room.state)
             _judge_leg(leg, method, step_mm, mechanics, count, task, sums, room)
 
 
@@ -308,10 +260,10 @@ def _judge_leg(
         _copy(room.state, room.other)
         size = BLOCK if left < 0 or left >= BLOCK else left
         buffer = room.path[: 2 * size].reshape(2, size).T
-        filled, passes, met = _fill(leg, method, room.state, room.registers, buffer)
+        filled, passes, met = fill_leg(leg, method, room.state, room.registers, buffer)
         path_x, path_y = buffer[:, 0][:filled], buffer[:, 1][:filled]
         if not arc:
-            _turn_round(leg, path_x, path_y)
+            turn_round(leg, path_x, path_y)
         way_x, way_y = _ways(leg, method, (room.other, room.state), (at_x, at_y), buffer[:filled])
         if left >= 0:
             left -= filled

@@ -37,7 +37,7 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
 def legs_of(toolpath: Toolpath, places: Ints, centres: Ints) -> Ints:
     """(L, 13) legs of `camtool.kernels.judge_steps` of all rows; `places` (N + 1, 3) of
     `positions`, `centres` (N, 2) steps."""
-    from camtool.kernels import judge_steps as columns
+    from camtool.kernels import leg_steps as columns
 
     count = len(toolpath)
     begin, way = places[:-1], np.diff(places, axis=0)
@@ -90,30 +90,31 @@ class JudgedSteps:
 
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
         """Run the rows low:high, which follow those run before, and judge them."""
-        from camtool.kernels import judge_steps as columns
+        from camtool.kernels import judge_steps as judging
+        from camtool.kernels import leg_steps as columns
 
         method, rounded, by_event, step_mm = self._how
         first, last = np.searchsorted(self._legs[:, columns.ROW], [low, high])
         legs = self._legs[first:last]
-        counts = np.zeros((len(legs), columns.COUNT_COLUMNS), dtype=np.int64)
+        counts = np.zeros((len(legs), judging.COUNT_COLUMNS), dtype=np.int64)
         number = {"dsm": columns.DSM, "stairs": columns.STAIRS, "dda": columns.DDA}[method]
         mechanics = self._mechanics.axes, self._mechanics.states
-        columns.judge_legs(legs, (number, rounded), step_mm, mechanics, counts, task, sums)
+        judging.judge_legs(legs, (number, rounded), step_mm, mechanics, counts, task, sums)
         row = legs[:, columns.ROW] - low
         deep = (legs[:, columns.KIND] == columns.DEPTH).astype(np.int64)
-        reversals = counts[:, columns.REVERSALS : columns.REVERSALS + 3]
+        reversals = counts[:, judging.REVERSALS : judging.REVERSALS + 3]
         added = reversals @ self._mechanics.compensation_steps
-        outputs = counts[:, columns.SAMPLES if by_event else columns.PASSES]
+        outputs = counts[:, judging.SAMPLES if by_event else judging.PASSES]
         period_s = self._periods_s[low + row, deep]
         count = high - low
-        missed = np.bincount(row[counts[:, columns.ENDED] == 0], minlength=count)
-        steps = counts[:, columns.STEPS : columns.STEPS + 3]
+        missed = np.bincount(row[counts[:, judging.ENDED] == 0], minlength=count)
+        steps = counts[:, judging.STEPS : judging.STEPS + 3]
         return Ledger(
             row=np.arange(low, high),
             duration_s=self._still_s[low:high]
             + np.bincount(row, (outputs + added) * period_s, minlength=count),
             compensation_s=np.asarray(np.bincount(row, added * period_s, minlength=count) * 1.0),
-            iterations=_summed(row, counts[:, columns.PASSES : columns.PASSES + 1], count)[:, 0],
+            iterations=_summed(row, counts[:, judging.PASSES : judging.PASSES + 1], count)[:, 0],
             steps=_summed(row, steps, count),
             reversals=_summed(row, reversals, count),
             ended=missed == 0,
