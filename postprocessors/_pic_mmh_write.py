@@ -9,7 +9,6 @@ step position: a block is sent only when it moves that position, and every arc i
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from camtool.findings import Finding
 from camtool.machine.controllers import PicMmhController
 from camtool.machine.model import Machine, controller_of
 from camtool.toolpath.lower import helices_to_steps, slope_step_mm
-from camtool.toolpath.moves import Kind, Move, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 
 from ._pic_mmh_arcs import (
@@ -33,12 +32,11 @@ from ._pic_mmh_arcs import (
     turned_rad,
     unwrapped_rad,
 )
+from ._pic_mmh_block import WORD
 from ._pic_mmh_format import SAY, Floats, Grid
 from ._pic_mmh_notes import Notes, too_long
 from ._pic_mmh_numbers import check_motion, event_words, numbers_of, place
 from ._pic_mmh_options import dialect_of
-
-WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
 
 XY = tuple[int, int]
 
@@ -54,37 +52,6 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
         row_of_block=np.array(writer.rows, dtype=np.int64),
         findings=writer.findings(),
     )
-
-
-def format_block(move: Move, machine: Machine) -> str:
-    """One motion as the block that says it, without planning where its arc would end.
-
-    PostError when the move is no motion, or needs two blocks (XY and Z).
-    """
-    single = Toolpath(
-        kind=np.array([move.kind]),
-        end=np.array([move.end]),
-        centre=np.array([move.centre or (math.nan, math.nan)]),
-        feed=np.array([math.nan if move.feed is None else move.feed]),
-        value=np.array([math.nan]),
-        source=np.array([-1]),
-        block=np.array([-1]),
-        start=np.zeros(3),
-    )
-    flat, tall = move.end[:2] != move.start[:2], move.end[2] != move.start[2]
-    if move.kind > Kind.ARC_CCW or (tall and (flat or move.centre)):
-        raise PostError("this is not one block", where=f"move {move.index}")
-    dialect = dialect_of(machine)
-    numbers = numbers_of(single, machine, dialect)
-    say = SAY[dialect.form]
-    x, y, z = (say(units) for units in numbers.end_units[0])
-    tail = numbers.feed_words[0]
-    if tall:
-        return f"{WORD[move.kind]}Z{z}{tail};"
-    centre = "".join(
-        f"{name}{say(units)}" for name, units in zip("IJ", numbers.centre_units[0], strict=True)
-    )
-    return f"{WORD[move.kind]}X{x}Y{y}{centre if move.centre else ''}{tail};"
 
 
 class _Writer:

@@ -38,7 +38,7 @@ class PicMmhPost:
 
     def format_block(self, move: Move, machine: Machine) -> str:
         """One motion as its block, without planning where its arc would end."""
-        from ._pic_mmh_write import format_block
+        from ._pic_mmh_block import format_block
 
         return format_block(move, machine)
 
