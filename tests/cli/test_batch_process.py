@@ -93,25 +93,41 @@ def assert_little_is_loaded(folder: Path) -> None:
     assert done.stdout == "[]\n"
 
 
-def test_a_terminal_gets_a_bar(tmp_path: Path, many: Path) -> None:
-    (many / "junk.dxf").write_text("junk\n")
+def on_a_terminal(folder: Path, code: int) -> str:
+    """What the command says on a terminal of 120 columns."""
     ours, theirs = pty.openpty()
     environment = {**os.environ, "COLUMNS": "120", "TERM": "xterm"}
+    environment.pop("NO_COLOR", None)
     command = [*COMMAND, "--no-verify"]
     said = b""
-    with running_in(tmp_path, args=command, stderr=theirs, env=environment) as running:
+    with running_in(folder, args=command, stderr=theirs, env=environment) as running:
         os.close(theirs)
         with suppress(OSError):  # the terminal's other end is closed
             while chunk := os.read(ours, 65536):
                 said += chunk
         os.close(ours)
-        assert running.wait() == 1
-    text = said.decode()
+        assert running.wait() == code
+    return said.decode()
+
+
+def test_a_terminal_gets_a_bar_and_a_table(tmp_path: Path, many: Path) -> None:
+    junk = many / "[red]junk with a name so long that its failure does not fit into a line.dxf"
+    junk.write_text("junk\n")
+    text = on_a_terminal(tmp_path, 1)
     assert "13/13" in text
     assert "1 failed" in text
     assert "/s" in text
     assert "13 drawings: 12 made, 1 failed" in text
     assert "made: drawings" not in text
+    (short,) = (line for line in text.splitlines() if "failed: drawings/[red]junk" in line)
+    assert "…" in short
+    (row,) = (line for line in text.splitlines() if "│" in line and "[red]junk" in line)
+    assert "\x1b[31m" in row, "in red"
+    assert "drawings/" not in row, "what all have in common is told once"
+    junk.unlink()
+    text = on_a_terminal(tmp_path, 0)
+    assert "12 drawings: 12 up to date" in text
+    assert "━" not in text, "there was nothing to wait for"
 
 
 def outputs_in(out: Path) -> dict[str, bytes]:
