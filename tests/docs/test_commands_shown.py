@@ -1,9 +1,8 @@
 """Every command line that a page shows is one that camtool takes.
 
-Blocks `sh`, `console` and those without a language are read for lines that begin with `camtool`;
-what stands behind three spaces or more is a remark. The commands parse them, and nothing is run
-here; `test_examples.py` runs what pages show with its output, and
-`test_lines_about_samples_run` what is shown without.
+Blocks `sh`, `console`, `make` and those without a language are read for lines that begin with
+`camtool`; what stands behind three spaces or more is a remark. The commands parse them.
+`test_examples.py` runs what pages show with its output, `test_lines_run` what is shown without.
 """
 
 import re
@@ -25,7 +24,9 @@ from tests.docs.test_examples import ROOT, shell
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<!`)`(camtool [^`\n]+)`(?!`)")
-LANGUAGES = ("", "sh", "console")
+LANGUAGES = ("", "sh", "console", "make")
+MAKE_NAME = re.compile(r"\$(?:\(\w+\)|[<@*])")
+FILTER = re.compile(r"^\w+ = (camtool filter .*)")
 REMARK = re.compile(r" {3,}(?=\S)")
 SHELL = set("|&;<>()")
 ARROW = "▶"
@@ -53,7 +54,8 @@ def lines_of(name: str, text: str) -> Iterator[Line]:
             continue
         block = match[3].replace("\\\n", " ")
         for line in block.splitlines():
-            line = line.strip().removeprefix("$ ")
+            line = MAKE_NAME.sub("NAME", line.strip().removeprefix("$ "))
+            line = FILTER.sub(r"\1 FILE", line)  # LinuxCNC puts the file's name behind it
             if line.startswith("camtool ") and ARROW not in line:
                 yield Line(name, line, match[2] != "console", text)
 
@@ -139,13 +141,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(samples / "logo.toml", place)
     shutil.copy(samples / "measured" / "pic-mmh-lines.toml", place / "measured.toml")
     assert shell("camtool post logo.dxf -t pic-mmh -q -o logo.pic", place, 0)[1] == 0
+    for name in ("old.pic", "new.pic"):
+        shutil.copy(place / "logo.pic", place / name)
+    shutil.copy(place / "logo.dxf", place / "logo2.dxf")
     return place
 
 
 ELSEWHERE = {"calibration.md", "write-a-post.md"}
 """Pages whose lines other tests run."""
 
-ENDLESS = ("--watch", "--scheduler")
+NOT_RUN = ("--watch", "--scheduler", " NAME", " FILE")
+"""Without an end, or of files and schedulers that are not there."""
 
 
 def lines_to_run() -> list[Line]:
@@ -155,15 +161,13 @@ def lines_to_run() -> list[Line]:
         for line in every
         if line.remark
         and line.page not in ELSEWHERE
-        and not any(flag in line.text for flag in ENDLESS)
+        and not any(part in line.text for part in NOT_RUN)
     ]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line", lines_to_run(), ids=str)
-def test_lines_about_samples_run(
-    line: Line, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lines_run(line: Line, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = next(
         each
         for each in reversed(readings(line))
