@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.geometry.polylines import Floats
-from camtool.verify.circles import Circle, least_squares_centre
+from camtool.verify.circles import Circle, circular_error, mean_points
 
 QUADRANTS_DEG = (0, 90, 180, 270)
 """Where an axis turns: X, Y, X, Y."""
@@ -148,11 +148,9 @@ class Pairs:
 
 
 def both_ways(circle: Circle, bins: Floats) -> BothWays:
-    """The figures of a circle from the bins (2 B, 9) of both ways round."""
+    """The figures of a circle from the bins (2 B, 9) of both ways round; NaN when all are empty."""
     seen = bins[bins[:, 0] > 0.0]
-    mean = seen[:, 1:3] / seen[:, :1]
-    centre = least_squares_centre(mean)
-    outer = np.hypot(*(seen[:, 7:9] - centre).T).max()
-    inner = np.hypot(*(seen[:, 4:6] - centre).T).min()
-    about = np.hypot(mean[:, 0], mean[:, 1]).mean()
-    return BothWays(circle, float(outer - inner), float(about) - circle.radius_mm)
+    if len(seen) == 0:
+        return BothWays(circle, math.nan, math.nan)
+    about = np.hypot(*mean_points(seen).T).mean()
+    return BothWays(circle, circular_error(seen), float(about) - circle.radius_mm)

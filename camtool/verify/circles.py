@@ -49,7 +49,8 @@ class Circle:
 
 @dataclass(frozen=True)
 class CircleFigures:
-    """What became of a circle, mm; NaN where the slides left fewer than three angles."""
+    """What became of a circle, mm; NaN where the slides left fewer than three angles, G also where
+    they did not go round the programmed centre: as with play that comes near to the radius."""
 
     circular_mm: float
     radial_max_mm: float
@@ -126,17 +127,35 @@ def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) < FEWEST_BINS:
         return UNSEEN
-    mean = seen[:, 1:3] / seen[:, :1]
-    centre = least_squares_centre(mean)
-    inner, outer = seen[:, 4:6] - centre, seen[:, 7:9] - centre
+    mean = mean_points(seen)
     return CircleFigures(
-        circular_mm=float(
-            np.hypot(outer[:, 0], outer[:, 1]).max() - np.hypot(inner[:, 0], inner[:, 1]).min()
-        ),
+        circular_mm=circular_error(seen),
         radial_max_mm=math.sqrt(seen[:, 6].max()) - radius_mm,
         radial_min_mm=math.sqrt(seen[:, 3].min()) - radius_mm,
         radial_mean_mm=float(np.hypot(mean[:, 0], mean[:, 1]).mean()) - radius_mm,
     )
+
+
+def mean_points(seen: Floats) -> Floats:
+    """(J, 2) about the programmed centre, of bins (J, 9) that are not empty."""
+    return np.asarray(seen[:, 1:3] / seen[:, :1])
+
+
+def circular_error(seen: Floats) -> float:
+    """G of bins (J, 9) that are not empty, J ≥ 1; NaN where they do not go round the centre."""
+    mean = mean_points(seen)
+    if not _surrounds(mean):
+        return math.nan
+    centre = least_squares_centre(mean)
+    inner, outer = seen[:, 4:6] - centre, seen[:, 7:9] - centre
+    return float(np.hypot(*outer.T).max() - np.hypot(*inner.T).min())
+
+
+def _surrounds(points: Floats) -> bool:
+    """Whether points (J, 2) lie on all sides of the origin: none of the angles between them, as
+    seen from there, is half a turn."""
+    angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
+    return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)
 
 
 def least_squares_centre(points: Floats) -> Floats:

@@ -51,6 +51,17 @@ def test_a_moved_circle_has_radial_errors_but_stays_round() -> None:
     assert found.radial_mean_mm == pytest.approx(0.0, abs=1e-5)
 
 
+def test_what_does_not_go_round_the_centre_has_no_circular_error() -> None:
+    """As play makes of a circle when it is as large as the radius."""
+    near, past = (
+        figures(ring(20_000) + np.array([share * RADIUS, 0.0])) for share in (0.99, 1.01)
+    )
+    assert near.circular_mm < 0.009 * 0.99 * RADIUS
+    assert math.isnan(past.circular_mm)
+    assert past.radial_max_mm == pytest.approx(1.01 * RADIUS, rel=1e-6)
+    assert past.radial_min_mm == pytest.approx(-0.99 * RADIUS, rel=1e-6)
+
+
 def test_an_ellipse() -> None:
     a, b = RADIUS + 0.010, RADIUS - 0.004
     stretched = (ring(50_000) - [2.0, 1.0]) * [a / RADIUS, b / RADIUS] + [2.0, 1.0]
