@@ -27,16 +27,14 @@ class Regions:
     of the motors."""
 
     def __init__(self, machine: Machine) -> None:
-        used = machine.play_map if machine.play_map.use else None
-        cells = (used.x, used.y, None) if used is not None else (None, None, None)
-        self._cells: tuple[PlayCells | None, ...] = cells
+        self._cells: tuple[PlayCells | None, ...] = machine.play_map.used
         self._zero = machine.controller.machine_zero_mm
         self._plain = tuple(_residual(axis, machine, None) for axis in machine.axes)
         self._by_cell: list[list[list[Residual]]] = [
             [[_residual(axis, machine, play) for play in row] for row in one.play_mm]
             if one is not None
             else []
-            for axis, one in zip(machine.axes, cells, strict=True)
+            for axis, one in zip(machine.axes, self._cells, strict=True)
         ]
 
     @property
