@@ -6,12 +6,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
+from camtool.machine.registry import load_target
+from camtool.pipeline import listing_of, picture, verify_program
 from camtool.preview.draw import Scene
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+from tests.oracles.png import decode
+from tests.postprocessors.i8751_machines import SAMPLE
 from tests.preview.conftest import SCENES, circle
-from tests.preview.viewer_pages import HOSTILE, busy, large, text_of, traced
+from tests.preview.viewer_pages import HOSTILE, busy, large_text, text_of, traced
 
 CHROMIUM = "/usr/bin/chromium"
 # Without the last ones it keeps looking for its maker's hosts.
@@ -45,9 +52,9 @@ def browser() -> Iterator[Any]:
 class Shown:
     """A page in the browser, and what it complained about."""
 
-    def __init__(self, browser: Any, scene: Scene, folder: Path, **more: Any) -> None:
+    def __init__(self, browser: Any, page: str, folder: Path, **more: Any) -> None:
         file = folder / "page.html"
-        file.write_text(text_of(scene), encoding="utf-8")
+        file.write_text(page, encoding="utf-8")
         self.page = browser.new_page(viewport={"width": 1200, "height": 800}, **more)
         self.complaints: list[str] = []
         self.page.on("console", lambda message: self.complaints.append(message.text))
@@ -101,8 +108,9 @@ def shown(browser: Any, tmp_path: Path) -> Iterator[Any]:
     """Opens scenes; nothing that it opened may have complained."""
     opened: list[Shown] = []
 
-    def show(scene: Scene, **more: Any) -> Shown:
-        opened.append(Shown(browser, scene, tmp_path, **more))
+    def show(scene: Scene | str, **more: Any) -> Shown:
+        page = scene if isinstance(scene, str) else text_of(scene)
+        opened.append(Shown(browser, page, tmp_path, **more))
         return opened[-1]
 
     yield show
@@ -300,6 +308,93 @@ def _paper(view: Any) -> int:
     return int(words.split("(")[1].split(",")[0])
 
 
+def test_it_prints_on_white_with_the_tables_and_without_the_controls(
+    shown: Any, tmp_path: Path
+) -> None:
+    view = shown(busy(SCENES["toolpath"]), color_scheme="dark")
+    view.settled()
+    file = tmp_path / "page.pdf"
+    view.page.pdf(path=str(file))
+    view.page.emulate_media(media="print", color_scheme="dark")
+    view.page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
+    for place in ("#controls", "#listing", "#tools", "#colours", "#now", "#tables button"):
+        assert view.page.locator(place).is_hidden(), place
+    assert view.page.locator("#tables").is_visible()
+    pixels = decode(view.page.screenshot(full_page=True))[..., :3].astype(int)
+    light = (pixels > 240).all(axis=2).mean()
+    assert light > 0.8
+    view.settled()
+    # The picture is there: the blue of feeds on the white ground.
+    stage = view.page.locator("#stage").screenshot()
+    blue = np.abs(decode(stage)[..., :3].astype(int) - [15, 106, 196]).max(axis=2) < 30
+    assert blue.sum() > 300
+    assert file.read_bytes().count(b"/Type /Page\n") + file.read_bytes().count(b"/Type/Page") <= 3
+
+
+def test_the_keyboard_reaches_everything_and_all_of_it_has_a_name(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    view.press("?")
+    names = """() => [...document.querySelectorAll(
+        "button, input, select, [tabindex]")].filter((each) => each.offsetParent).length"""
+    wanted, seen = view.page.evaluate(names), []
+    for _ in range(wanted):
+        view.press("Tab")
+        seen.append(
+            view.page.evaluate(
+                """() => { const it = document.activeElement, style = getComputedStyle(it);
+                const label = it.labels && it.labels.length ? it.labels[0].innerText : "";
+                return [it.getAttribute("aria-label") || label || it.innerText,
+                        it.outerHTML.slice(0, 60), style.outlineStyle]; }"""
+            )
+        )
+    assert all(name.strip() for name, _, _ in seen), seen
+    assert all(outline == "solid" for _, _, outline in seen), seen
+    assert len({tag for _, tag, _ in seen}) > 8
+    assert view.page.evaluate("() => document.activeElement.textContent") == "show"
+
+
+def test_the_listing_goes_from_block_to_block(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    view.page.locator("#listing").focus()
+    view.press("ArrowUp", "ArrowUp", "ArrowDown")
+    assert "move\n13," in view.text("#now")
+    assert view.text("#listing .current").split()[0] == "13"
+
+
+def test_at_the_end_stands_the_last_block(shown: Any) -> None:
+    view = shown(busy(SCENES["toolpath"]))
+    view.press("Home")
+    view.page.locator("#slider").fill("10000")
+    count = view.page.evaluate("() => JSON.parse(head.textContent).blocks.split('\\n').length")
+    assert view.text("#listing .current").split()[0] == str(count)
+    assert view.text("#clock").split(" of ")[0] == view.text("#clock").split(" of ")[1]
+
+
+def test_bytes_under_the_cursor_and_the_largest_error_of_the_report(shown: Any) -> None:
+    target = load_target("i8751", machine_file=SAMPLE, settings=["axes.x.backlash_mm=0.05"])
+    program = target.post.write(_square(), target.machine).data
+    decoded, judged = verify_program(program, target, source="a.bin")
+    listing = listing_of(program, target, decoded)
+    scene = picture(
+        title="a", toolpath=decoded, verification=judged, machine=target.machine, listing=listing
+    )
+    view = shown(scene)
+    tip = _find_move(view, view.place_of(0.5, 0.92))
+    made = listing()
+    assert made is not None
+    block = int(tip.split("block\n")[1].split()[0]) - 1
+    assert f"bytes\n{made.blocks[block]}" in tip
+    said = float(view.text("#scale-high").removesuffix(" µm"))
+    assert said == pytest.approx(judged.report.error_um.total.max, rel=1e-3)
+
+
+def _square() -> Toolpath:
+    path = ToolpathBuilder((0.0, 0.0, 0.0)).rapid(z=1.0).line(z=-0.1, feed=8.0)
+    for x, y in ((4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (0.0, 0.0)):
+        path.line(x, y, feed=8.0)
+    return path.rapid(z=1.0).event(Kind.END).finish()
+
+
 def test_hostile_names_stay_names(shown: Any) -> None:
     scene = busy(SCENES["toolpath"])
     view = shown(replace(scene, title=HOSTILE, notes=(HOSTILE,)))
@@ -326,8 +421,9 @@ def test_the_picture_shows_the_errors_in_colours(shown: Any) -> None:
 
 
 def test_many_moves_stay_quick(shown: Any) -> None:
+    page = large_text()
     begin = time.perf_counter()
-    view = shown(large(200_000))
+    view = shown(page)
     assert time.perf_counter() - begin < MOST_LOAD_S
     assert view.pixels("done") > 10_000
     for deed in (
@@ -335,6 +431,8 @@ def test_many_moves_stay_quick(shown: Any) -> None:
         lambda: view.press("+"),
         lambda: view.page.mouse.move(*view.place_of(0.5, 0.5)),
         lambda: view.press("e"),
+        lambda: view.press("v"),
+        lambda: view.press("m"),
     ):
         painted = int(view.page.evaluate("() => document.body.dataset.painted"))
         begin = time.perf_counter()

@@ -3,9 +3,11 @@
 import json
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
+from camtool.geometry.polylines import Segments
 from camtool.preview.draw import Scene
 from camtool.preview.viewer.page import viewer_page
 from camtool.preview.viewer.run import Line, Run, Table, Worst, by_feed
@@ -67,12 +69,29 @@ def spiral(count: int) -> Toolpath:
 
 
 def large(count: int) -> Scene:
-    """A scene of so many moves, with a program and errors."""
+    """A scene of so many moves, with a program, errors, a tool, and as many points of a predicted
+    path, each 10 µm outside of the wanted one."""
     toolpath = spiral(count)
     blocks = tuple(f"G01X{x * 1000:09.2f}Y{y * 1000:09.2f}F050;" for x, y, _ in toolpath.end)
     error = np.abs(np.sin(np.arange(count))) * 0.01
-    scene = Scene("many moves", toolpath=toolpath)
-    return with_run(scene, run_of(toolpath, blocks=blocks, error_mm=error))
+    flat = toolpath.end[:, :2]
+    out = flat / np.maximum(np.hypot(flat[:, 0], flat[:, 1]), 0.1)[:, None]
+    scene = Scene(
+        "many moves",
+        toolpath=toolpath,
+        trace_points=flat + error[:, None] * out,
+        trace_error_mm=error,
+        wanted=Segments.between(flat[1:-1], flat[2:], np.zeros(count - 2)),
+        tool_mm=0.6,
+    )
+    rows = np.arange(count)
+    return with_run(scene, run_of(toolpath, blocks=blocks, error_mm=error, trace_row=rows))
+
+
+@cache
+def large_text() -> str:
+    """The page of 200,000 moves, made once."""
+    return text_of(large(200_000))
 
 
 def text_of(scene: Scene) -> str:

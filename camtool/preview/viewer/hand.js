@@ -91,8 +91,8 @@ function pressed(event, { stage, player, panel }) {
     e: () => panel.nextColour(),
     m: () => panel.nextTimes(1),
     M: () => panel.nextTimes(-1),
-    "?": () => { find("help").hidden = !find("help").hidden; },
-    Escape: () => { find("help").hidden = true; },
+    "?": () => showHelp(find("help").hidden),
+    Escape: () => showHelp(false),
   };
   if (deeds[event.key]) deeds[event.key]();
   else return panel.toggle(event.key);

@@ -61,13 +61,17 @@ function listen(parts) {
     stage.layers.printing = printing;
     document.documentElement.classList.toggle("paper", printing);
     panel.scale();
-    if (printing) stage.paintForPrint();
-    else stage.paintNow();
+    stage.paintNow();
   };
   window.addEventListener("beforeprint", print(true));
   window.addEventListener("afterprint", print(false));
   find("fit").addEventListener("click", () => stage.fit());
-  find("help-button").addEventListener("click", () => { find("help").hidden = !find("help").hidden; });
+  find("help-button").addEventListener("click", () => showHelp(find("help").hidden));
+}
+
+function showHelp(isShown) {
+  find("help").hidden = !isShown;
+  find("help-button").setAttribute("aria-expanded", String(isShown));
 }
 
 function centre(stage, moves, row) {

@@ -72,15 +72,35 @@ function paintTrack(ctx, view, track, rows, styleOf, styles) {
   strokePens(ctx, pens, styles);
 }
 
-/** Stroke points first … last of a line of points (2 T) mm, each piece in the style of its end. */
+/** Stroke points first … last of a line of points (2 T) mm, each piece in the style of its end;
+ * pieces smaller than a pixel become one, in the highest of their styles. */
 function paintPoints(ctx, view, points, range, styleOf, styles) {
   const pens = styles.map((style) => (style ? new Pen(style.width) : null));
-  for (let at = Math.max(1, range.from); at < range.to; at++) {
-    const pen = pens[styleOf[at]];
-    if (!pen) continue;
-    pen.begin(at, view.px(points[2 * at - 2]), view.py(points[2 * at - 1]));
-    pen.to(view.px(points[2 * at]), view.py(points[2 * at + 1]));
+  const first = Math.max(1, range.from), px = (at) => view.px(points[2 * at]), py = (at) => view.py(points[2 * at + 1]);
+  let fromX = px(first - 1), fromY = py(first - 1), worst = -1, x = fromX, y = fromY;
+  const put = (step) => {
+    if (worst >= 0 && !view.isBeside(fromX, fromY, x, y)) {
+      pens[worst].begin(step, fromX, fromY);
+      pens[worst].to(x, y);
+    }
+    fromX = x;
+    fromY = y;
+    worst = -1;
+  };
+  let step = 0;
+  for (let at = first; at < range.to; at++) {
+    if (!pens[styleOf[at]]) {
+      put(step++);
+      fromX = x = px(at);
+      fromY = y = py(at);
+      continue;
+    }
+    x = px(at);
+    y = py(at);
+    worst = Math.max(worst, styleOf[at]);
+    if (Math.abs(x - fromX) + Math.abs(y - fromY) >= MERGED_PX) put(step++);
   }
+  put(step);
   strokePens(ctx, pens, styles);
 }
 

@@ -1,6 +1,6 @@
 // Beside the picture: layers, colours with their scale, the move under way, the program's lines.
 
-const LINES_AROUND = 7;
+const LINES_AROUND = 5;
 
 class LayerPanel {
   constructor(layers, changed) {
@@ -108,6 +108,15 @@ class Listing {
       event.preventDefault();
       this.show(this.middle + Math.sign(event.deltaY) * 3, this.current);
     }, { passive: false });
+    this.place.addEventListener("keydown", (event) => {
+      const way = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+      if (!way || event.shiftKey) return;
+      event.preventDefault();
+      event.stopPropagation();
+      let block = this.current + way;
+      while (this.rows[block] === -1) block += way;
+      if (this.rows[block] >= 0) this.go(this.rows[block]);
+    });
     this.lines = Array.from({ length: 2 * LINES_AROUND + 1 }, () => this.line());
   }
 
@@ -163,7 +172,8 @@ function showTables(head, go) {
       const line = element("tr");
       row.cells.forEach((cell) => line.append(element("td", cell)));
       if (row.move !== null) {
-        const button = element("button", "show", { type: "button" });
+        const name = `show move ${row.move + 1}`;
+        const button = element("button", "show", { type: "button", "aria-label": name });
         button.addEventListener("click", () => go(row.move));
         const last = element("td");
         last.append(button);

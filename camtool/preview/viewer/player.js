@@ -84,7 +84,7 @@ class Player {
   show() {
     const { run } = this, share = run.total ? run.time / run.total : 1;
     this.slider.value = String(Math.round(share * SLIDER_STEPS));
-    this.slider.setAttribute("aria-valuetext", clock(run.time));
+    this.slider.setAttribute("aria-valuetext", `${clock(run.time)}, move ${run.row + 1}`);
     find("clock").textContent = `${clock(run.time)} of ${clock(run.total)}`;
     this.moved();
   }

@@ -101,6 +101,7 @@ class Stage {
       this.slowest = performance.now() - begin;
     } else this.paintDone(colours);
     this.paintOver(colours);
+    if (this.layers.printing) this.join();
     if (!this.frame && !this.resting) delete document.body.dataset.waiting;
     document.body.dataset.painted = String(Number(document.body.dataset.painted || 0) + 1);
   }
@@ -171,10 +172,9 @@ class Stage {
     if (moves.count) paintTool(ctx, view, moves, run, this.layers.head.tool_mm, colours);
   }
 
-  /** Everything on the lowest canvas, in the colours of paper: on paper, what is cleared on one
-   * canvas would hide those below it. */
-  paintForPrint() {
-    this.paintNow();
+  /** Everything on the lowest canvas: on paper, what is cleared on one canvas would hide those
+   * below it. */
+  join() {
     const { width, height } = this.view, [lowest, ...others] = Object.values(this.contexts);
     for (const ctx of others) lowest.drawImage(ctx.canvas, 0, 0, width, height);
   }

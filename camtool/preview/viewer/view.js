@@ -55,6 +55,12 @@ class View {
     return [this.mmX(0) - more, this.mmY(height) - more, this.mmX(width) + more, this.mmY(0) + more];
   }
 
+  /** Whether a line on the canvas lies beyond one of its edges. */
+  isBeside(x0, y0, x1, y1) {
+    const beyond = (a, b, size) => (a < -NEAR_PX && b < -NEAR_PX) || (a > size + NEAR_PX && b > size + NEAR_PX);
+    return beyond(x0, x1, this.width) || beyond(y0, y1, this.height);
+  }
+
   /** Whether a place on the canvas is to be seen, or not far from that. */
   shows(px, py) {
     return px > -NEAR_PX && py > -NEAR_PX && px < this.width + NEAR_PX && py < this.height + NEAR_PX;
