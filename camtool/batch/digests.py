@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -37,3 +38,27 @@ def content_digest(data: bytes) -> str:
 def code_digest(files: Iterable[Path]) -> str:
     """The digest of program files: their names and contents."""
     return digest_of(*(part for path in sorted(files) for part in (path.name, file_digest(path))))
+
+
+def packages_digest(name: str) -> str:
+    """The digest of the versions of all packages that the package `name` needs, without extras;
+    that of nothing where it is not installed as a package."""
+    from importlib import metadata
+
+    try:
+        needs = metadata.requires(name) or []
+    except metadata.PackageNotFoundError:
+        return digest_of()
+    wanted = sorted(need for need in needs if "extra ==" not in need)
+    found = (re.match(r"[\w.-]+", need) for need in wanted)
+    return digest_of(*(f"{one[0]} {_version(one[0])}" for one in found if one))
+
+
+def _version(name: str) -> str:
+    """A package's version, "" for one that is only needed on other systems."""
+    from importlib import metadata
+
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from camtool import __version__
-from camtool.batch.digests import code_digest, content_digest, digest_of
+from camtool.batch.digests import code_digest, content_digest, digest_of, packages_digest
 from camtool.batch.records import Made, Task
 from camtool.cli.drawing import DrawingFlags
 from camtool.cli.jobflags import JobFlags
@@ -101,6 +101,7 @@ class PostWork:
         options = (self.preview, self.reports, self.check, self.compensate, self.gates, self.looks)
         return digest_of(
             __version__,
+            packages_digest("camtool"),
             code_digest(Path(__file__).parents[1].rglob("*.py")),
             code_digest(each for each in target.file.parent.iterdir() if _is_code(each)),
             target.file.name,

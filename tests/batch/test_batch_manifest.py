@@ -1,10 +1,11 @@
 """The manifest: by content, and usable however a run ended."""
 
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
-from camtool.batch.digests import content_digest, digest_of, file_digest
+from camtool.batch.digests import content_digest, digest_of, file_digest, packages_digest
 from camtool.batch.manifest import NAME, Entry, Manifest
 from camtool.cli.output import write_all
 
@@ -103,3 +104,12 @@ def test_what_is_tidy_is_not_written_again(tmp_path: Path) -> None:
     (tmp_path / "a.out").unlink()
     Manifest(tmp_path).tidy(write)
     assert len(written) == 2
+
+
+def test_packages_count_by_their_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = packages_digest("camtool")
+    assert before != packages_digest("numpy")
+    assert packages_digest("no such package") == digest_of()
+    version = metadata.version
+    monkeypatch.setattr(metadata, "version", lambda name: version(name) + ".1" * (name == "ezdxf"))
+    assert packages_digest("camtool") != before

@@ -4,13 +4,19 @@ import errno
 import json
 import os
 import shutil
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 
+from camtool.batch import digests as digests_module
 from camtool.batch.lock import alone_in
 from camtool.batch.records import Pool
 from camtool.cli import batchrun, batchwork
+from camtool.cli.drawing import DrawingFlags
+from camtool.cli.pictureflags import PictureFlags
+from camtool.machine.registry import load_target
+from camtool.verify.gates import Gates
 from tests.cli.conftest import Run
 from tests.oracles.batch_works import HerePool
 
@@ -259,3 +265,25 @@ def test_an_output_folder_within_the_drawings(camtool: Run, drawings: Path) -> N
         "square.dxf",
         *(f"out/{name}" for name in (MANIFEST, "square.pic", "square.svg")),
     }
+
+
+def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyPatch) -> None:
+    work = batchwork.PostWork(load_target("grbl"), DrawingFlags((), (), (), (), {}))
+    other = {
+        "target": load_target("grbl", settings=["axes.x.backlash_mm=0.2"]),
+        "drawing": DrawingFlags((), (), (), (), {"gap_mm": 0.5}),
+        "gates": Gates(error_mm=0.1),
+        "preview": ".svg",
+        "reports": True,
+        "check": False,
+        "compensate": True,
+        "looks": PictureFlags(dark=True),
+    }
+    assert other.keys() == {field.name for field in fields(work)}, "a new field counts too"
+    digests = [work.digest(), *(replace(work, **{key: other[key]}).digest() for key in other)]
+    monkeypatch.setattr(digests_module, "_version", lambda name: "another one")
+    digests.append(work.digest())
+    monkeypatch.undo()
+    monkeypatch.setattr(batchwork, "code_digest", lambda files: "of other code")
+    digests.append(work.digest())
+    assert len(set(digests)) == len(digests)
