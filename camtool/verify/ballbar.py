@@ -148,7 +148,7 @@ class Pairs:
 
 
 def both_ways(circle: Circle, bins: Floats) -> BothWays:
-    """The figures of a circle from the bins (2 B, 9) of both ways round; NaN when all are empty."""
+    """The figures of a circle from the bins (2 B, 9) of both ways round; NaN without points."""
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) == 0:
         return BothWays(circle, math.nan, math.nan)

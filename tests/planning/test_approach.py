@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import scaled
 from camtool.machine.controllers import PathController, PicMmhController
+from camtool.machine.mechanics import PlayCells, PlayMap
 from camtool.machine.model import Machine
 from camtool.planning.items import Run
 from camtool.planning.reversing.approach import (
@@ -66,6 +67,19 @@ def test_the_way_is_what_compensation_leaves_of_the_play(machine: Machine) -> No
     assert approach_from(line((1, 2), (3, 4)), one) == pytest.approx((1 - 0.3 - MARGIN, 2))
     none = with_play(machine, backlash_mm=0.0, compensation_mm=0.0)
     assert approach_from(line((1, 2), (3, 4)), none) is None
+
+
+def test_of_a_map_of_play_the_regions_that_are_worst_count(machine: Machine) -> None:
+    """Compensation of X, 0.15 mm, leaves 0.13 too much in one region and 0.05 too little in
+    another: the first is told, the second needs the longer approach."""
+    cells = PlayCells((0.0, 10.0, 20.0), (0.0, 20.0), ((0.02, 0.2),))
+    known = with_play(machine, backlash_mm=0.15, compensation_mm=0.15)
+    mapped = msgspec.structs.replace(known, play_map=PlayMap(use=True, x=cells))
+    x, y = residuals(mapped)
+    assert abs(x.plus_mm - x.minus_mm) == pytest.approx(0.13)
+    assert abs(y.plus_mm - y.minus_mm) == pytest.approx(0.0)
+    come = approach_from(line((1, 2), (3, 4)), mapped)
+    assert come == pytest.approx((1 - MARGIN - 0.05, 2 - MARGIN))
 
 
 def test_an_engaged_axis_comes_straight(machine: Machine) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline
 from camtool.machine.model import Axis, Machine
 from camtool.planning.items import Run
-from camtool.planning.reversing.residual import Residual, residuals
+from camtool.planning.reversing.residual import Residual, loosest, residuals
 from camtool.planning.reversing.turns import parts_of, turns_of
 
 APPROACH_MARGIN_MM = 0.05
@@ -43,12 +43,12 @@ def approach_from(run: Run, machine: Machine) -> Point | None:
 class Approaches:
     """`approach_from` for runs that are cut one after the other, with nothing between them but
     the way up, across and down (a tool change needs a fresh one): an axis that still stands
-    engaged from the run before goes straight to the start."""
+    engaged from the run before goes straight to the start. Play is the largest of all regions."""
 
     def __init__(self, machine: Machine) -> None:
-        axes = (machine.axes.x, machine.axes.y)
         self._drives = [
-            _Drive(axis, residual) for axis, residual in zip(axes, residuals(machine), strict=True)
+            _Drive(axis, residual)
+            for axis, residual in zip(loosest(machine), residuals(machine), strict=True)
         ]
 
     def __call__(self, run: Run) -> Point | None:

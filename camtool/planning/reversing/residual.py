@@ -9,13 +9,21 @@ low ≤ slide − motor ≤ high, and c added at each reversal from the directio
 
 The difference of the two is |play − c|. Compensation as exact as the play would leave none; the
 PIC machine's leaves 11.5 µm in X and 9.5 µm in Y (docs/decisions/0005-play.md).
+
+Where the play changes with the region of the table, an axis is taken with the one that leaves most
+over: where a contour is divided then hangs on its shape alone, not on where it lies, and what is
+told to be left over is left nowhere else.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
+
+import msgspec
 
 from camtool.machine.controllers import Controller
+from camtool.machine.mechanics import PlayCells
 from camtool.machine.model import Axis, Machine
 
 
@@ -35,10 +43,33 @@ class Residual:
         return self.plus_mm if sense > 0 else self.minus_mm
 
 
+def plays_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
+    """The play of an axis in every region of the table, mm."""
+    return (axis.backlash_mm,) if cells is None else tuple(chain.from_iterable(cells.play_mm))
+
+
+def loosest(machine: Machine) -> tuple[Axis, Axis]:
+    """X and Y with the largest play of all regions."""
+    x, y, _ = (
+        msgspec.structs.replace(axis, backlash_mm=max(plays_mm(axis, cells)))
+        for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
+    )
+    return x, y
+
+
 def residuals(machine: Machine) -> tuple[Residual, Residual]:
-    """X and Y of a machine."""
-    x, y, _ = machine.axes
-    return residual(x, machine.controller), residual(y, machine.controller)
+    """X and Y of a machine, each in the region where compensation leaves most over."""
+    x, y, _ = (
+        max(
+            (
+                residual(msgspec.structs.replace(axis, backlash_mm=play), machine.controller)
+                for play in plays_mm(axis, cells)
+            ),
+            key=lambda one: abs(one.plus_mm - one.minus_mm),
+        )
+        for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
+    )
+    return x, y
 
 
 def residual(axis: Axis, controller: Controller) -> Residual:
