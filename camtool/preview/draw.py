@@ -19,7 +19,7 @@ from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options, check_width
 from camtool.preview.page import Page, mat, page_of, sheet
 from camtool.preview.polar import draw_polar
 from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
-from camtool.preview.svg import Look, element
+from camtool.preview.svg import Look, element, number
 from camtool.preview.text import Style
 from camtool.preview.trace import trace_layer
 from camtool.preview.view import View, page_width
@@ -60,12 +60,15 @@ def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUA
 def panel(content: Content, page: Page) -> list[str]:
     """Head and plot with its axes, clipped: it covers nothing of its neighbours."""
     box = page.view.box
-    plot: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
+    sides = (box.left, box.top, box.width, box.height)
+    plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
+    # Named after its own sides: two pictures in one page share it only when it is the same.
+    clip = "clip-" + "-".join(number(side, 0) for side in sides)
     return [
         page.head,
         axes.frame(page.view, page.ticks),
-        element("clipPath", {"id": "clip"}, element("rect", plot)),
-        element("g", {"clip-path": "url(#clip)"}, *_plot(content, page.view)),
+        element("clipPath", {"id": clip}, element("rect", plot)),
+        element("g", {"clip-path": f"url(#{clip})"}, *_plot(content, page.view)),
         axes.axes(page.view, page.ticks),
     ]
 

@@ -104,6 +104,14 @@ def test_names_of_parts_are_there_once() -> None:
     assert set(re.findall(r"url\(#([^)]+)\)", svg)) <= set(names)
 
 
+def test_pictures_of_one_page_do_not_clip_each_other() -> None:
+    large = draw_beside([BEFORE, AFTER])
+    small = draw_beside([BEFORE, AFTER], Options(size_px=400))
+    clips = [set(re.findall(r'<clipPath id="([^"]+)"', svg)) for svg in (large, small)]
+    assert len(clips[0]) == len(clips[1]) == 2
+    assert not clips[0] & clips[1]
+
+
 def test_the_legend_names_each_thing_once_and_layers_keep_their_colour() -> None:
     one = drawing_of([circle(0, 0, 1), circle(3, 0, 1)], ["holes", "outline"])
     other = drawing_of([circle(0, 0, 1)], ["outline"])
