@@ -8,7 +8,6 @@ import os
 import re
 import select
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -19,6 +18,12 @@ import pytest
 pty = pytest.importorskip("pty")
 
 PATIENCE_S = 60.0
+AT_TERMINAL = (
+    "import fcntl, os, sys, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "os.execvp(sys.argv[1], sys.argv[1:])"
+)
+"""Begins a shell with its stdin as its terminal."""
+
 LAYERS = (
     "My Layer",
     "Größe",
@@ -86,10 +91,13 @@ class Terminal:
         command, begun = BEGUN[shell]
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         more = {"TERM": "xterm", "LC_ALL": "C.UTF-8", "HOME": str(folder), "PATH": path}
-        self.process, self.place = pty.fork()
-        if self.process == 0:  # pragma: no cover - the child
-            os.chdir(folder)
-            os.execvpe(command[0], command, os.environ | more | {"COLUMNS": "250"})
+        self.place, theirs = pty.openpty()
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", AT_TERMINAL, *command],
+            stdin=theirs, stdout=theirs, stderr=theirs, cwd=folder,
+            env=os.environ | more | {"COLUMNS": "250"},
+        )  # fmt: skip
+        os.close(theirs)
         self.send(f"{begun}; echo 'BEG''UN'\n")
         self.until("BEGUN")
 
@@ -113,8 +121,8 @@ class Terminal:
         return found[1]
 
     def close(self) -> None:
-        os.kill(self.process, signal.SIGKILL)
-        os.waitpid(self.process, 0)
+        self.process.kill()
+        self.process.wait()
         os.close(self.place)
 
 
