@@ -79,7 +79,7 @@ def post(
         target = posting.load()
         asked = Asked(source, output, report, preview, page, flags)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
-        made = posting.make(source, target, quiet=quiet)
+        made = posting.make(source, target, quiet=quiet, preview=preview)
         return finish(
             made.posted,
             asked,

@@ -80,9 +80,11 @@ class Posting:
         *,
         quiet: bool,
         on_read: Callable[[], None] | None = None,
+        preview: str | None = None,
     ) -> Made:
-        """The drawing posted; `on_read` is called when it has been read."""
-        from camtool.pipeline import post_drawing
+        """The drawing posted, for a picture of this name; `on_read` is called when it has been
+        read."""
+        from camtool.pipeline import points_for, post_drawing
 
         with compiled_beside(target.machine.target.name, quiet=quiet):
             wanted = self.job.job(self.drawing)
@@ -97,6 +99,7 @@ class Posting:
                     check=not self.no_verify,
                     compensate=self.compensate,
                     gates=self.gates.gates(),
+                    trace_points=points_for(preview),
                 )
         return Made(read, wanted, posted, target)
 

@@ -87,7 +87,7 @@ def preview(
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
     say_first_run(quiet=quiet)
-    seen = Seen(machine, simulate, job, drawing)
+    seen = Seen(machine, simulate, job, drawing, output)
     found = [seen.scene(name) for name in sources]
     painted = picture.painter(lambda: [scene for scene, _ in found], quiet=quiet)
     write_all({output: painted(output)})
@@ -113,6 +113,7 @@ class Seen:
     simulate: bool
     job: JobFlags
     drawing: DrawingFlags
+    output: str
 
     def scene(self, source: str) -> tuple[Scene, Findings]:
         """A drawing, a program, or the toolpath planned from a drawing."""
@@ -131,11 +132,19 @@ class Seen:
         return picture(title=Path(read.file).name, drawing=read), read.findings
 
     def _of_program(self, source: str, target: LoadedTarget) -> Scene:
-        from camtool.pipeline import listing_of, picture, read_program, verify_program
+        from camtool.pipeline import (
+            Judging,
+            listing_of,
+            picture,
+            points_for,
+            read_program,
+            verify_program,
+        )
 
         data, judged = read_bytes(source), None
         if self.simulate:
-            decoded, judged = verify_program(data, target, source=source)
+            judging = Judging(trace_points=points_for(self.output))
+            decoded, judged = verify_program(data, target, source=source, judging=judging)
         else:
             decoded = read_program(data, target, source)
         return picture(
@@ -147,14 +156,14 @@ class Seen:
         )
 
     def _of_job(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
-        from camtool.pipeline import picture, post_drawing, posted_scene
+        from camtool.pipeline import picture, points_for, post_drawing, posted_scene
         from camtool.planning.plan import plan
 
         title, job = Path(source).name, self.job.job(self.drawing)
         read = self.drawing.read(source, target.machine, job)
         with self.job.blamed():
             if self.simulate:
-                posted = post_drawing(read, job, target)
+                posted = post_drawing(read, job, target, trace_points=points_for(self.output))
                 scene = posted_scene(posted, target, title=title, drawing=read, job=job)
                 return scene, posted.findings if posted.failed else read.findings
             moves = plan(read, job, target.machine)

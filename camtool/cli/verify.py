@@ -116,7 +116,7 @@ def verify(
     inputs = [name for name in (program, against, beside) if name is not None]
     check_writable([preview, report, page, picture_beside(page, preview)], inputs)
 
-    from camtool.pipeline import Judging
+    from camtool.pipeline import Judging, points_for
 
     judging = Judging(
         interpolator=cast("Interpolator | None", interpolator),
@@ -124,6 +124,7 @@ def verify(
         gates=gates.gates(),
         compensated=compensated,
         worst=worst,
+        trace_points=points_for(preview),
     )
     target = machine.load()
     say_first_run(quiet=quiet)

@@ -21,7 +21,7 @@ from camtool.pipeline.judge import (
     verify_program,
 )
 from camtool.pipeline.pictures import picture, posted_scene
-from camtool.pipeline.viewing import listing_of
+from camtool.pipeline.viewing import listing_of, points_for
 
 __all__ = [
     "Judging",
@@ -32,6 +32,7 @@ __all__ = [
     "convert_program",
     "listing_of",
     "picture",
+    "points_for",
     "post_drawing",
     "posted_scene",
     "read_program",

@@ -28,14 +28,15 @@ if TYPE_CHECKING:
 class Judging:
     """How a program is judged: the interpolator in place of the controller's own, the parts of
     the mechanics that act (None: all), the limits that make findings (None: none), and whether
-    it was posted bent against the mechanics; how many of the worst moves are listed (None: as
-    usual)."""
+    it was posted bent against the mechanics; how many of the worst moves are listed, and how many
+    points of the slides' path are kept (None: as usual)."""
 
     interpolator: Interpolator | None = None
     effects: Effects | None = None
     gates: Gates | None = None
     compensated: bool = False
     worst: int | None = None
+    trace_points: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +76,11 @@ def post_drawing(
     check: bool = True,
     compensate: bool = False,
     gates: Gates | None = None,
+    trace_points: int | None = None,
 ) -> Posted:
     """Plan, write, read back, simulate and judge; `check=False` leaves out the last two;
-    `compensate` bends what is written against the machine's mechanics."""
+    `compensate` bends what is written against the machine's mechanics; `trace_points` of the
+    slides' path are kept at most (None: as usual)."""
     from camtool.planning.plan import planned
 
     plan = planned(drawing, job, target.machine)
@@ -94,6 +97,7 @@ def post_drawing(
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return Posted(wanted, program, decoded, None, findings)
+    from camtool.verify.case import TRACE_POINTS
     from camtool.verify.records import Planned
     from camtool.verify.report import certain
     from camtool.verify.verify import VerifyOptions
@@ -106,7 +110,11 @@ def post_drawing(
         decoded,
         target,
         Goal(goal, plan.placed, sent),
-        VerifyOptions(source=drawing.file, tool_diameter_mm=tool_mm(job)),
+        VerifyOptions(
+            source=drawing.file,
+            tool_diameter_mm=tool_mm(job),
+            trace_points=trace_points or TRACE_POINTS,
+        ),
     )
     beyond = _beyond(verification, gates)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
@@ -134,7 +142,7 @@ def verify_program(
     with `job` when there is one. ProgramError names file, block and column."""
     from camtool.planning.job import Job
     from camtool.simulation.options import ALL
-    from camtool.verify.case import WORST_LISTED
+    from camtool.verify.case import TRACE_POINTS, WORST_LISTED
     from camtool.verify.verify import VerifyOptions
 
     judging = judging or Judging()
@@ -152,6 +160,7 @@ def verify_program(
         source=source,
         tool_diameter_mm=tool_mm(job or Job()),
         worst=WORST_LISTED if judging.worst is None else judging.worst,
+        trace_points=judging.trace_points or TRACE_POINTS,
     )
     found = _judged(data, decoded, target, goal, options)
     beyond = _beyond(found, judging.gates)

@@ -19,8 +19,17 @@ if TYPE_CHECKING:
 LINES_SHOWN = 200
 """A table of the viewer has no more lines than this; the JSON report has them all."""
 
+POINTS_OF_A_PAGE = 400_000
+"""The viewer is given so many points of the slides' path: enough for the ends of 200,000 moves and
+the largest error within each."""
+
 NAME_WIDTH = 11
 """Characters of the report's text before the figures of a line."""
+
+
+def points_for(picture: str | None) -> int | None:
+    """How many points of the slides' path a picture of this name wants; None: as usual."""
+    return POINTS_OF_A_PAGE if (picture or "").lower().endswith(".html") else None
 
 
 def listing_of(

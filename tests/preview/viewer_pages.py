@@ -6,12 +6,16 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 
 from camtool.geometry.polylines import Segments
 from camtool.preview.draw import Scene
 from camtool.preview.viewer.page import viewer_page
 from camtool.preview.viewer.run import Line, Run, Table, Worst, by_feed
 from camtool.toolpath.moves import Toolpath
+
+MANY = [50_000, pytest.param(200_000, marks=pytest.mark.slow)]
+"""Moves of long programs."""
 
 HOSTILE = "</script><script>hack()</script><img src=x onerror=hack()> {script} &amp; \ud800\x00\n"
 
@@ -89,9 +93,9 @@ def large(count: int) -> Scene:
 
 
 @cache
-def large_text() -> str:
-    """The page of 200,000 moves, made once."""
-    return text_of(large(200_000))
+def large_text(count: int) -> str:
+    """The page of so many moves, made once."""
+    return text_of(large(count))
 
 
 def text_of(scene: Scene) -> str:

@@ -17,6 +17,7 @@ from camtool.preview.scene import Scene
 from camtool.preview.trace import Trace, bins_of
 from camtool.preview.viewer.columns import BYTE, FLOAT, INT, SHORT, Columns
 from camtool.preview.viewer.run import Floats, Ints, Run
+from camtool.preview.viewer.thinned import thinned
 from camtool.units import UM_PER_MM
 
 MOST_COUNTS = 32_000
@@ -47,15 +48,16 @@ def traced_of(scene: Scene, run: Run | None, top_um: float) -> Traced:
     error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
     steps = bins_of(Trace(points, error_um, cutting, top_um))
     bins = np.concatenate([[BINS], np.where(steps < 0, BINS, steps)])
+    kept = thinned(points, bins, float(error_um.max(initial=0.0)) / UM_PER_MM)
     # The point before a cut is where the cut begins.
-    off = _off(points, cutting | np.append(cutting[1:], False), scene.wanted)
+    drawn = (cutting | np.append(cutting[1:], False))[kept]
+    points, bins, row = points[kept], bins[kept], run.trace_row[kept]
+    off = _off(points, drawn, scene.wanted)
     largest = float(np.abs(off).max(initial=0.0))
     count_mm = largest / MOST_COUNTS if scene.wanted is not None and largest > 0.0 else 0.0
     counts = np.rint(off / count_mm) if count_mm else np.zeros_like(off)
     ever = np.ones(len(worst), dtype=np.bool_)
-    return Traced(
-        _columns(points, bins, run.trace_row, counts), count_mm, _off(worst, ever, scene.wanted)
-    )
+    return Traced(_columns(points, bins, row, counts), count_mm, _off(worst, ever, scene.wanted))
 
 
 def _off(points: Floats, chosen: np.ndarray, wanted: Segments | None) -> Floats:
