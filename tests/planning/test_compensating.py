@@ -26,8 +26,9 @@ FREE = "controller.grid=none"
 DENSE = 200
 """Chords that stand for an arc in the oracle: of 10 mm and half a turn they miss 0.3 µm."""
 
-FINE_MM = 2e-3
-"""How far the oracle's chords, and arcs that became ellipses, may be off."""
+FINE_MM = 0.5 * 0.004 + 0.0005 + 0.0003
+"""How far off slides may be: a controller notices that an axis turns once it came back by half a
+step, and adds its compensation then; arcs that became ellipses; the oracle's chords."""
 
 
 def cut(path: Polyline, z: float = -0.1) -> Toolpath:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError, ProgramError
@@ -60,19 +60,19 @@ def jobs(draw: st.DrawFn) -> Toolpath:
 @st.composite
 def machines(draw: st.DrawFn) -> Machine:
     """Made-up machines: steps, play, scale and rates of each axis, limits said or not."""
-    settings = [f"controller.grid={draw(st.sampled_from(['steps', 'none']))}"]
-    settings.append(f"controller.start_play={draw(st.sampled_from(['preloaded', 'centred']))}")
-    settings.append(f"controller.start_direction={draw(st.sampled_from('+-'))}")
+    changes = [f"controller.grid={draw(st.sampled_from(['steps', 'none']))}"]
+    changes.append(f"controller.start_play={draw(st.sampled_from(['preloaded', 'centred']))}")
+    changes.append(f"controller.start_direction={draw(st.sampled_from('+-'))}")
     for axis in "xyz":
         step = draw(st.sampled_from([0.001, 0.0125, 0.04, 0.00333]))
-        settings.append(f"axes.{axis}.coded_step_mm={step}")
-        settings.append(f"axes.{axis}.real_step_mm={step * draw(st.floats(0.9, 1.1))}")
-        settings.append(f"axes.{axis}.backlash_mm={draw(st.sampled_from([0.0, 0.03, 0.5]))}")
+        changes.append(f"axes.{axis}.coded_step_mm={step}")
+        changes.append(f"axes.{axis}.real_step_mm={step * draw(st.floats(0.9, 1.1))}")
+        changes.append(f"axes.{axis}.backlash_mm={draw(st.sampled_from([0.0, 0.03, 0.5]))}")
         if draw(st.booleans()):
-            settings.append(f"axes.{axis}.max_rate_mm_min={draw(st.floats(1.0, 1000.0))}")
+            changes.append(f"axes.{axis}.max_rate_mm_min={draw(st.floats(1.0, 1000.0))}")
     if draw(st.booleans()):
-        settings.append(f"limits.rapid_mm_min={draw(st.floats(1.0, 5000.0))}")
-    return path_machine(*settings)
+        changes.append(f"limits.rapid_mm_min={draw(st.floats(1.0, 5000.0))}")
+    return path_machine(*changes)
 
 
 def gathered(chunks: list[Chunk]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -96,6 +96,7 @@ def square(side: float = 1.0) -> Toolpath:
     return b.finish()
 
 
+@settings(max_examples=20)  # chunks of one sample are slow
 @given(jobs(), st.sampled_from([1, 7, 65536]))
 def test_every_row_gives_its_chunks_in_order(toolpath: Toolpath, chunk_steps: int) -> None:
     chunks = list(simulate(toolpath, path_machine(), Options(chunk_steps=chunk_steps)))
@@ -144,6 +145,7 @@ def test_extents_are_exact(toolpath: Toolpath) -> None:
     assert reach == pytest.approx(toolpath_extents(toolpath), abs=1e-12)
 
 
+@settings(max_examples=20)
 @given(jobs(), st.sampled_from([1, 10, 65536]))
 def test_chunks_do_not_matter(toolpath: Toolpath, chunk_steps: int) -> None:
     machine = path_machine(*both("backlash_mm", 0.03), *both("compensation_mm", 0.02))
