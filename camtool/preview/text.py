@@ -50,7 +50,7 @@ def wrapped(text: str, cap: float, limit: float) -> list[str]:
     """`text` as lines no wider than `limit`, broken at blanks but not before a unit; a longer word
     is shortened."""
     lines: list[str] = []
-    for word in _UNIT.split(one_line(text)):
+    for word in filter(None, _UNIT.split(one_line(text))):
         longer = f"{lines[-1]} {word}" if lines else word
         if lines and width(longer, cap) <= limit:
             lines[-1] = longer

@@ -82,3 +82,7 @@ def test_a_unit_stays_with_its_number() -> None:
         lines = text.wrapped(words, 13.0, float(limit))
         assert not any(line.lstrip("(").startswith(("µm", "mm", "h ")) for line in lines)
         assert " ".join(lines).count("…") or " ".join(lines) == words
+
+
+def test_nothing_is_no_line() -> None:
+    assert text.wrapped("", 13.0, 100.0) == text.wrapped(" \n ", 13.0, 100.0) == []
