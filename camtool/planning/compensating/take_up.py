@@ -13,6 +13,8 @@ When an axis reverses, that position jumps by e(−d) − e(d) =: J in the new d
   ahead. So the axis first overshoots by `OVERSHOOT` · r, then makes one step back, which leaves
   the slide (1 − `OVERSHOOT`) · r ahead, and holds until the path has come as far. With one half
   the largest error is r/2, at the reversal only; without any of this it is r all the way back.
+  In the cut nothing does better: the step throws the slide from one end of a length r to the
+  other, wherever it is made, and one of the two ends is r/2 or more off the place of the reversal.
 
 Where the play changes with the region of the table, e does too: a step towards d is taken alone,
 one against it is waited for. Rapids and other moves in the air take up the play on their way. An
