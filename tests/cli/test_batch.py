@@ -4,6 +4,8 @@ import errno
 import json
 import os
 import shutil
+import signal
+from collections.abc import Generator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -11,10 +13,12 @@ import pytest
 
 from camtool.batch import digests as digests_module
 from camtool.batch.lock import alone_in
-from camtool.batch.records import Pool
+from camtool.batch.records import Made, Pool, Task
 from camtool.cli import batchrun, batchwork
+from camtool.cli.batchstop import stoppable
 from camtool.cli.drawing import DrawingFlags
 from camtool.cli.pictureflags import PictureFlags
+from camtool.errors import CamtoolError
 from camtool.machine.registry import load_target
 from camtool.verify.gates import Gates
 from tests.cli.conftest import Run
@@ -287,3 +291,51 @@ def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(batchwork, "code_digest", lambda files: "of other code")
     digests.append(work.digest())
     assert len(set(digests)) == len(digests)
+
+
+def test_the_first_signal_is_noted_and_a_second_ctrl_c_waits_for_nothing() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with stoppable() as stop:
+        assert stop.signal is None
+        for _ in range(2):
+            signal.raise_signal(signal.SIGTERM)
+            assert stop.signal == signal.SIGTERM
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    with stoppable() as stop:
+        signal.raise_signal(signal.SIGINT)
+        assert stop.signal == signal.SIGINT
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.usefixtures("pools")
+def test_a_run_that_is_interrupted_at_once_says_so(
+    camtool: Run, drawings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(path: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(batchrun, "own_job", interrupted)
+    done = camtool("batch", "drawings/in", *PIC, *QUICK)
+    assert done.returncode == 128 + signal.SIGINT
+    assert b"interrupted; what is written is whole" in done.stderr
+    assert files_in(tmp_path / "build") == set()
+
+
+@pytest.mark.usefixtures("pools")
+def test_a_run_that_cannot_go_on_still_sums_up(
+    camtool: Run, drawings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Lost(HerePool):
+        def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
+            yield from super().results(tasks[:1])
+            raise CamtoolError("the scheduler was lost", where="--scheduler")
+
+    monkeypatch.setattr(batchrun.Batched, "_pool", lambda batched, note: Lost(batched.work))
+    sources = ("drawings/letter.svg", "drawings/in/square.dxf")
+    done = camtool("batch", *sources, *PIC, *QUICK, "--json", "-")
+    assert done.returncode == 2
+    assert done.stderr.endswith(b"camtool: error: --scheduler: the scheduler was lost\n")
+    whole = json.loads(done.stdout)
+    assert (whole["made"], whole["not_run"]) == (1, 1)
+    assert files_in(tmp_path / "build") == {MANIFEST, "letter.pic"}
