@@ -155,10 +155,10 @@ class Layers {
     return [null, wide, wide];
   }
 
-  drawingStyles(colours) {
+  drawingStyles(colours, everyLayer = false) {
     const alone = !this.columns.move_kind.length;
     return this.head.layers.map((layer, index) => {
-      if (!this.on.get(`drawing ${index}`)) return null;
+      if (!everyLayer && !this.on.get(`drawing ${index}`)) return null;
       return alone
         ? { colour: this.colourOfLayer(layer, colours), width: 1.5 }
         : { colour: colours.drawing, width: 4 };

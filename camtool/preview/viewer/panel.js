@@ -47,7 +47,11 @@ class LayerPanel {
 
   colourChoice() {
     const { columns, heights } = this.layers, choice = find("colour-by");
-    if (!columns.move_kind.length) { find("colours").hidden = true; return; }
+    if (!columns.move_kind.length) {
+      find("colours").hidden = true;
+      this.scale();
+      return;
+    }
     const known = columns.move_error.some((um) => um >= 0);
     if (known) choice.append(element("option", "error", { value: "error" }));
     if (heights[1] > heights[0]) choice.append(element("option", "height", { value: "height" }));
@@ -71,8 +75,17 @@ class LayerPanel {
     if (choice.options.length) step(choice, choice.selectedIndex === choice.options.length - 1 ? -choice.selectedIndex : 1);
   }
 
+  /** A drawing alone has the colours of its layers. */
+  swatches() {
+    const found = document.querySelectorAll(".swatch.drawing");
+    this.layers.drawingStyles(palette(), true).forEach((style, index) => {
+      found[index].style.borderColor = style.colour;
+    });
+  }
+
   /** The map's colours with the numbers that they stand for. */
   scale() {
+    this.swatches();
     const { layers } = this, { by, heights, columns } = layers, place = find("scale");
     place.hidden = by === "kind" && !columns.trace_row.length;
     if (place.hidden) return;
