@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
@@ -98,6 +98,11 @@ def test_without_it_the_same_part_is_off_by_the_play() -> None:
     assert errors_mm(compensated(wanted, machine).toolpath, wanted, machine).max() < FINE_MM
 
 
+@example(
+    Polyline(np.array([[6.1, 2.24, -0.037], [-1.37, 1.785, 0], [-0.5, -0.866, 0]]), True),
+    0.1,
+    "preloaded",
+)
 @given(
     contours(max_points=6), st.sampled_from([0.02, 0.1]), st.sampled_from(["preloaded", "centred"])
 )

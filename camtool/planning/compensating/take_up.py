@@ -13,6 +13,7 @@ When an axis reverses, that position jumps by e(−d) − e(d) =: J in the new d
   ahead. So the axis first overshoots by `OVERSHOOT` · r, then makes one step back, which leaves
   the slide (1 − `OVERSHOOT`) · r ahead, and holds until the path has come as far. With one half
   the largest error is r/2, at the reversal only; without any of this it is r all the way back.
+  An axis that still waits from the reversal before stands out already, and overshoots by the rest.
   In the cut nothing does better: the step throws the slide from one end of a length r to the
   other, wherever it is made, and one of the two ends is r/2 or more off the place of the reversal.
 
@@ -160,7 +161,8 @@ class _TakenUp:
             sense = drive.sense_of(begin, end)
             excess = (drive.at - drive.asked(begin, sense)) * sense
             if sense != drive.sense and excess > AHEAD_MM:
-                drive.at -= OVERSHOOT * excess * sense
+                thrown = (drive.asked(begin, drive.sense) - drive.asked(begin, sense)) * sense
+                drive.at -= max(excess - (1.0 - OVERSHOOT) * thrown, 0.0) * sense
                 back.append((drive, sense))
         if back:
             self._line(move)
