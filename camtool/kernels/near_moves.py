@@ -30,8 +30,8 @@ Ints = npt.NDArray[np.int64]
 Only = tuple[int, int, float, float]
 """Moves that may be the nearest: first:last, as far as their heights overlap low … high."""
 
-NODE_COST, MOVE_COST = 4.0, 20.0
-"""A node, and a move, that a search looks at cost about as much as so many distances of a list."""
+SEARCH_COST = 400.0
+"""A search for a list costs about as much as so many distances."""
 
 FIRST_REACH_MM = 0.05
 """ρ of the first list."""
@@ -45,10 +45,10 @@ SLACK = 1e-12
 SLACK_MM = 1e-12
 """See `SLACK`."""
 
-QX, QY, REACH, FIRST, LAST, Z_LOW, Z_HIGH, COUNT, LEAST, USED, COST = range(11)
+QX, QY, REACH, FIRST, LAST, Z_LOW, Z_HIGH, COUNT, LEAST, USED, LOOKED = range(11)
 """The memo of a list, float64: the point q, ρ (−1: there is no list), which moves first:last and
 heights it holds, how many moves are in it, how many of these are as near to q as any, for how
-many points it was used, and how many distances the search for it cost."""
+many points it was used, and how many nodes and moves the search for it looked at."""
 
 MEMO = 11
 """Numbers in a memo."""
@@ -117,7 +117,7 @@ def _search(only: Only, moves: Moves, near: Near, spot: Floats) -> tuple[float, 
     while height > 0:
         height -= 1
         node = stack[height]
-        memo[COST] += NODE_COST
+        memo[LOOKED] += 1.0
         if nodes[node, FIRST_BELOW] >= last or nodes[node, LAST_BELOW] <= first:
             continue
         if apart_square(nodes, node, x, y) > limit * limit:
@@ -132,7 +132,7 @@ def _search(only: Only, moves: Moves, near: Near, spot: Floats) -> tuple[float, 
             if moves.heights[k, 0] > z_high or moves.heights[k, 1] < z_low:
                 continue
             apart = _apart(moves.table[k], x, y, spot)
-            memo[COST] += MOVE_COST
+            memo[LOOKED] += 1.0
             if apart < best:
                 best, limit = apart, _looser(apart + beyond)
             if apart <= limit:
@@ -169,11 +169,11 @@ def renew(x: float, y: float, only: Only, moves: Moves, near: Near, spot: Floats
     memo = near.memo
     if memo[REACH] < 0.0:
         memo[REACH] = FIRST_REACH_MM
-    elif memo[USED] * (memo[COUNT] - memo[LEAST]) > memo[COST]:
+    elif memo[USED] * (memo[COUNT] - memo[LEAST]) > SEARCH_COST:
         memo[REACH] *= 0.5
     else:
         memo[REACH] = min(2.0 * memo[REACH], MOST_REACH_MM)
-    memo[QX], memo[QY], memo[USED], memo[COST] = x, y, 0.0, 0.0
+    memo[QX], memo[QY], memo[USED], memo[LOOKED] = x, y, 0.0, 0.0
     nearest, count = _search(only, moves, near, spot)
     if count == 0:  # nothing at this height: any height
         only = only[0], only[1], -np.inf, np.inf

@@ -9,7 +9,7 @@ import pytest
 from camtool.kernels.box_tree import LEAF
 from camtool.kernels.circle_bins import ANGLE_BINS, bin_directions, empty_bins
 from camtool.kernels.move_tree import FIRST, LAST, hilbert_order, move_tree
-from camtool.kernels.near_moves import COST, COUNT, Moves, no_list
+from camtool.kernels.near_moves import COUNT, LOOKED, Moves, no_list
 from camtool.kernels.thin_trace import WRITTEN, new_pen, unwritten
 from tests.oracles.kernel_doors import (
     fill_bins_,
@@ -156,14 +156,14 @@ def test_a_search_in_a_spiral_looks_at_few_of_its_turns() -> None:
     table = np.array([line.row() for line in lines], dtype=np.float64)
     heights, out = np.zeros((len(lines), 2)), np.empty(1)
     moves = Moves(table, heights, *move_tree(np.array([line.box() for line in lines])))
-    costs = []
+    looked = []
     for k in range(100, 8000, 700):
         near = no_list(len(lines))
         at = np.array([[places[k][0]], [places[k][1]]])
         nearest_errors_(at[0], at[1], (0, len(lines), 0.0, 0.0), moves, near, out)
         assert abs(out[0]) < EPS
-        costs.append(near.memo[COST])
-    assert max(costs) < 1500.0
+        looked.append(near.memo[LOOKED])
+    assert max(looked) < 300.0
 
 
 def test_the_bins_of_a_circle_are_those_of_a_loop() -> None:
