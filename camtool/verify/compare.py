@@ -6,10 +6,10 @@ Distances are exact: to true lines and arcs, never to chords.
     arc:       | |p − c| − r |  inside the wedge that the arc spans at its centre c (≤ 180°, so two
                signs of cross products tell), otherwise the distance to its nearer end.
 
-The nearest of many is searched by groups of neighbouring points. A tree of the moves' boxes gives
-those within a margin of the group's box. When the largest distance found is within the margin, no
-move outside could be nearer; otherwise the margin grows to that distance. So the result is exact
-whatever the first margin was; a good guess only saves time.
+The nearest of many is searched by groups of neighbouring points. A tree of boxes, of moves and
+pieces of long ones, gives those within a margin of the group's box. When the largest distance
+found is within the margin, no move outside could be nearer; otherwise the margin grows to that
+distance. So the result is exact whatever the first margin was; a good guess only saves time.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import numpy as np
 from camtool.geometry.measure import segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
 from camtool.verify.cuts import CutMoves
+from camtool.verify.pieces import boxes_of_pieces, gap_mm
 from camtool.verify.runs import group_boxes, ranges
 
 PAIRS_AT_ONCE = 1 << 17
@@ -144,8 +145,10 @@ class Target:
         self.table = SegmentTable(cuts.segments)
         self.boxes = segment_boxes(cuts.segments)
         self._tree: Any = None
+        self._whose = np.empty(0, dtype=np.int64)
         low, high = cuts.z.T
         length = segment_lengths(cuts.segments)
+        self.gap_mm = gap_mm(cuts.segments, self.boxes)
         self._slope = (high - low) / np.where(length > 0.0, length, 1.0)
 
     def nearest(self, points: Floats, groups: Groups) -> Found:
@@ -180,20 +183,23 @@ class Target:
     def _candidates(
         self, boxes: Floats, margin: Floats, todo: Ints, groups: Groups
     ) -> tuple[Ints, Ints]:
-        """Pairs (index into `todo`, move) whose boxes come within the margin, in order."""
+        """Pairs (index into `todo`, move) with a piece whose box comes within the margin, in
+        order."""
         import shapely
 
         if self._tree is None:
-            self._tree = shapely.STRtree(shapely.box(*self.boxes.T))
+            pieces, self._whose = boxes_of_pieces(self.cuts.segments, self.gap_mm)
+            self._tree = shapely.STRtree(shapely.box(*pieces.T))
         wide = boxes + margin[:, None] * np.array([-1.0, -1.0, 1.0, 1.0])
-        group, move = self._tree.query(shapely.box(*wide.T))
+        group, piece = self._tree.query(shapely.box(*wide.T))
+        pairs = np.sort(group * len(self.boxes) + self._whose[piece])
+        pairs = pairs[np.diff(pairs, prepend=-1) > 0]
+        group, move = np.divmod(pairs, len(self.boxes))
         wanted, z = groups.contour[todo][group], groups.z[todo][group]
         here = self.cuts.z[move]
         fits = (wanted == ANY_CONTOUR) | (wanted == self.contour[move])
         fits &= (z[:, 0] <= here[:, 1]) & (here[:, 0] <= z[:, 1])
-        group, move = group[fits], move[fits]
-        order = np.lexsort((move, group))
-        return group[order], move[order]
+        return group[fits], move[fits]
 
     def _off_height(self, points: Floats, height: Floats, move: Ints, window_mm: float) -> Any:
         """(J,) where the moves are at another height than the points nearest to them."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.geometry.polylines import Ints
+from camtool.geometry.polylines import POSITION_EPS_MM, Ints
 from camtool.verify.circles import Circle
 from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
 from camtool.verify.cuts import Bools, CutMoves, Samples
@@ -26,7 +26,10 @@ LEAST_MM = 1e-6
 """What is nearer than this at its height is found even when no distance is allowed."""
 
 SAMPLES_PER_GROUP = 64
-"""Neighbouring samples that share one search for near moves."""
+"""So many neighbouring samples share one search for near moves, unless moves lie close."""
+
+GAPS_PER_GROUP = 4.0
+"""A search reaches along so many gaps between moves: its box holds about their square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +95,12 @@ def nearest_at_height(
     found, wrong_depth = _nothing(len(samples.points)), np.zeros(len(samples.points), np.bool_)
     if len(samples.points) == 0:
         return found, wrong_depth
-    every = np.arange(len(samples.points))
+    every, together = np.arange(len(samples.points)), _samples_per_group(samples, target)
     for levels in (True, False):
         rest = every[np.isinf(found.distance)]
         if len(rest) == 0:
             break
-        offsets = run_offsets(samples.segment[rest], SAMPLES_PER_GROUP)
+        offsets = run_offsets(samples.segment[rest], together)
         first, z = rest[offsets[:-1]], samples.z[rest]
         count = len(first)
         contour = np.full(count, ANY_CONTOUR) if choice is None else choice[first]
@@ -116,6 +119,14 @@ def nearest_at_height(
         if not levels:
             wrong_depth[rest] = near.distance <= limit_mm
     return found, wrong_depth
+
+
+def _samples_per_group(samples: Samples, target: Target) -> int:
+    """How many samples of a segment share one search, so that its box holds few moves; only time
+    depends on it."""
+    steps = np.hypot(*np.diff(samples.points, axis=0).T)[np.diff(samples.segment) == 0]
+    spacing = max(float(steps.mean()) if len(steps) else 0.0, POSITION_EPS_MM)
+    return int(np.clip(GAPS_PER_GROUP * target.gap_mm / spacing, 1.0, SAMPLES_PER_GROUP))
 
 
 def _nothing(count: int) -> Found:

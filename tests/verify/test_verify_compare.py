@@ -161,3 +161,17 @@ def test_where_nothing_may_be_compared_the_distance_is_infinite() -> None:
     assert (found.segment == -1).all()
     none = Target(cut_moves(ToolpathBuilder().finish(), flat_cuts=True))
     assert np.isinf(none.nearest(np.zeros((10, 2)), groups).distance).all()
+
+
+@pytest.mark.parametrize("size", [1, 16])
+def test_the_search_among_long_moves_that_all_cross(size: int) -> None:
+    rng = np.random.default_rng(8)
+    path = ToolpathBuilder()
+    for x, y, to_x, to_y in rng.uniform(0.0, 50.0, (150, 4)):
+        path.rapid(x=x, y=y, z=1.0).line(z=-1.0, feed=100.0).line(to_x, to_y, feed=100.0)
+        path.rapid(z=1.0)
+    target = Target(cut_moves(path.finish(), flat_cuts=False))
+    points = rng.uniform(0.0, 50.0, (400, 2))
+    found = target.nearest(points, grouped(len(points), 1e-3, size))
+    allowed = np.ones(len(target.boxes), dtype=np.bool_)
+    np.testing.assert_allclose(found.distance, everything(target, points, allowed), atol=1e-12)
