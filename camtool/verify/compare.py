@@ -29,6 +29,9 @@ from camtool.verify.runs import group_boxes, ranges
 PAIRS_AT_ONCE = 1 << 17
 """Pairs of point and move that are worked on together: bounds memory, fits a processor's cache."""
 
+GROUPS_AT_ONCE = 1 << 13
+"""Groups whose near moves are searched together: bounds memory."""
+
 MARGIN_GROWTH = 4.0
 """The margin of a search grows by this factor while nothing at all was found."""
 
@@ -162,8 +165,14 @@ class Target:
         margin = np.minimum(np.maximum(groups.margin * MARGIN_SLACK, POSITION_EPS_MM), everything)
         todo = np.arange(count)
         while len(todo):
-            pairs = self._candidates(boxes[todo], margin[todo], todo, groups)
-            worst = self._least(points, groups, todo, pairs, found)
+            worst = np.concatenate(
+                [
+                    self._least(
+                        points, groups, part, self._candidates(boxes, margin, part, groups), found
+                    )
+                    for part in np.split(todo, range(GROUPS_AT_ONCE, len(todo), GROUPS_AT_ONCE))
+                ]
+            )
             done = (worst <= margin[todo]) | (margin[todo] >= everything)
             grown = np.where(
                 np.isfinite(worst), worst * MARGIN_SLACK, margin[todo] * MARGIN_GROWTH
@@ -190,7 +199,7 @@ class Target:
         if self._tree is None:
             pieces, self._whose = boxes_of_pieces(self.cuts.segments, self.gap_mm)
             self._tree = shapely.STRtree(shapely.box(*pieces.T))
-        wide = boxes + margin[:, None] * np.array([-1.0, -1.0, 1.0, 1.0])
+        wide = boxes[todo] + margin[todo, None] * np.array([-1.0, -1.0, 1.0, 1.0])
         group, piece = self._tree.query(shapely.box(*wide.T))
         pairs = np.sort(group * len(self.boxes) + self._whose[piece])
         pairs = pairs[np.diff(pairs, prepend=-1) > 0]
