@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from camtool.cli.talk import say, say_findings
 from camtool.cli.terminal import REPORT_NAMES, report_marks, show_facts
 
 if TYPE_CHECKING:
+    from camtool.cli.painter import Painter
     from camtool.cli.report import Flags
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Posted
@@ -55,7 +55,7 @@ def finish(
     *,
     quiet: bool,
     verbose: bool,
-    picture: Callable[[str], bytes],
+    picture: Painter,
     target: LoadedTarget,
 ) -> int:
     """Writes what was made and says so; the exit code. `picture` draws the ones that were asked.
@@ -92,16 +92,14 @@ def finish(
 
 
 def _page_alone(
-    made: Posted, asked: Asked, picture: Callable[[str], bytes], target: LoadedTarget
+    made: Posted, asked: Asked, picture: Painter, target: LoadedTarget
 ) -> dict[str, bytes]:
     """The files of the page, and the picture of `--preview` if that is what the page shows."""
     files, linked = _page(made, asked, picture, target), linked_picture(asked.page, asked.preview)
     return files if linked is None or linked in files else {**files, linked: picture(linked)}
 
 
-def _page(
-    made: Posted, asked: Asked, picture: Callable[[str], bytes], target: LoadedTarget
-) -> dict[str, bytes]:
+def _page(made: Posted, asked: Asked, picture: Painter, target: LoadedTarget) -> dict[str, bytes]:
     """The files of the page that was asked for."""
     subject = Subject(
         title=Path(asked.source).name if asked.source != STDOUT else "<stdin>",

@@ -6,14 +6,14 @@ by name before any work is done; a layer that was named and turns out to hold no
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import click
 
 from camtool.cli.gather import Command, with_flags
+from camtool.cli.painter import Painter, judged
 from camtool.cli.sections import option
 from camtool.cli.talk import say
 from camtool.cli.types import is_viewer
@@ -137,37 +137,22 @@ class PictureFlags:
         if self.exaggerate is not None and canvas.predicted and not covered:
             raise click.UsageError("--exaggerate moves the layer path, which is left out")
 
-    def painter(
-        self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False
-    ) -> Callable[[str], bytes]:
-        """What draws the scenes, several side by side, as a picture file of a name; they are made
-        when first asked for. Says what of the flags they turn out not to show."""
+    def painter(self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False) -> Painter:
+        """What draws the scenes, several side by side, as a picture file of a name. Says what of
+        the flags they turn out not to show."""
 
-        @functools.cache
-        def made() -> tuple[Sequence[Scene], Options]:
-            found, options = scenes(), self.options()
+        def told(found: Sequence[Scene]) -> None:
             for line in self._not_shown(found):
                 say(f"camtool: warning: {line}", quiet=quiet)
-            return found, options if _judged(found) else replace(options, polar=None)
 
-        def painted(name: str) -> bytes:
-            drawn, options = made()
-            if len(drawn) > 1:
-                from camtool.preview.beside import render_beside
-
-                return render_beside(drawn, name, options)
-            from camtool.preview.render import render
-
-            return render(drawn[0], name, options)
-
-        return painted
+        return Painter(scenes, self.options, told)
 
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
         """What to say of layers that hold nothing, and where nothing could be judged."""
         for name in self._missing(scenes):
             yield f"--layers {name}: nothing in this picture{HINTS.get(name, '')}"
         for flag in ("--exaggerate", "--polar"):
-            if flag in self.given and not _judged(scenes):
+            if flag in self.given and not judged(scenes):
                 yield f"{flag}: the part cannot be judged; the picture shows what is planned"
 
     def _missing(self, scenes: Sequence[Scene]) -> list[str]:
@@ -178,11 +163,6 @@ class PictureFlags:
         options = self.options()
         empty = [missing_layers(scene, options, self.named) for scene in scenes]
         return [name for name in self.named if all(name in names for names in empty)]
-
-
-def _judged(scenes: Sequence[Scene]) -> bool:
-    """Whether all have a predicted path."""
-    return all(scene.trace_points is not None for scene in scenes)
 
 
 FLAGS = tuple(field.name for field in fields(PictureFlags))

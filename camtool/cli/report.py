@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ from camtool.cli.pictureflags import FLAGS as PICTURE_FLAGS
 from camtool.cli.types import is_viewer, page
 
 if TYPE_CHECKING:
+    from camtool.cli.painter import Painter
     from camtool.findings import Finding
     from camtool.machine.registry import LoadedTarget
     from camtool.verify.page import Page, Setup
@@ -100,7 +100,7 @@ def pictures_asked(name: str | None, preview: str | None) -> list[str]:
 
 
 def report_files(
-    name: str, subject: Subject, picture: Callable[[str], bytes], *, preview: str | None
+    name: str, subject: Subject, picture: Painter, *, preview: str | None
 ) -> dict[str, bytes]:
     """The page of this name, and the picture beside it where it has one of its own."""
     from camtool.verify.html import html
@@ -111,13 +111,18 @@ def report_files(
     if name != STDOUT and suffix == ".json":
         return {name: to_json(_page(subject, ())).encode()}
     if name != STDOUT and suffix == ".html":
-        data = base64.b64encode(picture(EMBEDDED)).decode()
-        shown = ((_CAPTION, f"data:image/svg+xml;base64,{data}"),)
+        pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
+        shown = tuple((caption, _held(data)) for caption, data in pictures)
         return {name: html(_page(subject, shown)).encode()}
     beside, linked = picture_beside(name, preview), linked_picture(name, preview)
-    pictures = () if linked is None else ((_CAPTION, _from(name, linked)),)
-    files = {name: markdown(_page(subject, pictures)).encode()}
+    links = () if linked is None else ((_CAPTION, _from(name, linked)),)
+    files = {name: markdown(_page(subject, links)).encode()}
     return files if beside is None else {**files, beside: picture(beside)}
+
+
+def _held(svg: bytes) -> str:
+    """The address of a picture that the page itself holds."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
 def _from(page_name: str, picture_name: str) -> str:

@@ -62,11 +62,20 @@ def test_html_is_one_page_without_scripts(camtool: Run, drawing: Path, tmp_path:
     found = Tags(text)
     assert not found.tags & {"script", "iframe", "object", "link", "svg", "a", "base", "form"}
     assert not [name for name in found.attributes if name.startswith("on")]
-    (address,) = found.addresses
     head = "data:image/svg+xml;base64,"
-    assert address.startswith(head)
-    assert ElementTree.fromstring(base64.b64decode(address[len(head) :])).tag.endswith("svg")
-    for words in ("error by source", "dimension", "circle at mm", "worst moves", "ring.svg"):
+    assert len(found.addresses) == 3  # the whole, its worst place, a circle
+    for address in found.addresses:
+        assert address.startswith(head)
+        assert ElementTree.fromstring(base64.b64decode(address[len(head) :])).tag.endswith("svg")
+    for words in (
+        "The largest error, near (",
+        "the largest circular error, ",
+        "error by source",
+        "dimension",
+        "circle at mm",
+        "worst moves",
+        "ring.svg",
+    ):
         assert words in text, words
     assert "axes.x.backlash_mm" in text
     assert "0.02 (the target&#x27;s own: 0.0)" in text
