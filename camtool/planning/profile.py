@@ -85,7 +85,8 @@ def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found
     joined = [each for line in found.lines for each in _joined(chosen, line.of, setting)]
     found.findings += told_together(joined, "pairs of contours that stay joined")
     free = Polylines.of(reverse(path) for path in shape)
-    found.findings += unreached_findings(free, setting)
+    hair_mm = 2.0 * SLOT_TOLERANCE_MM if _any_as_wide(found) else 0.0
+    found.findings += unreached_findings(free, setting, hair_mm=hair_mm)
 
 
 def _alone(chosen: Chosen, k: int, setting: Setting, found: _Found) -> None:
@@ -162,6 +163,10 @@ def _as_wide(chosen: Chosen, k: int, setting: Setting) -> Finding:
         f"{tool_name(setting.operation.tool)} is as wide as this contour: it runs in its middle",
         where=_middle(chosen, k),
     )
+
+
+def _any_as_wide(found: _Found) -> bool:
+    return any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
 
 
 def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:

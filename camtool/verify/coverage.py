@@ -33,12 +33,41 @@ class Coverage:
     findings: tuple[Finding, ...]
 
 
-def cover(decoded: Target, goal: Goal, spacing_mm: float) -> Coverage:
+@dataclass(frozen=True, eq=False)
+class Drilled:
+    """Contours, of those that are wanted and of the decoded ones, for which a hole of the other
+    side stands: true (C,)."""
+
+    wanted: Bools
+    decoded: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """Samples of the cuts of one side with the nearest moves of the other; `drilled` as above."""
+
+    cuts: CutMoves
+    samples: Samples
+    found: Found
+    wrong_depth: Bools
+    drilled: Bools
+
+    def bad(self, goal: Goal) -> Bools:
+        """(S,) true for samples that the other side does not cut. A slope that is hardly below
+        the stock top may be a flat move upon it, which cuts nothing."""
+        sloping = self.cuts.slopes[self.samples.segment]
+        judged = ~sloping | (self.samples.z < STOCK_TOP_MM - goal.depth_mm)
+        judged &= ~self.drilled[self.cuts.contour[self.cuts.segments.path[self.samples.segment]]]
+        return np.asarray(judged & (self.wrong_depth | (self.found.distance > goal.limit_mm)))
+
+
+def cover(decoded: Target, goal: Goal, spacing_mm: float, drilled: Drilled) -> Coverage:
     """Compare decoded and wanted cutting moves both ways, on samples about `spacing_mm` apart."""
     cuts, wanted, limits = decoded.cuts, goal.target, (goal.limit_mm, goal.depth_mm)
     samples = sample_cuts(cuts, spacing_mm)
     found, wrong_depth = nearest_at_height(samples, None, wanted, limits)
-    extra = tuple(_extra_cuts(cuts, samples, found, wrong_depth, goal))
+    there = _Compared(cuts, samples, found, wrong_depth, drilled.decoded)
+    extra = tuple(_extra_cuts(there, goal))
     belongs = match_contours(cuts, samples, found, goal)
     rounding = Figure()
     real = np.isfinite(found.distance)
@@ -46,33 +75,24 @@ def cover(decoded: Target, goal: Goal, spacing_mm: float) -> Coverage:
     rounding.add(found.distance[real], samples.points[real], rows[real])
     back = sample_cuts(wanted.cuts, spacing_mm)
     found_back, wrong_back = nearest_at_height(back, None, decoded, limits)
-    missing = _missing(wanted.cuts, back, found_back, wrong_back, goal)
+    missing = _missing(_Compared(wanted.cuts, back, found_back, wrong_back, drilled.wanted), goal)
     match = match_rows(cuts, samples, belongs, found, goal)
     return Coverage(match, rounding, (*missing, *extra))
 
 
-def _judged(samples: Samples, cuts: CutMoves, depth_mm: float) -> Bools:
-    """(S,) true for samples that must be found: a slope that is hardly below the stock top may be
-    a flat move upon it, which cuts nothing."""
-    return np.asarray(~cuts.slopes[samples.segment] | (samples.z < STOCK_TOP_MM - depth_mm))
-
-
-def _extra_cuts(
-    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, goal: Goal
-) -> Iterator[Finding]:
-    bad = wrong_depth | (found.distance > goal.limit_mm)
-    bad &= _judged(samples, cuts, goal.depth_mm)
-    listed = list(_by_contour(cuts, samples, found.distance, bad))
+def _extra_cuts(there: _Compared, goal: Goal) -> Iterator[Finding]:
+    cuts, samples, distance = there.cuts, there.samples, there.found.distance
+    listed = list(_by_contour(cuts, samples, distance, there.bad(goal)))
     for number, (_, worst, share) in enumerate(listed):
         row = int(cuts.segments.path[samples.segment[worst]])
         at = at_point(samples.points[worst])
-        how = _away(found.distance[worst], "wanted", wrong_depth=bool(wrong_depth[worst]))
+        how = _away(distance[worst], "wanted", wrong_depth=bool(there.wrong_depth[worst]))
         yield Finding(
             Code.EXTRA_CUT,
             Severity.ERROR,
             f"{share:.0%} of a cut was not wanted: {how}" + and_more(number, len(listed), "cuts"),
             where=f"{block_name(cuts.toolpath, row)} near {at}",
-            measured=_finite(found.distance[worst]),
+            measured=_finite(distance[worst]),
             limit=goal.limit_mm,
             unit="mm",
         )
@@ -80,24 +100,21 @@ def _extra_cuts(
             return
 
 
-def _missing(
-    cuts: CutMoves, samples: Samples, found: Found, wrong_depth: Bools, goal: Goal
-) -> Iterator[Finding]:
-    bad = wrong_depth | (found.distance > goal.limit_mm)
-    bad &= _judged(samples, cuts, goal.depth_mm)
-    listed = list(_by_contour(cuts, samples, found.distance, bad))
+def _missing(back: _Compared, goal: Goal) -> Iterator[Finding]:
+    cuts, samples, distance = back.cuts, back.samples, back.found.distance
+    listed = list(_by_contour(cuts, samples, distance, back.bad(goal)))
     for number, (contour, worst, share) in enumerate(listed):
         row = int(cuts.segments.path[samples.segment[worst]])
         source = cuts.toolpath.text(row)
         name = f"contour {contour + 1}" + (f" ({source})" if source else "")
-        how = _away(found.distance[worst], "decoded", wrong_depth=bool(wrong_depth[worst]))
+        how = _away(distance[worst], "decoded", wrong_depth=bool(back.wrong_depth[worst]))
         yield Finding(
             Code.CONTOUR_MISSING,
             Severity.ERROR,
             f"{share:.0%} of {name} is not cut by the program: {how}"
             + and_more(number, len(listed), "contours"),
             where=f"{name} near {at_point(samples.points[worst])}",
-            measured=_finite(found.distance[worst]),
+            measured=_finite(distance[worst]),
             limit=goal.limit_mm,
             unit="mm",
         )

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.findings import Code, Finding, Severity
+from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
 from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verify.cuts import cutting_rows, moved_lengths
+from camtool.verify.cuts import Bools, CutMoves, cutting_rows, moved_lengths
 from camtool.verify.places import and_more, at_point, block_name
 
 
@@ -51,22 +52,57 @@ def holes_of(toolpath: Toolpath) -> Holes:
     return Holes(toolpath, toolpath.end[deepest, :2], toolpath.end[deepest, 2], deepest)
 
 
+def contours_drilled(
+    cuts: CutMoves, holes: Holes, limits_mm: tuple[float, float]
+) -> tuple[Bools, Bools]:
+    """(C,) which contours a hole stands for, and (H,) which holes do: all of the contour lies
+    within the first limit of the hole, and is as deep within the second.
+
+    A contour smaller than what a dialect can say comes out as a plunge, and cuts the same.
+    """
+    import shapely
+
+    drilled = np.zeros(cuts.contour_count, dtype=np.bool_)
+    stands = np.zeros(len(holes), dtype=np.bool_)
+    if not len(holes) or not len(drilled):
+        return drilled, stands
+    contour = cuts.contour[cuts.segments.path]
+    begin = np.flatnonzero(np.diff(contour, prepend=-1))
+    boxes = segment_boxes(cuts.segments)
+    low = np.minimum.reduceat(boxes[:, :2], begin)
+    high = np.maximum.reduceat(boxes[:, 2:], begin)
+    bottom = np.minimum.reduceat(cuts.z[:, 0], begin)
+    room = limits_mm[0] - 0.5 * np.hypot(*(high - low).T)
+    tiny = np.flatnonzero(room >= 0.0)
+    middles = shapely.points(0.5 * (low + high)[tiny])
+    tree = shapely.STRtree(shapely.points(holes.at))
+    one, hole = tree.query(middles, predicate="dwithin", distance=room[tiny])
+    same = np.abs(bottom[tiny[one]] - holes.bottom_mm[hole]) <= limits_mm[1]
+    drilled[contour[begin[tiny[one[same]]]]] = True
+    stands[hole[same]] = True
+    return drilled, stands
+
+
 def hole_findings(
-    decoded: Holes, wanted: Holes, limit_mm: float, depth_mm: float
+    decoded: Holes,
+    wanted: Holes,
+    limits_mm: tuple[float, float],
+    stand: tuple[Bools, Bools],
 ) -> tuple[Finding, ...]:
-    """CONTOUR_MISSING for holes that the program does not drill, EXTRA_CUT for others: within
-    `limit_mm` in XY, and `depth_mm` in height."""
+    """CONTOUR_MISSING for holes that the program does not drill, EXTRA_CUT for others: within the
+    limits in XY and in height. `stand`: which decoded and which wanted holes stand for contours
+    of the other side, as `contours_drilled` tells."""
     return (
-        *_unpaired(wanted, decoded, (limit_mm, depth_mm), Code.CONTOUR_MISSING),
-        *_unpaired(decoded, wanted, (limit_mm, depth_mm), Code.EXTRA_CUT),
+        *_unpaired(wanted, decoded, limits_mm, stand[1], Code.CONTOUR_MISSING),
+        *_unpaired(decoded, wanted, limits_mm, stand[0], Code.EXTRA_CUT),
     )
 
 
 def _unpaired(
-    holes: Holes, others: Holes, limits_mm: tuple[float, float], code: Code
+    holes: Holes, others: Holes, limits_mm: tuple[float, float], stand: Bools, code: Code
 ) -> Iterator[Finding]:
     here, paired = _paired(holes, others, limits_mm)
-    alone = np.flatnonzero(~paired).tolist()
+    alone = np.flatnonzero(~paired & ~stand).tolist()
     what = "is not drilled by the program" if code == Code.CONTOUR_MISSING else "was not wanted"
     for number, hole in enumerate(alone):
         more = and_more(number, len(alone), "holes")
@@ -84,9 +120,7 @@ def _unpaired(
             return
 
 
-def _paired(
-    holes: Holes, others: Holes, limits_mm: tuple[float, float]
-) -> tuple[np.ndarray[tuple[int], np.dtype[np.bool_]], np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+def _paired(holes: Holes, others: Holes, limits_mm: tuple[float, float]) -> tuple[Bools, Bools]:
     """(H,), (H,) which holes have another one at their place, and which one as deep too."""
     import shapely
 

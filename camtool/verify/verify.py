@@ -29,10 +29,10 @@ from camtool.toolpath.moves import Toolpath
 from camtool.verify.case import Case, VerifyOptions
 from camtool.verify.circles import full_circles
 from camtool.verify.compare import Target
-from camtool.verify.coverage import Coverage, cover
+from camtool.verify.coverage import Coverage, Drilled, cover
 from camtool.verify.cuts import CutMoves, cut_moves, is_flat
 from camtool.verify.figures import Figure
-from camtool.verify.holes import hole_findings, holes_of
+from camtool.verify.holes import contours_drilled, hole_findings, holes_of
 from camtool.verify.match import Goal, carried_match, own_match
 from camtool.verify.motion import tally_of
 from camtool.verify.noticed import motion_findings
@@ -130,13 +130,13 @@ def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Co
     if case.sent is not None:
         cuts = cut_moves(case.sent.toolpath, flat_cuts=flat_cuts)
         said = Goal(Target(cuts), [], goal.limit_mm, goal.depth_mm)
-    coverage = cover(decoded, said, case.options.sample_mm)
-    holes = hole_findings(
-        holes_of(decoded.cuts.toolpath),
-        holes_of(said.target.cuts.toolpath),
-        goal.limit_mm,
-        goal.depth_mm,
-    )
+    limits = goal.limit_mm, goal.depth_mm
+    bores = holes_of(decoded.cuts.toolpath)
+    wanted_bores = holes_of(said.target.cuts.toolpath)
+    missing, stand = contours_drilled(said.target.cuts, bores, limits)
+    extra, wanted_stand = contours_drilled(decoded.cuts, wanted_bores, limits)
+    coverage = cover(decoded, said, case.options.sample_mm, Drilled(missing, extra))
+    holes = hole_findings(bores, wanted_bores, limits, (stand, wanted_stand))
     match = coverage.match
     if case.sent is not None:
         match = carried_match(match, case.sent.row, goal)

@@ -26,6 +26,12 @@ REPORT_KEYS = {
 }
 
 
+def test_holes_as_wide_as_the_tool_are_plunges(camtool: Run, samples: Path) -> None:
+    done = camtool("post", samples / "plate.dxf", "-t", "grbl", "--tool-diameter", "3")
+    assert done.returncode == 0, done.stderr.decode()
+    assert b"7.069 mm" not in done.stderr
+
+
 def test_the_main_job(camtool_process: Run, samples: Path, tmp_path: Path) -> None:
     logo = samples / "logo.dxf"
     posted = camtool_process(

@@ -326,6 +326,18 @@ def test_a_ring_as_wide_as_the_tool_is_cut_along_its_middle() -> None:
     assert Code.SLOT_AS_WIDE in _codes(found)
 
 
+def test_a_round_hole_as_wide_as_the_tool_leaves_nothing_uncut() -> None:
+    found = contours(
+        drawing_of([_box(-3, -3, 3, 3), _circle(0, 0, 0.5)]), job_of(tool_diameter_mm=1.0)
+    )
+    assert Code.SLOT_AS_WIDE in _codes(found)
+    assert Code.UNREACHED not in _codes(found)
+    small = contours(
+        drawing_of([_box(-3, -3, 3, 3), _circle(0, 0, 0.4)]), job_of(tool_diameter_mm=1.0)
+    )
+    assert Code.UNREACHED in _codes(small)
+
+
 @settings(max_examples=60)
 @given(st.lists(star_contours(), min_size=2, max_size=5), st.integers(0, 2**32 - 1))
 def test_no_line_comes_nearer_to_any_contour_than_the_tool_is_wide(

@@ -166,6 +166,40 @@ def test_a_program_that_only_drills_is_judged_and_has_no_false_alarm() -> None:
     assert Code.NO_MOTION not in {finding.code for finding in found.findings}
 
 
+def ring(radius: float, depth: float) -> Toolpath:
+    """A full circle about (5, 5), beside a line."""
+    b = ToolpathBuilder().rapid(z=1).rapid(5 + radius, 5).line(z=-depth, feed=9)
+    b.arc(5 + radius, 5, centre=(5, 5), ccw=True, feed=9).rapid(z=1)
+    return b.rapid(8, 8).line(z=-1, feed=9).line(9, 8, feed=9).rapid(z=1).finish()
+
+
+def plunge(x: float, depth: float) -> Toolpath:
+    """The same where the circle is nothing but a plunge."""
+    b = ToolpathBuilder().rapid(z=1).rapid(x, 5).line(z=-depth, feed=9).rapid(z=1)
+    return b.rapid(8, 8).line(z=-1, feed=9).line(9, 8, feed=9).rapid(z=1).finish()
+
+
+def test_a_plunge_stands_for_a_contour_smaller_than_a_dialect_can_say() -> None:
+    tiny, limit = ring(0.0005, 1.0), 0.02
+    options = VerifyOptions(coverage_mm=limit)
+
+    def told(decoded: Toolpath, wanted: Toolpath) -> set[Code]:
+        return set(errors(verify(decoded, path_machine(), wanted=wanted, options=options)))
+
+    both = {Code.CONTOUR_MISSING, Code.EXTRA_CUT}
+    for x in (5.0, 5.0005, 5.01):
+        assert told(plunge(x, 1.0), tiny) == set()
+        assert told(tiny, plunge(x, 1.0)) == set()
+    # Farther off, of another depth, or for what is larger than the limit, it does not.
+    for decoded, wanted in (
+        (plunge(5.03, 1.0), tiny),
+        (plunge(5.0, 1.1), tiny),
+        (plunge(5.0, 1.0), ring(0.03, 1.0)),
+    ):
+        assert told(decoded, wanted) == both
+        assert told(wanted, decoded) == both
+
+
 def test_lost_added_and_shallow_holes() -> None:
     missing = judged(drilled(2.0), drilled(2.0, 3.0))
     assert errors(missing) == [Code.CONTOUR_MISSING]
