@@ -21,11 +21,11 @@ SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm"
 
 
 @contextmanager
-def compiled_beside(target: str, *, quiet: bool) -> Iterator[None]:
-    """On a first run say so, and let a second process compile along as long as the body runs."""
+def compiled_beside(target: str, *, quiet: bool, judging: bool) -> Iterator[None]:
+    """On a first run (of the judge, if it is to run) say so, and let a second process compile along as long as the body runs."""
     helper = None
-    if first_run():
-        say_first_run(quiet=quiet)
+    if first_run(judging=judging):
+        say_first_run(quiet=quiet, judging=judging)
         none = subprocess.DEVNULL
         command = [sys.executable, "-m", "camtool.cli.ahead", target]
         helper = subprocess.Popen(command, stdin=none, stdout=none, stderr=none)

@@ -186,11 +186,12 @@ class Batched:
         from camtool.batch.pool import LocalPool, PoolOptions
         from camtool.cli.talk import first_run, say_first_run
 
-        say_first_run(quiet=self.loudness.quiet)
+        judging = self.work.check
+        say_first_run(quiet=self.loudness.quiet, judging=judging)
         options = PoolOptions(
             jobs=self.running.jobs or os.cpu_count() or 1,
             timeout_s=self.running.timeout,
-            first_alone=first_run(),
+            first_alone=first_run(judging=judging),
         )
         return LocalPool(self.work, options)
 

@@ -71,7 +71,7 @@ def convert(
 
     from camtool.pipeline import convert_program, posted_scene
 
-    say_first_run(quiet=quiet)
+    say_first_run(quiet=quiet, judging=not no_verify)
     made = convert_program(
         read_bytes(program),
         before,

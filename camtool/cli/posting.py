@@ -86,7 +86,8 @@ class Posting:
         read."""
         from camtool.pipeline import points_for, post_drawing
 
-        with compiled_beside(target.machine.target.name, quiet=quiet):
+        name, judging = target.machine.target.name, not self.no_verify
+        with compiled_beside(name, quiet=quiet, judging=judging):
             wanted = self.job.job(self.drawing)
             read = self.drawing.read(source, target.machine, wanted)
             if on_read is not None:

@@ -86,7 +86,7 @@ def preview(
     # What is to be played needs its times, which only the machine's model knows.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
-    say_first_run(quiet=quiet)
+    say_first_run(quiet=quiet, judging=simulate)
     seen = Seen(machine, simulate, job, drawing, output)
     found = [seen.scene(name) for name in sources]
     painted = picture.painter(lambda: [scene for scene, _ in found], quiet=quiet)

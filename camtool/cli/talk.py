@@ -74,14 +74,15 @@ def one_line(text: str) -> str:
     return "".join(char if char.isprintable() else " " for char in text)
 
 
-def say_first_run(*, quiet: bool) -> None:
-    """A word before the long silence of the first run."""
-    if first_run():
+def say_first_run(*, quiet: bool, judging: bool = False) -> None:
+    """A word before the long silence of the first run; `judging` as below."""
+    if first_run(judging=judging):
         say("camtool: first run: compiling the kernels, once, for some 12 s", quiet=quiet)
 
 
-def first_run() -> bool:
-    """Whether no kernel has been compiled yet.
+def first_run(*, judging: bool = False) -> bool:
+    """Whether no kernel has been compiled yet; with `judging`, none of the judge's: most of the
+    time goes there, and reading a drawing compiles others.
 
     Their compiled form lies beside them or in NUMBA_CACHE_DIR; where their folder cannot be
     written numba keeps it elsewhere, and then we cannot tell: False.
@@ -93,4 +94,4 @@ def first_run() -> bool:
     if given is None and not os.access(folder, os.W_OK):
         return False
     kept = Path(given) if given else folder / "__pycache__"
-    return not any(kept.rglob("*.nbi"))
+    return not any(kept.rglob("judge*.nbi" if judging else "*.nbi"))

@@ -127,7 +127,7 @@ def verify(
         trace_points=points_for(preview),
     )
     target = machine.load()
-    say_first_run(quiet=quiet)
+    say_first_run(quiet=quiet, judging=True)
     wanted = job.job(drawing)
     read = drawing.read(against, target.machine, wanted) if against else None
     case = Case(target, judging, read, wanted)

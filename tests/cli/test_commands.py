@@ -196,3 +196,8 @@ def test_the_first_run_says_why_it_is_silent(
     (tmp_path / "__pycache__" / "play.play_fill.nbi").touch()
     say_first_run(quiet=False)
     assert capsys.readouterr().err == ""
+    say_first_run(quiet=False, judging=True)
+    assert "compiling" in capsys.readouterr().err
+    (tmp_path / "__pycache__" / "judge.judge_samples.nbi").touch()
+    say_first_run(quiet=False, judging=True)
+    assert capsys.readouterr().err == ""
