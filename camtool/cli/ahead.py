@@ -22,7 +22,8 @@ SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm"
 
 @contextmanager
 def compiled_beside(target: str, *, quiet: bool, judging: bool) -> Iterator[None]:
-    """On a first run (of the judge, if it is to run) say so, and let a second process compile along as long as the body runs."""
+    """On a first run say so, and let a second process compile along as long as the body runs;
+    `judging` as `first_run` has it."""
     helper = None
     if first_run(judging=judging):
         say_first_run(quiet=quiet, judging=judging)
