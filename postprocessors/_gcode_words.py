@@ -33,7 +33,7 @@ LINE_CHARS: Final = 4096
 """A longer line is refused where the dialect itself has no limit: no machine reads such."""
 
 # Possessive (++): a number is matched in one way only, so that no line costs more than its length.
-_NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?+|\.\d++)"
+_NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?|\.\d++)"
 _COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
 _ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
 _CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
@@ -159,8 +159,8 @@ def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
     """(the whole line, one word) as compiled patterns."""
     known = re.escape(lexing.letters)
     blank = r"[ \t]*+" if lexing.blanks == "between" else ""
-    numbered = rf"(?:N\d++{blank})?+" if lexing.block_numbers else ""
-    line = rf"{blank}{numbered}(?:[{known}]{_NUMBER}{blank})*+"
+    numbered = rf"(?>(?:N\d++{blank})?)" if lexing.block_numbers else ""
+    line = rf"{blank}{numbered}(?>(?:[{known}]{_NUMBER}{blank})*)"
     letters = known + ("N" if lexing.block_numbers else "")
     return re.compile(line), re.compile(rf"([{letters}])({_NUMBER})")
 
@@ -226,8 +226,8 @@ def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
         kept = list(range(len(text)))
     packed = "".join(text[at] for at in kept)
     blank = r"[ \t]*+" if lexing.blanks == "between" else ""
-    numbered = rf"(?:N\d++{blank})?+" if lexing.block_numbers else ""
-    head = re.compile(rf"{blank}{numbered}(?:[{re.escape(lexing.letters)}]{_NUMBER}{blank})*+")
+    numbered = rf"(?>(?:N\d++{blank})?)" if lexing.block_numbers else ""
+    head = re.compile(rf"{blank}{numbered}(?>(?:[{re.escape(lexing.letters)}]{_NUMBER}{blank})*)")
     match = head.match(packed)
     at = match.end() if match else 0
     message, mend, more = _explained(packed[at:], packed[:at], lexing)

@@ -28,7 +28,7 @@ MAX_SIGNS = 50_000_000
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])")
 _GAP = r"[ \t\r\n\f,]*+"
 _NUM = NUMBER.pattern
-_NUMBERS = re.compile(rf"{_GAP}(?:{_NUM}{_GAP})*+", re.ASCII)
+_NUMBERS = re.compile(rf"{_GAP}(?>(?:{_NUM}{_GAP})*)", re.ASCII)
 _ARC = re.compile(
     rf"({_NUM}){_GAP}({_NUM}){_GAP}({_NUM}){_GAP}([01]){_GAP}([01]){_GAP}({_NUM}){_GAP}({_NUM}){_GAP}",
     re.ASCII,
