@@ -19,6 +19,7 @@ from camtool.batch.manifest import NAME, Manifest
 from camtool.batch.records import Made, Task
 from camtool.errors import CamtoolError, OptionError
 from tests.oracles.batch_works import Obedient
+from tests.waiting import HANG_S, heard_from
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "samples"
@@ -45,18 +46,6 @@ def process(
             yield running, heard_from(running, said)
         finally:
             running.kill()
-
-
-def heard_from(running: subprocess.Popen[str], said: str) -> str:
-    """What a process says until it has said this."""
-    stream = running.stdout or running.stderr
-    assert stream is not None
-    heard = ""
-    while not re.search(said, heard):
-        line = stream.readline()
-        assert line, heard
-        heard += line
-    return heard
 
 
 @contextmanager
@@ -124,7 +113,7 @@ def test_a_cluster_makes_what_one_computer_makes_though_a_worker_is_killed(tmp_p
         stack.enter_context(worker(address, tmp_path / "two"))
         run, said = stack.enter_context(batch(tmp_path, "--scheduler", address, until=MADE))
         first.send_signal(signal.SIGKILL)
-        said += run.communicate(timeout=120)[1]
+        said += run.communicate(timeout=HANG_S)[1]
     assert run.returncode == 1, said
     assert "13 drawings: 12 made, 1 failed" in said, said
     assert "drawings/junk.dxf | is no DXF" in said
@@ -145,10 +134,10 @@ def test_what_is_left_halfway_is_whole_and_can_be_gone_on_with(tmp_path: Path, l
             head.send_signal(signal.SIGKILL)
         else:
             run.send_signal(signal.SIGINT)
-        said += run.communicate(timeout=60)[1]
+        said += run.communicate(timeout=HANG_S)[1]
         if lost == "client":  # the cluster is as good as before
             again, more = stack.enter_context(batch(tmp_path, *flags, until="drawings:"))
-            assert again.wait(timeout=60) == 0, more
+            assert again.wait(timeout=HANG_S) == 0, more
             assert "up to date" in more
     assert "Traceback" not in said
     assert len(said.splitlines()) < 45, said
@@ -158,7 +147,7 @@ def test_what_is_left_halfway_is_whole_and_can_be_gone_on_with(tmp_path: Path, l
         assert "camtool: error: --scheduler: the scheduler was lost; what is written" in said
         assert 1 <= assert_whole(tmp_path / "cluster") == whole["made"] == 40 - whole["not_run"]
         here = [*BATCH, "-o", "cluster", "-q"]
-        subprocess.run(here, cwd=tmp_path, check=True, timeout=60)
+        subprocess.run(here, cwd=tmp_path, check=True, timeout=HANG_S)
     else:
         assert run.returncode == 128 + signal.SIGINT, said
         assert "interrupted; what is written is whole" in said
@@ -173,10 +162,10 @@ def test_a_cluster_without_workers_is_told_and_waited_for(tmp_path: Path) -> Non
         _, address = stack.enter_context(scheduler())
         run, _ = stack.enter_context(batch(tmp_path, "--scheduler", address, until=LONELY))
         run.send_signal(signal.SIGINT)
-        assert run.wait(timeout=20) == 128 + signal.SIGINT
+        assert run.wait(timeout=HANG_S) == 128 + signal.SIGINT
         run, said = stack.enter_context(batch(tmp_path, "--scheduler", address, until=LONELY))
         stack.enter_context(worker(address, tmp_path / "one"))
-        said += run.communicate(timeout=60)[1]
+        said += run.communicate(timeout=HANG_S)[1]
     assert run.returncode == 0, said
     assert "the cluster has workers now" in said
     assert said.count("has no workers") == 1

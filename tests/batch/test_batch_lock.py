@@ -15,6 +15,7 @@ import pytest
 from camtool.batch import lock
 from camtool.batch.lock import NAME, alone_in
 from camtool.errors import OutputError
+from tests.waiting import HANG_S
 
 ROOT = Path(__file__).parents[2]
 HOLDER = """
@@ -51,7 +52,7 @@ def test_another_process_is_refused_and_told_who_holds_it(tmp_path: Path) -> Non
         for _ in range(2):  # being refused harms nothing
             with pytest.raises(OutputError, match=f"another batch writes there .{who}."):
                 alone_in(tmp_path).__enter__()
-        other.communicate("", timeout=10)
+        other.communicate("", timeout=HANG_S)
         assert other.returncode == 0
         assert not any(tmp_path.iterdir())
         with alone_in(tmp_path):

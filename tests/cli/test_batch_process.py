@@ -18,6 +18,7 @@ import pytest
 from camtool.batch.digests import file_digest
 from camtool.batch.manifest import NAME, Manifest
 from tests.cli.conftest import Run
+from tests.waiting import HANG_S, heard_from
 
 COMMAND = (sys.executable, "-m", "camtool", "batch", "drawings", "-t", "pic-mmh", "-o", "build")
 
@@ -57,17 +58,12 @@ def test_an_interrupted_run_leaves_whole_files_and_goes_on(
 ) -> None:
     command, pipe = [*COMMAND, "--jobs", "1"], subprocess.PIPE
     with running_in(tmp_path, args=command, stderr=pipe, start_new_session=True) as running:
-        assert running.stderr is not None
-        said = ""
-        while "made:" not in said:
-            line = running.stderr.readline()
-            assert line, said
-            said += line
+        said = heard_from(running, "made:")
         if number == signal.SIGINT:  # a terminal sends it to all processes of its foreground
             os.killpg(running.pid, number)
         else:
             running.send_signal(number)
-        said += running.communicate(timeout=60)[1]
+        said += running.communicate(timeout=HANG_S)[1]
     assert running.returncode == 128 + number, said
     assert "interrupted; what is written is whole" in said
     assert "Traceback" not in said
@@ -150,7 +146,7 @@ def interrupted(folder: Path, number: signal.Signals, moment: Random, *, all_of_
             os.killpg(running.pid, number)
         else:
             running.send_signal(number)
-        said += running.communicate(timeout=60)[1]
+        said += running.communicate(timeout=HANG_S)[1]
         ways = {0, -number, 128 + number}  # it may have been ready, or not yet have begun
         assert running.returncode in ways or "KeyboardInterrupt" in said, said
         return said

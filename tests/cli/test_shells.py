@@ -10,14 +10,14 @@ import select
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
+from tests.waiting import HANG_S
+
 pty = pytest.importorskip("pty")
 
-PATIENCE_S = 60.0
 AT_TERMINAL = (
     "import fcntl, os, sys, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
     "os.execvp(sys.argv[1], sys.argv[1:])"
@@ -106,9 +106,9 @@ class Terminal:
 
     def until(self, what: str) -> str:
         """What the terminal shows until this comes."""
-        shown, end = b"", time.monotonic() + PATIENCE_S
+        shown = b""
         while what.encode() not in shown:
-            ready, _, _ = select.select([self.place], [], [], max(0.0, end - time.monotonic()))
+            ready, _, _ = select.select([self.place], [], [], HANG_S)
             assert ready, f"{what} never came: {shown[-500:]!r}"
             shown += os.read(self.place, 65536)
         return shown.decode(errors="replace")

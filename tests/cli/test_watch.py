@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,12 +13,12 @@ from camtool.cli.jobflags import JobFlags
 from camtool.cli.watch import POLL_S, SETTLED_S, watch
 from camtool.errors import DrawingError
 from tests.cli.conftest import Run
+from tests.waiting import HANG_S, heard_from
 
 RING = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="40mm" viewBox="0 0 40 40">'
     '<circle cx="20" cy="20" r="{radius}"/></svg>'
 )
-PATIENCE_S = 60.0
 
 
 class Days:
@@ -175,43 +174,36 @@ def test_streams_cannot_be_watched(camtool: Run, flags: tuple[str, ...]) -> None
     assert b"--watch works on files" in done.stderr
 
 
-def until(is_so: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE_S
-    while not is_so():
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.05)
-
-
 def test_a_process_posts_again_until_ctrl_c(tmp_path: Path) -> None:
     drawing, job = tmp_path / "ring.svg", tmp_path / "job.toml"
     machine, program = tmp_path / "mill.toml", tmp_path / "ring.nc"
     drawing.write_text(RING.format(radius=10))
     job.write_text('depth = "0.5mm"\n')
     machine.write_text('extends = "grbl"\n')
-    log = tmp_path / "log"
     command = [sys.executable, "-m", "camtool", "post", drawing.name, "--job", job.name]
     command += ["--machine", machine.name, "-o", program.name, "--watch"]
-    with log.open("wb") as stream:
-        running = subprocess.Popen(command, cwd=tmp_path, stderr=stream)
-    try:
-        until(lambda: program.exists() and b"written" in log.read_bytes())
-        first = program.read_bytes()
-        drawing.write_text("<svg")  # half a drawing: an error, and the program stays
-        until(lambda: b"camtool: error" in log.read_bytes())
-        assert program.read_bytes() == first
-        drawing.write_text(RING.format(radius=9))
-        until(lambda: program.read_bytes() != first)
-        second = program.read_bytes()
-        job.write_text('depth = "0.25mm"\n')
-        until(lambda: b"Z-0.25" in program.read_bytes())
-        machine.write_text('extends = "grbl"\n[feed]\ndefault_mm_min = 77.0\n')
-        until(lambda: b"F77" in program.read_bytes())
-        assert second not in (first, program.read_bytes())
-        running.send_signal(signal.SIGINT)
-        assert running.wait(PATIENCE_S) == 0
-    finally:
-        running.kill()
-        running.wait()
-    assert b"fault" not in log.read_bytes()
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
+        try:
+            said = heard_from(running, "written")
+            first = program.read_bytes()
+            drawing.write_text("<svg")  # half a drawing: an error, and the program stays
+            said += heard_from(running, "camtool: error")
+            assert program.read_bytes() == first
+            drawing.write_text(RING.format(radius=9))
+            said += heard_from(running, "written")
+            second = program.read_bytes()
+            job.write_text('depth = "0.25mm"\n')
+            said += heard_from(running, "written")
+            assert b"Z-0.25" in program.read_bytes()
+            machine.write_text('extends = "grbl"\n[feed]\ndefault_mm_min = 77.0\n')
+            said += heard_from(running, "written")
+            assert b"F77" in program.read_bytes()
+            assert len({first, second, program.read_bytes()}) == 3
+            running.send_signal(signal.SIGINT)
+            said += running.communicate(timeout=HANG_S)[1]
+        finally:
+            running.kill()
+    assert running.returncode == 0, said
+    assert "fault" not in said
     names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == ["job.toml", "log", "mill.toml", "ring.nc", "ring.svg"]
+    assert names == ["job.toml", "mill.toml", "ring.nc", "ring.svg"]

@@ -2,36 +2,12 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
-
 import numpy as np
 
 from camtool.errors import CamtoolError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes
-
-PATIENCE_S = 60
-"""A small file that takes longer than this hangs."""
-
-
-@contextmanager
-def patience(seconds: int = PATIENCE_S) -> Iterator[None]:
-    """AssertionError when what is inside has not ended in time."""
-
-    def fail(_signal: int, _frame: FrameType | None) -> None:
-        raise AssertionError(f"still reading after {seconds} s")
-
-    before = signal.signal(signal.SIGALRM, fail)
-    signal.alarm(seconds)
-    try:
-        yield
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def read_or_refuse(data: bytes, file: str, options: ReadOptions) -> Drawing | CamtoolError:

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from camtool.errors import CamtoolError
 from camtool.importers.options import FORMATS, ReadOptions
 from tests.fuzz.damage import EVERY, Damage, cut, flip, headless
-from tests.fuzz.reading import patience, read_or_refuse
+from tests.fuzz.reading import read_or_refuse
 from tests.fuzz.seeds import BINARIES, TEXTS
+from tests.waiting import no_chewing
 
 SEEDS = TEXTS | BINARIES
 CHOICES = st.integers(0, 2**20)
@@ -39,7 +40,7 @@ def test_damaged_texts(name: str, hits: list[tuple[Damage, int, int]], everythin
     for damage, at, choice in hits:
         data = damage(data, at, choice)
     options = ReadOptions(**EVERYTHING) if everything else ReadOptions()
-    with patience():
+    with no_chewing():
         read_or_refuse(data, name, options)
 
 
@@ -47,7 +48,7 @@ def test_damaged_texts(name: str, hits: list[tuple[Damage, int, int]], everythin
 @given(damage=st.sampled_from([cut, headless, flip]), at=CHOICES, choice=CHOICES)
 @settings(max_examples=40)
 def test_damaged_binaries(name: str, damage: Damage, at: int, choice: int) -> None:
-    with patience():
+    with no_chewing():
         read_or_refuse(damage(seed(name), at, choice), name, ReadOptions())
 
 
@@ -55,7 +56,7 @@ def test_damaged_binaries(name: str, damage: Damage, at: int, choice: int) -> No
 def test_any_bytes_as_any_format(data: bytes, form: str | None) -> None:
     if form == "solid":  # tried on whole seeds only: each attempt takes a second
         form = None
-    with patience():
+    with no_chewing():
         read_or_refuse(data, "noise", ReadOptions(format=form))
 
 
@@ -67,5 +68,5 @@ def test_damaged_a_thousand_times(name: str, hits: list[tuple[Damage, int, int]]
     data = seed(name)
     for damage, at, choice in hits:
         data = damage(data, at, choice)
-    with patience():
+    with no_chewing():
         read_or_refuse(data, name, ReadOptions(**EVERYTHING))

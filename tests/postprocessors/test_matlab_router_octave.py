@@ -8,6 +8,7 @@ import pytest
 
 from tests.postprocessors.router_parts import STAR, arrays, posted, router, strokes
 from tests.postprocessors.test_matlab_router_golden import GOLDEN, part
+from tests.waiting import HANG_S
 
 OCTAVE = shutil.which("octave-cli")
 
@@ -22,7 +23,6 @@ function show(name, values)
 end
 """
 
-SECONDS = 120
 """Octave is stopped after so long."""
 
 GUI = """
@@ -46,7 +46,7 @@ def octave(script: str, folder: Path) -> dict[str, list[int]]:
     file = folder / "referee.m"
     file.write_text("1;\n" + SHOW + script, encoding="ascii")
     command = [str(OCTAVE), "--norc", "--quiet", "--no-history", str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG_S, check=False)
     assert done.returncode == 0, done.stderr
     lines = [line.split() for line in done.stdout.splitlines()]
     return {name: [int(value) for value in values] for name, *values in lines}

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.waiting import HANG_S
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "write-a-post.md").read_text(encoding="utf-8")
 MOST_LINES = 60
@@ -56,7 +58,7 @@ def camtool(installed: Path, folder: Path, *arguments: str) -> subprocess.Comple
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=HANG_S,
     )
 
 

@@ -1,6 +1,5 @@
 """The viewer in a real browser: the picture, its time, the mouse and the keys."""
 
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -11,9 +10,6 @@ from tests.preview.viewer_browser import NEEDS_BROWSER, browser, find_move, pape
 from tests.preview.viewer_pages import HOSTILE, MANY, busy, large_text
 
 __all__ = ["browser", "shown"]
-
-MOST_LOAD_S = 20.0
-MOST_PAINT_S = 6.0
 
 pytestmark = NEEDS_BROWSER
 
@@ -39,12 +35,11 @@ def test_the_slider_moves_the_tool(shown: Any) -> None:
 def test_play_goes_on_and_stops(shown: Any) -> None:
     view = shown(busy(SCENES["toolpath"]))
     view.page.locator("#play").click()
-    view.page.wait_for_timeout(300)
     assert view.text("#play") == "Pause"
+    past = "(before) => Number(document.getElementById('slider').value) > before"
+    view.page.wait_for_function(past, arg=0)
     first = int(view.page.locator("#slider").input_value())
-    view.page.wait_for_timeout(300)
-    second = int(view.page.locator("#slider").input_value())
-    assert 0 < first < second < 10_000
+    view.page.wait_for_function(past, arg=first)
     view.page.locator("h1").click()
     view.press(" ")
     assert view.text("#play") == "Play"
@@ -165,11 +160,9 @@ def test_the_picture_shows_the_errors_in_colours(shown: Any) -> None:
 
 
 @pytest.mark.parametrize("count", MANY)
-def test_many_moves_stay_quick(shown: Any, count: int) -> None:
+def test_many_moves_are_painted_after_each_deed(shown: Any, count: int) -> None:
     page = large_text(count)
-    begin = time.perf_counter()
     view = shown(page)
-    assert time.perf_counter() - begin < MOST_LOAD_S
     assert view.pixels("done") > 10_000
     for deed in (
         lambda: view.page.locator("#slider").fill("5000"),
@@ -180,10 +173,8 @@ def test_many_moves_stay_quick(shown: Any, count: int) -> None:
         lambda: view.press("m"),
     ):
         painted = int(view.page.evaluate("() => document.body.dataset.painted"))
-        begin = time.perf_counter()
         deed()
         view.page.wait_for_function(
             "(before) => Number(document.body.dataset.painted) > before", arg=painted
         )
-        assert time.perf_counter() - begin < MOST_PAINT_S
     assert "G01X" in view.text("#now")

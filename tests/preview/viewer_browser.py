@@ -8,6 +8,7 @@ import pytest
 
 from camtool.preview.draw import Scene
 from tests.preview.viewer_pages import text_of
+from tests.waiting import HANG_S
 
 CHROMIUM = "/usr/bin/chromium"
 # Without the last ones it keeps looking for its maker's hosts.
@@ -46,8 +47,9 @@ class Shown:
         self.page.on("console", lambda message: self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", self._asked)
+        self.page.set_default_timeout(HANG_S * 1000)
         self.page.goto(file.as_uri())
-        self.page.wait_for_selector("body[data-painted]", timeout=10_000)
+        self.page.wait_for_selector("body[data-painted]")
 
     def _asked(self, request: Any) -> None:
         if not request.url.startswith("file:"):

@@ -1,7 +1,6 @@
 """Rapids below the stock top: against points, one by one, and by hand."""
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.cleared import Reach, Through, rapids_through_stock
 from camtool.toolpath.moves import Toolpath
 from tests.oracles.cleared import most_uncut
+from tests.waiting import no_chewing
 
 RADIUS_MM = 0.5
 NEAR_MM = 0.12
@@ -155,16 +155,15 @@ def test_nothing_is_nothing() -> None:
     assert through(ToolpathBuilder()) == []
 
 
-def test_thousands_of_pecks_take_no_time() -> None:
+def test_thousands_of_pecks_are_not_chewed() -> None:
     path = ToolpathBuilder().rapid(z=5)
     for hole in range(5000):
         path.rapid(float(hole), 0.0)
         for peck in range(1, 6):
             path.line(z=-float(peck), feed=1).rapid(z=1.0).rapid(z=0.1 - peck)
         path.rapid(z=1.0)
-    began = time.perf_counter()
-    assert through(path) == []
-    assert time.perf_counter() - began < 3.0
+    with no_chewing():
+        assert through(path) == []
 
 
 @pytest.mark.parametrize("tolerance", [0.001, 0.05])
