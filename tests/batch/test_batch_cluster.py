@@ -26,8 +26,6 @@ SAMPLES = ROOT / "samples"
 BATCH = [sys.executable, "-m", "camtool", "batch", "drawings", "-t", "pic-mmh"]
 MADE, LONELY = r"made:", r"has no workers"
 
-pytest.importorskip("distributed", reason="the extra `distributed` is not installed")
-
 
 @contextmanager
 def process(
@@ -103,7 +101,6 @@ def assert_whole(out: Path) -> int:
     return len(programs)
 
 
-@pytest.mark.slow
 def test_a_cluster_makes_what_one_computer_makes_though_a_worker_is_killed(tmp_path: Path) -> None:
     drawn(tmp_path, 12)
     (tmp_path / "drawings" / "junk.dxf").write_text("junk\n")

@@ -24,6 +24,7 @@ FLAGS = [
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 NEEDS_BROWSER = [
     pytest.mark.referee,
+    pytest.mark.xdist_group("chromium"),
     pytest.mark.skipif(not Path(CHROMIUM).exists(), reason=f"{CHROMIUM} is not installed"),
 ]
 
