@@ -9,9 +9,6 @@ import numpy as np
 from camtool.geometry.measure import segment_boxes, segment_lengths
 from camtool.geometry.polylines import Floats, Ints, Polylines, Segments
 
-SMOOTH_RAD = 1e-5
-"""A convex corner that turns by less is none: a disc of radius ρ reaches ρ/8 · turn² less far."""
-
 ROUND_RAD = 1e-9
 """A reflex corner that turns by less is none: rounding of the tangents."""
 
@@ -28,7 +25,7 @@ class Boundary:
     @classmethod
     def of(cls, region: Polylines) -> Boundary:
         """The elements of closed paths, outer ones CCW and holes CW."""
-        from camtool.kernels.discs import CONVEX, REFLEX, SMOOTH
+        from camtool.kernels.discs import CONVEX, REFLEX, SMOOTH, SMOOTH_RAD
 
         segments = Segments.of(region)
         leave, arrive = _tangents(segments)

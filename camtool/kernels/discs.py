@@ -47,7 +47,10 @@ BLOCK = 16
 
 TOUCH_MM = 1e-9
 """Nearer than this a neighbour behind a reflex corner is not seen, and touching points may be
-off the ends of a neighbour behind a convex corner."""
+off the ends of an element by this, and by as much as the turn of a smooth joint moves them."""
+
+SMOOTH_RAD = 1e-5
+"""A convex corner that turns by less is none: a disc of radius ρ reaches ρ/8 · turn² less far."""
 
 
 @kernel
@@ -187,15 +190,29 @@ def _limit(
     if table[own, LENGTH] == 0.0 and (before or behind):
         return np.inf
     tx, ty = table[other, TX], table[other, TY]
+    tilt = _turn(table, links, own if at_start else links[own, 1])
+    turns = tilt + _turn(table, links, other), tilt + _turn(table, links, links[other, 1])
     # A neighbour behind a convex corner is seen from that corner.
     if before and at_start and links[own, 2] == CONVEX:
         sight = (table[other, UX], table[other, UY], at[4], at[5])
-        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0))
+        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0, turns))
     if behind and not at_start and links[other, 2] == CONVEX:
         sight = (tx, ty, at[4], at[5])
-        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0))
+        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0, turns))
     least = _least(table, links, own, other)
-    return min(found, _touching(table[other], (tx, ty, wx, wy), at, min(radius, found), least))
+    return min(
+        found, _touching(table[other], (tx, ty, wx, wy), at, min(radius, found), least, turns)
+    )
+
+
+@inner
+def _turn(table: Floats, links: Ints, own: int) -> float:
+    """By how many radians a smooth joint to the element before turns after all; 0 at others."""
+    if links[own, 2] != SMOOTH:
+        return 0.0
+    before = links[own, 0]
+    ux, uy = table[before, UX], table[before, UY]
+    return float(abs(ux * table[own, TY] - uy * table[own, TX]))
 
 
 @inner
@@ -215,19 +232,21 @@ def _touching(
     at: Place,
     radius: float,
     least: float,
+    turns: tuple[float, float],
 ) -> float:
     """The radius at which the disc touches the line or arc `element` within it; inf if it is not
     below `radius` or touches beyond the ends.
 
     `sight`: the tangent at a point of the element, and how the disc's place is seen from there.
-    With `least` below 0 that is a shared corner, and rounding may not hide the element.
+    With `least` below 0 that is a shared corner, and rounding may not hide the element. Nor may it
+    hide one that is touched at its end: beside an arc the disc at the joint touches what follows
+    the arc just there, and without it would seem to have room far beyond the arc's own radius.
     """
     tx, ty, wx, wy = sight
     kappa = element[SWEEP] / element[LENGTH]
     g = wy * tx - wx * ty - 0.5 * kappa * (wx * wx + wy * wy)
-    slack = 0.0
     if least < 0.0:
-        g, slack = max(g, 0.0), TOUCH_MM
+        g = max(g, 0.0)
     elif g <= least:
         return np.inf
     mx, my = -ty - kappa * wx, tx - kappa * wy
@@ -240,7 +259,9 @@ def _touching(
     cx, cy = at[0] + found * at[2], at[1] + found * at[3]
     after = (cx - element[AX]) * element[TX] + (cy - element[AY]) * element[TY]
     still = (cx - element[BX]) * element[UX] + (cy - element[BY]) * element[UY]
-    return found if after >= -slack and still <= slack else np.inf
+    begins = after >= -TOUCH_MM - turns[0] * found
+    ends = still <= TOUCH_MM + turns[1] * found
+    return found if begins and ends else np.inf
 
 
 @inner

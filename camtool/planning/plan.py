@@ -22,7 +22,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
 from camtool.planning.choose import choose
-from camtool.planning.contours.levels import levels
+from camtool.planning.contours.levels import carved_levels, levels
 from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
 from camtool.planning.job import Job, Operation
 from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
@@ -98,7 +98,8 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     and for passes that cannot be."""
     depth = depth_of(operation, machine)
     try:
-        passes = levels(depth, operation.step_down_mm, operation.last_pass_mm)
+        made = carved_levels if operation.kind == "vcarve" else levels
+        passes = made(depth, operation.step_down_mm, operation.last_pass_mm)
     except OptionError as error:
         error.where = f"{operation_name(operation)}, {error.where}"
         raise

@@ -15,6 +15,7 @@ from camtool.geometry.medial import Trace, discs_at, medial_trace
 from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
 from camtool.geometry.regions import oriented, regions
 from camtool.kernels.discs import LENGTH, SWEEP, frame
+from camtool.planning.carving.pieces import with_level
 from tests.oracles import contours as shapes
 from tests.strategies import contours
 
@@ -164,3 +165,39 @@ def test_corners_that_hardly_turn_are_seen_without_noise(turn: float) -> None:
     way = np.hypot(inner.x - 55.0, inner.y - 40.0 - low)
     assert inner.rho == pytest.approx(way * math.cos(0.5 * turn), rel=1e-6)
     assert inner.partner.tolist() == [1, 1, 1]
+
+
+ROUNDED_JOINT_MM = 2e-5
+"""Joints that turn by less than SMOOTH_RAD count as none: discs of 20 mm see them so far off."""
+
+ROUNDED = [(8.78, 8.265, 1.0), (16.15, 15.585, 0.5), (4.244, 7.383, 1.5), (17.681, 5.488, 0.2)]
+
+
+def rounded_rectangle(w: float, h: float, r: float) -> Polyline:
+    """Half sizes w and h, corners of radius r; arcs and lines join smoothly but for rounding."""
+    corner = math.tan(math.pi / 8.0)
+    return shapes.closed(
+        (w - r, -h, corner), (w, r - h), (w, h - r, corner), (w - r, h),
+        (r - w, h, corner), (-w, h - r), (-w, r - h, corner), (r - w, -h),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("digits", [3, 4, 9, 15])
+@pytest.mark.parametrize(("w", "h", "r"), ROUNDED)
+def test_a_disc_at_a_smooth_joint_is_no_larger_than_the_arc_there_allows(
+    w: float, h: float, r: float, digits: int
+) -> None:
+    # Failed once: the disc at the joint touched the wall beyond the arc at its very end, and by
+    # rounding beyond it; what lay farther off then seemed to be the limit, and a groove ran there.
+    for angle, shift in ((0.0, 0.0), (0.3, 1000.0), (math.pi / 4.0, -3.1)):
+        x, y, bulge = rounded_rectangle(w, h, r).vertices.T
+        c, s = math.cos(angle), math.sin(angle)
+        places = np.column_stack([c * x - s * y + shift, s * x + c * y + shift]).round(digits)
+        vertices = np.column_stack([places, bulge])
+        for start in range(len(vertices)):
+            region = Polylines.of([Polyline(np.roll(vertices, start, axis=0), True)])
+            boundary, trace = medial_trace(region, TOLERANCE_MM)
+            trace = with_level(boundary, trace, 2.0)
+            middles = trace.discs[:, :2]
+            far = nearest(middles, Segments.of(region)).distance
+            assert (trace.rho - far).max() <= ROUNDED_JOINT_MM

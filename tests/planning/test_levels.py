@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.planning.contours.levels import MOST_PASSES, levels
+from camtool.planning.contours.levels import MOST_PASSES, carved_levels, levels
 
 depths = st.floats(1e-3, 100.0)
 shares = st.floats(0.02, 1.0)
@@ -77,3 +77,23 @@ def test_what_cannot_be(depth: float, step: float | None, last: float | None, ke
         levels(depth, step, last)
     assert caught.value.where == f"key {key}"
     assert caught.value.mend
+
+
+@given(depths, shares, st.one_of(st.none(), shares))
+def test_a_v_bit_takes_no_more_than_the_step_under_its_tip(
+    depth: float, share: float, last_share: float | None
+) -> None:
+    step = depth * share
+    last = None if last_share is None else step * last_share
+    passes = np.array([0.0, *carved_levels(depth, step, last)])
+    steps = -np.diff(passes)
+    assert passes[-1] == -depth
+    assert steps[0] <= step * (1.0 + 1e-8)
+    assert np.all(steps > 0.0)
+    assert np.all(2.0 * steps[1:] <= step * (1.0 + 1e-8))
+    assert set(levels(depth, step, last)) <= set(passes.tolist())
+
+
+def test_a_v_bit_without_a_step_down_makes_the_passes_that_are_asked() -> None:
+    assert carved_levels(1.0) == levels(1.0)
+    assert carved_levels(1.0, None, 0.2) == levels(1.0, None, 0.2)

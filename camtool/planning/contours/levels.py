@@ -1,8 +1,9 @@
-"""At which depths a contour is cut: the z of its passes."""
+"""At which depths a contour or a carving is cut: the z of its passes."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from camtool.errors import OptionError
 
@@ -54,6 +55,27 @@ def levels(
     count = max(1, math.ceil(passes))
     above = tuple(-rest_mm * step / count for step in range(1, count))
     return (*above, -depth_mm) if last_pass_mm is None else (*above, -rest_mm, -depth_mm)
+
+
+def carved_levels(
+    depth_mm: float, step_down_mm: float | None = None, last_pass_mm: float | None = None
+) -> tuple[float, ...]:
+    """The z of all passes of a V bit, which goes inwards from the wall as it goes down.
+
+    A pass whose tip is d deeper than the one before runs d·tan α farther in (α the half angle of
+    the bit). Under its tip the earlier one has cut d less deep than its own depth, so that the
+    tip takes 2 d: passes after the first are no deeper than half the step down.
+
+    >>> carved_levels(0.9, 0.3)
+    (-0.3, -0.45, -0.6, -0.75, -0.9)
+    """
+    whole = levels(depth_mm, step_down_mm, last_pass_mm)
+    passes = list(whole[:1])
+    for above, z in pairwise(whole):
+        if step_down_mm is not None and 2.0 * (above - z) > step_down_mm * (1.0 + PASS_SLACK):
+            passes.append(0.5 * (above + z))
+        passes.append(z)
+    return tuple(passes)
 
 
 def _check_last(depth_mm: float, step_down_mm: float | None, last_pass_mm: float) -> None:
