@@ -54,21 +54,6 @@ def find_tasks(
     return sorted(tasks.values(), key=lambda task: task.stem)
 
 
-def refuse_overwriting(tasks: Sequence[Task], out: Path, extensions: Sequence[str]) -> None:
-    """OutputError when an output would take the place of a drawing."""
-    places = Places()
-    drawings = {places.of(task.source): task.source for task in tasks}
-    for task in tasks:
-        for extension in extensions:
-            place = places.of(out / f"{task.stem}{extension}")
-            if place in drawings:
-                raise OutputError(
-                    f"an output of {task.source} would take the place of {drawings[place]}",
-                    file=str(out),
-                    mend="choose another --out",
-                )
-
-
 def _found(source: str, out: Path) -> Iterator[tuple[Path, str]]:
     """(drawing, stem) of one argument; `out` is a real path."""
     path = Path(source)

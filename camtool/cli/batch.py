@@ -79,9 +79,9 @@ def batch(
     from camtool.cli.batchrun import Batched, Running
     from camtool.cli.batchtalk import Loudness
     from camtool.cli.batchwork import PostWork
-    from camtool.cli.output import check_writable
+    from camtool.cli.output import check_places
 
-    check_writable([summary], list(sources))
+    check_places([*machine.files(), *job.files()], [summary])
     work = PostWork(
         machine.load(),
         drawing,
@@ -94,4 +94,4 @@ def batch(
     )
     running = Running(jobs, scheduler, timeout, force, fail_fast)
     batched = Batched(work, Path(out), running, summary, Loudness(quiet, verbose))
-    return batched.run(sources, job, own_jobs=not no_own_jobs)
+    return batched.run(sources, job, machine.files(), own_jobs=not no_own_jobs)

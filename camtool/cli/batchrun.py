@@ -5,26 +5,27 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from camtool.batch.lock import NAME as LOCK
+from camtool.batch.manifest import NAME as MANIFEST
 from camtool.batch.manifest import Manifest
+from camtool.batch.places import Places
 from camtool.batch.records import Made, Outcome, Pool, State, Task
 from camtool.cli.batchstop import Stop, stoppable
 from camtool.cli.batchtalk import Loudness, Talk, say_summary, summary_json, talking
-from camtool.cli.batchwork import JobOrder, PostWork, own_job
-from camtool.cli.output import write_all
+from camtool.cli.batchwork import SVG, JobOrder, PostWork, own_job
+from camtool.cli.jobflags import JobFlags
+from camtool.cli.output import refuse_same, write_all
+from camtool.cli.seal import is_foreign
 from camtool.cli.talk import say
 from camtool.errors import CamtoolError, OutputError
-
-if TYPE_CHECKING:
-    from camtool.cli.jobflags import JobFlags
 
 EXIT_SIGNAL = 128
 """Added to the number of the signal that ended a run."""
@@ -83,10 +84,15 @@ class Batched:
     summary: str | None
     loudness: Loudness
 
-    def run(self, sources: Sequence[str], job: JobFlags, *, own_jobs: bool) -> int:
-        """Find, make, say; the exit code. CamtoolError for what is no single drawing's fault."""
+    def run(
+        self, sources: Sequence[str], job: JobFlags, reads: Sequence[str], *, own_jobs: bool
+    ) -> int:
+        """Find, make, say; the exit code. CamtoolError for what is no single drawing's fault.
+
+        `reads` are files that are read besides drawings and jobs.
+        """
         try:
-            ended, number = self._run(sources, job, own_jobs=own_jobs)
+            ended, number = self._run(sources, job, reads, own_jobs=own_jobs)
         except KeyboardInterrupt:  # before the first drawing, or for the second time
             ended, number = Ended((), None), int(signal.SIGINT)
         if number is not None:
@@ -98,24 +104,52 @@ class Batched:
         return int(any(outcome.error is not None for outcome in ended.outcomes))
 
     def _run(
-        self, sources: Sequence[str], job: JobFlags, *, own_jobs: bool
+        self, sources: Sequence[str], job: JobFlags, reads: Sequence[str], *, own_jobs: bool
     ) -> tuple[Ended, int | None]:
         """What became of them, and the signal that stopped the run."""
-        from camtool.batch.inputs import find_tasks, refuse_overwriting
+        from camtool.batch.inputs import find_tasks
         from camtool.batch.lock import alone_in
 
         begin = time.monotonic()
-        tasks = find_tasks(sources, self.out, Manifest(self.out).outputs())
-        refuse_overwriting(tasks, self.out, self.work.extensions)
-        _make_folder(self.out)
-        with stoppable() as stop, alone_in(self.out) as locked:
-            if not locked:
-                self._note("warning: --out has no locks: see that no other batch writes there")
+        made = Manifest(self.out).outputs()
+        tasks = find_tasks(sources, self.out, made)
+        with stoppable() as stop:
             ordered = self._ordered(tasks, job, own_jobs)
-            manifest = Manifest(self.out)  # again: until now it may have been another one's
-            ended = self._made(ordered, manifest, stop)
-            self._end(ended.outcomes, manifest, time.monotonic() - begin)
+            self._refuse_overwriting(ordered, [*reads, *job.files()], made)
+            _make_folder(self.out)
+            with alone_in(self.out) as locked:
+                if not locked:
+                    text = "warning: --out has no locks: see that no other batch writes there"
+                    self._note(text)
+                manifest = Manifest(self.out)  # again: until now it may have been another one's
+                ended = self._made(ordered, manifest, stop)
+                self._end(ended.outcomes, manifest, time.monotonic() - begin)
         return ended, stop.signal
+
+    def _refuse_overwriting(
+        self, ordered: Ordered, reads: Sequence[str], made: Collection[Path]
+    ) -> None:
+        """OutputError when an output would take the place of a file that is read or of another
+        output, or a picture that of a file that no batch has `made` there."""
+        own = {task.order.file for task in ordered.tasks} - {None, *reads}
+        jobs = chain.from_iterable(JobFlags(file, (), {}).files() for file in sorted(own))
+        ours = [str(self.out / name) for name in (MANIFEST, LOCK)]
+        makes = [
+            str(self.out / f"{task.stem}{extension}")
+            for task in ordered.tasks
+            for extension in self.work.extensions
+        ]
+        sources = [task.source for task in ordered.tasks]
+        refuse_same([*sources, *reads, *jobs], [*ours, self.summary, *makes])
+        places = Places()
+        for task in ordered.tasks if self.work.preview == SVG else ():
+            picture = self.out / f"{task.stem}{SVG}"
+            if is_foreign(picture, task.stem) and places.of(picture) not in made:
+                raise OutputError(
+                    f"is there, and is no picture of {task.source}",
+                    file=str(picture),
+                    mend="choose another --out, or --preview png",
+                )
 
     def _note(self, text: str) -> None:
         say(f"camtool: {text}", quiet=self.loudness.quiet)

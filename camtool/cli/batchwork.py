@@ -13,6 +13,7 @@ from camtool.batch.records import Made, Task
 from camtool.cli.drawing import DrawingFlags
 from camtool.cli.jobflags import JobFlags
 from camtool.cli.pictureflags import PictureFlags
+from camtool.cli.seal import sealed
 from camtool.cli.talk import one_line
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 REMARKS = 20
 """So many findings of a drawing come back from its worker; there may be a hundred thousand."""
+
+SVG = ".svg"
+"""The pictures that may lie where a drawing is."""
 
 OWN_JOB = ".toml"
 """`part.toml` beside `part.dxf` is its job."""
@@ -116,7 +120,8 @@ class PostWork:
         if posted.program is not None:
             yield posted.program.extension, posted.program.data
         if self.preview is not None:
-            yield self.preview, self._picture(drawing, job, posted)
+            picture = self._picture(drawing, job, posted)
+            yield self.preview, sealed(picture, task.stem) if self.preview == SVG else picture
         if self.reports and posted.verification is not None:
             yield ".json", posted.verification.report.to_json().encode()
 

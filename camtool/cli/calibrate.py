@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from camtool.cli.options import talk_options
-from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.output import STDOUT, check_places, write_all
 from camtool.cli.sections import SectionedCommand
 
 
@@ -43,7 +43,7 @@ def calibrate(
     from camtool.cli.options import MachineFlags
     from camtool.cli.talk import one_line, say
 
-    check_writable([output, report], [measurements])
+    check_places([measurements, machine], [output, report])
     said = read_measurements(Path(measurements))
     flags = MachineFlags(target or (None if machine else said.target or None), machine, ())
     known = flags.load().machine

@@ -11,7 +11,7 @@ import click
 
 from camtool.cli.drawing import DrawingFlags, drawing_options
 from camtool.cli.options import talk_options
-from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.output import STDOUT, check_places, write_all
 from camtool.cli.pictureflags import DRAWING, PictureFlags, picture_options
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
@@ -83,7 +83,7 @@ def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
     """The facts of one drawing, and whether any of them is an error."""
     from camtool.findings import Severity, worst
 
-    check_writable([asked.report, asked.preview], [source])
+    check_places([source], [asked.report, asked.preview])
     say_first_run(quiet=asked.quiet)
     read = drawing.read(source)
     facts = _facts(read)

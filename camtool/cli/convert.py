@@ -66,7 +66,9 @@ def convert(
     picture.check(pictures_asked(page, preview), UNVERIFIED if no_verify else RESULT)
     before = MachineFlags(source, from_machine, from_set).load()
     after = MachineFlags(target, machine, settings).load()
-    asked = Asked(program, output, report, preview, page, flags_given())
+    reads = [program, str(before.file), str(after.file)]
+    reads += [file for file in (from_machine, machine) if file is not None]
+    asked = Asked(program, output, report, preview, page, flags_given(), reads)
     asked.check(after.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import convert_program, posted_scene

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import PurePath
 from typing import TYPE_CHECKING, cast
@@ -10,9 +9,9 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from camtool.cli.options import MachineFlags, machine_options, talk_options
-from camtool.cli.output import STDOUT, check_writable, write_all
+from camtool.cli.output import STDOUT, check_new, check_places, write_all
 from camtool.cli.sections import SectionedCommand
-from camtool.errors import OptionError, OutputError
+from camtool.errors import OptionError
 
 if TYPE_CHECKING:
     from camtool.calibration.coupons import Kind
@@ -98,9 +97,9 @@ def coupon(
     output = output or "coupon.dxf"
     if output != STDOUT and PurePath(output).suffix.lower() not in DRAWINGS:
         raise click.UsageError(f"-o {output!r} ends in neither .dxf nor .svg")
-    check_writable([output, measurements], [])
-    if measurements not in (None, STDOUT) and os.path.lexists(str(measurements)):
-        raise OutputError("exists already", file=str(measurements), mend="give another name")
+    check_places(machine.files(), [output, measurements])
+    if measurements is not None:
+        check_new(measurements)
     known = machine.load().machine if machine.name() is not None else None
     made = sheet(cast("Kind", kind), size or _travel(known), regions, known)
     draw = drawings.svg if output.lower().endswith(".svg") else drawings.dxf

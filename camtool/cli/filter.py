@@ -48,11 +48,12 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
         posting = replace(posting, machine=replace(posting.machine, target=TARGET))
     _progress(BEGUN)
     target = posting.load()
-    made = posting.of(source).make(source, target, quiet=quiet, on_read=lambda: _progress(READ))
+    posting = posting.of(source)
+    made = posting.make(source, target, quiet=quiet, on_read=lambda: _progress(READ))
     _progress(MADE)
     code = finish(
         made.posted,
-        Asked(source, STDOUT, None),
+        Asked(source, STDOUT, None, reads=[*posting.files(source), str(target.file)]),
         quiet=quiet,
         verbose=verbose,
         picture=PictureFlags().painter(made.scenes, quiet=quiet),

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.output import STDOUT, check_writable, write_all
-from camtool.cli.report import Subject, linked_picture, picture_beside, report_files
+from camtool.cli.output import STDOUT, check_places, write_all
+from camtool.cli.report import (
+    Subject,
+    linked_picture,
+    picture_beside,
+    refuse_foreign_picture,
+    report_files,
+)
 from camtool.cli.talk import say, say_findings
 from camtool.cli.terminal import REPORT_NAMES, report_marks, show_facts
 
@@ -22,7 +29,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Asked:
-    """What the user wants written; `source` names what it is made of, None is not wanted."""
+    """What the user wants written; `source` names what it is made of, None is not wanted.
+
+    `reads` are all files that are read for it.
+    """
 
     source: str
     output: str | None
@@ -30,6 +40,7 @@ class Asked:
     preview: str | None = None
     page: str | None = None
     flags: Flags = ()
+    reads: Sequence[str] = ()
 
     def check(self, extension: str, *, verified: bool) -> None:
         """OutputError, before any work is done, when a place cannot be written."""
@@ -38,9 +49,9 @@ class Asked:
                 raise click.UsageError(
                     f"{flag} is the report of the verification that --no-verify leaves out"
                 )
-        beside = picture_beside(self.page, self.preview)
-        names = [self.program(extension), self.preview, self.report, self.page, beside]
-        check_writable(names, [self.source])
+        outputs = [self.program(extension), self.preview, self.report, self.page]
+        check_places(self.reads, [*outputs, picture_beside(self.page, self.preview)])
+        refuse_foreign_picture(self.page, self.preview)
 
     def program(self, extension: str) -> str:
         """The program's name; when none is given the source's, here; stdin goes to stdout."""

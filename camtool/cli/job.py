@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -47,14 +46,13 @@ def new(
 
     It works as it is; every other key stands there as a comment.
     """
-    from camtool.cli.output import STDOUT, write_all
+    from camtool.cli.output import STDOUT, check_new, check_places, write_all
     from camtool.cli.talk import say, say_findings, say_first_run
-    from camtool.errors import OutputError
     from camtool.jobs.template import job_template
 
     output = output or "job.toml"
-    if output != STDOUT and os.path.lexists(output):
-        raise OutputError("exists already", file=output, mend="give another name with -o")
+    check_places([source, *machine.files()], [output])
+    check_new(output)
     say_first_run(quiet=quiet)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(source, target)

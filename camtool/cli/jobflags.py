@@ -55,6 +55,10 @@ class JobFlags:
             return replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
         return job
 
+    def files(self) -> list[str]:
+        """The job file, and its tool table."""
+        return [file for file in (self.file, self.tool_table()) if file is not None]
+
     def tool_table(self) -> str | None:
         """The file of the tool table that the flag or the job file names; None without any, and
         where the job file cannot be read: `job` says why."""

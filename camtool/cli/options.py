@@ -41,6 +41,10 @@ class MachineFlags:
         file = Path(self.machine) if self.machine else None
         return load_target(name, machine_file=file, settings=self.settings)
 
+    def files(self) -> list[str]:
+        """The files that say what the machine is."""
+        return [] if self.machine is None else [self.machine]
+
     def name(self) -> str | None:
         """The target's name: as given, or as the machine file says; None when nobody does."""
         if self.target is not None or self.machine is None:

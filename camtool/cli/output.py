@@ -1,21 +1,31 @@
 """Writing results: all files of a command or none, and `-` for stdout.
 
-Each file is first written whole beside its place, under a temporary name; only when every one of
-them is there are they renamed. So an error (a full disk, a missing folder, Ctrl-C) leaves old
-files as they were and no new one.
+Before any work the places are checked: no output is an input, and no two outputs are one file, by
+whatever names and links they are called. Then each file is written whole beside its place, under a
+temporary name; streams (`-`, devices, pipes) come next, for what they have taken cannot be taken
+back; only when all of that is done are the files renamed. So an error (a full disk, a reader that
+is gone, Ctrl-C) leaves old files as they were and no new one.
 """
 
 from __future__ import annotations
 
+import io
 import os
 import stat
 import sys
 import tempfile
+import unicodedata
+from collections.abc import Hashable, Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from camtool.errors import OutputError
 
 STDOUT = "-"
+"""Stdout among outputs, stdin among inputs."""
+
+KEPT = 40
+"""So many characters of a file's name stand in that of its temporary file: names have an end."""
 
 
 def write_all(files: dict[str, bytes]) -> None:
@@ -26,29 +36,58 @@ def write_all(files: dict[str, bytes]) -> None:
         for name, data in files.items():
             if name not in streams:
                 staged.append(_stage(Path(name), data))
-        for temporary, place in staged:
-            temporary.replace(place)
+        for name, data in streams.items():
+            _write_stream(name, data)
+        _rename(staged)
     finally:
         for temporary, _ in staged:
             temporary.unlink(missing_ok=True)
-    for name, data in streams.items():
-        _write_stream(name, data)
 
 
-def check_writable(names: list[str | None], inputs: list[str]) -> None:
-    """OutputError, before any work is done, when a place cannot be written or is an input."""
-    sources = {Path(name).resolve() for name in inputs if name != STDOUT}
-    given = [name for name in names if name is not None]
-    for name in given:
-        if given.count(name) > 1:
-            raise OutputError(
-                "is asked for twice", file=name, mend="give each output its own name"
-            )
-        if _is_stream(name):
+def check_places(reads: Iterable[str | None], writes: Iterable[str | None]) -> None:
+    """OutputError, before any work is done, as `refuse_same`, and when a place of `writes` cannot
+    be written. None is a file that was not asked for."""
+    names = [name for name in writes if name is not None]
+    refuse_same(reads, names)
+    for name in names:
+        if not _is_stream(name):
+            _check_file(name)
+
+
+def refuse_same(reads: Iterable[str | None], writes: Iterable[str | None]) -> None:
+    """OutputError when a place of `writes` is one of `reads` or another one of `writes`; links of
+    both kinds are seen through."""
+    sources = {_input(name): name for name in reads if name is not None}
+    sources.pop(None, None)
+    taken: dict[Hashable, str] = {}
+    for name in writes:
+        if name is None:
             continue
-        place = Path(name)
-        if place.resolve() in sources:
-            raise OutputError("is the input itself", file=name, mend="choose another -o")
+        place = _place(name)
+        if place in sources:
+            read = sources[place]
+            called = "" if read in (name, STDOUT) else f" ({read})"
+            raise OutputError(
+                f"is the input itself{called}", file=name, mend="choose another place"
+            )
+        if place in taken:
+            twice = "is asked for twice"
+            if taken[place] != name:
+                twice = f"is asked for twice, also as {taken[place]}"
+            raise OutputError(twice, file=name, mend="give each output its own name")
+        taken[place] = name
+
+
+def check_new(name: str) -> None:
+    """OutputError when there is such a file already; streams take whatever comes."""
+    if os.path.lexists(name) and not _is_stream(name):
+        raise OutputError("exists already", file=name, mend="give another name")
+
+
+def _check_file(name: str) -> None:
+    """OutputError when no file can be made or replaced there."""
+    place = Path(os.path.realpath(name))
+    try:
         if place.is_dir():
             raise OutputError("is a folder", file=name, mend="give a file name")
         if not place.parent.is_dir():
@@ -56,9 +95,51 @@ def check_writable(names: list[str | None], inputs: list[str]) -> None:
                 f"the folder {place.parent} does not exist", file=name, mend="make it first"
             )
         if not os.access(place.parent, os.W_OK):
-            raise OutputError("the folder is not writable", file=name, mend="choose another -o")
-        if place.exists() and not os.access(place, os.W_OK):
-            raise OutputError("is write-protected", file=name, mend="choose another -o")
+            raise OutputError("the folder is not writable", file=name, mend="choose another place")
+        if _there(place) and not os.access(place, os.W_OK):
+            raise OutputError("is write-protected", file=name, mend="choose another place")
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise _refused(name, error) from error
+
+
+def _there(place: Path) -> bool:
+    """Whether there is a file; OSError when nobody can know: a loop of links, a name too long."""
+    try:
+        place.stat()
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _input(name: str) -> Hashable:
+    """What tells a file that is read from all others; None for what no output can replace."""
+    try:
+        found = os.fstat(sys.stdin.fileno()) if name == STDOUT else Path(name).stat()
+    except (OSError, ValueError, AttributeError):  # nothing there, or no file of the system's
+        return None
+    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
+
+
+def _place(name: str) -> Hashable:
+    """What tells a place that is written from all others: its file, or its folder and name.
+
+    Names that differ only in case, or in how accents are coded, are taken for one: they are one
+    file on other computers, and programs travel.
+    """
+    try:
+        found = os.fstat(sys.stdout.fileno()) if name == STDOUT else Path(name).stat()
+    except (io.UnsupportedOperation, AttributeError):  # a stdout that is no file of the system's
+        return name
+    except OSError:
+        folder, base = os.path.split(os.path.realpath(name))
+        base = unicodedata.normalize("NFC", unicodedata.normalize("NFC", base).casefold())
+        with suppress(OSError):
+            found = Path(folder).stat()
+            return found.st_dev, found.st_ino, base
+        return folder, base
+    return found.st_dev, found.st_ino
 
 
 def _is_stream(name: str) -> bool:
@@ -73,38 +154,85 @@ def _is_stream(name: str) -> bool:
 
 
 def _write_stream(name: str, data: bytes) -> None:
-    if name == STDOUT:
-        sys.stdout.flush()
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
-        return
+    """The data written and taken; BrokenPipeError where the reader of stdout is gone."""
     try:
+        if name == STDOUT:
+            sys.stdout.flush()
+            sys.stdout.buffer.write(data)
+            sys.stdout.buffer.flush()
+            return
         with Path(name).open("wb") as stream:
             stream.write(data)
+    except BrokenPipeError:
+        if name == STDOUT:
+            raise
+        raise OutputError("its reader is gone", file=name) from None
     except OSError as error:
-        raise OutputError(f"cannot be written ({error.strerror})", file=name) from error
+        raise _refused("<stdout>" if name == STDOUT else name, error) from error
+
+
+def _refused(name: str, error: OSError) -> OutputError:
+    return OutputError(
+        f"cannot be written ({error.strerror})", file=name, mend="choose another place"
+    )
+
+
+def _rename(staged: list[tuple[Path, Path]]) -> None:
+    """Every temporary file to its place; when one cannot go there, or at Ctrl-C, those that have
+    gone come back."""
+    olds: dict[Path, Path | None] = {}
+    if len(staged) > 1:
+        olds = {place: _second_name(temporary, place) for temporary, place in staged}
+    try:
+        for temporary, place in staged:
+            try:
+                temporary.replace(place)
+            except OSError as error:
+                raise _refused(str(place), error) from error
+    except BaseException:
+        for place, old in olds.items():
+            if old is None:
+                place.unlink(missing_ok=True)
+            elif old != place:
+                old.replace(place)
+        raise
+    finally:
+        for place, old in olds.items():
+            if old is not None and old != place:
+                old.unlink(missing_ok=True)
+
+
+def _second_name(temporary: Path, place: Path) -> Path | None:
+    """A second name for the file at a place, by which it can come back: the place itself where the
+    file system knows no links, None where there is no file."""
+    if not os.path.lexists(place):
+        return None
+    old = temporary.with_name(f"{temporary.name}.old")
+    try:
+        old.hardlink_to(place)
+    except OSError:
+        return place
+    return old
 
 
 def _stage(place: Path, data: bytes) -> tuple[Path, Path]:
     """(temporary file holding the data, final place), in the same folder; links are followed."""
-    place = place.resolve()
+    named, place = str(place), Path(os.path.realpath(place))
     temporary: Path | None = None
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)
+        handle, name = tempfile.mkstemp(prefix=f".{place.name[:KEPT]}.", dir=place.parent)
         temporary = Path(name)
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
         temporary.chmod(_mode_for(place))
-    except OSError as error:
+    except BaseException as error:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
-        raise OutputError(
-            f"cannot be written ({error.strerror})",
-            file=str(place),
-            mend="choose another place with -o",
-        ) from error
+        if isinstance(error, OSError):
+            raise _refused(named, error) from error
+        raise
     return temporary, place
 
 

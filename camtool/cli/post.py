@@ -77,7 +77,8 @@ def post(
 
     def once() -> int:
         target = posting.load()
-        asked = Asked(source, output, report, preview, page, flags)
+        reads = [*posting.files(source), str(target.file)]
+        asked = Asked(source, output, report, preview, page, flags, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
         made = posting.make(source, target, quiet=quiet, preview=preview)
         return finish(

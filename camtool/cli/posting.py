@@ -106,8 +106,7 @@ class Posting:
 
     def files(self, source: str) -> list[str]:
         """The files that a program is made of: drawing, job, its tool table, and machine."""
-        given = (source, self.job.file, self.job.tool_table(), self.machine.machine)
-        return [file for file in given if file is not None]
+        return [source, *self.job.files(), *self.machine.files()]
 
     def of(self, source: str) -> Posting:
         """The same with the drawing's own job file, `part.toml` beside `part.dxf`, if it has one.

@@ -15,7 +15,7 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
-from camtool.cli.output import check_writable, write_all
+from camtool.cli.output import check_places, write_all
 from camtool.cli.pictureflags import (
     DRAWING,
     RESULT,
@@ -82,7 +82,7 @@ def preview(
     sources = [source] if beside is None else [source, beside]
     if beside is not None:
         check_beside("--beside", [output])
-    check_writable([output], sources)
+    check_places([*sources, *machine.files(), *job.files()], [output])
     # What is to be played needs its times, which only the machine's model knows.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 

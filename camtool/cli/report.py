@@ -1,7 +1,8 @@
 """`--report`: a page about a program, as HTML, Markdown or JSON, with its picture.
 
 HTML holds its picture. Markdown links to a picture beside it: the one of `--preview`, or else an
-SVG of the page's own name; Markdown on stdout has none.
+SVG of the page's own name, which never takes the place of a file that the page did not bring
+along; Markdown on stdout has none.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import click
 
 from camtool.cli.output import STDOUT
 from camtool.cli.pictureflags import FLAGS as PICTURE_FLAGS
+from camtool.cli.seal import is_foreign, sealed
 from camtool.cli.types import is_viewer, page
+from camtool.errors import OutputError
 
 if TYPE_CHECKING:
     from camtool.cli.painter import Painter
@@ -93,6 +96,18 @@ def picture_beside(name: str | None, preview: str | None) -> str | None:
     return None if linked == preview else linked
 
 
+def refuse_foreign_picture(name: str | None, preview: str | None) -> None:
+    """OutputError when the picture that a page of this name brings along, which nobody asked for
+    by name, would take the place of a file that is no picture of that page."""
+    beside = picture_beside(name, preview)
+    if beside is not None and is_foreign(beside, str(name)):
+        raise OutputError(
+            f"is there, and is not the picture that {name} brought along",
+            file=beside,
+            mend="give the page another name, or its picture a name with --preview",
+        )
+
+
 def pictures_asked(name: str | None, preview: str | None) -> list[str]:
     """The pictures to be made for a page and a `--preview`, by names of their kind."""
     held = EMBEDDED if name is not None and name.lower().endswith(".html") else None
@@ -117,7 +132,7 @@ def report_files(
     beside, linked = picture_beside(name, preview), linked_picture(name, preview)
     links = () if linked is None else ((_CAPTION, _from(name, linked)),)
     files = {name: markdown(_page(subject, links)).encode()}
-    return files if beside is None else {**files, beside: picture(beside)}
+    return files if beside is None else {**files, beside: sealed(picture(beside), name)}
 
 
 def _held(svg: bytes) -> str:

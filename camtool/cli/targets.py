@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
@@ -82,18 +81,18 @@ def show(
 @talk_options
 def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool) -> None:
     """Write a machine file for NAME that extends TARGET, with every value as a comment."""
-    from camtool.cli.output import STDOUT, write_all
-    from camtool.errors import OutputError
+    from camtool.cli.output import STDOUT, check_new, check_places, write_all
     from camtool.machine.registry import list_target
     from camtool.machine.template import machine_template
 
     base = list_target(extends)
     text = machine_template(name, extends, base.file.read_text(encoding="utf-8"), base.needs)
     output = output or f"{name}.toml"
-    if output != STDOUT and os.path.lexists(output):
-        raise OutputError("exists already", file=output, mend="give another name with -o")
+    check_places([str(base.file)], [output])
+    check_new(output)
     write_all({output: text.encode()})
-    say(f"written: {output}; take the # away from what differs", quiet=quiet)
+    where = "stdout" if output == STDOUT else output
+    say(f"written: {where}; take the # away from what differs", quiet=quiet)
 
 
 def _list(as_json: bool) -> None:

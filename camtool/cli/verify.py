@@ -15,7 +15,7 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
-from camtool.cli.output import check_writable
+from camtool.cli.output import check_places
 from camtool.cli.pictureflags import (
     OVERLAY,
     RESULT,
@@ -23,7 +23,12 @@ from camtool.cli.pictureflags import (
     check_beside,
     picture_options,
 )
-from camtool.cli.report import picture_beside, pictures_asked, report_option
+from camtool.cli.report import (
+    picture_beside,
+    pictures_asked,
+    refuse_foreign_picture,
+    report_option,
+)
 from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say_first_run
 from camtool.cli.types import is_viewer
@@ -113,8 +118,11 @@ def verify(
     """
     wishes = Wishes(preview, picture, report, page, beside, quiet, verbose)
     _check(wishes, comparing=compare is not None, gated=gates.given)
-    inputs = [name for name in (program, against, beside) if name is not None]
-    check_writable([preview, report, page, picture_beside(page, preview)], inputs)
+    check_places(
+        [program, against, beside, *machine.files(), *job.files()],
+        [preview, report, page, picture_beside(page, preview)],
+    )
+    refuse_foreign_picture(page, preview)
 
     from camtool.pipeline import Judging, points_for
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.batch.inputs import find_tasks, refuse_overwriting
+from camtool.batch.inputs import find_tasks
 from camtool.batch.places import Places
 from camtool.errors import InputError, OutputError
 
@@ -81,16 +81,6 @@ def test_a_source_without_drawings_is_an_error(source: str) -> None:
     Path("empty").mkdir()
     with pytest.raises(InputError, match=source.replace("*", r"\*")):
         stems(source)
-
-
-@pytest.mark.usefixtures("here")
-def test_an_output_never_takes_the_place_of_a_drawing() -> None:
-    drawn("a.svg", "b.dxf")
-    tasks = find_tasks(["."], Path(), frozenset())
-    with pytest.raises(OutputError, match=r"take the place of a\.svg"):
-        refuse_overwriting(tasks, Path(), [".pic", ".svg"])
-    refuse_overwriting(tasks, Path(), [".pic", ".png"])
-    refuse_overwriting(tasks, Path("build"), [".pic", ".svg"])
 
 
 @pytest.mark.usefixtures("here")
@@ -172,9 +162,3 @@ def test_real_places_are_those_of_resolve() -> None:
     for name in ("d/a.svg", "d/link.svg", "f/b.svg", "f/../e/b.svg", "f/none", ".", "f", "d/.."):
         assert places.of(name) == Path(name).resolve(), name
         assert places.of(Path(name).absolute()) == Path(name).resolve(), name
-    Path("out").mkdir()
-    Path("out/a.svg").symlink_to("../d/a.svg")
-    with pytest.raises(
-        OutputError, match=r"an output of d/a\.svg would take the place of d/a\.svg"
-    ):
-        refuse_overwriting(find_tasks(["d/a.svg"], Path("out")), Path("out"), [".svg"])
