@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -122,16 +123,11 @@ def as_nobody() -> Iterator[None]:
 
 
 @pytest.fixture
-def open_path(tmp_path_factory: pytest.TempPathFactory, tmp_path: Path) -> Iterator[Path]:
-    """A folder that anybody can come to; only its own permissions count."""
-    changed = {}
-    for folder in [tmp_path, *tmp_path.parents]:
-        if folder.is_relative_to(tmp_path_factory.getbasetemp().parent):
-            changed[folder] = folder.stat().st_mode
-            folder.chmod(0o755)
-    yield tmp_path
-    for folder, mode in changed.items():
-        folder.chmod(mode)
+def open_path() -> Iterator[Path]:
+    """A folder that anybody can come to; pytest's own folders are its user's alone."""
+    with TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
 
 
 def test_missing_permissions_are_the_error_of_that_drawing(open_path: Path) -> None:

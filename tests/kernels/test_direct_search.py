@@ -98,10 +98,11 @@ def filled(
     """Positions of the compiled fill up to the end, or so many; in buffers of some size."""
     most, size = limits
     state = direct_search_start(*start, clockwise, error)
-    buffer, parts, met = np.empty((2, size), dtype=np.int64).T, [], False
-    while not met and sum(map(len, parts)) < most:
+    buffer, parts, met, filled_so_far = np.empty((2, size), dtype=np.int64).T, [], False, 0
+    while not met and filled_so_far < most:
         count, met = direct_search_fill(state, *end, buffer)
         parts.append(buffer[:count].copy())
+        filled_so_far += count
     return np.concatenate(parts), met
 
 

@@ -1,7 +1,6 @@
 """LinuxCNC's own interpreter as the referee: what `rs274 -g` makes of a program must be what our
 readers make of it, and what our writers were given. Skipped where LinuxCNC is not installed."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,7 @@ from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.oracles.rs274 import RS274, compare, interpreted, motions, needs_rs274
+from tests.oracles.rs274 import compare, interpreted, motions, needs_rs274, run_rs274
 from tests.postprocessors.gcode_parts import part, toolpaths
 
 pytestmark = needs_rs274
@@ -49,19 +48,13 @@ def test_events_are_canonical_calls_too(tmp_path: Path) -> None:
 def test_the_path_mode_is_the_one_asked_for(path: str, tmp_path: Path) -> None:
     target = load_target("linuxcnc", settings=[f"dialect.path={path}", "dialect.percent=true"])
     program = target.post.write(part(), target.machine)
-    run = subprocess.run(
-        [str(RS274), "-g", "/dev/stdin"],
-        input=program.data,
-        cwd=tmp_path,
-        capture_output=True,
-        check=True,
-    )
+    run = run_rs274("-g", "/dev/stdin", input=program.data.decode(), cwd=tmp_path)
     mode = {
         "blend": "CONTINUOUS, 0.010000",
         "exact-path": "EXACT_PATH",
         "exact-stop": "EXACT_STOP",
     }
-    assert f"SET_MOTION_CONTROL_MODE(CANON_{mode[path]}" in run.stdout.decode()
+    assert f"SET_MOTION_CONTROL_MODE(CANON_{mode[path]}" in run.stdout
 
 
 @pytest.mark.parametrize("name", TARGETS)
