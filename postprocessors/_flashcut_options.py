@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
+from camtool.machine.ranges import Tolerance
 
 from ._gcode_options import feed_decimals
 
@@ -40,7 +41,7 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     slants: Literal["whole", "split"] = "whole"
     z_up: Literal["+", "-"] = "+"
     spindle_stops: bool = True
-    arc_spread_mm: Annotated[float, Meta(gt=0.0)] = 0.005
+    arc_spread_mm: Tolerance = 0.005
 
 
 def dialect_of(machine: Machine) -> Dialect:

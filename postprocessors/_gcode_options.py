@@ -18,15 +18,13 @@ from msgspec import Meta
 
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
+from camtool.machine.ranges import Angle, Part, Radius, Slack, Tolerance
 
 POWER_OF_TEN_TOLERANCE: Final = 1e-9
 """`feed.unit_mm_min` must be a power of ten to this part of its logarithm."""
 
 MOST_FEED_DECIMALS: Final = 6
 """`feed.unit_mm_min` is no smaller than 10 to the minus this."""
-
-NotNegative = Annotated[float, Meta(ge=0.0)]
-Positive = Annotated[float, Meta(gt=0.0)]
 
 
 class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -43,19 +41,19 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
     decimals: Annotated[int, Meta(ge=3, le=6)] = 3
     strip_zeros: bool = False
-    line_chars: Annotated[int, Meta(ge=64)]
+    line_chars: Annotated[int, Meta(ge=64, le=1_000_000)]
     block_numbers: bool = False
     comments: Literal["contours", "header", "none"] = "contours"
     full_circles: Literal["whole", "halves"] = "whole"
     program_end: Literal["M2", "M30"] = "M2"
     retract: bool = True
-    arc_difference_mm: Positive
-    arc_difference_part: Positive
-    arc_most_difference_mm: Positive
-    arc_least_radius_mm: NotNegative
-    arc_most_radius_mm: Positive
-    arc_full_turn_rad: NotNegative
-    arc_chord_slack_mm: NotNegative = 0.0
+    arc_difference_mm: Tolerance
+    arc_difference_part: Part
+    arc_most_difference_mm: Tolerance
+    arc_least_radius_mm: Slack
+    arc_most_radius_mm: Radius
+    arc_full_turn_rad: Angle
+    arc_chord_slack_mm: Slack = 0.0
 
 
 def feed_decimals(machine: Machine) -> int:

@@ -6,6 +6,7 @@ from typing import Literal
 
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
+from camtool.machine.ranges import Seconds
 
 from ._gcode_options import GcodeDialect, feed_decimals
 
@@ -16,7 +17,7 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     longer dwells wrong."""
 
     tool_change: Literal["refuse", "pause"] = "refuse"
-    most_dwell_s: float
+    most_dwell_s: Seconds
 
 
 def dialect_of(machine: Machine) -> Dialect:

@@ -12,7 +12,8 @@ from typing import Final, Literal
 from camtool.errors import MachineError
 from camtool.machine.controllers.i8751_pulses import Firmware
 from camtool.machine.loader import convert
-from camtool.machine.model import Machine, Positive
+from camtool.machine.model import Machine
+from camtool.machine.ranges import Tolerance
 
 RECORDS_PER_PACKET: Final = 5
 """15 blocks of three motors (L4106-4134)."""
@@ -29,8 +30,8 @@ class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
     options of `Firmware` are those on pulses.
     """
 
-    tolerance_mm: Positive
-    arc_tolerance_mm: Positive
+    tolerance_mm: Tolerance
+    arc_tolerance_mm: Tolerance
     format: Literal["packets", "listing", "hex"] = "packets"
     plus_backward: str = ""
     key: Literal["once", "each-packet"] = "once"

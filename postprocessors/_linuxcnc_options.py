@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
-from msgspec import Meta
+from typing import Literal
 
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
+from camtool.machine.ranges import Tolerance
 
 from ._gcode_options import GcodeDialect, feed_decimals
 
@@ -18,7 +17,7 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     `percent`: a line of % before and after the program."""
 
     path: Literal["blend", "exact-path", "exact-stop"] = "blend"
-    blend_tolerance_mm: Annotated[float, Meta(gt=0.0)] = 0.01
+    blend_tolerance_mm: Tolerance = 0.01
     percent: bool = False
 
 

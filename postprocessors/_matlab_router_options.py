@@ -16,6 +16,7 @@ from msgspec import Meta
 from camtool.errors import MachineError
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
+from camtool.machine.ranges import Depth, FeedRate, Speed, Step, Tolerance
 
 UNIT_MM: Final = 0.1
 """Positions and distances are whole tenths of a millimetre (L3202-3204, L4444-4445)."""
@@ -35,7 +36,6 @@ FIXED_Y_UNITS: Final = 200
 MOST_NUMBER: Final = 32767
 """Every number is a signed int16 in the master (L4625-4635)."""
 
-Positive = Annotated[float, Meta(gt=0.0)]
 Lines = Annotated[int, Meta(ge=1, le=255)]
 
 
@@ -46,18 +46,18 @@ class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     format: Literal["m", "stream"] = "m"
     speed: Literal["axis", "path"] = "axis"
     too_fast: Literal["refused", "limited"] = "refused"
-    arc_tolerance_mm: Positive = 0.05
-    bend_tolerance_mm: Positive = 0.1
-    plunge_mm: Positive = 10.0
-    plunge_mm_min: Positive = 234.375
-    spindle_rpm: Positive | None = None
-    grid_mm: Positive | None = None
+    arc_tolerance_mm: Tolerance = 0.05
+    bend_tolerance_mm: Tolerance = 0.1
+    plunge_mm: Depth = 10.0
+    plunge_mm_min: FeedRate = 234.375
+    spindle_rpm: Speed | None = None
+    grid_mm: Step | None = None
     max_lines: Lines | None = None
     odd: Literal["truncated", "kept"] | None = None
     first_y: Literal["number", "character"] | None = None
     master_y: Literal["sent", "fixed"] | None = None
     end: Literal["off", "raise"] | None = None
-    baud: Annotated[int, Meta(ge=1)] | None = None
+    baud: Annotated[int, Meta(ge=1, le=1_000_000_000)] | None = None
     data_bits: Literal[7, 8] | None = None
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
-from msgspec import Meta
 
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
+from camtool.machine.ranges import Count
 
 
 class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -19,7 +19,7 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     form: Literal["example", "annex"] = "example"
-    buffer_chars: Annotated[int, Meta(ge=1)] = 35
+    buffer_chars: Count = 35
 
 
 def dialect_of(machine: Machine) -> Dialect:

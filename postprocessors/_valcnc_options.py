@@ -9,12 +9,11 @@ from msgspec import Meta
 
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
+from camtool.machine.ranges import Count, Scale, Step, Tolerance
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
-
-Positive = Annotated[float, Meta(gt=0.0)]
 
 
 class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -28,16 +27,16 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     an arc's start and end may differ by this much.
     """
 
-    coord_scale: Positive
-    nominal_step_mm: Positive
+    coord_scale: Scale
+    nominal_step_mm: Step
     coord_scale_checked: bool = False
     decimals: Annotated[int, Meta(ge=1, le=6)] = 4
-    block_chars: Annotated[int, Meta(ge=1)] = 127
-    max_sweep_deg: Annotated[float, Meta(gt=0.0, le=180.0)] = 90.0
+    block_chars: Count = 127
+    max_sweep_deg: Annotated[float, Meta(ge=1e-3, le=180.0)] = 90.0
     full_circles: Literal["refused", "whole"] = "refused"
     missing_words: Literal["refused", "keep", "zero"] = "refused"
     z_order: Literal["refused", "before", "after", "together"] = "refused"
-    arc_spread_mm: Positive = 0.04
+    arc_spread_mm: Tolerance = 0.04
 
 
 def dialect_of(machine: Machine) -> Dialect:

@@ -19,16 +19,17 @@ from typing import Any
 
 import msgspec
 
-from camtool.calibration.records import KINDS, MOST_TIMES, Added, Coupon, Positive, RegionsOf
+from camtool.calibration.records import KINDS, MOST_TIMES, Added, Coupon, RegionsOf
 from camtool.errors import InputError, MachineError
 from camtool.machine.loader import convert, read_table
+from camtool.machine.ranges import Tolerance
 
 
 class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The file without its coupons, whose tables are known by name only."""
 
     target: str = ""
-    uncertainty_mm: Positive | None = None
+    uncertainty_mm: Tolerance | None = None
     compensation_mm: Added = Added()
     regions: RegionsOf = RegionsOf()
     lines: tuple[()] = ()

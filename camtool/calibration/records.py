@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar, Literal
 import msgspec
 from msgspec import Meta
 
-Positive = Annotated[float, Meta(gt=0.0)]
-NotNegative = Annotated[float, Meta(ge=0.0)]
-Pair = tuple[Positive, Positive]
+from camtool.machine.ranges import Length, Lost, Place, Reading, Tolerance
+
+Pair = tuple[Length, Length]
 Flat = Literal["x", "y"]
 Any3 = Literal["x", "y", "z"]
 
@@ -22,17 +22,17 @@ this part of it, is no measurement of it but a slip: a wrong unit, a lost digit.
 class Added(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What the controller added at each reversal while it cut, mm; None: as the machine says."""
 
-    x: NotNegative | None = None
-    y: NotNegative | None = None
-    z: NotNegative | None = None
+    x: Lost | None = None
+    y: Lost | None = None
+    z: Lost | None = None
 
 
 class Regions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The cells of the table in which the play of an axis was measured, as a machine's play map
     has them: edges in table coordinates, `names[j][i]` the region of coupons in a cell."""
 
-    x_mm: tuple[float, ...]
-    y_mm: tuple[float, ...]
+    x_mm: tuple[Place, ...]
+    y_mm: tuple[Place, ...]
     names: tuple[tuple[str, ...], ...]
 
     @property
@@ -56,7 +56,7 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     source: str = ""
     region: str = ""
-    uncertainty_mm: Positive | None = None
+    uncertainty_mm: Tolerance | None = None
     compensation_mm: Added | None = None
 
     @property
@@ -80,10 +80,10 @@ class Lines(Coupon, frozen=True, kw_only=True):
     kind = "lines"
 
     axis: Flat
-    nominal_mm: Positive
-    first_mm: NotNegative | None = None
-    second_mm: NotNegative | None = None
-    shorter_by_mm: float | None = None
+    nominal_mm: Length
+    first_mm: Reading | None = None
+    second_mm: Reading | None = None
+    shorter_by_mm: Place | None = None
 
     @property
     def axes(self) -> str:
@@ -109,9 +109,9 @@ class Square(Coupon, frozen=True, kw_only=True):
     kind = "squares"
 
     nominal_mm: Pair
-    dx_mm: NotNegative | None = None
-    dy_mm: NotNegative | None = None
-    diagonals_mm: tuple[NotNegative, NotNegative] | None = None
+    dx_mm: Reading | None = None
+    dy_mm: Reading | None = None
+    diagonals_mm: tuple[Reading, Reading] | None = None
 
     def lengths(self) -> Iterator[tuple[str, float, float]]:
         width, height = self.nominal_mm
@@ -132,9 +132,9 @@ class Circle(Coupon, frozen=True, kw_only=True):
 
     kind = "circles"
 
-    nominal_mm: Positive
+    nominal_mm: Length
     direction: Literal["cw", "ccw"]
-    diameters_mm: tuple[NotNegative, ...]
+    diameters_mm: tuple[Reading, ...]
     angles_deg: tuple[Annotated[float, Meta(ge=-360.0, le=360.0)], ...] | None = None
 
     @property
@@ -165,10 +165,10 @@ class Steps(Coupon, frozen=True, kw_only=True):
     kind = "steps"
 
     axis: Any3
-    nominal_mm: tuple[Positive, ...]
-    forward_mm: tuple[NotNegative, ...] | None = None
-    backward_mm: tuple[float, ...] | None = None
-    rows_apart_mm: float = 0.0
+    nominal_mm: tuple[Length, ...]
+    forward_mm: tuple[Reading, ...] | None = None
+    backward_mm: tuple[Place, ...] | None = None
+    rows_apart_mm: Place = 0.0
 
     @property
     def axes(self) -> str:
@@ -200,8 +200,8 @@ class Closure(Coupon, frozen=True, kw_only=True):
     kind = "closures"
 
     nominal_mm: Pair
-    gap_x_mm: float | None = None
-    gap_y_mm: float | None = None
+    gap_x_mm: Place | None = None
+    gap_y_mm: Place | None = None
 
     def faults(self) -> Iterator[tuple[str, str, str]]:
         gaps = (("gap_x_mm", self.gap_x_mm), ("gap_y_mm", self.gap_y_mm))

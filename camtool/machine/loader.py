@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import msgspec
+import msgspec.inspect
 
 from camtool.errors import MachineError
 from camtool.machine.controllers import Controller, SlideStart
@@ -27,6 +28,9 @@ from camtool.patterns import guess
 
 NEEDS = "needs"
 """Key at the top of a target's file: the keys that only the user's machine file can give."""
+
+MOST_SHOWN = 40
+"""Numbers of more characters are not repeated in messages."""
 
 Table = dict[str, Any]
 _T = TypeVar("_T")
@@ -42,7 +46,7 @@ def read_table(path: Path) -> Table:
         ) from error
     except UnicodeDecodeError as error:
         raise MachineError("is not UTF-8 text", file=str(path)) from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, or a whole number of too many digits
         raise MachineError(f"is no TOML: {error}", file=str(path)) from error
 
 
@@ -135,6 +139,8 @@ def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -
         elif missing:
             keys.append(missing[1])
             message = "key is missing"
+        elif message.startswith(_OUT_OF_RANGE):
+            message = _outside(kind, table, keys[1:] if at else keys) or message
         *tables, key = keys or ["?"]
         where = (f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}"
         raise MachineError(
@@ -143,6 +149,53 @@ def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -
             where=where,
             mend=_mend(kind, table, tables, key) if unknown else "",
         ) from None
+
+
+_OUT_OF_RANGE = (
+    *(f"Expected `{of}` {than}" for of in ("int", "float") for than in "<>"),
+    "Number out of range",  # a whole one that is no float
+)
+"""How msgspec begins to say that a number is outside of its range."""
+
+
+def _outside(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
+    """What is wrong with the number at `keys` ("axes", "x", "travel_mm"; "play_mm[0][1]"); ""
+    where its range has not both ends."""
+    about: Any = msgspec.inspect.type_info(kind)
+    value: Any = table
+    for name in re.findall(r"[^.\[\]]+", ".".join(keys)):
+        key = int(name) if isinstance(value, list) else name
+        about, value = _part(about, value, key), value[key]
+    about = _fitting(about, value)
+    if about.ge is None or about.le is None:
+        return ""
+    said = repr(value)
+    if len(said) > MOST_SHOWN:
+        said = f"a number of {len(said)} characters"
+    ends = (str(end) if isinstance(end, int) else f"{end:g}" for end in (about.ge, about.le))
+    return f"{said} is not between {' and '.join(ends)}"
+
+
+def _part(about: Any, value: Any, key: int | str) -> Any:
+    """What is known of the part `key` of a table or a list of which `about` is known."""
+    about = _fitting(about, value)
+    if isinstance(about, msgspec.inspect.StructType):
+        return next(field.type for field in about.fields if field.encode_name == key)
+    if isinstance(about, msgspec.inspect.TupleType):
+        return about.item_types[int(key)]
+    return about.item_type
+
+
+def _fitting(about: Any, value: Any) -> Any:
+    """Of what may stand in one place, that which such a value means: the table of its model, the
+    number where there may be none."""
+    for one in getattr(about, "types", (about,)):
+        if isinstance(one, msgspec.inspect.StructType):
+            if one.tag is None or value.get(one.tag_field) == one.tag:
+                return one
+        elif not isinstance(one, msgspec.inspect.NoneType):
+            return one
+    return about
 
 
 def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
@@ -219,6 +272,10 @@ def _setting(text: str) -> Table:
         parsed: Any = tomllib.loads(f"v = {value.strip()}")["v"]
     except tomllib.TOMLDecodeError:
         parsed = value.strip()
+    except ValueError as error:  # a whole number of too many digits
+        raise MachineError(
+            "is a whole number of thousands of digits", where=f"--set {key.strip()}"
+        ) from error
     for part in reversed(keys):
         parsed = {part: parsed}
     return dict(parsed)

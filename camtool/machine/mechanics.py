@@ -8,10 +8,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from camtool.machine.ranges import Lost, Place
+
 MAX_SQUARENESS_RAD = 0.1
 """No machine is out of square by more (5.7°): a larger number was meant in other units."""
-
-Play = Annotated[float, Meta(ge=0.0)]
 
 
 class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -22,9 +22,9 @@ class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     y_mm[j + 1] and from x_mm[i] up to x_mm[i + 1]; outside of all edges holds the nearest cell.
     """
 
-    x_mm: tuple[float, ...]
-    y_mm: tuple[float, ...]
-    play_mm: tuple[tuple[Play, ...], ...]
+    x_mm: tuple[Place, ...]
+    y_mm: tuple[Place, ...]
+    play_mm: tuple[tuple[Lost, ...], ...]
 
     def __post_init__(self) -> None:
         for name, edges in (("x_mm", self.x_mm), ("y_mm", self.y_mm)):
@@ -60,4 +60,4 @@ class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `seed`: which draws the random repeatability of the axes makes."""
 
     squareness_rad: Annotated[float, Meta(ge=-MAX_SQUARENESS_RAD, le=MAX_SQUARENESS_RAD)] = 0.0
-    seed: Annotated[int, Meta(ge=0, lt=1 << 32)] = 0
+    seed: Annotated[int, Meta(ge=0, le=(1 << 32) - 1)] = 0

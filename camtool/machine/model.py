@@ -16,11 +16,19 @@ from msgspec import Meta
 from camtool.errors import MachineError
 from camtool.machine.controllers import Controller, SlideStart
 from camtool.machine.mechanics import MechanicsOptions, PlayMap
+from camtool.machine.ranges import (
+    Acceleration,
+    Depth,
+    FeedRate,
+    Length,
+    Lost,
+    Rate,
+    Slack,
+    Step,
+    Tolerance,
+)
 
 _Controller = TypeVar("_Controller", bound=SlideStart)
-
-Positive = Annotated[float, Meta(gt=0.0)]
-NotNegative = Annotated[float, Meta(ge=0.0)]
 
 
 class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,15 +52,15 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     difference of places that a program can say, where that is coarser than the step. `travel_mm`,
     `max_rate_mm_min` and `acceleration_mm_s2` are None when nobody has said."""
 
-    coded_step_mm: Positive
-    real_step_mm: Positive = AS_CODED
-    resolution_mm: Positive | None = None
-    travel_mm: Positive | None = None
-    backlash_mm: NotNegative = 0.0
-    compensation_mm: NotNegative = 0.0
-    repeatability_mm: NotNegative = 0.0
-    max_rate_mm_min: Positive | None = None
-    acceleration_mm_s2: Positive | None = None
+    coded_step_mm: Step
+    real_step_mm: Step = AS_CODED
+    resolution_mm: Step | None = None
+    travel_mm: Length | None = None
+    backlash_mm: Lost = 0.0
+    compensation_mm: Lost = 0.0
+    repeatability_mm: Lost = 0.0
+    max_rate_mm_min: FeedRate | None = None
+    acceleration_mm_s2: Acceleration | None = None
 
     def __post_init__(self) -> None:
         if self.real_step_mm == AS_CODED:
@@ -73,8 +81,8 @@ class Axes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Feed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Feeds in mm/min: the default, and the finest difference that the dialect can say."""
 
-    default_mm_min: Positive
-    unit_mm_min: Positive
+    default_mm_min: FeedRate
+    unit_mm_min: FeedRate
 
 
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -84,20 +92,20 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `rapid_step_rate_hz` or `rapid_mm_min`; `max_reversals` is the count above which parts were
     seen to fail."""
 
-    max_step_rate_hz: Positive | None = None
-    rapid_step_rate_hz: Positive | None = None
-    max_feed_mm_min: Positive | None = None
-    rapid_mm_min: Positive | None = None
-    max_reversals: int | None = None
+    max_step_rate_hz: Rate | None = None
+    rapid_step_rate_hz: Rate | None = None
+    max_feed_mm_min: FeedRate | None = None
+    rapid_mm_min: FeedRate | None = None
+    max_reversals: Annotated[int, Meta(ge=0, le=1_000_000_000)] | None = None
 
 
 class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What planning takes where the job says nothing, mm."""
 
-    safe_z_mm: Positive
-    cut_depth_mm: Positive
-    fit_tolerance_mm: Positive
-    gap_mm: NotNegative = 0.01
+    safe_z_mm: Length
+    cut_depth_mm: Depth
+    fit_tolerance_mm: Tolerance
+    gap_mm: Slack = 0.01
 
 
 Scalar = bool | int | float | str
@@ -111,8 +119,8 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     when the one before has been cut, so that both times add up; "streamed": the next is sent
     meanwhile."""
 
-    baud: Positive | None = None
-    bits_per_character: Positive = 10.0
+    baud: Rate | None = None
+    bits_per_character: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0
     wait: Literal["sequential", "streamed"] = "sequential"
 
     def seconds(self, characters: int, motion_s: float) -> float:

@@ -6,6 +6,8 @@ from typing import Literal
 
 import msgspec
 
+from camtool.machine.ranges import Place
+
 
 class SlideStart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How the slides stand when a program begins, and where machine zero is.
@@ -15,4 +17,4 @@ class SlideStart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     start_play: Literal["preloaded", "centred"] = "preloaded"
     start_direction: Literal["+", "-"] = "+"
-    machine_zero_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    machine_zero_mm: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)

@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from camtool.machine.controllers.base import SlideStart
+from camtool.machine.ranges import Slack, Tolerance
 
 
 class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
@@ -18,7 +19,7 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
     and cosine (N_ARC_CORRECTION, config.h).
     """
 
-    arc_tolerance_mm: Annotated[float, Meta(gt=0.0)] = 0.002
-    junction_deviation_mm: Annotated[float, Meta(ge=0.0)] = 0.01
-    buffer_blocks: Annotated[int, Meta(ge=3)] = 16
-    arc_correction: Annotated[int, Meta(ge=1)] = 12
+    arc_tolerance_mm: Tolerance = 0.002
+    junction_deviation_mm: Slack = 0.01
+    buffer_blocks: Annotated[int, Meta(ge=3, le=10_000)] = 16
+    arc_correction: Annotated[int, Meta(ge=1, le=10_000)] = 12

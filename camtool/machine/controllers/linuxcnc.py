@@ -19,6 +19,6 @@ class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxc
     initraj.cc).
     """
 
-    servo_period_s: Annotated[float, Meta(gt=0.0)] = 0.001
-    lookahead_moves: Annotated[int, Meta(ge=2)] = 50
+    servo_period_s: Annotated[float, Meta(ge=1e-6, le=1.0)] = 0.001
+    lookahead_moves: Annotated[int, Meta(ge=2, le=10_000)] = 50
     kink_ratio: Annotated[float, Meta(ge=0.001, le=0.7071)] = 0.1

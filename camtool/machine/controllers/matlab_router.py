@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from camtool.machine.controllers.base import SlideStart
 
-PlantGain = Annotated[float, Meta(gt=0.0, le=1000.0)]
+PlantGain = Annotated[float, Meta(ge=1e-6, le=1000.0)]
 Seconds = Annotated[float, Meta(ge=1e-6, le=60.0)]
 Pause = Annotated[float, Meta(ge=0.0, le=10.0)]
 Percent = Annotated[float, Meta(ge=0.0, le=60.0)]

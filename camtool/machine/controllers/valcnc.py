@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from camtool.machine.controllers.base import SlideStart
+from camtool.machine.ranges import Rate
 
 
 class ValcncController(SlideStart, frozen=True, tag_field="model", tag="valcnc"):
@@ -21,9 +22,9 @@ class ValcncController(SlideStart, frozen=True, tag_field="model", tag="valcnc")
     last one ends where the sum of the angles leads (L1330) or at the end that was programmed.
     """
 
-    step_rate_hz: Annotated[float, Meta(gt=0.0)] = 6000.0
+    step_rate_hz: Rate = 6000.0
     rounding: Literal["nearest", "truncated"] = "nearest"
     counting: Literal["coordinates", "differences"] = "coordinates"
-    arc_segment_mm: Annotated[float, Meta(ge=0.001)] = 0.2
+    arc_segment_mm: Annotated[float, Meta(ge=0.001, le=1000.0)] = 0.2
     arc_segments: Annotated[int, Meta(ge=1, le=100_000)] | None = None
     arc_end: Literal["computed", "programmed"] = "computed"
