@@ -8,8 +8,6 @@ controller, which rounds the way of each piece by itself, has nothing to round.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import numpy.typing as npt
 
@@ -59,8 +57,4 @@ def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
     share = ((part[inner] + 1) / count[of])[:, None]
     end = toolpath.end[row]
     end[inner, :2] = toolpath.starts[of, :2] + np.rint(share * steps[of]) * q_mm
-    columns = {
-        name: getattr(toolpath, name)[row]
-        for name in ("kind", "centre", "feed", "value", "source", "block")
-    }
-    return Lowered(replace(toolpath, end=end, **columns), row)
+    return Lowered(toolpath.picked(row, end=end), row)

@@ -13,7 +13,7 @@ from typing import Final
 
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
 from ._gcode_circles import Circle, centre_of_radius, follow
 from ._gcode_notes import ReadNotes
@@ -135,25 +135,24 @@ class ModalReader:
         if "arc distance" in modes:
             self._absolute_centres = modes["arc distance"] == G.ABSOLUTE_CENTRES
         if "path" in modes:
-            self._set_path_mode(block, modes["path"], numbers)
+            self._set_path_mode(modes["path"], numbers)
         if modes.get("tool length") == G.TOOL_LENGTH:  # H tells of which tool
             numbers.pop("H", None)
         if "work frame" in modes:
             self._set_frame(block, modes["work frame"])
 
-    def _set_path_mode(self, block: Block, code: int, numbers: dict[str, float]) -> None:
-        """G61, G61.1 and G64 with P, its tolerance, and Q, that of merging lines (P where it is
-        not said): a block that says other than the machine file is noted."""
-        blends = code == G.BLEND
-        corner = numbers.pop("P", 0.0) * self._mm if blends else 0.0
-        merging = numbers.pop("Q", None) if blends else None
-        lines = corner if merging is None else merging * self._mm
-        if self._rules.path_mode is None:
+    def _set_path_mode(self, code: int, numbers: dict[str, float]) -> None:
+        """G61, G61.1, and G64 with P, its tolerance, and Q, that of merging lines (P where it is
+        not said): how the moves from this block on meet their corners. Below 0 they count as not
+        said."""
+        if not self._rules.path_modes:
             return
-        mode, tolerance = self._rules.path_mode
-        fits = math.isclose(corner, tolerance) and math.isclose(lines, tolerance)
-        if code != mode or not fits:
-            self._notes.corners.append(block.index)
+        if code != G.BLEND:
+            self.path.mode = PathMode("exact-path" if code == G.EXACT_PATH else "exact-stop")
+            return
+        corner = max(numbers.pop("P", 0.0) * self._mm, 0.0)
+        merging = numbers.pop("Q", -1.0) * self._mm
+        self.path.mode = PathMode("blend", corner, corner if merging < 0.0 else merging)
 
     def _set_frame(self, block: Block, frame: int) -> None:
         """G54 to G59: whichever comes before the first move has its zero at part zero."""

@@ -15,7 +15,6 @@ class ReadNotes:
     fast: list[tuple[int, float]] = field(default_factory=list)
     coolant: list[int] = field(default_factory=list)
     pauses: list[int] = field(default_factory=list)
-    corners: list[int] = field(default_factory=list)
 
     def findings(self) -> tuple[Finding, ...]:
         """One finding for each kind that was noticed."""
@@ -25,7 +24,6 @@ class ReadNotes:
         )
         return (
             *([self._too_fast()] if self.fast else []),
-            *([self._other_corners()] if self.corners else []),
             *(_passed_over(blocks, what) for blocks, what in passed_over if blocks),
         )
 
@@ -40,15 +38,6 @@ class ReadNotes:
             measured=most,
             limit=self.max_feed_mm_min,
             unit="mm_min",
-        )
-
-    def _other_corners(self) -> Finding:
-        return Finding(
-            Code.EXECUTED_OTHERWISE,
-            Severity.WARNING,
-            "the program meets corners otherwise than the machine file says, which is what is "
-            "simulated: --set dialect.path=exact-path, or blend with dialect.blend_tolerance_mm",
-            where=f"block {self.corners[0] + 1}",
         )
 
 

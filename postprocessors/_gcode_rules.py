@@ -19,6 +19,7 @@ class G(IntEnum):
     TOOL_LENGTH = 430
     MACHINE_FRAME = 530
     FIRST_FRAME = 540
+    EXACT_PATH = 610
     BLEND = 640
     NO_MOTION = 800
     ABSOLUTE = 900
@@ -61,8 +62,8 @@ class Rules:
     `refused`: codes ("G55", "M6") that the controller knows but that have no place in a program
     here, and why. `first_motion`: the motion mode before any word says one (None: none).
     `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
-    `circle_without_end`: an arc that says only its centre is a full circle. `path_mode`: how the
-    machine is taken to meet corners, a code of the group "path" with its tolerance in mm.
+    `circle_without_end`: an arc that says only its centre is a full circle. `path_modes`: the
+    group "path" tells how corners are met.
     `tools`: "change" (M6), "pause" (M0 beside a T word), or "none"; T words go up to `most_tool`.
     """
 
@@ -73,6 +74,6 @@ class Rules:
     full_turn_rad: float
     chord_slack_mm: float
     circle_without_end: bool = False
-    path_mode: tuple[int, float] | None = None
+    path_modes: bool = False
     tools: str = "none"
     most_tool: int = 99_999

@@ -10,6 +10,7 @@ anywhere. Comment lines and `%` are lines, but no blocks.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 
@@ -20,7 +21,7 @@ from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.extents import toolpath_extents
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from camtool.toolpath.program import Program
 
 from ._gcode_arcs import ArcCounts, arcs_of
@@ -36,7 +37,8 @@ class Style:
     """A dialect's own part of a program.
 
     `header`: its first blocks; `event`: the block of an event; `message`: what a comment for the
-    operator begins with; `frame`: the line around the program that is no block (%), or "".
+    operator begins with; `frame`: the line around the program that is no block (%), or "";
+    `path_mode`: the block that asks for a path mode, `own_mode`: that of rows that ask for none.
     """
 
     dialect: GcodeDialect
@@ -44,6 +46,8 @@ class Style:
     event: EventWords
     message: str = ""
     frame: str = ""
+    path_mode: Callable[[PathMode], str] | None = None
+    own_mode: PathMode | None = None
 
 
 def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
@@ -55,12 +59,14 @@ def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program
     events = events_of(toolpath, style.event)
     sent = sent_rows(toolpath, arcs, feeds)
     texts = block_texts(sent, dialect, feed_decimals(machine))
-    blocks, of_row = _in_order(sent, texts, events)
+    first_mode, changes = _path_modes(toolpath, sent, style)
+    blocks, of_row = _in_order(sent, texts, events, changes)
+    header = (*style.header, *first_mode)
     footer = _footer(toolpath, events, dialect)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
-    of_row = [*[-1] * len(style.header), *of_row, *[-1] * len(footer)]
+    of_row = [*[-1] * len(header), *of_row, *[-1] * len(footer)]
     of_row[-1] = len(toolpath) - 1 if ended else -1
-    blocks = [*style.header, *blocks, *footer]
+    blocks = [*header, *blocks, *footer]
     if dialect.block_numbers:
         blocks = [f"N{index} {block}" for index, block in enumerate(blocks, 1)]
     lines = [
@@ -83,11 +89,34 @@ def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program
     )
 
 
-def _in_order(sent: Sent, texts: list[str], events: Events) -> tuple[list[str], list[int]]:
-    """Blocks of motions and events, and the row of each."""
+def _path_modes(
+    toolpath: Toolpath, sent: Sent, style: Style
+) -> tuple[tuple[str, ...], dict[int, str]]:
+    """The path mode to begin with, and the blocks that change it, by the place among the rows
+    that are sent; none for dialects that know no such thing."""
+    if style.path_mode is None or style.own_mode is None:
+        return (), {}
+    said = [style.path_mode(mode) for mode in (*toolpath.modes, style.own_mode)]
+    moving = np.flatnonzero(sent.is_motion)
+    asked = toolpath.mode[sent.row[moving]]
+    if len(asked) == 0:
+        return (said[-1],), {}
+    turns = np.flatnonzero(np.diff(asked)) + 1
+    return (said[asked[0]],), {int(moving[k]): said[asked[k]] for k in turns.tolist()}
+
+
+def _in_order(
+    sent: Sent, texts: list[str], events: Events, modes: dict[int, str]
+) -> tuple[list[str], list[int]]:
+    """Blocks of motions and events, with changes of the path mode before them, and the row of
+    each."""
     blocks, rows = [], []
     motions = iter(texts)
-    for is_motion, row in zip(sent.is_motion.tolist(), sent.row.tolist(), strict=True):
+    pairs = zip(sent.is_motion.tolist(), sent.row.tolist(), strict=True)
+    for at, (is_motion, row) in enumerate(pairs):
+        if at in modes:
+            blocks.append(modes[at])
+            rows.append(-1)
         block = next(motions) if is_motion else events.blocks.get(row, "")
         if block:
             blocks.append(block)

@@ -33,8 +33,6 @@ GROUPS: Final = {
     **dict.fromkeys((980, 990), "return mode"),
 }
 
-PATH_CODES: Final = {"exact-path": 610, "exact-stop": 611, "blend": 640}
-
 _FRAME: Final = "moves part zero by what only the controller knows"
 _COMPENSATES: Final = "compensates for a tool, which is not simulated"
 _CYCLE: Final = "is a cycle; write its moves"
@@ -104,9 +102,6 @@ def rules_of(dialect: Dialect) -> Rules:
         full_turn_rad=dialect.arc_full_turn_rad,
         chord_slack_mm=dialect.arc_chord_slack_mm,
         circle_without_end=True,
-        path_mode=(
-            PATH_CODES[dialect.path],
-            dialect.blend_tolerance_mm if dialect.path == "blend" else 0.0,
-        ),
+        path_modes=True,
         tools="change",
     )

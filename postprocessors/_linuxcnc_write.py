@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from camtool.toolpath.program import Program
 
 from ._gcode_events import Event, common_words, tool_number
 from ._gcode_format import NumberStyle, say_number
 from ._gcode_write import Style, write_program
-from ._linuxcnc_options import Dialect, dialect_of
+from ._linuxcnc_options import dialect_of
 
 MODES = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
 """XY plane, mm, no cutter radius, no tool length, the first work frame, no cycle, absolute, I J as
@@ -26,20 +26,25 @@ def write_linuxcnc(toolpath: Toolpath, machine: Machine) -> Program:
     dialect = dialect_of(machine)
     style = Style(
         dialect,
-        (MODES, _path_mode(dialect)),
+        (MODES,),
         _words,
         message="MSG,",
         frame="%" if dialect.percent else "",
+        path_mode=_path_mode,
+        own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
     )
     return write_program(toolpath, machine, style)
 
 
-def _path_mode(dialect: Dialect) -> str:
-    if dialect.path == "exact-path":
+def _path_mode(mode: PathMode) -> str:
+    """The block that asks for it."""
+    if mode.corners == "exact-path":
         return "G61"
-    if dialect.path == "exact-stop":
+    if mode.corners == "exact-stop":
         return "G61.1"
-    return f"G64 P{say_number(dialect.blend_tolerance_mm, TOLERANCE)}"
+    corner = f" P{say_number(mode.tolerance_mm, TOLERANCE)}" if mode.tolerance_mm else ""
+    apart = mode.merging_mm != mode.tolerance_mm
+    return f"G64{corner}" + (f" Q{say_number(mode.merging_mm, TOLERANCE)}" if apart else "")
 
 
 def _words(event: Event) -> str:

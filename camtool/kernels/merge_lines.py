@@ -52,16 +52,17 @@ def _joins(points: Floats, base: int, new: int, tolerance: float) -> bool:
 
 @kernel
 def merge_lines(
-    points: Floats, apart: Bools, tolerance: float, chain: Ints, moved: Floats
+    points: Floats, apart: Bools, tolerance: Floats, chain: Ints, moved: Floats
 ) -> None:
     """The chain of each of N moves, `chain` (N,), numbered from 0, and where the moves then end,
     `moved` (N, 3): on the chain's line, never back.
 
-    `points` (N+1, 3): the start and all ends; `apart` (N,): moves that do not join the one before.
+    `points` (N+1, 3): the start and all ends; `apart` (N,): moves that do not join the one before;
+    `tolerance` (N,): within which a move joins.
     """
     number, base = -1, 0
     for k in range(len(apart)):
-        if k == 0 or apart[k] or not _joins(points, base, k + 1, tolerance):
+        if k == 0 or apart[k] or not _joins(points, base, k + 1, tolerance[k]):
             number, base = number + 1, k
         chain[k] = number
         moved[k] = points[k + 1]

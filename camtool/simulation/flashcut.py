@@ -57,12 +57,12 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
 
 
-def interpolation(machine: Machine, options: Options) -> str:
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
     """Both axes by timers of their own."""
     return "timers"
 
 
-def assumptions(machine: Machine) -> tuple[str, ...]:
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What times and figures take for granted."""
     controller = controller_of(machine, FlashcutController)
     parts, shortest = controller.half_periods_per_step, controller.half_period_ms

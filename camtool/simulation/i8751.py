@@ -60,12 +60,12 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
 
 
-def interpolation(machine: Machine, options: Options) -> str:
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
     """A diagonal and the rest along an axis; there are no arcs."""
     return "dog-leg"
 
 
-def assumptions(machine: Machine) -> tuple[str, ...]:
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What the times take for granted."""
     firmware = firmware_of(machine)
     periods = PulseTimes(firmware).periods_s

@@ -2,8 +2,9 @@
 
 What it does with a program, in the order of the files:
 
-1. In the mode "blend", lines that lie on one line but for the tolerance are merged
-   (`linuxcnc_moves`, `camtool.kernels.merge_lines`; G64 P says both tolerances).
+1. Each row has the path mode that the program says there (G61, G61.1, G64 P Q), or that of the
+   machine file. In the mode "blend", lines that lie on one line but for a tolerance are merged
+   (`linuxcnc_moves`, `camtool.kernels.merge_lines`).
 2. Corners: stops, bends that pass for straight, blends (`linuxcnc_corners`), as they come out at
    the programmed feed. No blend leaves its corner by more than the tolerance.
 3. Speeds: limits of the axes, turning in arcs, corners, so many moves ahead
@@ -20,6 +21,8 @@ over some milliseconds at half of the axis's limits; here it acts at once, and t
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import cast, get_args
 
 import numpy as np
 
@@ -30,13 +33,14 @@ from camtool.machine.model import Machine, controller_of
 from camtool.simulation.linuxcnc_corners import CornerRules, Corners, corners_of
 from camtool.simulation.linuxcnc_moves import Moves, merged, moves_of
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.simulation.motion import Bools, Chunk, Floats, Ints
 from camtool.simulation.options import Options
 from camtool.simulation.path import check_positions, check_rows, placed
 from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
 from camtool.simulation.row_chunks import RowTotals, row_chunks
 from camtool.simulation.speed_plan import SpeedPlan, axis_limits
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Corners as CornerMode
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
 LEAST_WAY_MM = 1e-9
 """What blends leave of a move is nothing when it is shorter."""
@@ -50,9 +54,6 @@ REST_PERIODS = 1.0
 PERIOD_EPS = 1e-6
 """Periods: a time longer than a whole number of them by less is that number."""
 
-MODES = ("blend", "exact-path", "exact-stop")
-"""What `[dialect]` may say of corners."""
-
 
 def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
     """The motion; see `camtool.simulation.models.ControllerModel`."""
@@ -60,14 +61,14 @@ def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chun
     rows = path.running
     check_rows(path, rows)
     path = path.first(rows)
-    rules = _rules(machine)
-    path, chain = merged(path, rules.tolerance_mm if rules.mode == "blend" else 0.0)
+    modes = _modes(path, machine)
+    path, chain = merged(path, modes.merging_mm)
     moves = moves_of(
         path, chain, machine, controller_of(machine, LinuxcncController).servo_period_s
     )
-    corners = corners_of(moves, rules)
+    corners = corners_of(moves, _rules(modes, moves, machine))
     samples = LinuxcncSamples(path, machine, moves, corners)
-    seconds = _seconds(path, machine, moves, corners)
+    seconds = _seconds(path, machine, (moves, modes), corners)
     mechanics = Mechanics(machine, path.start, options.effects)
     return row_chunks(samples, RowTotals(seconds), mechanics, options.chunk_steps)
 
@@ -83,25 +84,29 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     return sample_spacing_mm(toolpath, machine)
 
 
-def interpolation(machine: Machine, options: Options) -> str:
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
     """Blends, or the path alone."""
-    mode, _ = _path_mode(machine)
-    return "blend" if mode == "blend" else "path"
+    blends = any(mode.corners == "blend" for mode in _asked(toolpath, machine))
+    return "blend" if blends else "path"
 
 
-def assumptions(machine: Machine) -> tuple[str, ...]:
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What the figures and times take for granted."""
-    mode, tolerance_mm = _path_mode(machine)
-    said = {
-        "blend": f"corners are blended within {tolerance_mm:g} mm (G64 P), as the speed needs",
-        "exact-path": "no corner is rounded (G61)",
-        "exact-stop": "the machine stops at each corner (G61.1)",
-    }
     return (
-        said[mode],
+        *dict.fromkeys(_corners_said(mode) for mode in _asked(toolpath, machine)),
         "speeds by trapezoids within the limits of the axes, overrides at 100 %",
         "the step generator may be half a step off on each axis, which is not in the figures",
     )
+
+
+def _corners_said(mode: PathMode) -> str:
+    if mode.corners == "exact-path":
+        return "no corner is rounded (G61)"
+    if mode.corners == "exact-stop":
+        return "the machine stops at each corner (G61.1)"
+    if mode.tolerance_mm == 0.0:
+        return "corners are blended as far as the moves allow (G64 without P)"
+    return f"corners are blended within {mode.tolerance_mm:g} mm (G64 P), as the speed needs"
 
 
 class LinuxcncSamples:
@@ -171,14 +176,16 @@ class LinuxcncSamples:
         return np.column_stack(columns)
 
 
-def _seconds(path: Toolpath, machine: Machine, moves: Moves, corners: Corners) -> Floats:
+def _seconds(
+    path: Toolpath, machine: Machine, planned: tuple[Moves, Modes], corners: Corners
+) -> Floats:
     """(N,) s of each row.
 
     Blends are blocks of their own, half of each belongs to the row on either side; the rows of a
     merged line share its time by their lengths. In the mode "blend" the last move before a wait
     accelerates by half: it was kept ready for a blend that never came (`tcGetOverallMaxAccel`).
     """
-    controller, mode = controller_of(machine, LinuxcncController), _path_mode(machine)[0]
+    controller, (moves, modes) = controller_of(machine, LinuxcncController), planned
     seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
     count = len(moves.length)
     following = np.append(corners.reach[1:], 0.0)
@@ -191,7 +198,7 @@ def _seconds(path: Toolpath, machine: Machine, moves: Moves, corners: Corners) -
     entry = np.where(blended, np.inf, corners.speed)
     lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
     last = np.append(moves.waits[1:], np.ones(min(count, 1), dtype=np.bool_))
-    spared = np.where(last & (mode == "blend"), LAST_PART, 1.0)
+    spared = np.where(last & modes.blend[moves.row], LAST_PART, 1.0)
     acceleration = moves.acceleration * (1.0 - lost) * spared
     plan[1::2] = np.column_stack([own, moves.speed, acceleration, entry])
     lasting = np.flatnonzero(plan[:, 0] > LEAST_WAY_MM)
@@ -216,12 +223,43 @@ def _in_periods(plan: SpeedPlan, window: int, period_s: float) -> Floats:
     return seconds
 
 
-def _rules(machine: Machine) -> CornerRules:
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """How N rows meet the corners behind them: `blend` (N,) and `stop` (N,), which are neither
+    where the path is kept without a stop; `tolerance_mm` (N,) of blends, inf: none; `merging_mm`
+    (N,), 0: none."""
+
+    blend: Bools
+    stop: Bools
+    tolerance_mm: Floats
+    merging_mm: Floats
+
+
+def _modes(path: Toolpath, machine: Machine) -> Modes:
+    """What the program says of each row, and where it says nothing, the machine file."""
+    table = np.array(
+        [
+            (mode.corners == "blend", mode.corners == "exact-stop", mode.tolerance_mm or np.inf,
+             mode.merging_mm)
+            for mode in _asked(path, machine)
+        ]
+    )[path.mode]  # fmt: skip
+    return Modes(table[:, 0] > 0.0, table[:, 1] > 0.0, table[:, 2], table[:, 3])
+
+
+def _asked(path: Toolpath, machine: Machine) -> tuple[PathMode, ...]:
+    """The modes of the program, and behind them (at −1) that of the machine file where any row
+    leaves it to that."""
+    silent = len(path) == 0 or bool((path.mode < 0).any())
+    return (*path.modes, _machine_mode(machine)) if silent else path.modes
+
+
+def _rules(modes: Modes, moves: Moves, machine: Machine) -> CornerRules:
     controller = controller_of(machine, LinuxcncController)
-    mode, tolerance_mm = _path_mode(machine)
     return CornerRules(
-        mode=mode,
-        tolerance_mm=tolerance_mm,
+        blend=modes.blend[moves.row],
+        stop=modes.stop[moves.row],
+        tolerance_mm=modes.tolerance_mm[moves.row],
         kink_ratio=controller.kink_ratio,
         period_s=controller.servo_period_s,
         rate=axis_limits(machine, "max_rate_mm_min") / 60.0,
@@ -229,20 +267,22 @@ def _rules(machine: Machine) -> CornerRules:
     )
 
 
-def _path_mode(machine: Machine) -> tuple[str, float]:
-    """Mode and blend tolerance that `[dialect]` says; MachineError when it does not."""
+def _machine_mode(machine: Machine) -> PathMode:
+    """What `[dialect]` says of corners; MachineError when it does not."""
     mode = machine.dialect.get("path")
     tolerance = machine.dialect.get("blend_tolerance_mm")
-    if mode not in MODES or not isinstance(mode, str):
+    if mode not in get_args(CornerMode):
         raise MachineError(
             "LinuxCNC needs to know how it meets corners",
             where="table [dialect], key path",
-            mend=f"one of {', '.join(MODES)}",
+            mend=f"one of {', '.join(get_args(CornerMode))}",
         )
-    if mode == "blend" and not isinstance(tolerance, (int, float)):
+    if mode != "blend":
+        return PathMode(cast(CornerMode, mode))
+    if not isinstance(tolerance, (int, float)):
         raise MachineError(
             "blending needs its tolerance",
             where="table [dialect], key blend_tolerance_mm",
             mend="the P of G64, in mm",
         )
-    return mode, float(tolerance) if mode == "blend" and tolerance is not None else 0.0
+    return PathMode("blend", float(tolerance), float(tolerance))

@@ -31,7 +31,7 @@ from camtool.simulation.linuxcnc_moves import (
     TANGENT_RATIO,
     Moves,
 )
-from camtool.simulation.motion import Floats, Ints
+from camtool.simulation.motion import Bools, Floats, Ints
 
 STRAIGHT_BACK_RAD = np.deg2rad(2.0)
 """A way back within this angle is a stop (SHARP_CORNER_DEG)."""
@@ -76,11 +76,13 @@ class Corners:
 
 @dataclass(frozen=True)
 class CornerRules:
-    """`mode` "blend", "exact-path" or "exact-stop"; `tolerance_mm` of blends; `kink_ratio`;
-    `period_s` of the servo; limits (3,) of the axes, mm/s and mm/s²."""
+    """`blend` (M,) and `stop` (M,): moves behind which corners are blended, and met with a stop;
+    `tolerance_mm` (M,) of each move, inf: none; `kink_ratio`; `period_s` of the servo; limits (3,)
+    of the axes, mm/s and mm/s²."""
 
-    mode: str
-    tolerance_mm: float
+    blend: Bools
+    stop: Bools
+    tolerance_mm: Floats
     kink_ratio: float
     period_s: float
     rate: Floats
@@ -93,7 +95,8 @@ def corners_of(moves: Moves, rules: CornerRules) -> Corners:
     before, after = np.roll(moves.end, 1, axis=0), moves.begin
     turn, both = after - before, after + before
     back = np.linalg.norm(both, axis=1) < STRAIGHT_BACK_RAD
-    free = ~moves.waits & moves.like & ~back & (rules.mode != "exact-stop")
+    # The move before a corner says how it is met; both say how far a blend may leave it.
+    free = ~moves.waits & moves.like & ~back & ~np.roll(rules.stop, 1)
     # A kink: the change of velocity within one period, as a part of what each axis can do.
     highest = np.minimum(np.roll(moves.speed, 1), moves.speed)
     jolt = highest / rules.period_s + moves.acceleration
@@ -109,7 +112,7 @@ def corners_of(moves: Moves, rules: CornerRules) -> Corners:
         onward=_unit(both),
         theta=0.5 * np.arccos(np.clip(-(before * after).sum(axis=1), -1.0, 1.0)),
     )
-    on = np.flatnonzero(free & ~smooth & (rules.mode == "blend"))
+    on = np.flatnonzero(free & ~smooth & np.roll(rules.blend, 1))
     _blend(corners, moves, on, rules)
     # A bend that passes for straight at low speed, where that is faster than the blend.
     kink = highest[on] * rules.kink_ratio / part[on]
@@ -148,10 +151,11 @@ def _blend(corners: Corners, moves: Moves, on: Ints, rules: CornerRules) -> None
     corners.acceleration[on] = TANGENT_RATIO * whole
 
 
-def _most_reach(moves: Moves, on: Ints, theta: Floats, tolerance_mm: float) -> Floats:
+def _most_reach(moves: Moves, on: Ints, theta: Floats, tolerance_mm: Floats) -> Floats:
     """The largest d at the corners `on`; 0 where the moves hardly bend."""
     shorter = np.minimum(moves.length[on], moves.length[on - 1])
-    leaves = np.minimum(tolerance_mm, TOLERANCE_PART * shorter)
+    asked = np.minimum(tolerance_mm[on], tolerance_mm[on - 1])
+    leaves = np.minimum(asked, TOLERANCE_PART * shorter)
     flat = np.pi - 2.0 * theta < LEAST_BEND_RAD
     by_tolerance = leaves * np.cos(theta) / np.where(flat, 1.0, 1.0 - np.sin(theta))
     end_part = np.where(moves.is_arc[on - 1], ARC_END_PART, LINE_PART)

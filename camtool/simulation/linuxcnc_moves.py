@@ -44,21 +44,21 @@ WAITS = (
 """Before these the machine comes to rest (their preconditions in emctaskmain.cc)."""
 
 
-def merged(path: Toolpath, tolerance_mm: float) -> tuple[Toolpath, Ints]:
+def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     """The rows with the ends of merged lines on their common line, and the line of each row (N,);
-    `tolerance_mm` 0: nothing is merged.
+    `tolerance_mm` (N,) of each row, 0: it is not merged.
 
-    Only feed moves with one feed and nothing but moves of no length between them are merged; any
-    event, an MSG comment too, ends a line.
+    Only feed moves with one feed and one path mode, and nothing but moves of no length between
+    them, are merged; any event, an MSG comment too, ends a line.
     """
     count = len(path)
     chain, moved = np.arange(count), path.end.copy()
-    if tolerance_mm > 0.0 and count:
+    if tolerance_mm.any():
         same_feed = np.zeros(count, dtype=np.bool_)
         same_feed[1:] = path.feed[1:] == path.feed[:-1]
         is_line = path.kind == Kind.LINE
-        apart = ~(is_line & same_feed)
-        apart[1:] |= ~is_line[:-1]
+        apart = ~(is_line & same_feed) | (tolerance_mm == 0.0)
+        apart[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
         points = np.concatenate([path.start[None, :], path.end])
         merge_lines(points, apart, tolerance_mm, chain, moved)
     return replace(path, end=moved), chain
@@ -67,12 +67,13 @@ def merged(path: Toolpath, tolerance_mm: float) -> tuple[Toolpath, Ints]:
 @dataclass(frozen=True, eq=False)
 class Moves:
     """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
-    move. length mm, speed mm/s (as programmed, within the limits), acceleration mm/s² (along the
-    way), each (M,); begin, end (M, 3): unit tangents;
-    is_arc (M,); waits (M,): the machine comes to rest before this move, whatever the corner;
-    like (M,): this move and the one before are both rapids or both at a feed."""
+    move; row (M,): the first of each. length mm, speed mm/s (as programmed, within the limits),
+    acceleration mm/s² (along the way), each (M,); begin, end (M, 3): unit tangents; is_arc (M,);
+    waits (M,): the machine comes to rest before this move, whatever the corner; like (M,): this
+    move and the one before are both rapids or both at a feed."""
 
     row_of: Ints
+    row: Ints
     length: Floats
     speed: Floats
     acceleration: Floats
@@ -111,7 +112,7 @@ def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> 
     cuts = path.is_feed[lead]
     like = cuts == np.roll(cuts, 1)
     speed = np.minimum(feed, highest)
-    return Moves(row_of, lengths, speed, along, begin, end, arm >= 0, waits, like)
+    return Moves(row_of, lead, lengths, speed, along, begin, end, arm >= 0, waits, like)
 
 
 def _tangents(path: Toolpath, lead: Ints) -> tuple[Floats, Floats]:

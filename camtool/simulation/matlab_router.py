@@ -82,12 +82,12 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     return max(step, max(fastest, rapid) / 60.0 * TICK_S)
 
 
-def interpolation(machine: Machine, options: Options) -> str:
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
     """Each axis by itself, by its speed loop."""
     return "servo"
 
 
-def assumptions(machine: Machine) -> tuple[str, ...]:
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What times and figures take for granted."""
     router = controller_of(machine, MatlabRouterController)
     law = "slave X's program" if router.slaves == "listing" else "the program that the text tells"

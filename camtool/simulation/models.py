@@ -36,10 +36,10 @@ class ControllerModel(Protocol):
     def spacing_mm(self, toolpath: Toolpath, machine: Machine) -> float:
         """How far apart in XY the samples of the motion are, about."""
 
-    def interpolation(self, machine: Machine, options: Options) -> str:
+    def interpolation(self, toolpath: Toolpath, machine: Machine, options: Options) -> str:
         """A word for the report: how lines and arcs are made, such as "dsm" or "path"."""
 
-    def assumptions(self, machine: Machine) -> tuple[str, ...]:
+    def assumptions(self, toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
         """What the times and figures take for granted, one short sentence each."""
 
 

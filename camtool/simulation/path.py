@@ -61,12 +61,12 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     return sample_spacing_mm(toolpath, machine)
 
 
-def interpolation(machine: Machine, options: Options) -> str:
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
     """Nothing is interpolated."""
     return "path"
 
 
-def assumptions(machine: Machine) -> tuple[str, ...]:
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What the times leave out."""
     return (
         "the controller follows every line and arc exactly",

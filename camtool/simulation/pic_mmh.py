@@ -62,12 +62,12 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
 
 
-def interpolation(machine: Machine, options: Options) -> str:
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
     """How arcs are made: dsm, dda or stairs."""
     return options.interpolator or controller_of(machine, PicMmhController).arcs
 
 
-def assumptions(machine: Machine) -> tuple[str, ...]:
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What the times take for granted."""
     base = controller_of(machine, PicMmhController).time_base
     return (

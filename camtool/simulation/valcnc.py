@@ -81,12 +81,12 @@ def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
 
 
-def interpolation(machine: Machine, options: Options) -> str:
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
     """Lines by the counter, arcs by lines."""
     return "counter"
 
 
-def assumptions(machine: Machine) -> tuple[str, ...]:
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What the times and the path take for granted."""
     controller = controller_of(machine, ValcncController)
     pieces = f"pieces of {controller.arc_segment_mm:g} mm (controller.arc_segment_mm)"

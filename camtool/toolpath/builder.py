@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from camtool.findings import Finding
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
 Coordinate = float | None
 
@@ -27,9 +27,12 @@ class ToolpathBuilder:
         """Provenance given to the rows that follow."""
         self.block = -1
         """Program block given to the rows that follow."""
+        self.mode: PathMode | None = None
+        """How the rows that follow meet their corners; None: as the machine does."""
         self._start = start
         self._rows: list[tuple[float, ...]] = []
         self._texts: dict[str, int] = {}
+        self._modes: dict[PathMode, int] = {}
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -76,7 +79,7 @@ class ToolpathBuilder:
 
     def finish(self, findings: tuple[Finding, ...] = ()) -> Toolpath:
         """The rows so far as a Toolpath."""
-        table = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), 10)
+        table = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), 11)
         return Toolpath(
             kind=table[:, 0].astype(np.int64),
             end=table[:, 1:4],
@@ -85,6 +88,8 @@ class ToolpathBuilder:
             value=table[:, 7],
             source=table[:, 8].astype(np.int64),
             block=table[:, 9].astype(np.int64),
+            mode=table[:, 10].astype(np.int64),
+            modes=tuple(self._modes),
             start=np.array(self._start, dtype=np.float64),
             texts=tuple(self._texts),
             findings=findings,
@@ -113,7 +118,10 @@ class ToolpathBuilder:
     ) -> ToolpathBuilder:
         number = math.nan if value is None else float(value)
         source = self._index(self.source) if self.source else -1
-        self._rows.append((kind, *end, *centre, feed, number, source, self.block))
+        mode = -1
+        if self.mode is not None:
+            mode = self._modes.setdefault(self.mode, len(self._modes))
+        self._rows.append((kind, *end, *centre, feed, number, source, self.block, mode))
         return self
 
     def _index(self, text: str) -> int:

@@ -21,14 +21,7 @@ def carried_over(decoded: Toolpath) -> Toolpath:
     rapid to where machine zero lay. Rows lose their block: the new program has blocks of its own.
     """
     first = 1 if len(decoded) and decoded.kind[0] == Kind.SET_ZERO else 0
-    kind = decoded.kind[first:].copy()
-    kind[(kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)] = Kind.RAPID
-    return replace(
-        decoded,
-        kind=kind,
-        block=np.full(len(kind), -1, dtype=np.int64),
-        **{
-            name: getattr(decoded, name)[first:]
-            for name in ("end", "centre", "feed", "value", "source")
-        },
-    )
+    homes = (decoded.kind == Kind.HOME_XY) | (decoded.kind == Kind.HOME_Z)
+    kind = np.where(homes, int(Kind.RAPID), decoded.kind)[first:]
+    rows = np.arange(first, len(decoded))
+    return decoded.picked(rows, kind=kind, block=np.full(len(rows), -1))

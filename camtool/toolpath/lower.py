@@ -193,14 +193,4 @@ def _repeated(counts: Ints) -> tuple[Ints, Ints]:
 
 def _built(toolpath: Toolpath, row: Ints, kind: Ints, end: Floats, centre: Floats) -> Lowered:
     """Rows of new kinds, ends and centres with all else of the rows that they came from."""
-    new = replace(
-        toolpath,
-        kind=kind,
-        end=end,
-        centre=centre,
-        feed=toolpath.feed[row],
-        value=toolpath.value[row],
-        source=toolpath.source[row],
-        block=toolpath.block[row],
-    )
-    return Lowered(new, row)
+    return Lowered(toolpath.picked(row, kind=kind, end=end, centre=centre), row)

@@ -10,8 +10,9 @@ at `start`. Planning builds it, posts write it, a post's reader gives it back, s
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,13 @@ from camtool.findings import Finding
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+
+COLUMNS = ("kind", "end", "centre", "feed", "value", "source", "block", "mode")
+"""What a Toolpath says of each row ..."""
+
+WHOLE = ("kind", "source", "block", "mode")
+"""... and which of it are whole numbers."""
 
 
 class Kind(IntEnum):
@@ -39,6 +47,23 @@ class Kind(IntEnum):
     HOME_XY = 17  # return to machine zero in X and Y
     HOME_Z = 18  # return to machine zero in Z
     END = 19  # end of program
+
+
+Corners = Literal["blend", "exact-path", "exact-stop"]
+
+
+@dataclass(frozen=True)
+class PathMode:
+    """How a program asks for corners to be met.
+
+    "blend": rounded within `tolerance_mm` (0: as far as the moves allow), lines in a row taken for
+    one within `merging_mm` (0: never); "exact-path": met, without a stop where they hardly bend;
+    "exact-stop": met with a stop.
+    """
+
+    corners: Corners
+    tolerance_mm: float = 0.0
+    merging_mm: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -65,7 +90,9 @@ class Toolpath:
     no arc; feed (N,) mm/min, NaN for rapids and events; value (N,), NaN where none; source (N,)
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
     program block that the row was read from, −1 when planned; start (3,) mm; `made_from` the name
-    of the drawing, "" when nobody knows. ValueError when columns disagree.
+    of the drawing, "" when nobody knows; mode (N,) index into `modes` or −1, where the program
+    leaves to the machine how it meets the corner behind the row (empty: all of them). ValueError
+    when columns disagree.
     """
 
     kind: Ints
@@ -79,9 +106,13 @@ class Toolpath:
     texts: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     made_from: str = ""
+    mode: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    modes: tuple[PathMode, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.kind)
+        if len(self.mode) == 0:
+            object.__setattr__(self, "mode", np.full(count, -1))
         shapes = {
             "kind": (count,),
             "end": (count, 3),
@@ -90,10 +121,11 @@ class Toolpath:
             "value": (count,),
             "source": (count,),
             "block": (count,),
+            "mode": (count,),
             "start": (3,),
         }
         for name, shape in shapes.items():
-            dtype = np.int64 if name in ("kind", "source", "block") else np.float64
+            dtype = np.int64 if name in WHOLE else np.float64
             column = np.array(getattr(self, name), dtype=dtype)
             if column.shape != shape:
                 raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
@@ -147,8 +179,13 @@ class Toolpath:
 
     def first(self, rows: int) -> Toolpath:
         """The first rows alone."""
-        columns = ("kind", "end", "centre", "feed", "value", "source", "block")
-        return replace(self, **{name: getattr(self, name)[:rows] for name in columns})
+        return self.picked(np.arange(min(rows, len(self))))
+
+    def picked(self, row: Ints, **others: npt.NDArray[np.int64] | Floats) -> Toolpath:
+        """Rows (M,) of this one, in that order and as often as they are named; `others`: columns
+        that take the place of theirs."""
+        columns = {name: getattr(self, name)[row] for name in COLUMNS}
+        return replace(self, **{**columns, **others})
 
     def text(self, row: int) -> str:
         """Provenance of a row ("" when it has none)."""

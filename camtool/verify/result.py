@@ -229,7 +229,7 @@ def assumptions(case: Case) -> tuple[str, ...]:
     from camtool.simulation.models import model_of
 
     link = case.machine.link
-    said = model_of(case.machine).assumptions(case.machine)
+    said = model_of(case.machine).assumptions(case.decoded, case.machine)
     if link.baud is None:
         return (*said, "the program is in the controller before it runs")
     how = "block by block, before each is cut" if link.wait == "sequential" else "while it runs"
@@ -250,7 +250,7 @@ def _interpolator(case: Case) -> str:
     """How the controller makes lines and arcs."""
     from camtool.simulation.models import model_of
 
-    return model_of(case.machine).interpolation(case.machine, case.simulation)
+    return model_of(case.machine).interpolation(case.decoded, case.machine, case.simulation)
 
 
 def _blocks(case: Case) -> int | None:

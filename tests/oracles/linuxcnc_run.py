@@ -3,7 +3,8 @@
 `MEASURED` was taken from LinuxCNC 2.9.0~pre1 (Debian package linuxcnc-uspace), its trivial
 kinematics and simulated axes of 30.48 mm/s and 508 mm/s² with a servo period of 1 ms, by sampling
 the commanded position of the three joints in every period: in how many periods it changed, and by
-how much the path stays away from each programmed corner, µm.
+how much the path stays away from each programmed corner, µm. `MODES` in the same way, from
+programs that say G61 and G64 themselves.
 """
 
 from __future__ import annotations
@@ -86,4 +87,30 @@ MEASURED = (
     Measured("polygon", _POLYGON, "blend", 0.01, 1082),
     Measured("polygon, stops", _POLYGON, "exact-path", 0.0, 7484),
     Measured("angles", _ANGLES, "blend", 0.02, 1659, (20.0,) * 5),
+)
+
+
+@dataclass(frozen=True)
+class Modes:
+    """A program with path modes of its own, and how far the path stays from some places (x, y) mm,
+    µm."""
+
+    program: str
+    corners_um: dict[tuple[float, float], float]
+
+
+_NEARLY = "X4 Y0.1\nX6 Y0\nX8 Y0.1\nX10 Y5\n"
+
+MODES = (
+    # The move before a corner says how it is met, the tighter of both tolerances holds.
+    Modes("F900\nG64 P0.5\nG1 X10\nG61\nY10\n", {(10, 0): 233.7}),
+    Modes("F900\nG61\nG1 X10\nG64 P0.5\nY10\n", {(10, 0): 0.0}),
+    Modes("F900\nG64 P0.5\nG1 X10\nG64 P0.1\nY10\nX0\n", {(10, 0): 100.1, (10, 10): 100.1}),
+    # Without P as far as the speed needs, at most a quarter of the shorter move.
+    Modes("F900\nG64\nG1 X2\nY2\nX4\nY4.5\n", {(2, 0): 233.7, (2, 2): 233.7, (4, 2): 233.7}),
+    # Q merges lines, P rounds what corners are left.
+    Modes(
+        f"F900\nG64 P0.05 Q0.2\nG1 X2 Y0\n{_NEARLY}",
+        {(2, 0): 25.0, (4, 0.1): 50.0, (6, 0): 75.0, (8, 0.1): 50.1},
+    ),
 )

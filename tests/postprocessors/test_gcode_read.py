@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
 from camtool.machine.registry import load_target
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.carried import carried_over
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from tests.postprocessors.gcode_parts import part
 
 TARGETS = ("grbl", "linuxcnc")
@@ -382,24 +383,42 @@ def test_a_circle_may_say_its_centre_alone_in_linuxcnc() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "settings", "noted"),
+    ("said", "mode"),
     [
-        ("G64 P0.01", (), False),
-        ("G64 P0.01 Q0.01", (), False),
-        ("G64 P0.01 Q0", (), True),
-        ("G64 P0.02", (), True),
-        ("G64", (), True),
-        ("G61", (), True),
-        ("G20 G64 P0.001", ("dialect.blend_tolerance_mm=0.0254",), False),
-        ("G61", ("dialect.path=exact-path",), False),
-        ("G61.1", ("dialect.path=exact-path",), True),
-        ("G61.1", ("dialect.path=exact-stop",), False),
-        ("G64 P0.01", ("dialect.path=exact-stop",), True),
+        ("G64 P0.01", PathMode("blend", 0.01, 0.01)),
+        ("G64 P0.01 Q0", PathMode("blend", 0.01, 0.0)),
+        ("G64 P0.01 Q-1", PathMode("blend", 0.01, 0.01)),
+        ("G64 Q0.3", PathMode("blend", 0.0, 0.3)),
+        ("G64", PathMode("blend", 0.0, 0.0)),
+        ("G64 P-1", PathMode("blend", 0.0, 0.0)),
+        ("G20 G64 P0.5", PathMode("blend", 12.7, 12.7)),
+        ("G61", PathMode("exact-path")),
+        ("G61.1", PathMode("exact-stop")),
     ],
 )
-def test_other_corners_than_those_simulated_are_noted(
-    said: str, settings: tuple[str, ...], noted: bool
-) -> None:
-    path = read(f"{said}\nG0 X1\nM2\n", "linuxcnc", *settings)
-    codes = [(finding.code, finding.where) for finding in path.findings]
-    assert codes == ([(Code.EXECUTED_OTHERWISE, "block 1")] if noted else [])
+def test_the_program_says_how_corners_are_met(said: str, mode: PathMode) -> None:
+    """As `rs274 -g` prints them (SET_MOTION_CONTROL_MODE, SET_NAIVECAM_TOLERANCE)."""
+    path = read(f"G0 X1\n{said} X2\nX3\nG4 P1\nM2\n", "linuxcnc")
+    assert path.modes == (mode,)
+    assert path.mode.tolist() == [-1, 0, 0, 0, 0]
+    assert path.findings == ()
+    assert read("G61 G0 X1\nM2\n", "grbl").modes == ()
+
+
+def test_path_modes_are_written_where_they_change() -> None:
+    text = (
+        "G0 Z1\nG61\nX1\nG64 P0.25 Q0.5\nG1 X2 F9\nG64 P0.25\nG4 P1\nY2\nG64\nX5\nG61.1\nX0\nM2\n"
+    )
+    path = read(text, "linuxcnc")
+    target = loaded("linuxcnc", ())
+    program = target.post.write(carried_over(path), target.machine)
+    again = target.post.read(program.data, target.machine)
+    moves, wanted = again.is_motion, path.is_motion
+    assert [again.modes[k] for k in again.mode[moves][1:]] == [
+        path.modes[k] for k in path.mode[wanted][1:]
+    ]
+    assert again.modes[again.mode[moves][0]] == PathMode("blend", 0.01, 0.01)
+    said = [line for line in program.data.decode().splitlines() if line.startswith("G6")]
+    assert said == ["G64 P0.01", "G61", "G64 P0.25 Q0.5", "G64 P0.25", "G64", "G61.1"]
+    grbl = loaded("grbl", ())
+    assert b"G6" not in grbl.post.write(carried_over(path), grbl.machine).data

@@ -126,7 +126,7 @@ def test_bad_options_are_named(setting: str) -> None:
 
 def test_another_controller_is_refused() -> None:
     with pytest.raises(MachineError, match="needs the controller flashcut"):
-        flashcut.assumptions(machine("controller.model=path"))
+        flashcut.assumptions(ToolpathBuilder().finish(), machine("controller.model=path"))
 
 
 def test_held_are_the_lengths_that_the_program_says() -> None:
@@ -144,7 +144,9 @@ def test_the_page_names_every_option() -> None:
 
 
 def test_the_assumptions_name_the_fastest_feed() -> None:
-    fastest, *others = flashcut.assumptions(machine("controller.half_period_ms=20"))
+    fastest, *others = flashcut.assumptions(
+        ToolpathBuilder().finish(), machine("controller.half_period_ms=20")
+    )
     assert "2.71 mm/min" in fastest  # 1.9 µm in 42 ms
     assert any("steps too many stay" in one for one in others)
 

@@ -315,10 +315,14 @@ def test_the_table_of_the_page(column: int, settings: tuple[str, ...]) -> None:
 
 def test_what_it_says_of_itself() -> None:
     model = model_of(machine())
-    assert model.interpolation(machine(), Options()) == "dog-leg"
+    assert model.interpolation(ToolpathBuilder().finish(), machine(), Options()) == "dog-leg"
     assert model.spacing_mm(in_steps((1, 0, 0)), machine()) == STEP_MM
-    said = " ".join(model.assumptions(machine("cruise=declared", "elbow=flows", "delay=counted")))
+    said = " ".join(
+        model.assumptions(
+            ToolpathBuilder().finish(), machine("cruise=declared", "elbow=flows", "delay=counted")
+        )
+    )
     assert "8.06 Hz" in said
     assert "70.0 Hz" in said
     assert "a dog-leg has a ramp" in said
-    assert "104.4 Hz" in " ".join(model.assumptions(machine()))
+    assert "104.4 Hz" in " ".join(model.assumptions(ToolpathBuilder().finish(), machine()))

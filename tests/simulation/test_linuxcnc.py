@@ -1,5 +1,6 @@
 """LinuxCNC from the program to the slides, and against LinuxCNC itself."""
 
+import itertools
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ from camtool.errors import MachineError, ProgramError
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
+from camtool.simulation.linuxcnc import assumptions
 from camtool.simulation.linuxcnc_moves import merged
 from camtool.simulation.motion import Floats
 from camtool.simulation.options import CHUNK_STEPS, Options
@@ -18,7 +20,7 @@ from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.gcode_machines import linuxcnc_machine
-from tests.oracles.linuxcnc_run import MEASURED, Measured, merge, off_line
+from tests.oracles.linuxcnc_run import MEASURED, MODES, Measured, Modes, merge, off_line
 from tests.oracles.motion_rows import RowMotion, rows_of
 
 PERIOD = 0.001
@@ -68,6 +70,32 @@ def test_linuxcnc_itself(case: Measured) -> None:
     ]
     for found, wanted in zip(left, case.corners_um, strict=False):
         assert found == pytest.approx(wanted, abs=0.2)
+
+
+@pytest.mark.parametrize("case", MODES, ids=lambda case: case.program)
+@pytest.mark.parametrize("own", ["blend", "exact-path", "exact-stop"])
+def test_the_program_s_own_modes_are_what_linuxcnc_obeys(case: Modes, own: str) -> None:
+    """Whatever the machine file says."""
+    machine = in_mode(own, 0.07)
+    rows = run(read(f"G21 G17 G90 G94\n{case.program}M2\n", machine), machine)
+    points = [tuple(p) for p in np.concatenate([row.commanded for row in rows]).tolist()]
+    for corner, wanted in case.corners_um.items():
+        beside = min(
+            off_line(a, b, (*corner, 0.0)) for a, b in itertools.pairwise(points)
+            if a != b
+        )  # fmt: skip
+        assert 1000.0 * beside == pytest.approx(wanted, abs=0.3)
+
+
+def test_where_the_program_says_nothing_the_machine_file_does() -> None:
+    path = read("F900\nG1 X5\nY5\nM2\n", in_mode("blend"))
+    assert total(path, in_mode("exact-stop")) > total(path, in_mode("blend", 0.5)) + 0.01
+    modal = read("F900\nG64 P0.5 G1 X5\nY5\nM2\n", in_mode("blend"))
+    assert total(modal, in_mode("exact-stop")) == total(path, in_mode("blend", 0.5))
+    assert [*assumptions(modal, in_mode("exact-stop"))][:1] == [
+        "corners are blended within 0.5 mm (G64 P), as the speed needs"
+    ]
+    assert "(G61.1)" in assumptions(path, in_mode("exact-stop"))[0]
 
 
 def test_one_trapezoid_and_one_triangle() -> None:
@@ -204,8 +232,8 @@ def test_what_is_merged() -> None:
     builder.line(3.0, 0.0, 0.0, feed=200.0).message("here").line(4.0, 0.0, 0.0, feed=200.0)
     builder.arc(4.2, 0.0, 0.0, centre=(4.1, -5.0), ccw=False, feed=200.0)
     path = builder.line(5.0, 0.0, 0.0, feed=200.0).line(6.0, 0.0, 0.0, feed=200.0).finish()
-    assert merged(path, 0.01)[1].tolist() == [0, 1, 1, 1, 2, 3, 4, 5, 6, 6]
-    assert merged(path, 0.0)[1].tolist() == list(range(10))
+    assert merged(path, np.full(10, 0.01))[1].tolist() == [0, 1, 1, 1, 2, 3, 4, 5, 6, 6]
+    assert merged(path, np.zeros(10))[1].tolist() == list(range(10))
 
 
 def test_straight_back_is_a_stop() -> None:
@@ -226,7 +254,7 @@ def test_lines_are_merged_as_the_list_does(seed: int, tolerance: float) -> None:
     points: Floats = np.round(np.cumsum(way, axis=0), 3).astype(np.float64)
     apart = rng.random(count) < 0.05
     chain, moved = np.empty(count, dtype=np.int64), np.empty((count, 3))
-    merge_lines(points, apart, tolerance, chain, moved)
+    merge_lines(points, apart, np.full(count, tolerance), chain, moved)
     listed = [tuple(point) for point in points.tolist()]
     assert chain.tolist() == merge(listed, apart.tolist(), tolerance)
     for number in range(int(chain[-1]) + 1):
@@ -247,7 +275,7 @@ def test_a_chain_takes_a_hundred_and_one_points() -> None:
     points: Floats = np.zeros((300, 3))
     points[:, 0] = np.arange(300)
     chain, moved = np.empty(299, dtype=np.int64), np.empty((299, 3))
-    merge_lines(points, np.zeros(299, dtype=np.bool_), 0.01, chain, moved)
+    merge_lines(points, np.zeros(299, dtype=np.bool_), np.full(299, 0.01), chain, moved)
     assert np.bincount(chain).tolist() == [101, 101, 97]
 
 

@@ -424,8 +424,8 @@ def test_the_ends_of_the_ranges_are_bounded_too() -> None:
 
 def test_what_is_said_of_the_model() -> None:
     machine = router("friction_percent=[1, 0, 0]", "slaves=text")
-    assert any("dry friction" in text for text in assumptions(machine))
-    assert any("text" in text for text in assumptions(machine))
+    assert any("dry friction" in text for text in assumptions(ToolpathBuilder().finish(), machine))
+    assert any("text" in text for text in assumptions(ToolpathBuilder().finish(), machine))
     path, machine = read("matlab-router-star")
     at = places(motion(path, machine))
     apart = np.hypot(*np.diff(at[:, :2], axis=0).T)

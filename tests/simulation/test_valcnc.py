@@ -450,10 +450,13 @@ def test_the_page_names_every_option() -> None:
 
 def test_what_it_says_of_itself() -> None:
     model = model_of(machine())
-    assert model.interpolation(machine(), Options()) == "counter"
+    assert model.interpolation(ToolpathBuilder().finish(), machine(), Options()) == "counter"
     assert model.spacing_mm(line_of(1, 1), machine()) == STEP_MM
-    assert any("6000" in one for one in model.assumptions(machine()))
-    assert any("0.2 mm" in one for one in model.assumptions(machine()))
+    assert any("6000" in one for one in model.assumptions(ToolpathBuilder().finish(), machine()))
+    assert any("0.2 mm" in one for one in model.assumptions(ToolpathBuilder().finish(), machine()))
     assert any(
-        "7 pieces" in one for one in model.assumptions(machine("controller.arc_segments=7"))
+        "7 pieces" in one
+        for one in model.assumptions(
+            ToolpathBuilder().finish(), machine("controller.arc_segments=7")
+        )
     )

@@ -12,8 +12,8 @@ from camtool.machine.controllers.base import SlideStart
 class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxcnc"):
     """LinuxCNC 2.9 with its trapezoid planner, and the options of its model.
 
-    How corners are met says `[dialect]`, keys `path` and `blend_tolerance_mm`, for the program
-    says it. `servo_period_s`: SERVO_PERIOD of the ini file. `lookahead_moves`:
+    How corners are met the program says; where it does not, `[dialect]`, keys `path` and
+    `blend_tolerance_mm`. `servo_period_s`: SERVO_PERIOD of the ini file. `lookahead_moves`:
     ARC_BLEND_OPTIMIZATION_DEPTH, `kink_ratio`: ARC_BLEND_KINK_RATIO, the part of the highest
     acceleration that a bend may take up within one period and pass for straight (defaults of
     initraj.cc).

@@ -1,0 +1,113 @@
+"""Recordings of grbl's own firmware and of LinuxCNC's own motion against their models.
+
+`referees/README.md` says where they come from. grbl: positions step for step, by their digest, and
+times within 0.2 %; LinuxCNC: paths within 15 µm, times within 2 %. The tables go into
+docs/validation.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from camtool.machine.registry import load_target
+from camtool.simulation.motion import Floats
+from camtool.simulation.options import IDEAL, Options
+from camtool.simulation.simulate import simulate
+from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.validation.page import check, mm, signed
+from tests.validation.pieces import UM
+
+REFEREES = Path(__file__).parent / "referees"
+GRBL = sorted((REFEREES / "grbl").glob("*.json"))
+LINUXCNC = sorted((REFEREES / "linuxcnc").glob("*.ngc"))
+
+GRBL_TIME_PART = 0.002
+LINUXCNC_TIME_PART = 0.02
+LINUXCNC_PATH_MM = 0.015
+
+MOST_SAMPLES = 5000
+"""So many of the model's samples are held against the recorded line."""
+
+NEAR_PIECES = 50
+NEAR_PART = 0.01
+"""A point is looked for so many pieces of a line, or that part of it, before and behind."""
+
+
+def run(name: str, data: bytes, *settings: str) -> tuple[list[RowMotion], float]:
+    """The motion of each row of a program, and the time of all, s."""
+    target = load_target(name, settings=settings)
+    path = target.post.read(data, target.machine)
+    rows = rows_of(simulate(path, target.machine, Options(effects=IDEAL)))
+    return rows, sum(row.duration_s for row in rows)
+
+
+def samples(rows: list[RowMotion]) -> Floats:
+    return np.concatenate([row.commanded for row in rows])
+
+
+def off_line(points: Floats, line: Floats) -> float:
+    """The farthest of `points` (P, 3) from a polyline (L, 3) that goes the same way, mm.
+
+    Each point is looked for near where the one before it was found, so a path that wanders off, or
+    goes another way, counts as farther than it is, never as nearer.
+    """
+    begin, way = line[:-1], np.diff(line, axis=0)
+    square = (way**2).sum(axis=1)
+    begin, way, square = begin[square > 0.0], way[square > 0.0], square[square > 0.0]
+    reach = max(NEAR_PIECES, int(NEAR_PART * len(begin)))
+    most, at = 0.0, 0
+    for point in points:
+        near = slice(max(at - reach, 0), at + reach)
+        share = ((point - begin[near]) * way[near]).sum(axis=1) / square[near]
+        apart = begin[near] + np.clip(share, 0.0, 1.0)[:, None] * way[near] - point
+        far = (apart**2).sum(axis=1)
+        at = near.start + int(far.argmin())
+        most = max(most, float(far.min()))
+    return float(np.sqrt(most))
+
+
+def digest(steps: Floats) -> str:
+    return hashlib.sha256(np.rint(steps).astype("<i4").tobytes()).hexdigest()
+
+
+def test_grbl() -> None:
+    assert len(GRBL) == 8
+    for file in GRBL:
+        said: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        recorded = said["without_amass"]
+        motion, _ = run("grbl", said["program"].encode())
+        steps = samples(motion) / 0.004
+        assert len(steps) == recorded["step_ticks"], file.name
+        assert digest(steps) == recorded["sha256_of_int32_xyz_rows"], file.name
+
+
+def test_linuxcnc(bless: bool) -> None:
+    assert len(LINUXCNC) == 5
+    rows = []
+    for file in LINUXCNC:
+        recorded = np.loadtxt(file.with_suffix(".csv"), delimiter=",")
+        motion, seconds = run("linuxcnc", file.read_bytes())
+        found = np.concatenate([recorded[:1, 1:], samples(motion)])
+        every = max(1, len(found) // MOST_SAMPLES)
+        beside = off_line(recorded[:, 1:], found)
+        apart = off_line(found[::every], recorded[:, 1:])
+        wanted_s = float(recorded[-1, 0])
+        assert max(beside, apart) < LINUXCNC_PATH_MM, file.name
+        assert abs(seconds - wanted_s) < LINUXCNC_TIME_PART * wanted_s, file.name
+        rows.append(
+            [
+                f"{file.stem}.ngc",
+                mm(wanted_s),
+                mm(seconds),
+                signed(100.0 * (seconds / wanted_s - 1.0), 2),
+                mm(beside * UM, 1),
+                mm(apart * UM, 1),
+            ]
+        )
+    heads = ["program", "LinuxCNC, s", "model, s", "%", "it is off ours, µm", "we are off its, µm"]
+    check("referee-linuxcnc", heads, rows, bless)
