@@ -79,6 +79,12 @@ class Code(IntEnum):
     RETURN_TO_MACHINE_ZERO = 407
     ABOVE_GATE = 408
     END_NOT_REACHED = 409
+    FEED_DIFFERS = 414
+    SPINDLE_DIFFERS = 415
+    CUT_OTHER_WAY = 416
+    CLEARANCE_LOW = 417
+    END_DIFFERS = 418
+    SETTING_DIFFERS = 419
 
 
 @dataclass(frozen=True)

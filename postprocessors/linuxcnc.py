@@ -33,6 +33,12 @@ class LinuxCncPost:
 
         return read_linuxcnc(data, machine)
 
+    def unit_mm(self, machine: Machine) -> float:
+        """The last decimal of a coordinate."""
+        from ._linuxcnc_options import dialect_of
+
+        return 10.0 ** -dialect_of(machine).decimals
+
     def listing(self, data: bytes, machine: Machine) -> Listing:
         """The lines that are blocks."""
         from ._gcode_listing import listing

@@ -42,6 +42,14 @@ class PicMmhPost:
 
         return format_block(move, machine)
 
+    def unit_mm(self, machine: Machine) -> float:
+        """The coarser of the last decimal of a coordinate and a step."""
+        from ._pic_mmh_format import UNITS_PER_MM
+        from ._pic_mmh_options import dialect_of
+
+        steps = (axis.coded_step_mm for axis in machine.axes)
+        return max(1.0 / UNITS_PER_MM[dialect_of(machine).form], *steps)
+
     def listing(self, data: bytes, machine: Machine) -> Listing:
         """What stands before each semicolon, with it."""
         from camtool.toolpath.program import Listing

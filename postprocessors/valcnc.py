@@ -36,6 +36,13 @@ class ValcncPost:
 
         return read_program(data, machine)
 
+    def unit_mm(self, machine: Machine) -> float:
+        """The last decimal of a coordinate, on the axis where it is the most."""
+        from ._valcnc_options import dialect_of, scales_of
+
+        dialect = dialect_of(machine)
+        return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
+
     def listing(self, data: bytes, machine: Machine) -> Listing:
         """The lines that are blocks."""
         from ._gcode_listing import listing

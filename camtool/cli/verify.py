@@ -114,7 +114,10 @@ def verify(
     """Simulate PROGRAM (- is stdin) as the machine would run it, and judge the result.
 
     With --against, the path is compared with what DRAWING would give, planned with the same flags
-    (--tool-diameter, --side ...). Exit code 1 when a finding is an error.
+    (--tool-diameter, --side ...), and the program with the one that camtool would write: where
+    and which way round it cuts, at the resolution of the dialect; feeds, spindle, tool and dwells
+    as far as the flags name them; clearance of rapids; its end. Exit code 1 when a finding is an
+    error.
     """
     wishes = Wishes(preview, picture, report, page, beside, quiet, verbose)
     _check(wishes, comparing=compare is not None, gated=gates.given)

@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
+    from camtool.planning.plan import Plan
     from camtool.simulation.options import Effects
     from camtool.toolpath.bent import Bent
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
+    from camtool.verify.asked import Asked
     from camtool.verify.gates import Gates
     from camtool.verify.records import Before
     from camtool.verify.verify import Verification, VerifyOptions
@@ -41,12 +43,13 @@ class Judging:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What a program is held against: the wanted toolpath, the drawing in its frame, and what
-    was sent where that was bent; None where there is none."""
+    """What a program is held against: the wanted toolpath, the drawing in its frame, what was
+    sent where that was bent, and what else the job asks for; None where there is none."""
 
     wanted: Toolpath | None = None
     drawing: Drawing | None = None
     sent: Bent | None = None
+    asked: Asked | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +156,8 @@ def verify_program(
 
         plan = planned(drawing, _plain(job or Job()), target.machine)
         sent = _bent(plan.toolpath, target.machine) if judging.compensated else None
-        goal = Goal(plan.toolpath, plan.placed, sent)
+        asked = _asked(drawing, job or Job(), target, plan, sent)
+        goal = Goal(plan.toolpath, plan.placed, sent, asked)
     options = VerifyOptions(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
@@ -279,6 +283,51 @@ def _judged(
         drawing=goal.drawing,
         options=sized,
         sent=goal.sent,
+        asked=goal.asked,
+    )
+
+
+def _asked(
+    drawing: Drawing, job: Job, target: LoadedTarget, plain: Plan, sent: Bent | None
+) -> Asked | None:
+    """What the job asks for, in moves as the dialect would say them; None where it asks for what
+    cannot be made, which is said already. `plain` is the plan of the job without what it does
+    against reversals, `sent` that bent against the mechanics."""
+    from camtool.planning.link import feeds_of, safe_z_of
+    from camtool.planning.plan import planned
+    from camtool.verify.asked import Asked
+
+    machine = target.machine
+    if _plain(job) != job:
+        plan = planned(drawing, job, machine)
+        bent = None if sent is None else _bent(plan.toolpath, machine)
+    else:
+        plan, bent = plain, sent
+    if worst(plan.toolpath.findings) >= Severity.ERROR:
+        return None
+    wanted = plan.toolpath if bent is None else bent.toolpath
+    program = target.post.write(wanted, machine)
+    unit = getattr(target.post, "unit_mm", None)
+    units = [
+        max(axis.coded_step_mm, axis.resolution_mm or 0.0) if unit is None else unit(machine)
+        for axis in machine.axes
+    ]
+    feeds: list[float] = []
+    for operation in job.operations:
+        both = feeds_of(operation, machine)
+        if operation.feed_mm_min is not None:
+            feeds += [both.cut_mm_min, both.plunge_mm_min]
+        elif operation.plunge_feed_mm_min is not None:
+            feeds.append(both.plunge_mm_min)
+    return Asked(
+        written=target.post.read(program.data, machine),
+        wanted=wanted,
+        unit_mm=max(units[:2]),
+        unit_z_mm=units[2],
+        feeds_mm_min=tuple(feeds),
+        feed_unit_mm_min=machine.feed.unit_mm_min,
+        safe_z_mm=safe_z_of(job, machine),
+        safe_z_said=job.safe_z_mm is not None,
     )
 
 

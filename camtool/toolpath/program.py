@@ -42,9 +42,10 @@ class PostProcessor(Protocol):
 
     Where a program's file is not what goes over the line to the machine (a listing, a dump), a
     post has besides `line_bytes(data, machine) -> int`: how many bytes do. One whose moves may
-    leave the wanted path on purpose has `stray_mm(machine) -> float`: how far at most.
-    One that can show which part of a program each block is has `listing(data, machine) ->
-    Listing`, of a program that `read` takes.
+    leave the wanted path on purpose has `stray_mm(machine) -> float`: how far at most. One whose
+    coordinates are finer or coarser than the machine's steps has `unit_mm(machine) -> float`:
+    their finest difference. One that can show which part of a program each block is has
+    `listing(data, machine) -> Listing`, of a program that `read` takes.
     """
 
     name: str

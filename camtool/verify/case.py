@@ -10,6 +10,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.options import ALL, Effects, Options
 from camtool.toolpath.bent import Bent
 from camtool.toolpath.moves import Toolpath
+from camtool.verify.asked import Asked
 
 COVERAGE_MM = 0.005
 """A move is missing, or extra, when farther than this from all moves of the other side ..."""
@@ -66,7 +67,8 @@ class VerifyOptions:
 @dataclass(frozen=True, eq=False)
 class Case:
     """What is to be judged. `sent`: what the program should say, where it is not `wanted` itself
-    but bent against the mechanics."""
+    but bent against the mechanics. `asked`: what the job asks for besides, and how the dialect
+    would say it."""
 
     decoded: Toolpath
     machine: Machine
@@ -74,6 +76,7 @@ class Case:
     drawing: Drawing | None
     options: VerifyOptions
     sent: Bent | None = None
+    asked: Asked | None = None
 
     @property
     def simulation(self) -> Options:

@@ -183,6 +183,26 @@ class Target:
         found.distance[far], found.segment[far] = np.inf, -1
         return found
 
+    def within(
+        self, points: Floats, height: Floats, limits_mm: tuple[float, float]
+    ) -> tuple[Ints, Ints, Floats]:
+        """All pairs (point, move), in order, and how far apart (mm), of points (J, 2) at heights
+        (J,) mm: no farther apart than the first limit in XY, nor than the second in height."""
+        limit_mm, depth_mm = limits_mm
+        none = np.empty(0, dtype=np.int64)
+        parts: list[tuple[Ints, Ints, Floats]] = [(none, none, np.empty(0))]
+        for begin in range(0, len(points) if len(self.boxes) else 0, PAIRS_AT_ONCE):
+            some = points[begin : begin + PAIRS_AT_ONCE]
+            point, move = self._pairs(np.concatenate([some, some], axis=1), limit_mm)
+            distance = self.table.distances(some[point], move)
+            near = np.flatnonzero(distance <= limit_mm)
+            point, move, distance = point[near], move[near], distance[near]
+            z = height[begin + point]
+            there = ~self._off_height(some[point], z, move, depth_mm)
+            parts.append((begin + point[there], move[there], distance[there]))
+        every, moves, distances = zip(*parts, strict=True)
+        return np.concatenate(every), np.concatenate(moves), np.concatenate(distances)
+
     def _reach(self, boxes: Floats) -> float:
         """A margin, mm, that takes in every move from every group."""
         both = np.concatenate([self.boxes, boxes])
@@ -194,21 +214,25 @@ class Target:
     ) -> tuple[Ints, Ints]:
         """Pairs (index into `todo`, move) with a piece whose box comes within the margin, in
         order."""
-        import shapely
-
-        if self._tree is None:
-            pieces, self._whose = boxes_of_pieces(self.cuts.segments, self.gap_mm)
-            self._tree = shapely.STRtree(shapely.box(*pieces.T))
-        wide = boxes[todo] + margin[todo, None] * np.array([-1.0, -1.0, 1.0, 1.0])
-        group, piece = self._tree.query(shapely.box(*wide.T))
-        pairs = np.sort(group * len(self.boxes) + self._whose[piece])
-        pairs = pairs[np.diff(pairs, prepend=-1) > 0]
-        group, move = np.divmod(pairs, len(self.boxes))
+        group, move = self._pairs(boxes[todo], margin[todo, None])
         wanted, z = groups.contour[todo][group], groups.z[todo][group]
         here = self.cuts.z[move]
         fits = (wanted == ANY_CONTOUR) | (wanted == self.contour[move])
         fits &= (z[:, 0] <= here[:, 1]) & (here[:, 0] <= z[:, 1])
         return group[fits], move[fits]
+
+    def _pairs(self, boxes: Floats, margin_mm: Any) -> tuple[Ints, Ints]:
+        """Pairs (box, move) with a piece whose box comes within the margin, in order."""
+        import shapely
+
+        if self._tree is None:
+            pieces, self._whose = boxes_of_pieces(self.cuts.segments, self.gap_mm)
+            self._tree = shapely.STRtree(shapely.box(*pieces.T))
+        wide = boxes + margin_mm * np.array([-1.0, -1.0, 1.0, 1.0])
+        box, piece = self._tree.query(shapely.box(*wide.T))
+        pairs = np.sort(box * len(self.boxes) + self._whose[piece])
+        pairs = pairs[np.diff(pairs, prepend=-1) > 0]
+        return np.divmod(pairs, len(self.boxes))
 
     def _off_height(self, points: Floats, height: Floats, move: Ints, window_mm: float) -> Any:
         """(J,) where the moves are at another height than the points nearest to them."""

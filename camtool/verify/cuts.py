@@ -186,26 +186,33 @@ def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Points (S, 2) mm on the segments `segment` (S,) of some CutMoves, ends included, and their
-    heights `z` (S,) mm."""
+    """Points (S, 2) mm on the segments `segment` (S,) of some CutMoves, ends included, at the
+    part `share` (S,) of their length, and their heights `z` (S,) mm."""
 
     points: Floats
     segment: Ints
     z: Floats
+    share: Floats
+
+    def of(self, which: Ints) -> Samples:
+        """Some of them."""
+        return Samples(self.points[which], self.segment[which], self.z[which], self.share[which])
 
 
-def sample_cuts(cuts: CutMoves, spacing_mm: float) -> Samples:
-    """Points on the true lines and arcs, about spacing_mm apart (coarser when they would exceed
-    `MOST_SAMPLES`, but never fewer than `FEWEST_SAMPLES` parts of a segment)."""
+def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> Samples:
+    """Points on the true lines and arcs (on these segments `only`), about spacing_mm apart
+    (coarser when they would exceed `MOST_SAMPLES`, but never fewer than `FEWEST_SAMPLES` parts of
+    a segment)."""
     from camtool.geometry.measure import point_at, segment_lengths
 
-    lengths = segment_lengths(cuts.segments)
+    which = np.arange(len(cuts.segments)) if only is None else only
+    lengths = segment_lengths(cuts.segments[which])
     spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
     parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), FEWEST_SAMPLES)
-    segment = np.repeat(np.arange(len(parts)), parts + 1)
-    within = np.arange(len(segment)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
-    share = within / parts[segment]
+    owner = np.repeat(np.arange(len(parts)), parts + 1)
+    within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
+    share, segment = within / parts[owner], which[owner]
     begin, end = cuts.ends_z[segment].T
     # On the level exactly: rounding must not make slopes of flat moves.
     z = np.where(begin == end, begin, begin + share * (end - begin))
-    return Samples(point_at(cuts.segments, segment, share), segment, z)
+    return Samples(point_at(cuts.segments, segment, share), segment, z, share)

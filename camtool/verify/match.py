@@ -148,8 +148,9 @@ def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -
             break
         which = ranges(begin[open_], np.diff(begin)[open_])
         choice = np.repeat(candidate[open_], np.diff(begin)[open_])
-        part = Samples(samples.points[which], samples.segment[which], samples.z[which])
-        near, _ = nearest_at_height(part, choice, wanted, (goal.limit_mm, goal.depth_mm))
+        near, _ = nearest_at_height(
+            samples.of(which), choice, wanted, (goal.limit_mm, goal.depth_mm)
+        )
         starts = np.cumsum(np.diff(begin)[open_]) - np.diff(begin)[open_]
         fits = np.maximum.reduceat(near.distance, starts) <= goal.limit_mm
         fitting = np.repeat(fits, np.diff(begin)[open_])

@@ -185,6 +185,17 @@ class ShapeReport(msgspec.Struct, frozen=True):
     undercut_um: float
 
 
+class AskedReport(msgspec.Struct, frozen=True):
+    """Moves as programmed against those that the job asks for: how many cut, how many of these
+    are the very moves that camtool would write, how far the others are from what was asked at
+    most, and how far they may be."""
+
+    moves: int
+    alike: int
+    off_um: float
+    limit_um: float
+
+
 class FindingReport(msgspec.Struct, frozen=True):
     """A finding, by the names of its code and severity."""
 

@@ -49,6 +49,7 @@ class Report(msgspec.Struct, frozen=True):
     shape: record.ShapeReport | None = None
     worst: tuple[record.WorstReport, ...] = ()
     assumptions: tuple[str, ...] = ()
+    asked: record.AskedReport | None = None
 
     def to_json(self) -> str:
         """Indented JSON with keys in the order of the record, and a newline at the end."""

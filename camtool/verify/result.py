@@ -9,6 +9,7 @@ from camtool.findings import Finding
 from camtool.geometry.polylines import Floats
 from camtool.units import UM_PER_MM
 from camtool.verify import records as record
+from camtool.verify.against import Held
 from camtool.verify.by_row import (
     contour_figures,
     contour_name,
@@ -41,6 +42,7 @@ class Result:
     slides: SlidePass
     rows: RowFigures
     tally: Tally
+    held: Held | None = None
 
     def report(
         self, extents: Floats, findings: tuple[Finding, ...], trace: Trace | None
@@ -81,6 +83,7 @@ class Result:
             shape=self._shape(trace),
             worst=self._worst(),
             assumptions=assumptions(case),
+            asked=self._asked(),
         )
 
     def _errors(self) -> record.Errors:
@@ -205,6 +208,17 @@ class Result:
         steps = axes.x.coded_step_mm, axes.y.coded_step_mm
         missed = missed_ends(self.rows, self.cuts.toolpath, steps)
         return record.UnreachedReport(missed.count, certain(missed.most_mm * UM_PER_MM))
+
+    def _asked(self) -> record.AskedReport | None:
+        asked, held = self.case.asked, self.held
+        if asked is None or held is None:
+            return None
+        return record.AskedReport(
+            moves=held.moves,
+            alike=held.alike,
+            off_um=certain(held.off_mm * UM_PER_MM),
+            limit_um=certain(asked.limits_mm[0] * UM_PER_MM),
+        )
 
     def _shape(self, trace: Trace | None) -> record.ShapeReport | None:
         diameter = self.case.options.tool_diameter_mm

@@ -26,6 +26,8 @@ from camtool.simulation.simulate import check_options, simulate
 from camtool.toolpath.bent import Bent
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Toolpath
+from camtool.verify.against import Held, hold
+from camtool.verify.asked import Asked
 from camtool.verify.case import Case, VerifyOptions
 from camtool.verify.circles import full_circles
 from camtool.verify.compare import Target
@@ -77,13 +79,15 @@ def verify(
     drawing: Drawing | None = None,
     options: VerifyOptions | None = None,
     sent: Bent | None = None,
+    asked: Asked | None = None,
 ) -> Verification:
     """Simulate `decoded` on `machine` and judge it; against `wanted` when there is one.
 
     `drawing` gives the fitting error and its findings; `sent` is what the program was written from
-    where `wanted` was bent. Toolpaths are in the work frame.
+    where `wanted` was bent; `asked` is what else its job asks for. Toolpaths are in the work
+    frame.
     """
-    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent)
+    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent, asked)
     check_options(machine, case.simulation)
     steps = steps_on_the_way(decoded, machine, case.simulation)
     return judge(case, steps or simulate(decoded, machine, case.simulation))
@@ -102,6 +106,7 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     circles = full_circles(wanted.cuts, case.coverage_mm)
     goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
     coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
+    held_against = _held_against(case, flat_cuts=flat_cuts)
     shaped = points_wanted(decoded.cuts, case.options.tool_diameter_mm or 0.0)
     points = max(case.options.trace_points, shaped or 0)
     size = trace_size(case.decoded, case.spacing_mm, points)
@@ -116,8 +121,8 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
     extents = toolpath_extents(case.decoded)
     noticed = motion_findings(decoded.cuts, case, tally, extents, rows)
-    findings = _all_findings(case, coverage, noticed)
-    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally)
+    findings = _all_findings(case, coverage, held_against, noticed)
+    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, held_against)
     trace = slides.trace()
     report = result.report(extents, findings, trace if shaped else None)
     return Verification(report, trace, findings, rows, wanted.cuts, slides.seen())
@@ -143,15 +148,25 @@ def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Co
     return replace(coverage, match=match, findings=(*coverage.findings, *holes))
 
 
+def _held_against(case: Case, *, flat_cuts: bool) -> Held | None:
+    if case.asked is None:
+        return None
+    return hold(case.decoded, case.asked, flat_cuts=flat_cuts, sample_mm=case.options.sample_mm)
+
+
 def _all_findings(
-    case: Case, coverage: Coverage, motion: tuple[Finding, ...]
+    case: Case, coverage: Coverage, held: Held | None, motion: tuple[Finding, ...]
 ) -> tuple[Finding, ...]:
-    """Findings of every stage once, in the order of the stages."""
+    """Findings of every stage once, in the order of the stages. What lies beside what was asked
+    by more than the dialect's resolution is found by coverage too, where it is far: once is
+    enough."""
+    places = coverage.findings if held is None or not held.place else held.place
     groups = (
         case.drawing.findings if case.drawing is not None else (),
         case.wanted.findings if case.wanted is not None else (),
         case.decoded.findings,
-        coverage.findings,
+        places,
+        () if held is None else held.settings,
         motion,
     )
     return tuple(dict.fromkeys(finding for group in groups for finding in group))

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from camtool.verify.records import ShapeReport
+    from camtool.verify.records import AskedReport, ShapeReport
     from camtool.verify.report import Report
 
 
@@ -77,6 +77,8 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
         yield "rapids", f"{mm(far)} mm in XY (as drawn {mm(drawn)} mm)"
     if report.before is not None:
         yield "before", _before(report)
+    if report.asked is not None:
+        yield "as asked", _asked(report.asked)
     error = report.error_um.total
     yield "error", f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}"
     yield "by source", _error_sources(report)
@@ -89,6 +91,16 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
         yield "ends", f"{report.unreached.moves} moves end elsewhere, up to {far:.2f} µm away"
     if report.shape is not None:
         yield "shape", _shape(report.shape)
+
+
+def _asked(asked: AskedReport) -> str:
+    """How many moves are the very ones that were asked for."""
+    if asked.alike == asked.moves:
+        return f"all {asked.moves} cutting moves are those that camtool writes"
+    return (
+        f"{asked.alike} of {asked.moves} cutting moves are those that camtool writes, the others"
+        f" up to {asked.off_um:.2f} µm off ({asked.limit_um:.2f} µm allowed)"
+    )
 
 
 def _shape(shape: ShapeReport) -> str:
