@@ -58,7 +58,7 @@ def hold(decoded: Toolpath, asked: Asked, *, flat_cuts: bool, sample_mm: float) 
 
 def _same(one: Toolpath, other: Toolpath) -> bool:
     """Whether two toolpaths are equal, row for row."""
-    names = ("kind", "end", "centre", "feed", "value", "start")
-    return all(
+    names = ("kind", "end", "centre", "feed", "value", "start", "mode")
+    return one.modes == other.modes and all(
         np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in names
     )

@@ -35,6 +35,7 @@ def hold_settings(
         *_feeds(both, asked),
         *_spindle(both),
         *_tools(both),
+        *_corners(both),
         *_dwells(mine.toolpath, other.toolpath, asked),
         *_clearance(mine, other, alike, asked),
         *_end(mine.toolpath, other.toolpath, asked),
@@ -165,6 +166,37 @@ def _tools(both: _Both) -> Iterator[Finding]:
                 measured=float(is_[row]),
                 limit=limit,
             )
+
+
+def _corners(both: _Both) -> Iterator[Finding]:
+    """SETTING_DIFFERS for moves whose corners may be rounded farther than the written program
+    lets the controller round them; what says nothing leaves them to the machine."""
+    is_, wanted = _rooms(both.decoded), _rooms(both.written)
+    looser = is_[both.pairs[:, 0]] > wanted[both.pairs[:, 1]]
+    rows, of = both.unlike(~looser)
+    if len(rows):
+        row, limit = int(rows[0]), float(wanted[of][0])
+        room = "as far as the moves allow" if np.isinf(is_[row]) else f"within {is_[row]:g} mm"
+        yield Finding(
+            Code.SETTING_DIFFERS,
+            Severity.ERROR,
+            f"{_moves(len(rows))} with corners rounded {room}, where "
+            + (f"{limit:g} mm is asked for" if limit else "none is to be rounded"),
+            where=block_name(both.decoded, row),
+            measured=float(is_[row]) if np.isfinite(is_[row]) else None,
+            limit=limit,
+            unit="mm",
+        )
+
+
+def _rooms(toolpath: Toolpath) -> Floats:
+    """(N,) mm by which the corner behind each row may be rounded, or lines merged; NaN where the
+    program leaves that to the machine."""
+    rooms = [
+        max(mode.tolerance_mm or np.inf, mode.merging_mm) if mode.corners == "blend" else 0.0
+        for mode in toolpath.modes
+    ]
+    return np.array([*rooms, np.nan])[toolpath.mode]
 
 
 def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:

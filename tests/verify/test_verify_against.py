@@ -68,11 +68,13 @@ def told(verification: Verification) -> list[Code]:
 @both
 def test_the_own_program_is_as_asked(target: LoadedTarget) -> None:
     verification = held(program(target), target)
-    assert errors(verification) == [] and told(verification) == []
+    assert errors(verification) == []
+    assert told(verification) == []
     asked = verification.report.asked
     assert asked is not None
     assert asked.alike == asked.moves > 6
-    assert asked.off_um == 0.0 and asked.limit_um == pytest.approx(1.5)
+    assert asked.off_um == 0.0
+    assert asked.limit_um == pytest.approx(1.5)
 
 
 def times(word: str, factor: int) -> Callable[[str], str]:
@@ -112,10 +114,28 @@ def test_a_setting_that_the_job_names_is_held(target: LoadedTarget, fault: str) 
     damaged = damage(text)
     assert damaged != text
     found = [each for each in held(damaged, target).findings if each.code is code]
-    assert found and found[0].severity is Severity.ERROR
+    assert found
+    assert found[0].severity is Severity.ERROR
     assert "block" in found[0].where
     if code is not Code.END_DIFFERS:
-        assert found[0].measured != found[0].limit and found[0].unit
+        assert found[0].measured != found[0].limit
+        assert found[0].unit
+
+
+def test_corners_are_rounded_no_farther_than_asked() -> None:
+    target = load_target("linuxcnc")
+    text = program(target)
+    assert "G64 P0.010\n" in text or "G64 P0.01\n" in text
+
+    def under(mode: str) -> list[Code]:
+        return errors(held(re.sub(r"G64 P\S+", mode, text), target))
+
+    assert under("G64 P1") == under("G64") == [Code.SETTING_DIFFERS]
+    assert under("G64 P0.005") == under("G61") == under("") == []
+    exact = load_target("linuxcnc", settings=["dialect.path=exact-path"])
+    assert "G61\n" in program(exact)
+    damaged = program(exact).replace("G61\n", "G64 P0.01\n")
+    assert errors(held(damaged, exact)) == [Code.SETTING_DIFFERS]
 
 
 @both
@@ -124,13 +144,16 @@ def test_what_nobody_asked_for_is_told(target: LoadedTarget) -> None:
     text = program(target, plain)
     assert told(held(text, target, plain)) == []
     faster = held(times("F", 2)(text), target, plain)
-    assert errors(faster) == [] and told(faster) == [Code.FEED_DIFFERS]
+    assert errors(faster) == []
+    assert told(faster) == [Code.FEED_DIFFERS]
     lower = held(text.replace("Z5.000", "Z2.000"), target, plain)
-    assert errors(lower) == [] and Code.CLEARANCE_LOW in told(lower)
+    assert errors(lower) == []
+    assert Code.CLEARANCE_LOW in told(lower)
     on_stock = held(text.replace("Z5.000", "Z0.000"), target, plain)
     assert Code.CLEARANCE_LOW in errors(on_stock)
     turning = held(text.replace("G0 Z5.000", "M3 S500\nG0 Z5.000", 1), target, plain)
-    assert errors(turning) == [] and told(turning) == [Code.SPINDLE_DIFFERS]
+    assert errors(turning) == []
+    assert told(turning) == [Code.SPINDLE_DIFFERS]
 
 
 @both
@@ -155,7 +178,8 @@ def test_a_shift_of_a_few_units_is_found(target: LoadedTarget) -> None:
     assert "X20.500 " in text
     near = held(text.replace("X20.500 ", "X20.501 "), target)
     assert errors(near) == []
-    assert near.report.asked is not None and 0.9 < near.report.asked.off_um < 1.1
+    assert near.report.asked is not None
+    assert 0.9 < near.report.asked.off_um < 1.1
     far = held(text.replace("X20.500 ", "X20.503 "), target)
     assert errors(far) == [Code.EXTRA_CUT]
     deeper = held(text.replace("Z-1.000", "Z-1.003", 1), target)
@@ -169,7 +193,7 @@ def test_a_circle_cut_twice(target: LoadedTarget) -> None:
     assert len(circles) == 1
     twice = held(text.replace(circles[0], circles[0] * 2), target)
     assert errors(twice) == [Code.EXTRA_CUT]
-    assert "cut 2 times" in [each.message for each in twice.findings if each.severity > 1][0]
+    assert "cut 2 times" in next(each.message for each in twice.findings if each.severity > 1)
 
 
 @both
