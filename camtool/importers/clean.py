@@ -6,7 +6,6 @@ what has no length, and what is drawn twice.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from camtool.geometry.chain import numbered
 from camtool.geometry.drawing import Skipped
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polylines
+from camtool.geometry.repeats import encloses, without_repeats
 from camtool.importers.piece import MAX_COORDINATE_MM, Piece
 
 DRAWN_TWICE = "is drawn twice"
@@ -48,14 +48,12 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
         return Cleaned(Polylines.of([]), np.empty(0, dtype=np.int64))
     vertices, counts = _columns(pieces, file)
     closed = np.array([piece.closed for piece in pieces], dtype=np.bool_)
-    keep, repeated = _without_repeats(vertices, counts, closed)
+    keep, repeated = without_repeats(vertices, counts, closed)
     owner = np.repeat(np.arange(len(pieces)), counts)[keep]
     vertices = vertices[keep]
     left = np.bincount(owner, minlength=len(pieces))
     long_enough = left >= 2
-    # There and back along one line encloses nothing: it is that line, once.
-    bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(pieces))
-    closed &= (left != 2) | (bent != 0.0)
+    closed &= encloses(vertices, owner, left)
     gone = _kinds(pieces, ~long_enough, "has no length")
     points = _kinds(pieces, long_enough & (repeated > 0), "is repeated", repeated, "point of ")
     rows = np.flatnonzero(long_enough)
@@ -92,56 +90,6 @@ def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
         where=where,
         mend="move the drawing to its origin, or name its unit with --units",
     )
-
-
-def _without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bools, Ints]:
-    """The vertices (N,) to keep, and how many points each piece repeats (M,).
-
-    A vertex is kept when it lies off the one kept before it; its bulge is that of the last vertex
-    on it, for a bulge belongs to what leaves. A closed piece's repeated first point at its end
-    goes uncounted: it says "closed" once more.
-    """
-    first = np.cumsum(counts) - counts
-    filled = counts > 0
-    begins = np.zeros(len(vertices), dtype=np.bool_)
-    begins[first[filled]] = True
-    step = np.hypot(*np.diff(vertices[:, :2], axis=0, prepend=np.nan).T)
-    keep = begins | ~(step <= POSITION_EPS_MM)
-    owner = np.repeat(np.arange(len(counts)), counts)
-    for piece in np.unique(owner[~keep]).tolist():
-        rows = slice(int(first[piece]), int(first[piece] + counts[piece]))
-        keep[rows] = _kept(vertices[rows])
-    repeated = np.bincount(owner[~keep], minlength=len(counts)).astype(np.int64)
-    _drop_closing(vertices, keep, owner, first, closed & filled)
-    return keep, repeated
-
-
-def _kept(path: Floats) -> Bools:
-    """The vertices of one piece to keep, which take the bulges of those left out after them."""
-    keep = np.zeros(len(path), dtype=np.bool_)
-    last = -1
-    for row, (x, y, bulge) in enumerate(path.tolist()):
-        if last >= 0 and math.hypot(x - path[last, 0], y - path[last, 1]) <= POSITION_EPS_MM:
-            path[last, 2] = bulge
-        else:
-            keep[row] = True
-            last = row
-    return keep
-
-
-def _drop_closing(vertices: Floats, keep: Bools, owner: Ints, first: Ints, closed: Bools) -> None:
-    """Takes vertices at the end of closed pieces out of `keep` that lie on their first one."""
-    waiting = closed.copy()
-    while waiting.any():
-        rows = np.flatnonzero(keep)
-        is_last = np.append(owner[rows][1:] != owner[rows][:-1], True) & waiting[owner[rows]]
-        last = rows[is_last]
-        begin = first[owner[last]]
-        apart = np.hypot(*(vertices[last, :2] - vertices[begin, :2]).T)
-        same = (apart <= POSITION_EPS_MM) & (last != begin)
-        keep[last[same]] = False
-        waiting[:] = False
-        waiting[owner[last[same]]] = True
 
 
 def _kinds(

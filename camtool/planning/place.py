@@ -15,9 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camtool.errors import GeometryError, OptionError
+from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, FitError, Gap, Healing
 from camtool.geometry.measure import extents
-from camtool.geometry.polylines import Floats, Polylines
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polylines
+from camtool.geometry.repeats import encloses, without_repeats
 from camtool.planning.job import Job, Placement
 
 MOST_POINTS = 10_000_000
@@ -58,7 +60,9 @@ def place(drawing: Drawing, job: Job) -> Drawing:
     Copies come one after the other, row by row: all paths and marks of the first, then of the
     second, whose sources say so ("CIRCLE 2F copy 2"). Fit, lower left and centre take the box
     around all that the operations take. What was found on reading stays in the drawing's frame.
-    Raises OptionError for a fit that cannot be, and for a scale that leaves no shape.
+    Points that the scale brings together are
+    merged (`collapsed` tells). Raises OptionError for a fit that cannot be, and for a scale that
+    leaves no shape at all.
     """
     placement = job.placement
     if placement == Placement():
@@ -73,6 +77,29 @@ def place(drawing: Drawing, job: Job) -> Drawing:
         _repeated(drawing, maps),
         fit=FitError(drawing.fit.max_mm * first.scale, drawing.fit.rms_mm * first.scale),
     )
+
+
+def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
+    """What the scale made too small for a shape, told once: points that became one, and paths
+    that became a point and are left out (a warning: something drawn is not cut)."""
+    columns, rows = job.placement.copies
+    paths = columns * rows * len(drawing.paths) - len(placed.paths)
+    points = columns * rows * len(drawing.paths.vertices) - len(placed.paths.vertices)
+    if not points:
+        return []
+    return [
+        Finding(
+            Code.POINTS_MERGED,
+            Severity.WARNING if paths else Severity.INFO,
+            f"at this scale {points} points lie within {POSITION_EPS_MM * 1e6:g} nm of the one "
+            "before them and were merged"
+            + (f"; {paths} paths are no longer than that and are left out" if paths else ""),
+            where=drawing.file,
+            measured=float(points),
+            limit=POSITION_EPS_MM,
+            unit="",
+        )
+    ]
 
 
 def _first_map(drawing: Drawing, job: Job) -> _Map:
@@ -97,7 +124,14 @@ def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:
 
 def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -> float:
     """The largest scale at which the box (2, 2) is no larger than `fit_mm`; 0 there is any."""
-    sizes = np.zeros(2) if box is None else box[:, 1] - box[:, 0]
+    if box is None:
+        raise OptionError(
+            "the operations take nothing of this drawing, so that nothing can be made to fit",
+            file=file,
+            where="key fit",
+            mend="choose other layers, or drill its single points (--kind drill)",
+        )
+    sizes = box[:, 1] - box[:, 0]
     scales = [
         room / size
         for room, size in zip(fit_mm, sizes.tolist(), strict=True)
@@ -132,7 +166,7 @@ def _box(drawing: Drawing, job: Job, where: _Map) -> Floats | None:
     paths, marks = taken(drawing, job)
     boxes = []
     if paths:
-        boxes.append(extents(_lines(drawing.paths.select(paths), [where])))
+        boxes.append(extents(_lines(drawing.paths.select(paths), [where])[0]))
     if marks:
         points = where.points(np.array([drawing.marks[index].at_mm for index in marks]))
         boxes.append(np.column_stack([points.min(axis=0), points.max(axis=0)]))
@@ -190,15 +224,17 @@ def _is_identity(where: _Map) -> bool:
 
 
 def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
-    """All that has a place, once for each map."""
-    count = len(maps)
+    """All that has a place, once for each map; paths that the scale makes a point are left out."""
+    paths, rows = _lines(drawing.paths, maps)
+    copy, path = np.divmod(rows, max(1, len(drawing.paths)))
+    which = list(zip(copy.tolist(), path.tolist(), strict=True))
     return replace(
         drawing,
-        paths=_lines(drawing.paths, maps),
-        layers=drawing.layers * count,
-        colours=drawing.colours * count,
-        sources=tuple(_copy_name(s, n) for n in range(count) for s in drawing.sources),
-        line_types=drawing.line_types * count,
+        paths=paths,
+        layers=tuple(drawing.layers[each] for _, each in which),
+        colours=tuple(drawing.colours[each] for _, each in which),
+        sources=tuple(_copy_name(drawing.sources[each], n) for n, each in which),
+        line_types=tuple(drawing.line_types[each] for _, each in which),
         marks=tuple(
             replace(mark, at_mm=where.point(mark.at_mm), source=_copy_name(mark.source, n))
             for n, where in enumerate(maps)
@@ -206,22 +242,36 @@ def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
         ),
         gaps=_gaps(drawing.gaps, maps),
         closed_gaps=_gaps(drawing.closed_gaps, maps),
-        healing=_healing(drawing, maps),
+        healing=_healing(drawing, maps, rows),
     )
 
 
-def _lines(lines: Polylines, maps: list[_Map]) -> Polylines:
-    """The paths under each map, one map after the other."""
-    step = len(lines.vertices)
-    offsets = [lines.offsets[1:] + n * step for n in range(len(maps))]
+def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints]:
+    """The paths under each map, one map after the other, and which of these (copy · paths + path)
+    are left: points that the scale brings together are merged, and a path of one point is none.
+
+    OptionError when numbers are lost, or no path is left of any.
+    """
+    count = len(maps) * len(lines)
+    counts = np.tile(np.diff(lines.offsets), len(maps))
+    closed = np.tile(lines.closed, len(maps))
+    with np.errstate(over="ignore", invalid="ignore"):
+        vertices = np.concatenate([where.vertices(lines.vertices) for where in maps])
+        keep, _ = without_repeats(vertices, counts, closed)
     try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            vertices = np.concatenate([where.vertices(lines.vertices) for where in maps])
-        return Polylines(
-            vertices,
-            np.concatenate([lines.offsets[:1], *offsets]),
-            np.tile(lines.closed, len(maps)),
-        )
+        if keep.all():
+            offsets = np.concatenate([[0], np.cumsum(counts)])
+            return Polylines(vertices, offsets, closed), np.arange(count)
+        owner = np.repeat(np.arange(count), counts)[keep]
+        left = np.bincount(owner, minlength=count)
+        rows = np.flatnonzero(left >= 2)
+        if not len(rows):
+            offsets = np.concatenate([[0], np.cumsum(counts)])
+            Polylines(vertices, offsets, closed)  # raises: it names the first point
+        vertices = vertices[keep]
+        closed &= encloses(vertices, owner, left)
+        offsets = np.concatenate([[0], np.cumsum(left[rows])])
+        return Polylines(vertices[left[owner] >= 2], offsets, closed[rows]), rows
     except GeometryError as error:
         raise OptionError(
             f"scaled {maps[0].scale:g} times, {error.where or 'a path'} has no shape:"
@@ -243,9 +293,11 @@ def _gaps(gaps: tuple[Gap, ...], maps: list[_Map]) -> tuple[Gap, ...]:
     )
 
 
-def _healing(drawing: Drawing, maps: list[_Map]) -> Healing:
-    """The places of branches and crossings; what was counted on reading stays as it was."""
+def _healing(drawing: Drawing, maps: list[_Map], rows: Ints) -> Healing:
+    """The places of branches and crossings of the paths `rows` that are left; what was counted on
+    reading stays as it was."""
     healing, paths = drawing.healing, len(drawing.paths)
+    now = {row: index for index, row in enumerate(rows.tolist())}
     return replace(
         healing,
         branches=tuple(
@@ -254,8 +306,9 @@ def _healing(drawing: Drawing, maps: list[_Map]) -> Healing:
             for branch in healing.branches
         ),
         crossings=tuple(
-            replace(each, at_mm=where.point(each.at_mm), path=each.path + n * paths)
+            replace(each, at_mm=where.point(each.at_mm), path=now[each.path + n * paths])
             for n, where in enumerate(maps)
             for each in healing.crossings
+            if each.path + n * paths in now
         ),
     )

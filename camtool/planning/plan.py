@@ -26,7 +26,7 @@ from camtool.planning.contours.levels import carved_levels, levels
 from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
 from camtool.planning.job import Job, Operation
 from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
-from camtool.planning.place import place
+from camtool.planning.place import collapsed, place
 from camtool.planning.places import operation_name
 from camtool.toolpath.moves import Toolpath
 
@@ -85,7 +85,8 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
 
         approaches = partial(Approaches, machine)
     toolpath = link(worked, safe_z_of(job, machine), approaches).finish()
-    findings = [finding for step in steps for finding in step.findings]
+    findings = collapsed(drawing, placed, job)
+    findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, job, any(step.runs for step in steps))
     findings += checked(toolpath, job, machine)
     made_from = PurePath(drawing.file).name

@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
+from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Branch, Drawing, FitError, Gap, Healing, Mark, SelfCrossing
 from camtool.geometry.measure import extents, path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline, Segments
 from camtool.planning import place as module
 from camtool.planning.job import Job, Operation, Placement, job_of
-from camtool.planning.place import place, taken
+from camtool.planning.place import collapsed, place, taken
 from tests.drawings import drawing_of
 from tests.strategies import polylines
 
@@ -40,8 +41,8 @@ def _mark(x: float, y: float, layer: str = "0") -> Mark:
 
 def test_the_drawing_itself_when_nothing_changes() -> None:
     made = drawing_of([_box(0, 0, 4, 3)])
-    for settings in ({}, {"origin": "drawing"}, {"origin": "lower-left"}, {"origin": (0.0, 0.0)}):
-        assert place(made, job_of(**settings)) is made
+    for same in ({}, {"origin": "drawing"}, {"origin": "lower-left"}, {"origin": (0.0, 0.0)}):
+        assert place(made, job_of(**same)) is made
     assert place(made, job_of(rotate_rad=2.0 * math.pi, fit_mm=(4.0, 9.0))) is made
     assert place(made, job_of(origin="centre")) is not made
 
@@ -271,3 +272,52 @@ def test_placements_that_cannot_be(settings: dict[str, Any], where: str) -> None
     with pytest.raises(OptionError) as caught:
         Placement(**settings)
     assert caught.value.where == where
+
+
+def _fine(count: int) -> Polyline:
+    """A closed path with a run of `count` points 20 nm apart on its first side."""
+    run = [[2e-5 * k, 0.0, 0.0] for k in range(count)]
+    return Polyline(np.array([*run, [4.0, 0.0, 0.5], [4.0, 3.0, 0.0], [0.0, 3.0, 0.0]]), True)
+
+
+@settings(deadline=None)
+@given(
+    scale=st.sampled_from([1.0, 0.5, 0.05, 0.01, 1e-3]),
+    count=st.integers(1, 60),
+    rotate=st.floats(0.0, 6.0),
+)
+def test_points_that_the_scale_brings_together_are_one(
+    scale: float, count: int, rotate: float
+) -> None:
+    made = drawing_of([_fine(count), _box(10, 10, 11, 11)])
+    job = job_of(scale=scale, rotate_rad=rotate)
+    placed = place(made, job)
+    assert len(placed.paths) == 2
+    assert path_lengths(placed.paths) == pytest.approx(
+        scale * path_lengths(made.paths), abs=2.1e-6 * count
+    )
+    areas = scale**2 * signed_areas(made.paths)
+    assert signed_areas(placed.paths) == pytest.approx(areas, abs=1e-5)
+    gone = len(made.paths.vertices) - len(placed.paths.vertices)
+    told = collapsed(made, placed, job)
+    assert [each.measured for each in told] == ([float(gone)] if gone else [])
+    assert gone == 0 if scale > 0.05 else (count < 2 or gone > 0)
+
+
+def test_paths_that_become_a_point_are_left_out_and_told() -> None:
+    speck = _box(5, 5, 5.00001, 5.00001)
+    made = replace(
+        drawing_of([_box(0, 0, 2, 1), speck, _line(0, 0, 1, 1)]),
+        layers=("A", "B", "C"),
+        healing=Healing(
+            crossings=(SelfCrossing((5.0, 5.0), 1, "B"), SelfCrossing((0.5, 0.5), 2, "C"))
+        ),
+    )
+    job = job_of(scale=0.05, copies=(2, 1), pitch_mm=(3.0, 0.0))
+    placed = place(made, job)
+    assert placed.layers == ("A", "C", "A", "C")
+    assert placed.sources[2].endswith("copy 2")
+    assert [each.path for each in placed.healing.crossings] == [1, 3]
+    (told,) = collapsed(made, placed, job)
+    assert (told.code, told.severity) == (Code.POINTS_MERGED, Severity.WARNING)
+    assert "2 paths" in told.message
