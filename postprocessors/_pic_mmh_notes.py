@@ -17,6 +17,9 @@ class Notes:
     split: int = 0
     split_place: str = ""
     split_step_mm: float = 0.0
+    far: int = 0
+    """Arcs whose centre the dialect cannot say."""
+    far_place: str = ""
     mended: int = 0
     remainder_um: float = 0.0
     remainder_place: str = ""
@@ -47,6 +50,18 @@ class Notes:
                     f"{self.dropped} moves of less than a step were left out, "
                     f"{self.arcs_as_lines} arcs too small to end as arcs were written as lines",
                     measured=float(collapsed),
+                    unit="moves",
+                )
+            )
+        if self.far:
+            found.append(
+                Finding(
+                    Code.ARC_MENDED,
+                    Severity.INFO,
+                    f"{self.far} nearly straight arcs, whose centres have more than five digits "
+                    "of µm, were written as lines within a step or unit of them",
+                    where=self.far_place,
+                    measured=float(self.far),
                     unit="moves",
                 )
             )

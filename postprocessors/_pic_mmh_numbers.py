@@ -37,7 +37,8 @@ what rounding centre and ends to 1 µm makes of an arc (√2 µm at each end).""
 class Numbers:
     """One item per row: ends (x, y, z) and centres (x, y) as units and as steps, feed words.
 
-    `centre_*` are (0, 0) and `feed_words` "" where the row has none.
+    `centre_*` are (0, 0) and `feed_words` "" where the row has none; a centre that cannot be said
+    is none (`far_arcs`).
     """
 
     grids: tuple[Grid, Grid, Grid]
@@ -56,7 +57,8 @@ def numbers_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Number
     grids = (x, y, z)
     _check_coordinates(toolpath, grids)
     words, finding = _feed_words(toolpath, machine)
-    centres = np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0)
+    centred = toolpath.is_arc & ~far_arcs(toolpath, machine, dialect)
+    centres = np.where(centred[:, None], toolpath.centre, 0.0)
     end_units, end_steps = _both(toolpath.end, grids)
     centre_units, centre_steps = _both(centres, grids)
     return Numbers(
@@ -136,23 +138,23 @@ def _check_arcs(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> None:
-    """Five digits of µm (L3284-3285) for every end and every arc's centre."""
-    columns = [
-        (name, toolpath.end[:, axis], np.ones(len(toolpath), dtype=np.bool_))
-        for axis, name in enumerate("XYZ")
-    ]
-    columns += [
-        (name, toolpath.centre[:, axis], toolpath.is_arc) for axis, name in enumerate("IJ")
-    ]
-    for (name, values, used), axis in zip(columns, (0, 1, 2, 0, 1), strict=True):
+    """Five digits of µm (L3284-3285) for every end."""
+    for name, values, grid in zip("XYZ", toolpath.end.T, grids, strict=True):
         _refuse(
-            used & ~grids[axis].fits(values),
+            ~grid.fits(values),
             toolpath,
             lambda row, name=name, values=values: (  # type: ignore[misc]
                 f"{name} = {values[row]:.6g} mm has more than five digits of µm"
             ),
-            "keep every coordinate and arc centre within ±99.999 mm",
+            "keep every coordinate within ±99.999 mm",
         )
+
+
+def far_arcs(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Bools:
+    """(N,) true for arcs whose centre has more than five digits of µm: nearly straight ones."""
+    grids = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
+    said = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
+    return np.asarray(toolpath.is_arc & ~(said[0] & said[1]))
 
 
 def _feed_words(toolpath: Toolpath, machine: Machine) -> tuple[list[str], Finding | None]:

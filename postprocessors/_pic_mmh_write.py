@@ -9,6 +9,7 @@ step position: a block is sent only when it moves that position, and every arc i
 from __future__ import annotations
 
 import math
+from typing import NoReturn
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.controllers import PicMmhController
 from camtool.machine.model import Machine, controller_of
-from camtool.toolpath.lower import helices_to_steps, slope_step_mm
+from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 
@@ -35,7 +36,7 @@ from ._pic_mmh_arcs import (
 from ._pic_mmh_block import WORD
 from ._pic_mmh_format import SAY, Floats, Grid
 from ._pic_mmh_notes import Notes, too_long
-from ._pic_mmh_numbers import check_motion, event_words, numbers_of, place
+from ._pic_mmh_numbers import check_motion, event_words, far_arcs, numbers_of, place
 from ._pic_mmh_options import dialect_of
 
 XY = tuple[int, int]
@@ -54,6 +55,15 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     )
 
 
+def _refuse_chords(where: str) -> NoReturn:
+    """PostError for an arc that passes where no coordinate can be said."""
+    raise PostError(
+        "an arc that has to be written as lines leaves the five digits of a coordinate",
+        where=where,
+        mend="keep every coordinate within ±99.999 mm",
+    )
+
+
 class _Writer:
     """The rows followed once; `units` and `steps` are where the controller stands (x, y, z)."""
 
@@ -67,16 +77,27 @@ class _Writer:
         self._wanted = toolpath
         check_motion(toolpath, machine)
         # Refuses by the numbers of the rows that were given, before these are lowered.
-        self._feed_finding = numbers_of(toolpath, machine, dialect).feed_finding
+        given = numbers_of(toolpath, machine, dialect)
+        self._feed_finding = given.feed_finding
         step_mm = slope_step_mm(machine)
-        lowered = helices_to_steps(toolpath, step_mm)
+        far = far_arcs(toolpath, machine, dialect)
+        straight = arcs_to_lines(toolpath, far, LINE_SAGITTA * given.grids[0].resolution_mm)
+        stepped = helices_to_steps(straight.toolpath, step_mm)
+        lowered = stepped.after(straight)
+        beyond = ~given.grids[0].fits(lowered.toolpath.end[:, :2]).all(axis=1)
+        if beyond.any():
+            _refuse_chords(place(toolpath, int(lowered.row[beyond.argmax()])))
         self._toolpath, self._row = lowered.toolpath, lowered.row.tolist()
         self._numbers = numbers_of(lowered.toolpath, machine, dialect)
-        self._notes = Notes(split_step_mm=step_mm)
+        self._notes = Notes(split_step_mm=step_mm, far=int(far.sum()))
+        if far.any():
+            self._notes.far_place = place(toolpath, int(far.argmax()))
         self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
-        if (slopes := self._split & toolpath.is_feed).any():
-            self._notes.split = int(slopes.sum())
-            self._notes.split_place = place(toolpath, int(slopes.argmax()))
+        steps = np.bincount(stepped.row, minlength=len(straight.toolpath)) > 1
+        slopes = np.unique(straight.row[steps & straight.toolpath.is_feed])
+        if len(slopes):
+            self._notes.split = len(slopes)
+            self._notes.split_place = place(toolpath, int(slopes[0]))
         self._units = [0, 0, 0]
         self._steps = [0, 0, 0]
         self._starts = lowered.toolpath.starts[:, :2]
@@ -127,7 +148,7 @@ class _Writer:
             self._arc(row, kind)
         elif [x, y] != self._steps[:2]:
             self._send_xy(row, WORD[kind], self._numbers.end_units[row], (x, y))
-        elif not self._split[self._row[row]]:  # parts of slopes may be small
+        elif not self._split[self._row[row]]:  # parts of slopes and of far arcs may be small
             self._notes.dropped += 1
 
     def _send_z(self, row: int, kind: Kind) -> None:
@@ -228,11 +249,7 @@ class _Writer:
         sagitta = LINE_SAGITTA * grid.resolution_mm
         ends = chord_ends(start, self._toolpath.centre[row], sweep_rad, sagitta)
         if not grid.fits(ends[:-1]).all():
-            raise PostError(
-                "an arc that has to be written as lines leaves the five digits of a coordinate",
-                where=self._place(row),
-                mend="keep every coordinate within ±99.999 mm",
-            )
+            _refuse_chords(self._place(row))
         units = [*grid.units(ends[:-1]).tolist(), self._numbers.end_units[row][:2]]
         for point in units:
             x, y = grid.steps(np.array(point)).tolist()

@@ -191,7 +191,7 @@ REFUSED = {
     "Z too long": (builder().rapid(z=99.999996), "Z = 100 mm"),
     "centre too far": (
         builder().arc(0, 0, centre=(0, 200), ccw=True, feed=1),
-        "J = 200 mm has more than five digits",
+        "an arc that has to be written as lines leaves the five digits",
     ),
     "arc without centre": (
         builder().arc(1, 0, centre=(math.nan, 0), ccw=True, feed=1),
