@@ -11,7 +11,7 @@ from camtool.machine.loader import convert
 from camtool.machine.model import Machine
 from camtool.machine.ranges import Tolerance
 
-from ._gcode_options import feed_decimals
+from ._gcode_options import check_unit, feed_decimals
 
 MOST_MM: Final = 9999.999
 """Coordinates beyond this have more than the 4.3 digits of a block (L436, L440-451)."""
@@ -47,4 +47,6 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def dialect_of(machine: Machine) -> Dialect:
     """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
     feed_decimals(machine)
-    return convert(machine.dialect, Dialect, machine.target.name, "dialect")
+    dialect = convert(machine.dialect, Dialect, machine.target.name, "dialect")
+    check_unit(machine, 10.0**-dialect.decimals, dialect.arc_spread_mm)
+    return dialect

@@ -26,6 +26,9 @@ POWER_OF_TEN_TOLERANCE: Final = 1e-9
 MOST_FEED_DECIMALS: Final = 6
 """`feed.unit_mm_min` is no smaller than 10 to the minus this."""
 
+UNIT_GUARD: Final = 1e-9
+"""Part of a length: a last decimal that is worth a step by less is worth a step."""
+
 
 class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What both dialects let a user choose, and their controller's rule for arcs.
@@ -69,3 +72,25 @@ def feed_decimals(machine: Machine) -> int:
             mend="use 1, 0.1, 0.01 or 0.001",
         )
     return whole
+
+
+def check_unit(machine: Machine, unit_mm: float, arc_spread_mm: float) -> None:
+    """MachineError where the last decimal of a coordinate, worth `unit_mm`, is more than a dialect
+    can lose: a step of the machine, or what the radii of an arc may differ by, which the rounding
+    of its numbers makes up to a unit."""
+    step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    if unit_mm > step_mm * (1.0 + UNIT_GUARD):
+        raise MachineError(
+            f"the last decimal is worth {unit_mm:g} mm, more than a step of {step_mm:g} mm",
+            file=machine.target.name,
+            where="table [dialect], key decimals",
+            mend=f"{math.ceil(math.log10(unit_mm / step_mm) - UNIT_GUARD)} more are needed",
+        )
+    if arc_spread_mm <= unit_mm * (1.0 + UNIT_GUARD):
+        raise MachineError(
+            f"{arc_spread_mm:g} mm is no more than the last decimal is worth, {unit_mm:g} mm: "
+            "rounding alone makes the radii of an arc differ by that",
+            file=machine.target.name,
+            where="table [dialect], key arc_spread_mm",
+            mend=f"use {2.0 * unit_mm:g}, or more decimals",
+        )

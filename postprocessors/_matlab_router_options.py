@@ -46,7 +46,8 @@ class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     format: Literal["m", "stream"] = "m"
     speed: Literal["axis", "path"] = "axis"
     too_fast: Literal["refused", "limited"] = "refused"
-    arc_tolerance_mm: Tolerance = 0.05
+    # Half the grid: with more, chords leave their arc farther than its snapped vertices may.
+    arc_tolerance_mm: Annotated[float, Meta(ge=1e-6, le=0.1)] = 0.05
     bend_tolerance_mm: Tolerance = 0.1
     plunge_mm: Depth = 10.0
     plunge_mm_min: FeedRate = 234.375

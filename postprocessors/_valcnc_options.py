@@ -11,6 +11,8 @@ from camtool.machine.loader import convert
 from camtool.machine.model import Machine
 from camtool.machine.ranges import Count, Scale, Step, Tolerance
 
+from ._gcode_options import check_unit
+
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
@@ -32,7 +34,7 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     coord_scale_checked: bool = False
     decimals: Annotated[int, Meta(ge=1, le=6)] = 4
     block_chars: Count = 127
-    max_sweep_deg: Annotated[float, Meta(ge=1e-3, le=180.0)] = 90.0
+    max_sweep_deg: Annotated[float, Meta(ge=1.0, le=90.0)] = 90.0
     full_circles: Literal["refused", "whole"] = "refused"
     missing_words: Literal["refused", "keep", "zero"] = "refused"
     z_order: Literal["refused", "before", "after", "together"] = "refused"
@@ -41,7 +43,11 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def dialect_of(machine: Machine) -> Dialect:
     """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
-    return convert(machine.dialect, Dialect, machine.target.name, "dialect")
+    dialect = convert(machine.dialect, Dialect, machine.target.name, "dialect")
+    mm_per_unit = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    mm_per_unit /= dialect.coord_scale * dialect.nominal_step_mm
+    check_unit(machine, 10.0**-dialect.decimals * mm_per_unit, dialect.arc_spread_mm)
+    return dialect
 
 
 def scales_of(machine: Machine, dialect: Dialect) -> npt.NDArray[np.float64]:

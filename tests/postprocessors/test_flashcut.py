@@ -111,7 +111,8 @@ def test_options() -> None:
     assert write(path, "dialect.z_up=-") == ["G00 Z-0.5", "G00 X1.25 Y0.0", "M30"]
     assert write(path, "dialect.trailing_zeros=true")[1] == "G00 X1.250 Y0.000"
     assert write(path, "dialect.program_end=M02")[2] == "M02"
-    assert write(path, "dialect.decimals=1")[1] == "G00 X1.3 Y0.0"
+    fine = ToolpathBuilder().rapid(1.23456, 0.0).finish()
+    assert write(fine, "dialect.decimals=4")[0] == "G00 X1.2346 Y0.0"
     assert write(path, "feed.unit_mm_min=0.01") == write(path)
 
 
@@ -188,6 +189,8 @@ def test_texts_of_drawings_never_reach_a_program() -> None:
     [
         (["dialect.decimals=0"], "decimals"),
         (["dialect.decimals=5"], "decimals"),
+        (["dialect.decimals=2"], "1 more are needed"),
+        (["dialect.arc_spread_mm=0.001"], "rounding alone"),
         (["dialect.feed_words=never"], "feed_words"),
         (["dialect.arc_spread_mm=0"], "arc_spread_mm"),
         (["dialect.colour=red"], "colour"),

@@ -114,7 +114,7 @@ def test_circles_on_axes_of_unequal_steps_become_lines() -> None:
 
 def test_no_arc_is_longer_than_asked_for() -> None:
     path = ToolpathBuilder().rapid(10.0, 0.0).arc(10.0, 0.0, centre=(0, 0), ccw=True, feed=14400.0)
-    for degrees, count in ((90, 4), (45, 8), (180, 2), (100, 4)):
+    for degrees, count in ((90, 4), (45, 8), (60, 6), (85, 5)):
         setting = f"dialect.max_sweep_deg={degrees}"
         back = read("\n".join(write(path.finish(), setting)).encode())
         sweeps = np.abs(back.sweeps()[back.is_arc])
@@ -149,7 +149,10 @@ def test_texts_of_drawings_never_reach_a_program() -> None:
     [
         ("dialect.coord_scale=0", "coord_scale"),
         ("dialect.decimals=7", "decimals"),
-        ("dialect.max_sweep_deg=181", "max_sweep_deg"),
+        ("dialect.max_sweep_deg=91", "max_sweep_deg"),
+        ("dialect.max_sweep_deg=0.5", "max_sweep_deg"),
+        ("dialect.decimals=2", "decimals"),
+        ("dialect.arc_spread_mm=0.0008", "arc_spread_mm"),
         ("dialect.missing_words=guess", "missing_words"),
         ("dialect.z_order=first", "z_order"),
         ("dialect.steps=200", "steps"),
