@@ -57,6 +57,7 @@ class Code(IntEnum):
     NOT_DRILLED = 216
     HOLE_SIZE = 217
     TOOL_NOT_SAID = 218
+    SIDE_BY_UNCUT = 219
 
     BLOCK_TOO_LONG = 301
     FEED_ROUNDED = 302

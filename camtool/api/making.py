@@ -26,7 +26,7 @@ def plan(
     N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, all
     lines are followed with a tool of no width; `job_of(tool_diameter_mm=0.2, side="auto")` makes
     a simple one. Raises OptionError for what the job asks and the drawing or the machine cannot
-    give; of a file, layers that the operations name are read alone. Source: docs/toolpaths.md.
+    give. Of a file only the layers that the operations name are cut. Source: docs/toolpaths.md.
     """
     from camtool.planning.plan import plan as planned
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -12,9 +13,8 @@ from camtool.cli.jobflags import JobFlags
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.cli.sections import SectionedCommand
 
-if TYPE_CHECKING:
-    from camtool.geometry.drawing import Drawing
-    from camtool.planning.job import Job, Operation
+MOST_GROUPS = 12
+"""So many groups of contours of an operation are printed."""
 
 
 @click.group(short_help="Job files: begin one, or see what one says.")
@@ -65,56 +65,87 @@ def new(
 @job.command(cls=SectionedCommand, short_help="What a job file says.")
 @click.argument("file", metavar="FILE")
 @click.option("--against", metavar="DRAWING", help="Say what of this drawing is taken.")
+@click.option("--json", "report", metavar="FILE", help="The same as JSON; - is stdout.")
+@machine_options
 @drawing_options
 @talk_options
 def check(
-    file: str, against: str | None, drawing: DrawingFlags, quiet: bool, verbose: bool
+    file: str,
+    against: str | None,
+    report: str | None,
+    machine: MachineFlags,
+    drawing: DrawingFlags,
+    quiet: bool,
+    verbose: bool,
 ) -> None:
-    """Check the job FILE, and say what each operation does; with --against, to which paths."""
-    from camtool.cli.talk import one_line
+    """Check the job FILE, and say what each operation does; with --against, to which paths, on
+    which side of them, and why."""
+    from camtool.cli.output import STDOUT, check_places, write_all
+    from camtool.cli.talk import one_line, say_findings
+    from camtool.jobs.described import described
 
+    inputs = [file, against, *machine.files()]
+    check_places(inputs, [report])
     said = JobFlags(file, (), {}).job(drawing)
-    read = drawing.read(against, job=said) if against is not None else None
-    if not quiet:
-        for line in _summary(said, read):
+    target = machine.load().machine if machine.name() is not None else None
+    read = drawing.read(against, target, said) if against is not None else None
+    facts, findings = described(said, read, target)
+    if report is not None:
+        facts["findings"] = [
+            {
+                "code": each.code.name,
+                "severity": each.severity.name.lower(),
+                "message": each.message,
+            }
+            for each in findings
+        ]
+        write_all({report: (json.dumps(facts, indent=2, ensure_ascii=False) + "\n").encode()})
+    if not quiet and report != STDOUT:
+        for line in _summary(facts):
             click.echo(one_line(line))
+    say_findings(findings, quiet=quiet, verbose=verbose)
 
 
-def _summary(job: Job, drawing: Drawing | None) -> Iterator[str]:
-    """The operations of a job, and what of a drawing they take."""
-    placed = None
-    if drawing is not None:
-        from camtool.geometry.facts import drawing_extents
-        from camtool.planning.place import place
+def _summary(facts: dict[str, Any]) -> Iterator[str]:
+    """What a job says, and what of a drawing it takes, line by line."""
+    if "extents_mm" in facts:
+        axes = facts["extents_mm"].items()
+        ranges = (f"{axis} {' … '.join(map(_place, pair))}" for axis, pair in axes)
+        yield f"drawing    {'   '.join(ranges)} mm"
+    for operation in facts["operations"]:
+        name = f"operation  {operation['number']} {operation['name']}".rstrip()
+        yield f"{name}: {_does(operation)}"
+        if "takes" in operation:
+            takes = operation["takes"]
+            yield (
+                f"           {takes['closed']} closed paths, {takes['open']} open,"
+                f" {takes['points']} points"
+            )
+            yield from _sides(operation["contours"])
+    if "stock_mm" in facts:
+        yield f"stock      {' by '.join(f'{size:g}' for size in facts['stock_mm']['size'])} mm"
 
-        placed = place(drawing, job)
-        (left, right), (low, high) = drawing_extents(placed).tolist()
-        x, y = (" … ".join(map(_place, pair)) for pair in ((left, right), (low, high)))
-        yield f"drawing    x {x}   y {y} mm"
-    for number, operation in enumerate(job.operations, start=1):
-        yield f"operation  {number} {operation.name}".rstrip() + f": {_does(operation)}"
-        if placed is not None:
-            yield f"           {_takes(operation, placed)}"
-    if job.stock is not None:
-        width, height = job.stock.size_mm
-        yield f"stock      {width:g} by {height:g} by {job.stock.thickness_mm:g} mm"
+
+def _sides(groups: list[dict[str, Any]]) -> Iterator[str]:
+    """The groups of contours with their sides; the largest where there are many."""
+    shown = sorted(groups, key=lambda group: -group["contours"])[:MOST_GROUPS]
+    for group in shown:
+        yield (
+            f"           {group['contours']} on layer {group['layer'] or '(no name)'}"
+            f" {group['side']}: {group['why']}"
+        )
+    if len(groups) > len(shown):
+        yield f"           and {len(groups) - len(shown)} groups more; --json has them all"
 
 
 def _place(mm: float) -> str:
     return f"{round(mm, 4) + 0.0:.4f}"  # never −0
 
 
-def _does(operation: Operation) -> str:
-    tool = operation.tool
-    called = f" ({tool.name})" if tool.name else ""
-    depth = "" if operation.depth_mm is None else f", {operation.depth_mm:g} mm deep"
-    step = "" if operation.step_down_mm is None else f" by {operation.step_down_mm:g} mm"
-    return f"{operation.kind}, tool {tool.diameter_mm:g} mm{called}{depth}{step}"
-
-
-def _takes(operation: Operation, drawing: Drawing) -> str:
-    names = zip(drawing.layers, drawing.colours, strict=True)
-    rows = [row for row, each in enumerate(names) if operation.takes(*each)]
-    closed = int(drawing.paths.closed[rows].sum())
-    marks = sum(operation.takes(mark.layer, mark.colour) for mark in drawing.marks)
-    return f"{closed} closed paths, {len(rows) - closed} open, {marks} points"
+def _does(operation: dict[str, Any]) -> str:
+    tool = operation["tool"]
+    called = f" ({tool['name']})" if tool["name"] else ""
+    depth, step = operation["depth_mm"], operation["step_down_mm"]
+    deep = "" if depth is None else f", {depth:g} mm deep"
+    by = "" if step is None else f" by {step:g} mm"
+    return f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{called}{deep}{by}"

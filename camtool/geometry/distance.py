@@ -17,12 +17,14 @@ measured with the formula above.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Segments
+from camtool.geometry.boxes import box_pairs
+from camtool.geometry.measure import path_extents, segment_boxes
+from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Polylines, Segments
 
 POINTS_AT_A_TIME = 256
 """How many neighbouring points `nearest` handles at a time: it bounds the memory."""
@@ -102,6 +104,13 @@ def approach(a: Polyline, b: Polyline) -> Approach:
             found = _approach(*paired_distances(first[i + begin], second[j]))
             best = min(best, found, key=lambda each: each.distance)
     return best
+
+
+def near_paths(lines: Polylines, others: Polylines, reach_mm: float) -> Iterator[tuple[int, int]]:
+    """Pairs of paths whose boxes come within `reach_mm` of each other."""
+    one, other = (path_extents(each).transpose(0, 2, 1).reshape(-1, 4) for each in (lines, others))
+    for rows, columns in box_pairs(one, other, reach_mm=reach_mm):
+        yield from zip(rows.tolist(), columns.tolist(), strict=True)
 
 
 def _approach(distance: Floats, points: Floats) -> Approach:

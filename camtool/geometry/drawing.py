@@ -93,6 +93,18 @@ class FitError:
 
 
 @dataclass(frozen=True, eq=False)
+class Unchosen:
+    """Closed contours of the file, M of them, that were not chosen (by layer, colour or line
+    type): nobody cuts them, but what is a part and what is a hole depends on them too. `layers`,
+    `sources` and `line_types` have one item per path."""
+
+    paths: Polylines = field(default_factory=lambda: Polylines.of([]))
+    layers: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
+    line_types: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """Exact lines and arcs in mm, Y up, drawing frame.
 
@@ -100,7 +112,7 @@ class Drawing:
     "CIRCLE 2F") have one item per path, and so has `line_types` ("" is continuous; left out, all
     are). `used` counts the entities of each kind that became geometry; `skipped` the others, with
     the reason. `marks` are single points; a drawing of marks alone has no paths. `gaps` stay
-    open, `closed_gaps` were bridged.
+    open, `closed_gaps` were bridged. `unchosen`: the closed contours that were left out by choice.
     """
 
     paths: Polylines
@@ -118,6 +130,7 @@ class Drawing:
     closed_gaps: tuple[Gap, ...] = ()
     healing: Healing = field(default_factory=Healing)
     line_types: tuple[str, ...] = ()
+    unchosen: Unchosen = field(default_factory=Unchosen)
 
     def __post_init__(self) -> None:
         count = len(self.paths)

@@ -32,8 +32,9 @@ class Nesting:
     depth: Ints
 
 
-def nesting(lines: Polylines) -> Nesting:
-    """Which closed path holds which path.
+def nesting(lines: Polylines, holds: Bools | None = None) -> Nesting:
+    """Which closed path holds which path; of closed paths only those that `holds` (M,) marks
+    count as holders (None: all).
 
     Path i is in path j when its vertices and the middles of its segments lie inside j, or nearer
     to its line than `POSITION_EPS_MM` (but not all of them: a path does not hold its double, and
@@ -53,7 +54,7 @@ def nesting(lines: Polylines) -> Nesting:
     for j in sorted(np.flatnonzero(lines.closed).tolist(), key=lambda k: (-areas[k], k)):
         waiting[j] = False
         inner = np.flatnonzero(_box_in(boxes, boxes[j]) & (waiting | ~lines.closed))
-        if len(inner) == 0 or is_double[j]:
+        if len(inner) == 0 or is_double[j] or not (holds is None or holds[j]):
             continue
         ring = segments[first_segment[j] : first_segment[j + 1]]
         held, on_line = _held(points, first_point, inner, ring)

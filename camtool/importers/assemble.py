@@ -3,7 +3,7 @@
 Every reader ends here, so that a DXF and an SVG of the same part give the same Drawing:
 
     pieces ──select.py──▶ wanted ──clean.py──▶ checked, once ──heal.py──▶ contours ──told.py──▶
-    findings
+    findings            └▶ the others, cleaned and healed on their own ──▶ unchosen closed contours
 
 A *piece* is one entity or one subpath, in mm, Y up. A *gap* lies between two open ends.
 Tolerances: POSITION_EPS_MM (two points are one), `options.gap_mm` (two ends are joined), and
@@ -15,10 +15,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from camtool.errors import DrawingError
 from camtool.findings import Finding
-from camtool.geometry.drawing import Drawing, FitError, Mark, Skipped, Units
-from camtool.importers.clean import DRAWN_TWICE, cleaned
+from camtool.geometry.drawing import Drawing, FitError, Mark, Skipped, Unchosen, Units
+from camtool.importers.clean import DRAWN_TWICE, cleaned, is_placed
 from camtool.importers.heal import gap_of, healed
 from camtool.importers.marks import cleaned_marks, selected_with_marks
 from camtool.importers.options import ReadOptions
@@ -55,7 +57,8 @@ def assemble(
     each kind of `skipped` are added here. A drawing of `marks` alone has no paths. Raises
     DrawingError when a number is no position or when nothing is left to draw.
     """
-    pieces, marks, unwanted = selected_with_marks(pieces, marks, options.select, file)
+    every = pieces
+    pieces, marks, unwanted = selected_with_marks(every, marks, options.select, file)
     clean = cleaned(pieces, file)
     points, repeated = cleaned_marks(marks, file)
     dropped = [*unwanted, *clean.skipped, *repeated]
@@ -79,11 +82,35 @@ def assemble(
         closed_gaps=result.closed_gaps,
         healing=result.healing,
         line_types=tuple(piece.line_type for piece in first),
+        unchosen=_unchosen(every, pieces, file, options),
     )
     # What is drawn twice has a finding of its own.
     once = [item for item in clean.skipped if item.reason != DRAWN_TWICE]
     noticed = [*findings, *skip_findings(skipped, [*unwanted, *once, *repeated])]
     return replace(drawing, findings=(*noticed, *_judged(drawing, options)))
+
+
+def _unchosen(
+    every: Sequence[Piece], chosen: Sequence[Piece], file: str, options: ReadOptions
+) -> Unchosen:
+    """The closed contours among the pieces that were not chosen.
+
+    They are joined among themselves alone, and nothing is said of them: nobody asked for them.
+    Pieces that are no place in a drawing are left out.
+    """
+    kept = set(chosen)
+    others = [piece for piece in every if piece not in kept and is_placed(piece)]
+    if not others:
+        return Unchosen()
+    found = healed(others, cleaned(others, file), options)
+    rows = np.flatnonzero(found.lines.closed).tolist()
+    first = [others[found.members[row][0]] for row in rows]
+    return Unchosen(
+        paths=found.lines.select(rows),
+        layers=tuple(piece.layer for piece in first),
+        sources=tuple(_source([others[k] for k in found.members[row]]) for row in rows),
+        line_types=tuple(piece.line_type for piece in first),
+    )
 
 
 def _judged(drawing: Drawing, options: ReadOptions) -> list[Finding]:

@@ -72,6 +72,13 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     )
 
 
+def is_placed(piece: Piece) -> bool:
+    """Whether every number of a piece is finite, and every point within MAX_COORDINATE_MM."""
+    vertices = piece.vertices
+    near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all()
+    return bool(near and np.isfinite(vertices).all())
+
+
 def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
     """All vertices (N, 3) and how many each piece has; DrawingError when one is no position."""
     counts = np.array([len(piece.vertices) for piece in pieces], dtype=np.int64)

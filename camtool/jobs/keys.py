@@ -13,6 +13,7 @@ from camtool.jobs.values import (
     entry,
     feed,
     fraction,
+    layers,
     lead,
     length,
     lengths,
@@ -59,6 +60,12 @@ WHOLE = {
         choices=GOALS,
     ),
     "approach": Key("approach", plain(switch), "Take up the play of X and Y before every cut."),
+    "frames": Key(
+        "frames",
+        plain(layers),
+        "Layers that hold no edges of parts: frames, stock.",
+        "PATTERNS",
+    ),
     "tool_table": Key("tool_table", plain(text), "LinuxCNC's tool table.", "FILE"),
     "tool_table_units": Key(
         "tool_table_units", word(UNITS_OF_TABLES), "Of its lengths.  [mm]", choices=UNITS_OF_TABLES

@@ -41,6 +41,7 @@ _EXAMPLES = {
     "safe_z": '"1mm"',
     "minimise": '"reversals"',
     "approach": "true",
+    "frames": '["SHEET"]',
     "tool_table": '"tool.tbl"',
     "tool_table_units": '"mm"',
     "mirror": '"x"',

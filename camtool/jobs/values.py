@@ -115,6 +115,13 @@ def patterns(value: object) -> tuple[str, ...]:
     return tuple(text(item) for item in value)
 
 
+def layers(value: object) -> tuple[str, ...]:
+    """A list of patterns, or one text with commas between them."""
+    if isinstance(value, str):
+        value = [word.strip() for word in value.split(",")]
+    return patterns(value)
+
+
 def colours(value: object) -> tuple[str, ...]:
     """Patterns of colours as drawings have them ("#rrggbb"); names and numbers are turned so."""
     from camtool.importers.select import colour_named

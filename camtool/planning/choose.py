@@ -6,12 +6,14 @@ import numpy as np
 
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Drawing
+from camtool.geometry.polylines import Bools
 from camtool.planning.items import Chosen
 from camtool.planning.job import Operation
+from camtool.planning.sides import Sides, runs_beside
 
 
-def choose(drawing: Drawing, operation: Operation) -> Chosen:
-    """What the operation takes of a drawing in the work frame.
+def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
+    """What the operation takes of a drawing in the work frame, with the sides of that drawing.
 
     OptionError, naming what there is, when the drawing has something, but nothing of that.
     """
@@ -26,7 +28,15 @@ def choose(drawing: Drawing, operation: Operation) -> Chosen:
         names=tuple(path_name(drawing, i) for i in index),
         points=np.array([mark.at_mm for mark in marks], dtype=np.float64).reshape(len(marks), 2),
         point_names=tuple(f"{mark.layer}/{mark.source}" for mark in marks),
+        rim=_rim(operation, sides, index),
     )
+
+
+def _rim(operation: Operation, sides: Sides, index: list[int]) -> Bools:
+    """(M,) which of the chosen paths are rims of parts, for a profile that asks for it."""
+    if operation.side == "auto" and runs_beside(operation):
+        return sides.seen_by(operation).rim[index]
+    return np.full(len(index), operation.side == "outside")
 
 
 def path_name(drawing: Drawing, index: int) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from camtool.findings import Finding
-from camtool.geometry.polylines import Floats, Ints, Polyline, Polylines
+from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Polylines
 from camtool.planning.job import Operation
 
 RAPID = float("nan")
@@ -114,10 +114,12 @@ class Work:
 class Chosen:
     """The paths that an operation takes, in the work frame: `lines`; `source` (M,), the index of
     each in the placed drawing; `names` for people; `points` (K, 2) mm, the marks of its layers,
-    with their `point_names`."""
+    with their `point_names`. `rim` (M,): whether a closed path is the rim of a part, what lies
+    within it staying, or of a hole."""
 
     lines: Polylines
     source: Ints
     names: tuple[str, ...]
     points: Floats
     point_names: tuple[str, ...]
+    rim: Bools

@@ -56,6 +56,9 @@ ORIGINS = ("drawing", "lower-left", "centre")
 GOALS = ("rapids", "reversals")
 """What the order is chosen for: short rapids, or few reversals while cutting."""
 
+FRAMES = ("*border*", "*frame*", "*title*")
+"""Layers, by patterns of their names, of what belongs to the sheet of paper."""
+
 TOOL_KINDS = ("flat", "v", "drill")
 """Shapes of tools: an end mill (or a point of no width), a V bit, a drill."""
 
@@ -259,7 +262,8 @@ class Stock:
 @dataclass(frozen=True)
 class Job:
     """How a drawing is cut. `approach`: every cut starts after a move that takes up the play of
-    both axes. `minimise`: one of GOALS. Raises OptionError for what no job can be."""
+    both axes. `minimise`: one of GOALS. `frames`: patterns of the layers whose contours, where
+    nobody cuts them, are no edges of parts. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = (Operation(),)
     placement: Placement = Placement()
@@ -267,6 +271,7 @@ class Job:
     safe_z_mm: float | None = None
     minimise: str = "rapids"
     approach: bool = False
+    frames: tuple[str, ...] = FRAMES
 
     def __post_init__(self) -> None:
         above_zero("safe Z", self.safe_z_mm, "mm")

@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.errors import GeometryError, OptionError
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.drawing import Drawing, FitError, Gap, Healing
+from camtool.geometry.drawing import Drawing, FitError, Gap, Healing, Unchosen
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polylines
 from camtool.geometry.repeats import encloses, without_repeats
@@ -210,7 +210,8 @@ def _copy_shifts(placement: Placement) -> Floats:
 
 def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
     columns, rows = placement.copies
-    count = columns * rows * (len(drawing.paths.vertices) + len(drawing.marks))
+    points = len(drawing.paths.vertices) + len(drawing.unchosen.paths.vertices)
+    count = columns * rows * (points + len(drawing.marks))
     if count > MOST_POINTS:
         raise OptionError(
             f"{columns} by {rows} copies have {count} points, more than {MOST_POINTS}",
@@ -243,6 +244,7 @@ def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
         gaps=_gaps(drawing.gaps, maps),
         closed_gaps=_gaps(drawing.closed_gaps, maps),
         healing=_healing(drawing, maps, rows),
+        unchosen=_around(drawing.unchosen, maps),
     )
 
 
@@ -279,6 +281,22 @@ def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints]:
             where="key scale",
             mend="give a scale nearer to 1, or check the units of the drawing",
         ) from error
+
+
+def _around(unchosen: Unchosen, maps: list[_Map]) -> Unchosen:
+    """What was not chosen, once for each map, but for contours that shrink to points."""
+    try:
+        paths, rows = _lines(unchosen.paths, maps)
+    except OptionError:  # nothing is left of them; what is chosen has been placed already
+        return Unchosen()
+    copy, path = np.divmod(rows, max(1, len(unchosen.paths)))
+    which = list(zip(copy.tolist(), path.tolist(), strict=True))
+    return Unchosen(
+        paths=paths,
+        layers=tuple(unchosen.layers[each] for _, each in which),
+        sources=tuple(_copy_name(unchosen.sources[each], n) for n, each in which),
+        line_types=tuple(unchosen.line_types[each] for _, each in which),
+    )
 
 
 def _copy_name(source: str, copy: int) -> str:

@@ -28,6 +28,7 @@ from camtool.planning.job import Job, Operation
 from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
 from camtool.planning.place import collapsed, place
 from camtool.planning.places import operation_name
+from camtool.planning.sides import Sides
 from camtool.toolpath.moves import Toolpath
 
 Point = tuple[float, float]
@@ -70,12 +71,13 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
     from camtool.planning.checks import checked
 
     placed = place(drawing, job)
+    sides = Sides.of(placed, job, machine.defaults.cut_depth_mm)
     here: Point = HOME
     steps: list[Step] = []
     for rank, operation in enumerate(job.operations, 1):
         there = HOME if rank == len(job.operations) else None
         setting = setting_of(operation, job, machine)
-        step = _step(placed, job, setting, machine, (here, there))
+        step = _step(placed, job, setting, machine, (here, there), sides)
         here = _end(step.runs, here)
         steps.append(step)
     worked = [Worked(step.operation, step.runs) for step in steps]
@@ -141,17 +143,19 @@ def _step(
     setting: Setting,
     machine: Machine,
     way: tuple[Point, Point | None],
+    sides: Sides,
 ) -> Step:
     """One operation from what it takes to its runs, for a tool that comes from the first point
     of its `way` and goes to the second (None: stays)."""
     from camtool.planning.contours.runs import runs_of
+    from camtool.planning.gouges import side_findings
     from camtool.planning.order import best_order, choices_of, chosen_path, drawn, travel_mm
     from camtool.planning.precedence import must_precede
 
-    chosen = choose(placed, setting.operation)
+    chosen = choose(placed, setting.operation, sides)
     work = work_of(chosen, setting)
     items: tuple[Item, ...] = tuple(_with_starts(item) for item in work.items)
-    findings = list(work.findings)
+    findings = [*work.findings, *side_findings(work, chosen, sides, setting.operation)]
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), *way)
     if job.minimise == "reversals":

@@ -1,10 +1,10 @@
 """Profiles: on which lines the middle of the tool runs.
 
-`auto` takes all closed paths together as one shape: what an odd number of them hold is the part,
-and the tool runs round it, a tool's radius (and the allowance) away: outside of parts and
-islands, inside of holes. Where parts lie nearer to each other than the tool is wide, one contour
-runs round both. `outside` and `inside` take each closed path on its own. Open paths have no
-inside: the tool runs on them.
+`auto` takes all closed paths together: which of them are rims of parts and which of holes, the
+nesting of the whole drawing says (`sides`), and the tool runs a tool's radius (and the allowance)
+away: outside of parts and islands, inside of holes. Where parts lie nearer to each other than the
+tool is wide, one contour runs round both. `outside` and `inside` take each closed path on its
+own. Open paths have no inside: the tool runs on them.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.distance import approach, nearest
-from camtool.geometry.measure import extents, path_extents, point_at, signed_areas
+from camtool.geometry.distance import approach, near_paths, nearest
+from camtool.geometry.measure import extents, point_at, signed_areas
+from camtool.geometry.nest import nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Ints, Polyline, Polylines, Segments
 from camtool.geometry.transform import reverse
 from camtool.planning.arcs import joints
 from camtool.planning.items import Chosen, Contour, Setting, Work
 from camtool.planning.places import at_place, told_together, tool_name
+from camtool.planning.sides import runs_beside
 
-GOUGE_TOLERANCE_MM = 1e-4
-"""Another contour may be cut into by this much before it is a gouge: a tenth of a micrometre."""
+ROOM_TOLERANCE_MM = 1e-4
+"""Two contours may be nearer than the tool is wide by this much before they count as joined."""
 
 SLOT_TOLERANCE_MM = 5e-4
 """A slot or hole narrower than the tool by this much or less counts as wide as the tool."""
@@ -56,15 +58,13 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     closed = np.flatnonzero(chosen.lines.closed).tolist()
     opens = np.flatnonzero(~chosen.lines.closed).tolist()
     found = _Found()
-    if operation.side == "on" or operation.tool.radius_mm + operation.allowance_mm == 0.0:
+    if not runs_beside(operation):
         opens = list(range(len(chosen.lines)))
     elif operation.side == "auto":
         _together(chosen, closed, setting, found)
     else:
         for k in closed:
             _alone(chosen, k, setting, found)
-        gouges = list(_gouges(chosen, setting, found.lines))
-        found.findings += told_together(gouges, "places like this")
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
@@ -74,18 +74,46 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
-    """Round the shape of all closed paths at once."""
-    from camtool.geometry.regions import oriented
+    """Round the shapes of all closed paths, each shape at once."""
+    for of in _shapes(chosen, closed):
+        _shape(chosen, of, setting, found)
+
+
+def _shapes(chosen: Chosen, closed: list[int]) -> Iterator[list[int]]:
+    """The closed paths in groups that are the boundary of a region each.
+
+    One of them is a hole in the part around it, or a part in the hole around it. Where what lies
+    between two of them was not chosen, both are rims of parts, say, and they are not of one shape.
+    """
+    nest = nesting(chosen.lines.select(closed))
+    shapes: dict[tuple[int, bool], list[int]] = {}
+    key: dict[int, tuple[int, bool]] = {-1: (-1, False)}
+    for place in np.argsort(nest.depth, kind="stable").tolist():
+        parent, rim = int(nest.parent[place]), bool(chosen.rim[closed[place]])
+        if parent >= 0 and rim != chosen.rim[closed[parent]]:
+            key[place] = key[parent]
+        else:
+            key[place] = (parent, rim)
+        shapes.setdefault(key[place], []).append(closed[place])
+    return (sorted(of) for of in shapes.values())
+
+
+def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> None:
+    """Round a shape of these paths."""
     from camtool.planning.uncut import unreached_findings
 
-    if not closed:
-        return
-    shape = oriented(chosen.lines.select(closed))
-    _round(chosen, closed, shape, setting, found)
-    joined = [each for line in found.lines for each in _joined(chosen, line.of, setting)]
+    lines = chosen.lines.select(of)
+    ccw = signed_areas(lines) > 0.0
+    turned = zip(lines, (ccw == chosen.rim[of]).tolist(), strict=True)
+    shape = Polylines.of(path if right else reverse(path) for path, right in turned)
+    before = len(found.lines)
+    _round(chosen, of, shape, setting, found)
+    made = found.lines[before:]
+    joined = [each for line in made for each in _joined(chosen, line.of, setting)]
     found.findings += told_together(joined, "pairs of contours that stay joined")
     free = Polylines.of(reverse(path) for path in shape)
-    hair_mm = 2.0 * SLOT_TOLERANCE_MM if _any_as_wide(found) else 0.0
+    as_wide = any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
+    hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
     found.findings += unreached_findings(free, setting, hair_mm=hair_mm)
 
 
@@ -93,8 +121,7 @@ def _alone(chosen: Chosen, k: int, setting: Setting, found: _Found) -> None:
     """Round or within one path, whatever the others are."""
     path = chosen.lines[k]
     ccw = bool(signed_areas(chosen.lines.select([k]))[0] > 0.0)
-    outside = setting.operation.side == "outside"
-    shape = Polylines.of([path if ccw == outside else reverse(path)])
+    shape = Polylines.of([path if ccw == chosen.rim[k] else reverse(path)])
     _round(chosen, [k], shape, setting, found)
 
 
@@ -165,10 +192,6 @@ def _as_wide(chosen: Chosen, k: int, setting: Setting) -> Finding:
     )
 
 
-def _any_as_wide(found: _Found) -> bool:
-    return any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
-
-
 def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:
     area = abs(float(signed_areas(chosen.lines.select([k]))[0]))
     way = "round" if outer else "into"
@@ -192,11 +215,11 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
     """Said of a line that runs round several paths at once: between them nothing is cut."""
     room = 2.0 * _away(setting)
     lines = chosen.lines.select(of)
-    for one, other in sorted(_neighbours(lines, lines, room)):
+    for one, other in sorted(near_paths(lines, lines, room)):
         if one >= other:
             continue
         near = approach(lines[one], lines[other])
-        if near.distance >= room - GOUGE_TOLERANCE_MM:
+        if near.distance >= room - ROOM_TOLERANCE_MM:
             continue
         yield Finding(
             Code.UNREACHED,
@@ -278,38 +301,3 @@ def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
         f"an open contour has no {side}: the tool runs on the line",
         where=at_place(chosen.names[k], chosen.lines[k].start.tolist()),
     )
-
-
-def _gouges(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Finding]:
-    """Where the tool, following an offset contour, would cut into another closed contour."""
-    radius = setting.operation.tool.radius_mm
-    paths = Polylines.of(line.path for line in lines)
-    for one, other in _neighbours(paths, chosen.lines, radius):
-        mine = lines[one].of[0]
-        if mine == other or not chosen.lines.closed[other]:
-            continue
-        near = approach(paths[one], chosen.lines[other])
-        if near.distance < radius - GOUGE_TOLERANCE_MM:
-            yield Finding(
-                Code.GOUGE,
-                Severity.WARNING,
-                f"{tool_name(setting.operation.tool)} cuts"
-                f" {radius - near.distance:.4g} mm into {chosen.names[other]}",
-                where=at_place(chosen.names[mine], near.point),
-                measured=near.distance,
-                limit=radius,
-                unit="mm",
-            )
-
-
-def _neighbours(lines: Polylines, others: Polylines, reach: float) -> Iterator[tuple[int, int]]:
-    """Pairs of paths whose boxes come within `reach` of each other."""
-    import shapely
-
-    def boxes(paths: Polylines, wider: float) -> object:
-        box = path_extents(paths)
-        low, high = box[:, :, 0] - wider, box[:, :, 1] + wider
-        return shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-
-    one, other = shapely.STRtree(boxes(others, 0.0)).query(boxes(lines, reach))
-    return zip(one.tolist(), other.tolist(), strict=True)

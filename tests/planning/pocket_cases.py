@@ -68,7 +68,9 @@ def chosen_of(paths: Sequence[Polyline]) -> Chosen:
     """The paths as an operation takes them."""
     count = len(paths)
     names = tuple(f"0/PATH {index}" for index in range(count))
-    return Chosen(Polylines.of(paths), np.arange(count), names, np.empty((0, 2)), ())
+    return Chosen(
+        Polylines.of(paths), np.arange(count), names, np.empty((0, 2)), (), np.zeros(count, bool)
+    )
 
 
 def setting_of(diameter_mm: float, **settings: Any) -> Setting:

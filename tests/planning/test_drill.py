@@ -39,7 +39,14 @@ def chosen_of(
     names = tuple(f"PATH {index}" for index in range(len(paths)))
     marks = tuple(f"POINT {index}" for index in range(len(points)))
     places = np.array(points, dtype=np.float64).reshape(-1, 2)
-    return Chosen(Polylines.of(paths), 10 + np.arange(len(paths)), names, places, marks)
+    return Chosen(
+        Polylines.of(paths),
+        10 + np.arange(len(paths)),
+        names,
+        places,
+        marks,
+        np.zeros(len(paths), bool),
+    )
 
 
 def setting_of(depth: float = 3.0, safe_z: float = 5.0, **settings: object) -> Setting:

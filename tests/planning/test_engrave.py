@@ -22,7 +22,14 @@ def setting_of(direction: str = "drawn") -> Setting:
 
 def chosen_of(paths: list[Polyline]) -> Chosen:
     names = tuple(f"PATH {index}" for index in range(len(paths)))
-    return Chosen(Polylines.of(paths), 3 + np.arange(len(paths)), names, np.empty((0, 2)), ())
+    return Chosen(
+        Polylines.of(paths),
+        3 + np.arange(len(paths)),
+        names,
+        np.empty((0, 2)),
+        (),
+        np.zeros(len(paths), bool),
+    )
 
 
 def test_paths_are_kept_as_they_are_drawn() -> None:

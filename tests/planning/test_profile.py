@@ -18,9 +18,11 @@ from camtool.geometry.measure import sample, signed_areas
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.transform import moved, reverse, scaled
 from camtool.planning.choose import choose
+from camtool.planning.gouges import side_findings
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Job, job_of
 from camtool.planning.profile import profile
+from camtool.planning.sides import Sides
 from tests.drawings import drawing_of
 from tests.strategies import contours as star_contours
 
@@ -40,13 +42,16 @@ class Contours:
 def contours(drawing: Drawing, job: Job) -> Contours:
     (operation,) = job.operations
     setting = Setting(operation, Feeds(1.0, 1.0), (-0.1,), 1.0)
-    work = profile(choose(drawing, operation), setting)
+    sides = Sides.of(drawing, job, 0.1)
+    chosen = choose(drawing, operation, sides)
+    work = profile(chosen, setting)
+    found = (*work.findings, *side_findings(work, chosen, sides, operation))
     items = tuple(item for item in work.items if isinstance(item, Contour))
     assert len(items) == len(work.items)
     return Contours(
         Polylines.of(item.path for item in items),
         np.array([item.source for item in items], dtype=np.int64),
-        work.findings,
+        found,
         items,
     )
 
@@ -98,13 +103,16 @@ def test_auto_goes_round_parts_and_within_holes() -> None:
     assert radii == pytest.approx([1 + R, 3 - R, 5 + R, 1 + R])
 
 
-def test_only_chosen_layers_nest() -> None:
-    made = drawing_of([_circle(0, 0, 1), _circle(0, 0, 3)], ["IN", "FRAME"])
-    found = contours(made, job_of(tool_diameter_mm=2 * R, layers=("IN",)))
+def test_all_layers_nest_whichever_is_chosen() -> None:
+    made = drawing_of([_circle(0, 0, 1), _circle(0, 0, 3)], ["HOLES", "RIM"])
+    found = contours(made, job_of(tool_diameter_mm=2 * R, layers=("HOLES",)))
     assert found.source.tolist() == [0]
-    assert _areas(found) == [pytest.approx(math.pi * (1 + R) ** 2)]
-    later = contours(made, job_of(tool_diameter_mm=2 * R, layers=("FR*",)))
+    assert _areas(found) == [pytest.approx(math.pi * (1 - R) ** 2)]
+    assert _codes(found) == [Code.SIDE_BY_UNCUT]  # nobody cuts the rim: it might be a frame
+    later = contours(made, job_of(tool_diameter_mm=2 * R, layers=("RI*",)))
     assert later.source.tolist() == [1]
+    assert _areas(later) == [pytest.approx(math.pi * (3 + R) ** 2)]
+    assert later.findings == ()
 
 
 def test_layers_that_are_not_there_are_named_with_those_that_are() -> None:
@@ -175,6 +183,7 @@ def test_parts_nearer_than_the_tool_is_wide_are_gouged_when_cut_one_by_one() -> 
     # Round the left circle the tool's middle reaches x = 1.25; the other begins at 1.3.
     assert first.measured == pytest.approx(0.05)
     assert first.limit == 0.25
+    assert "cuts 0.2 mm into" in first.message
     assert first.where == "0/PATH 0 at X 1.2500 Y 0.0000"
     assert "0/PATH 1" in first.message
 

@@ -59,7 +59,9 @@ SHAPES = {
 def chosen_of(paths: Sequence[Polyline]) -> Chosen:
     lines = Polylines.of(paths)
     names = tuple(f"PATH {index}" for index in range(len(lines)))
-    return Chosen(lines, np.arange(len(lines)), names, np.empty((0, 2)), ())
+    return Chosen(
+        lines, np.arange(len(lines)), names, np.empty((0, 2)), (), np.zeros(len(lines), bool)
+    )
 
 
 def setting_of(*levels: float, angle: float = math.pi / 2, **tool: float) -> Setting:

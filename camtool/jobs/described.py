@@ -1,0 +1,102 @@
+"""What a job does with a drawing, as JSON has it: operations, what they take, and the sides.
+
+Contours of one operation, layer, side and reason are one group.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from camtool.geometry.facts import drawing_extents
+from camtool.planning.choose import choose
+from camtool.planning.gouges import by_uncut
+from camtool.planning.place import place
+from camtool.planning.sides import Sides, runs_beside
+
+if TYPE_CHECKING:
+    from camtool.findings import Finding
+    from camtool.geometry.drawing import Drawing
+    from camtool.machine.model import Machine
+    from camtool.planning.items import Chosen
+    from camtool.planning.job import Job, Operation
+
+WITHIN = {"pocket": "it is cleared as a pocket", "vcarve": "it is carved"}
+"""Kinds of operation that take all within their contours, and why."""
+
+NOT_KNOWN_MM = math.inf
+"""The depth of an operation that says none, where no machine says one."""
+
+
+def described(
+    job: Job, drawing: Drawing | None = None, machine: Machine | None = None
+) -> tuple[dict[str, Any], list[Finding]]:
+    """The job in words and numbers, mm, with what it takes of a drawing; and what is to be said
+    of the sides. OptionError for an operation that takes nothing."""
+    facts: dict[str, Any] = {
+        "operations": [_operation(job, k) for k in range(len(job.operations))]
+    }
+    if job.stock is not None:
+        stock = job.stock
+        facts["stock_mm"] = {
+            "corner": list(stock.corner_mm),
+            "size": [*stock.size_mm, stock.thickness_mm],
+        }
+    findings: list[Finding] = []
+    if drawing is None:
+        return facts, findings
+    placed = place(drawing, job)
+    x, y = drawing_extents(placed).tolist()
+    facts = {"drawing": drawing.file, "extents_mm": {"x": x, "y": y}, **facts}
+    unsaid = NOT_KNOWN_MM if machine is None else machine.defaults.cut_depth_mm
+    sides = Sides.of(placed, job, unsaid)
+    for operation, said in zip(job.operations, facts["operations"], strict=True):
+        chosen = choose(placed, operation, sides)
+        closed = chosen.lines.closed
+        said["takes"] = {
+            "closed": int(closed.sum()),
+            "open": int((~closed).sum()),
+            "points": len(chosen.points),
+        }
+        said["contours"] = _groups(operation, chosen, sides, placed)
+        if operation.side == "auto" and runs_beside(operation):
+            findings += by_uncut(sides, operation, chosen.source[closed])
+    return facts, findings
+
+
+def _operation(job: Job, index: int) -> dict[str, Any]:
+    operation = job.operations[index]
+    tool = operation.tool
+    return {
+        "number": index + 1,
+        "name": operation.name,
+        "kind": operation.kind,
+        "tool": {"name": tool.name, "diameter_mm": tool.diameter_mm},
+        "depth_mm": operation.depth_mm,
+        "step_down_mm": operation.step_down_mm,
+    }
+
+
+def _groups(
+    operation: Operation, chosen: Chosen, sides: Sides, placed: Drawing
+) -> list[dict[str, Any]]:
+    """How many contours of a layer have the tool on which side, and why."""
+    if operation.kind == "drill":
+        return []
+    groups: Counter[tuple[str, str, str]] = Counter()
+    beside = runs_beside(operation)
+    for place_in, row in enumerate(chosen.source.tolist()):
+        if operation.kind in WITHIN:
+            side, why = "within", WITHIN[operation.kind]
+        elif operation.kind == "engrave":
+            side, why = "on", "it is engraved"
+        else:
+            outer = "outside" if chosen.rim[place_in] else "inside"
+            side = outer if beside and chosen.lines.closed[place_in] else "on"
+            why = sides.why(operation, row)
+        groups[placed.layers[row], side, why] += 1
+    return [
+        {"layer": layer, "contours": count, "side": side, "why": why}
+        for (layer, side, why), count in groups.items()
+    ]

@@ -1,0 +1,197 @@
+"""Cuts that run into what is to stay, and sides that follow from what nobody cuts.
+
+A profile keeps what is on the other side of its contour. Where the sweep of another cut comes over
+that contour, it takes some of what was to stay: an error, because a strip that stays can be filed
+off, and a gouge cannot be put back. It is a warning only where nobody cuts the other contour, for
+that may be of the drawing alone; and where the job itself names the side, for contours of the same
+operation, and for those that cross: whoever draws a notch beyond an edge wants it open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.distance import approach, near_paths, nearest
+from camtool.geometry.measure import extents, path_lengths, point_at, sample
+from camtool.geometry.nest import inside, nesting
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Bools,
+    Floats,
+    Ints,
+    Polyline,
+    Polylines,
+    Segments,
+)
+from camtool.planning.items import Chosen, Contour, Work
+from camtool.planning.job import Operation
+from camtool.planning.places import at_place, operation_name, told_together, tool_name
+from camtool.planning.sides import Sides, runs_beside
+
+GOUGE_TOLERANCE_MM = 1e-4
+"""Another contour may be cut into by this much before it is a gouge: a tenth of a micrometre."""
+
+SAMPLES_ROUND = 500
+"""How far a path goes across another one is looked up at so many places of it."""
+
+
+def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
+    """What is said of the sides of an operation: gouges, and sides that nobody's cut decides."""
+    if operation.kind == "pocket":
+        return told_together(list(_cleared_away(chosen, sides, operation)), "contours like this")
+    if not runs_beside(operation):
+        return []
+    gouges = list(_gouges(work, chosen, sides, operation))
+    found = told_together(gouges, "places like this")
+    if operation.side == "auto":
+        found += by_uncut(sides, operation, chosen.source[chosen.lines.closed])
+    return found
+
+
+def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:
+    """Where the tool, beside one contour, comes over another one."""
+    radius = operation.tool.radius_mm
+    beside = [
+        item for item in work.items if isinstance(item, Contour) and item.material_left is not None
+    ]
+    seen, sided = sides.seen_by(operation), sides.sided()
+    wanted = sided | seen.bounds
+    # Those of one operation with the side auto are offset together.
+    own = set(chosen.source.tolist())
+    if operation.side == "auto":
+        wanted = wanted.copy()
+        wanted[chosen.source] = False
+    others = np.flatnonzero(wanted)
+    walls = sides.lines.select(others.tolist())
+    for one, which in near_paths(Polylines.of(item.path for item in beside), walls, radius):
+        item, other = beside[one], int(others[which])
+        wall = walls[which]
+        if item.source == other:
+            continue
+        near = approach(item.path, wall)
+        if near.distance >= radius - GOUGE_TOLERANCE_MM:
+            continue
+        drawn = sides.lines[item.source]
+        kept = bool(sided[other])
+        if not kept and _lies_in(drawn, wall):
+            continue  # the edge of the stock, or of a sheet: nobody says that it stays
+        told = operation.side != "auto" and (other in own or _cross(drawn, wall))
+        amount = radius - near.distance
+        if near.distance <= POSITION_EPS_MM:
+            amount = radius + _beyond(item.path, wall, drawn)
+        yield Finding(
+            Code.GOUGE,
+            Severity.ERROR if kept and not told else Severity.WARNING,
+            f"{tool_name(operation.tool)} beside {item.name} cuts {amount:.4g} mm into"
+            f" {sides.names[other]}" + ("" if kept else ", which nobody cuts"),
+            where=at_place(item.name, near.point),
+            measured=near.distance,
+            limit=radius,
+            unit="mm",
+        )
+
+
+def _witnesses(path: Polyline) -> Floats:
+    """(P, 2) the vertices of a path and the middles of its segments."""
+    segments = Segments.of(path)
+    middles = point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
+    return np.concatenate([path.vertices[:, :2], middles])
+
+
+def _parts(path: Polyline, wall: Polyline) -> tuple[Bools, Floats]:
+    """(P,), (P,) of the witnesses of a path: whether each is within a closed one, and how far
+    from its line, mm."""
+    return _within(_witnesses(path), wall)
+
+
+def _within(points: Floats, wall: Polyline) -> tuple[Bools, Floats]:
+    ring = Segments.of(wall)
+    return inside(points, ring), nearest(points, ring).distance
+
+
+def _lies_in(path: Polyline, wall: Polyline) -> bool:
+    """Whether a path lies within a closed one."""
+    within, away = _parts(path, wall)
+    return bool((within | (away <= GOUGE_TOLERANCE_MM)).all())
+
+
+def _cross(one: Polyline, other: Polyline) -> bool:
+    """Whether two closed paths cross, and not only touch."""
+    for path, wall in ((one, other), (other, one)):
+        within, away = _parts(path, wall)
+        clear = away > GOUGE_TOLERANCE_MM
+        if (within & clear).any() and (~within & clear).any():
+            return True
+    return False
+
+
+def _beyond(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
+    """How far the tool's centre gets across a closed line, mm; the side on which most of the drawn
+    contour lies is this side of it."""
+    length = float(path_lengths(Polylines.of([path]))[0])
+    within, away = _within(sample(path, length / SAMPLES_ROUND), wall)
+    home, clear = _parts(drawn, wall)
+    mostly_in = bool((np.where(home, 1.0, -1.0) * (clear > GOUGE_TOLERANCE_MM)).sum() > 0.0)
+    return float(away[within != mostly_in].max(initial=0.0))
+
+
+def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[Finding]:
+    """Parts that another operation keeps, in what a pocket clears as deep as that, or deeper."""
+    kept = sides.kept_from(pocket)
+    kept[chosen.source] = False
+    rows = np.flatnonzero(kept)
+    if len(rows) == 0:
+        return
+    holds = np.zeros(len(sides.lines), dtype=np.bool_)
+    holds[chosen.source] = True
+    nest = nesting(sides.lines, holds & sides.lines.closed)
+    for row in rows[nest.depth[rows] % 2 == 1].tolist():
+        holder = sides.names[int(nest.parent[row])]
+        width = float(np.ptp(extents(sides.lines.select([row])), axis=1).min())
+        yield Finding(
+            Code.GOUGE,
+            Severity.ERROR,
+            f"the pocket {holder} clears away {sides.names[row]}, {width:.4g} mm wide, which"
+            " another operation keeps: let the pocket take its layer too, as an island",
+            where=at_place(sides.names[row], sides.lines[row].start.tolist()),
+            measured=width,
+            limit=0.0,
+            unit="mm",
+        )
+
+
+def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding]:
+    """What follows from closed contours that nobody cuts, for those of the operation (`rows`):
+    some have their side because of them, others in spite of those on the layers of frames."""
+    seen = sides.seen_by(operation)
+    for severity, turned, around in (
+        (Severity.WARNING, seen.by_uncut, sides.uncut),
+        (Severity.INFO, seen.by_frames, sides.frames),
+    ):
+        found = rows[turned[rows]]
+        if len(found) == 0:
+            continue
+        parent = nesting(sides.lines, around).parent
+        first = int(found[0])
+        name = sides.names[int(parent[first])]
+        side = "outside" if seen.rim[first] else "inside"
+        many = "1 contour" if len(found) == 1 else f"{len(found)} contours"
+        if severity == Severity.WARNING:
+            layer = name.partition("/")[0]
+            why = f"without {name}, which nobody cuts"
+            mend = f"if that is no edge of a part, give --frames {layer!r}, or the side"
+        else:
+            why = f"if {name}, on the layer of a frame, were the edge of a part"
+            mend = "--frames says which layers are none"
+        yield Finding(
+            Code.SIDE_BY_UNCUT,
+            severity,
+            f"{many} would be cut on the other side {why}: {sides.names[first]} is cut {side};"
+            f" {mend}",
+            where=operation_name(operation),
+            measured=float(len(found)),
+            unit="contours",
+        )

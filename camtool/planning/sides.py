@@ -1,0 +1,183 @@
+"""Sides by nesting: what of a drawing is part and what is hole, whatever an operation takes of it.
+
+A closed contour that an even number of others hold is the rim of a part, which stays; one that an
+odd number hold is the rim of a hole. All closed contours of the file are nested, those of other
+operations and those that nobody cuts too, or a window cut by itself would be taken for a part.
+Not every contour bounds material, though. None of these holds anything:
+
+- what is only engraved or carved, for the part goes on beneath it;
+- the pocket of another operation that is less deep than the cut: what is drawn within it goes
+  through its floor (a counterbore and its bore);
+- of what nobody cuts: what has a line type of its own, as centre lines, hidden edges and pitch
+  circles have; what is on a layer of `Job.frames`; and what runs along a contour that is cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camtool.geometry.distance import nearest
+from camtool.geometry.drawing import Drawing
+from camtool.geometry.measure import path_extents, point_at
+from camtool.geometry.nest import nesting
+from camtool.geometry.polylines import Bools, Ints, Polylines, Segments
+from camtool.patterns import matches
+from camtool.planning.job import Job, Operation
+
+SAME_CONTOUR_MM = 0.01
+"""A contour that nobody cuts, and that runs along one that is cut so near, is that one again."""
+
+CONTINUOUS = ("", "continuous", "bylayer", "byblock")
+"""Line types of edges that are seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The sides of all contours (of `Sides.lines`) as one operation sees them.
+
+    `rim` (M,): what is within it is part, and stays. `holder` (M,): the smallest contour that
+    holds it, −1 if none. `by_uncut` (M,): it would be the other side without the contours that
+    nobody cuts; `by_frames` (M,): with those that count as frames. `bounds` (M,): which contours
+    bound material.
+    """
+
+    rim: Bools
+    holder: Ints
+    by_uncut: Bools
+    by_frames: Bools
+    bounds: Bools
+
+
+@dataclass(eq=False)
+class Sides:
+    """The M contours of a placed drawing, those that were not chosen after those that were, and
+    their sides. `names`: layer and source of each. `takes` (K, M): what each of the `operations`
+    takes of them. `uncut` (M,): the closed ones that bound material though nobody cuts them, and
+    `frames` (M,) those that do not because of their layer.
+    `unsaid_mm`: the depth of operations that say none."""
+
+    lines: Polylines
+    names: tuple[str, ...]
+    operations: tuple[Operation, ...]
+    takes: Bools
+    uncut: Bools
+    frames: Bools
+    unsaid_mm: float
+    _known: dict[bytes, Seen] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, placed: Drawing, job: Job, unsaid_mm: float) -> Sides:
+        """The sides of a drawing in the work frame, cut by this job."""
+        around, lines = placed.unchosen, placed.paths
+        takes = np.zeros((len(job.operations), len(lines) + len(around.paths)), dtype=np.bool_)
+        if len(around.paths):
+            lines = Polylines.of([*lines, *around.paths])
+        for number, operation in enumerate(job.operations):
+            names = zip(placed.layers, placed.colours, strict=True)
+            takes[number, : len(placed.paths)] = [operation.takes(*name) for name in names]
+        layers = (*placed.layers, *around.layers)
+        types = (*placed.line_types, *around.line_types)
+        sources = (*placed.sources, *around.sources)
+        sheet = {layer for layer in set(layers) if matches(job.frames, layer)}
+        seen = [kind.casefold() in CONTINUOUS for kind in types]
+        # A drill takes circles alone, whatever else is on its layers.
+        makers = [operation.kind != "drill" for operation in job.operations]
+        worked = np.asarray(takes[makers].any(axis=0))
+        idle = np.asarray(lines.closed & np.array(seen, dtype=np.bool_) & ~worked)
+        idle &= ~_again(lines, worked, idle)
+        framed = np.array([layer in sheet for layer in layers], dtype=np.bool_)
+        return cls(
+            lines=lines,
+            names=tuple(f"{layer}/{it}" for layer, it in zip(layers, sources, strict=True)),
+            operations=job.operations,
+            takes=takes,
+            uncut=np.asarray(idle & ~framed),
+            frames=np.asarray(idle & framed),
+            unsaid_mm=unsaid_mm,
+        )
+
+    def seen_by(self, operation: Operation) -> Seen:
+        """The sides for a profile of this operation."""
+        depth = self._depth(operation)
+        cut = self._taken(
+            each.kind == "profile" or (each.kind == "pocket" and self._depth(each) >= depth)
+            for each in self.operations
+        )
+        bounds = cut | self.uncut
+        key = bounds.tobytes()
+        if key not in self._known:
+            nest = nesting(self.lines, bounds)
+            rim = nest.depth % 2 == 0
+            less = self._rim(cut) if self.uncut.any() else rim
+            more = self._rim(bounds | self.frames) if self.frames.any() else rim
+            self._known[key] = Seen(rim, nest.parent, less != rim, more != rim, bounds)
+        return self._known[key]
+
+    def sided(self) -> Bools:
+        """(M,) the contours that a profile follows on one side, for the other one to stay."""
+        return self._taken(map(runs_beside, self.operations))
+
+    def kept_from(self, pocket: Operation) -> Bools:
+        """(M,) the contours, no deeper than a pocket, what is within which is to stay."""
+        kept = np.zeros(len(self.lines), dtype=np.bool_)
+        for number, each in enumerate(self.operations):
+            if runs_beside(each) and self._depth(each) <= self._depth(pocket):
+                rim = self.seen_by(each).rim if each.side == "auto" else each.side == "outside"
+                kept |= self.takes[number] & self.lines.closed & rim
+        return kept
+
+    def _rim(self, bounds: Bools) -> Bools:
+        return np.asarray(nesting(self.lines, bounds).depth % 2 == 0)
+
+    def _taken(self, chosen: Iterable[bool]) -> Bools:
+        """(M,) the closed contours that any of these operations takes."""
+        return np.asarray(self.lines.closed & self.takes[list(chosen)].any(axis=0))
+
+    def _depth(self, operation: Operation) -> float:
+        return self.unsaid_mm if operation.depth_mm is None else operation.depth_mm
+
+    def why(self, operation: Operation, row: int) -> str:
+        """In a few words why an operation has its tool on this side of a contour."""
+        if not self.lines.closed[row]:
+            return "it is open"
+        if operation.side != "auto":
+            return "the job says so"
+        if not runs_beside(operation):
+            return "the tool has no width"
+        seen = self.seen_by(operation)
+        holder = int(seen.holder[row])
+        frame = ", but for what is on the layer of a frame" if seen.by_frames[row] else ""
+        if holder < 0:
+            return f"nothing is around it{frame}"
+        uncut = ", which nobody cuts" if self.uncut[holder] else ""
+        what = "hole" if seen.rim[row] else "part"
+        return f"within the {what} {self.names[holder]}{uncut}{frame}"
+
+
+def runs_beside(operation: Operation) -> bool:
+    """Whether an operation is a profile that runs beside its closed contours, not on them."""
+    if operation.kind != "profile" or operation.side == "on":
+        return False
+    return operation.tool.radius_mm + operation.allowance_mm > 0.0
+
+
+def _again(lines: Polylines, cut: Bools, uncut: Bools) -> Bools:
+    """(M,) those of the contours that nobody cuts that run along one that is cut."""
+    found = np.zeros(len(lines), dtype=np.bool_)
+    rows = np.flatnonzero(cut & lines.closed)
+    if not uncut.any() or len(rows) == 0:
+        return found
+    boxes = path_extents(lines)
+    for k in np.flatnonzero(uncut).tolist():
+        alike = rows[np.abs(boxes[rows] - boxes[k]).max(axis=(1, 2)) <= SAME_CONTOUR_MM]
+        mine = Segments.of(lines[k])
+        middles = point_at(mine, np.arange(len(mine)), np.full(len(mine), 0.5))
+        points = np.concatenate([mine.start, middles])
+        found[k] = any(
+            (nearest(points, Segments.of(lines[row])).distance <= SAME_CONTOUR_MM).all()
+            for row in alike.tolist()
+        )
+    return found
