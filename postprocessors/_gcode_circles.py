@@ -9,6 +9,8 @@ from camtool.toolpath.builder import ToolpathBuilder
 
 Point = tuple[float, float]
 
+_TURN = 2.0 * math.pi
+
 
 @dataclass(frozen=True)
 class Circle:
@@ -50,18 +52,32 @@ def turn_of(circle: Circle) -> float:
     return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)
 
 
-def follow(
-    path: ToolpathBuilder, circle: Circle, to_z: float, feed_and_turn: tuple[float, float]
-) -> None:
+@dataclass(frozen=True)
+class Way:
+    """How an arc is run: mm/min; the turn (rad) below which the controller takes it for a full
+    circle; and how many turns it begins."""
+
+    feed: float
+    full_turn_rad: float
+    turns: int = 1
+
+
+def follow(path: ToolpathBuilder, circle: Circle, to_z: float, way: Way) -> None:
     """The rows of an arc read at the path's position, a helix where it rises or sinks.
 
-    `feed_and_turn`: mm/min, and the turn (rad) below which the controller takes an arc for a full
-    circle: it is that then, and a line to its end.
+    Whole turns come first, each with its share of the height. An arc so short that the controller
+    takes it for a full circle is one, and a line to its end.
     """
-    feed, full_turn_rad = feed_and_turn
     same = circle.start == circle.end
-    full = same or abs(turn_of(circle)) <= full_turn_rad
+    turn = turn_of(circle)
+    full = same or abs(turn) <= way.full_turn_rad
+    sweep = _TURN if full else math.fmod((turn if circle.ccw else -turn) + _TURN, _TURN)
+    z = path.position[2]
+    rise = (to_z - z) / (_TURN * (way.turns - 1) + sweep)
+    for done in range(1, way.turns):
+        height = z + rise * _TURN * done
+        path.arc(*circle.start, height, centre=circle.centre, ccw=circle.ccw, feed=way.feed)
     end = circle.start if full else circle.end
-    path.arc(*end, to_z, centre=circle.centre, ccw=circle.ccw, feed=feed)
+    path.arc(*end, to_z, centre=circle.centre, ccw=circle.ccw, feed=way.feed)
     if full and not same:
-        path.line(*circle.end, feed=feed)
+        path.line(*circle.end, feed=way.feed)

@@ -94,6 +94,8 @@ def common_words(event: Event) -> str:
         return "G53 G0 Z0"
     if event.kind not in (*SPINDLE, Kind.DWELL):
         raise event.refuse(f"a {event.kind.name} has no block in this dialect")
+    if event.kind in SPINDLE and math.isnan(event.value):
+        return SPINDLE[event.kind]  # its speed is nobody's word
     if not (math.isfinite(event.value) and event.value >= 0.0):
         raise event.refuse(f"a {event.kind.name} without a value of 0 or more")
     said = say_number(event.value, VALUE)

@@ -9,7 +9,7 @@ from camtool.toolpath.program import Listing
 
 _LINE_END: Final = re.compile(r"\r\n|\n|\r")
 _NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
-_NUMBER: Final = re.compile(r"[Nn]\d+")
+_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
 
 
 def listing(data: bytes) -> Listing:

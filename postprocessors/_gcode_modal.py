@@ -15,9 +15,9 @@ from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
-from ._gcode_circles import Circle, centre_of_radius, follow
+from ._gcode_circles import Circle, Way, centre_of_radius, follow
 from ._gcode_notes import ReadNotes
-from ._gcode_rules import M_CODES, G, Rules
+from ._gcode_rules import G, Rules
 from ._gcode_spindle import MachineWords
 from ._gcode_words import Block
 
@@ -28,6 +28,12 @@ FEED_GUARD: Final = 1e-9
 """Part of a feed: a feed above its limit by less is at the limit."""
 
 MOTION_GROUP: Final = "motion"
+
+TURNS_TOLERANCE: Final = 1e-3
+"""Turns: a P beside a whole number by no more is that number (rs274 takes 2.001)."""
+
+MOST_TURNS: Final = 10_000
+"""Turns of an arc, each of which is a move."""
 
 
 class ModalReader:
@@ -80,10 +86,12 @@ class ModalReader:
         self, block: Block, modes: dict[str, int], m_codes: list[int], numbers: dict[str, float]
     ) -> None:
         """All but the end of the program, in RS274's order; takes out the numbers it uses."""
+        feed = numbers.pop("F", None)
+        before = self._mm
         if modes:
             self._set_modes(block, modes, numbers)
-        if "F" in numbers:
-            self._set_feed(block, numbers.pop("F") * self._mm)
+        if feed is not None:
+            self._set_feed(block, feed * (before if self._rules.feed_first else self._mm))
         if m_codes or "S" in numbers or "T" in numbers:
             self._machine.read(block, m_codes, numbers)
         once = modes.get("one block")
@@ -97,6 +105,16 @@ class ModalReader:
     def finish(self) -> Toolpath:
         """The rows, with what was noticed."""
         return self.path.finish(self._notes.findings())
+
+    @property
+    def ended(self) -> bool:
+        """Whether the program's end came."""
+        return self._machine.ended
+
+    def unread(self, lines: list[int]) -> None:
+        """Lines (from 1) behind the end, which no controller reads."""
+        if lines:
+            self._notes.behind_end = len(lines), lines[0]
 
     def message(self, text: str) -> None:
         """A comment that the operator is shown."""
@@ -115,7 +133,7 @@ class ModalReader:
         name = f"{letter}{value:g}"
         if exact and name in self._rules.refused:
             block.fail_at(letter, f"{name} {self._rules.refused[name]}", number=text)
-        fits = code in self._rules.groups if letter == "G" else code in M_CODES
+        fits = code in (self._rules.groups if letter == "G" else self._rules.m_codes)
         if not (exact and fits):
             block.fail_at(letter, f"the controller does not know {letter}{text}", number=text)
         self._codes[letter, text] = code
@@ -125,11 +143,7 @@ class ModalReader:
         """Motion, units, distance and arc modes."""
         self._motion = modes.get(MOTION_GROUP, self._motion)
         if "units" in modes:
-            mm = MM_PER_INCH if modes["units"] == G.INCHES else 1.0
-            if mm != self._mm and "F" in numbers:
-                message = "a feed beside a change of units"
-                block.fail_at("F", message, mend="say F in the next block")
-            self._mm = mm
+            self._mm = MM_PER_INCH if modes["units"] == G.INCHES else 1.0
         if "distance" in modes:
             self._absolute = modes["distance"] == G.ABSOLUTE
         if "arc distance" in modes:
@@ -201,6 +215,7 @@ class ModalReader:
         x, y, z = self.path.position
         to = [x, y, z]
         axes = False
+        flat = "X" in numbers or "Y" in numbers
         for at, axis in enumerate("XYZ"):
             if axis in numbers:
                 axes = True
@@ -220,6 +235,8 @@ class ModalReader:
             block.fail("a feed move, and no feed yet", mend="say F first")
         elif motion == G.LINE:
             self.path.line(*to, feed=self._feed)
+        elif self._rules.ends_in_plane and not flat:
+            block.fail("an arc without X or Y: grbl's error 32", mend="say where it ends in XY")
         else:
             self._arc(block, motion == G.ARC_CCW, to, numbers)
 
@@ -231,6 +248,7 @@ class ModalReader:
     def _arc(self, block: Block, ccw: bool, to: list[float], numbers: dict[str, float]) -> None:
         """G2 and G3, by centre or by radius, flat or helical."""
         x, y, _ = self.path.position
+        turns = self._turns(block, numbers.pop("P", 1.0)) if self._rules.turns else 1
         if "R" in numbers and ("I" in numbers or "J" in numbers):
             block.fail_at("R", "an arc by its radius and by its centre at once")
         if "R" in numbers:
@@ -248,7 +266,16 @@ class ModalReader:
                 letter = "I" if any(word == "I" for word, _ in block.words) else "J"
                 block.fail_at(letter, fault)
         circle = Circle((x, y), (to[0], to[1]), centre, ccw)
-        follow(self.path, circle, to[2], (self._feed, self._rules.full_turn_rad))
+        follow(self.path, circle, to[2], Way(self._feed, self._rules.full_turn_rad, turns))
+
+    def _turns(self, block: Block, value: float) -> int:
+        """How many turns P begins: 2 is one whole turn and then the arc."""
+        turns = round(min(value, MOST_TURNS + 1.0))
+        if turns > MOST_TURNS:
+            block.fail_at("P", f"an arc of more than {MOST_TURNS} turns")
+        if abs(value - turns) > TURNS_TOLERANCE or turns < 1:
+            block.fail_at("P", "the turns of an arc are a whole number from 1")
+        return turns
 
     def _centre(
         self, block: Block, start: tuple[float, float], numbers: dict[str, float]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
@@ -63,7 +63,9 @@ class Rules:
     here, and why. `first_motion`: the motion mode before any word says one (None: none).
     `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
     `circle_without_end`: an arc that says only its centre is a full circle. `path_modes`: the
-    group "path" tells how corners are met.
+    group "path" tells how corners are met. `turns`: P tells how many turns an arc begins.
+    `ends_in_plane`: an arc must say X or Y. `feed_first`: a feed beside a change of units is in
+    the units before. `m_codes`: the M codes it takes and the group of each.
     `tools`: "change" (M6), "pause" (M0 beside a T word), or "none"; T words go up to `most_tool`.
     """
 
@@ -75,5 +77,9 @@ class Rules:
     chord_slack_mm: float
     circle_without_end: bool = False
     path_modes: bool = False
+    turns: bool = False
+    ends_in_plane: bool = False
+    feed_first: bool = False
+    m_codes: Mapping[int, str] = field(default_factory=lambda: M_CODES)
     tools: str = "none"
     most_tool: int = 99_999

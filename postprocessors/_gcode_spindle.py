@@ -68,7 +68,7 @@ class MachineWords:
             self._path.event(turn)
         elif turn is not None:
             if self._speed is None:
-                block.fail_at("M", "the spindle is started before an S word was said")
+                self._notes.speedless.append(block.index)
             self._spindle = turn
             self._path.event(turn, self._speed)
         elif said and self._spindle is not None:

@@ -6,8 +6,8 @@ the dialects whose blocks are rows of words, one block a line.
         block.fail("a Z beside X", word=2)               # ProgramError: block, line and column
 
 What a *block* is: a line with at least one word. `Block.index` counts them from 0 (so does
-`Toolpath.block`), `Block.line` counts lines of the file from 1; empty lines, comments and `%` are
-lines but no blocks. Lines end with LF, CR LF or CR, also mixed. N words in front are taken off
+`Toolpath.block`), `Block.line` counts lines of the file from 1; empty lines and comments are lines
+but no blocks. Lines end with LF, CR LF or CR, also mixed. N words in front are taken off
 where `Lexing.block_numbers` allows them. Columns are those of the file's own line, from 1, and
 are only worked out when something is wrong: that is why words carry none.
 
@@ -46,7 +46,7 @@ _SIGNS: Final = {
     "[": ("an expression", "only plain numbers can be read"),
     "$": ("a command of the controller itself", "programs hold words only"),
     "/": ("a block that a switch may leave out", "write it without / or remove it"),
-    "%": ("a % that is not alone on its line", "remove it"),
+    "%": ("a %, which is no word and frames no program here", "remove it"),
     "=": ("an assignment", "only plain numbers can be read"),
 }
 
@@ -60,9 +60,9 @@ class Lexing:
     `letters`: those that begin words. `lower_case`: small letters count as capitals. `blanks`:
     spaces and tabs "anywhere" (even inside a number), "between" words (and around them), or
     "none". `parentheses`, `semicolon`: comments of that sign. `block_numbers`: a leading N word.
-    `percent`: lines of a lone %. `line_chars`: longest line; `counts_blanks` tells whether blanks
-    and comments count for it (the controller may drop them as they come in). `foreign_comments`:
-    comments may hold signs beyond ASCII (grbl takes such bytes for commands, even there).
+    `line_chars`: longest line; `counts_blanks` tells whether blanks and comments count for it (the
+    controller may drop them as they come in). `foreign_comments`: comments may hold signs beyond
+    ASCII (grbl takes such bytes for commands, even there).
     """
 
     letters: str
@@ -71,7 +71,6 @@ class Lexing:
     parentheses: bool = False
     semicolon: bool = False
     block_numbers: bool = False
-    percent: bool = False
     line_chars: int = LINE_CHARS
     counts_blanks: bool = True
     comment_lines: bool = False
@@ -142,8 +141,6 @@ def blocks_of(data: bytes, lexing: Lexing) -> Iterator[Block]:
             message = f"the line has more than {lexing.line_chars} characters"
             raise _error(message, index, number, lexing.line_chars + 1, "shorten it")
         if not text.isascii() or line_of_words.fullmatch(text) is None:
-            if lexing.percent and raw.strip() == "%":
-                continue
             raise _fault(raw, index, number, lexing)
         words: list[tuple[str, str]] = word.findall(text)
         if words and words[0][0] == "N" and lexing.block_numbers:
@@ -159,7 +156,7 @@ def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
     """(the whole line, one word) as compiled patterns."""
     known = re.escape(lexing.letters)
     blank = r"[ \t]*+" if lexing.blanks == "between" else ""
-    numbered = rf"(?>(?:N\d++{blank})?)" if lexing.block_numbers else ""
+    numbered = rf"(?>(?:N\d++(?:\.\d*+)?{blank})?)" if lexing.block_numbers else ""
     line = rf"{blank}{numbered}(?>(?:[{known}]{_NUMBER}{blank})*)"
     letters = known + ("N" if lexing.block_numbers else "")
     return re.compile(line), re.compile(rf"([{letters}])({_NUMBER})")
@@ -226,7 +223,7 @@ def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
         kept = list(range(len(text)))
     packed = "".join(text[at] for at in kept)
     blank = r"[ \t]*+" if lexing.blanks == "between" else ""
-    numbered = rf"(?>(?:N\d++{blank})?)" if lexing.block_numbers else ""
+    numbered = rf"(?>(?:N\d++(?:\.\d*+)?{blank})?)" if lexing.block_numbers else ""
     head = re.compile(rf"{blank}{numbered}(?>(?:[{re.escape(lexing.letters)}]{_NUMBER}{blank})*)")
     match = head.match(packed)
     at = match.end() if match else 0

@@ -12,12 +12,15 @@ from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
 from ._gcode_modal import ModalReader
-from ._gcode_rules import Rules
+from ._gcode_rules import M_CODES, Rules
 from ._gcode_words import Lexing, blocks_of
 from ._grbl_options import Dialect, dialect_of
 
 MOST_TOOL: Final = 255
 """Beyond it grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
+
+MIST: Final = 70
+"""M7, tenfold: grbl's error 20 as it ships (ENABLE_M7 of config.h is off)."""
 
 GROUPS: Final = {
     **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
@@ -45,6 +48,7 @@ REFUSED: Final = {
     "G43.1": "shifts Z by a tool length",
     "G93": "says feeds as inverse time, which is not read",
     "M6": "is unknown to grbl, its error 20",
+    "M7": "is unknown to grbl as it ships, its error 20",
 }
 
 
@@ -89,6 +93,8 @@ def rules_of(dialect: Dialect) -> Rules:
         arc_fault=arc_fault,
         full_turn_rad=dialect.arc_full_turn_rad,
         chord_slack_mm=dialect.arc_chord_slack_mm,
+        ends_in_plane=True,
+        m_codes={code: group for code, group in M_CODES.items() if code != MIST},
         tools="pause" if dialect.tool_change == "pause" else "none",
         most_tool=MOST_TOOL,
     )

@@ -6,6 +6,7 @@ the program through LinuxCNC for that.
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 from camtool.errors import ProgramError
@@ -19,6 +20,7 @@ from ._linuxcnc_options import Dialect, dialect_of
 
 GROUPS: Final = {
     **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
+    80: "lathe diameter",
     **dict.fromkeys((40, 530), "one block"),
     170: "plane",
     **dict.fromkeys((200, 210), "units"),
@@ -47,8 +49,15 @@ REFUSED: Final = {
     **dict.fromkeys(("G41", "G41.1", "G42", "G42.1", "G43.1", "G43.2"), _COMPENSATES),
     **dict.fromkeys(("G73", "G76", "G81", "G82", "G83", "G84", "G85", "G86", "G89"), _CYCLE),
     **dict.fromkeys(("G5", "G5.1", "G5.2", "G5.3"), "is a spline; write it as arcs"),
+    "G7": "counts X as a diameter, as lathes do",
     "G93": "says feeds as inverse time, which is not read",
 }
+
+
+LINE_END: Final = re.compile(rb"\r\n|\n|\r")
+
+SAYS_SOMETHING: Final = re.compile(rb"\s*[^\s%(;]")
+"""A line that is not blank, a % or a comment."""
 
 
 def read_linuxcnc(data: bytes, machine: Machine) -> Toolpath:
@@ -61,23 +70,51 @@ def read_linuxcnc(data: bytes, machine: Machine) -> Toolpath:
         parentheses=True,
         semicolon=True,
         block_numbers=True,
-        percent=True,
         line_chars=dialect.line_chars,
         comment_lines=True,
         foreign_comments=True,
     )
     reader = ModalReader(machine, rules_of(dialect))
+    lines = LINE_END.split(data)
+    end, framed = _unframed(lines)
     empty = True
-    for block in blocks_of(data, lexing):
+    for block in blocks_of(b"\n".join(lines[:end]), lexing):
         for text in block.comments:
             if text.lstrip()[:4].upper() == "MSG,":
                 reader.message(text.lstrip()[4:].strip())
         if block.words:
             reader.block(block)
             empty = False
-    if empty:
+        if reader.ended:
+            end = block.line
+            break
+    if empty and not framed:
         raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
+    if not (reader.ended or framed):
+        raise ProgramError(
+            "the file ends and the program does not, which LinuxCNC takes for a fault",
+            where=f"line {len(lines) if lines[-1] else max(len(lines) - 1, 1)}",
+            mend="end with M2, or put a line of % before and behind the program",
+        )
+    behind = [k for k, text in enumerate(lines[end:], end + 1) if SAYS_SOMETHING.match(text)]
+    reader.unread(behind)
     return reader.finish()
+
+
+def _unframed(lines: list[bytes]) -> tuple[int, bool]:
+    """How many lines there are before the end that a % makes, and whether one does.
+
+    Where the first line that is not blank is a lone % (it becomes blank), the next such line ends
+    the program; elsewhere % is no word.
+    """
+    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    if lines[first].strip() != b"%":
+        return len(lines), False
+    lines[first] = b""
+    for k in range(first + 1, len(lines)):
+        if lines[k].strip() == b"%":
+            return k, True
+    return len(lines), False
 
 
 def rules_of(dialect: Dialect) -> Rules:
@@ -103,5 +140,7 @@ def rules_of(dialect: Dialect) -> Rules:
         chord_slack_mm=dialect.arc_chord_slack_mm,
         circle_without_end=True,
         path_modes=True,
+        turns=True,
+        feed_first=True,
         tools="change",
     )

@@ -228,6 +228,12 @@ def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
         Kind.SPINDLE_CCW: ("spindle speed", MOST_SPINDLE),
         Kind.TOOL_CHANGE: ("tool", MOST_TOOL),
     }[kind]
+    if math.isnan(value) and name == "spindle speed":
+        raise PostError(
+            "the spindle is started without a speed, which M03 and M04 must say here",
+            where=place(toolpath, row),
+            mend="say S in the program",
+        )
     whole = kind != Kind.TOOL_CHANGE or value == math.floor(value)
     if not (0.0 <= value <= most and whole):
         raise PostError(

@@ -183,10 +183,11 @@ def convert_program(
     """A program of one target as the program of another, read back and judged against the first.
 
     What the first controller decodes is what the second one shall do; where its part zero was set
-    is left out, since a program begins there. `feed_mm_min` takes the place of all feeds, for
-    machines that are slower than the first. ProgramError names file, block and column.
+    is left out, since a program begins there. Cuts that are too fast for the second machine get
+    its highest feed; `feed_mm_min` takes the place of all feeds. ProgramError names file, block
+    and column.
     """
-    from camtool.toolpath.carried import at_feed, carried_over
+    from camtool.toolpath.carried import at_feed, carried_over, within_feeds
     from camtool.verify.verify import VerifyOptions
 
     decoded = read_program(data, source, file)
@@ -194,6 +195,8 @@ def convert_program(
     wanted = decoded if same else carried_over(decoded)
     if feed_mm_min is not None:
         wanted = at_feed(wanted, feed_mm_min)
+    else:
+        wanted = within_feeds(wanted, target.machine)
     if worst(wanted.findings) >= Severity.ERROR:
         return Posted(wanted, None, None, None, wanted.findings)
     program = target.post.write(wanted, target.machine)

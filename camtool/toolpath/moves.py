@@ -91,8 +91,8 @@ class Toolpath:
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
     program block that the row was read from, −1 when planned; start (3,) mm; `made_from` the name
     of the drawing, "" when nobody knows; mode (N,) index into `modes` or −1, where the program
-    leaves to the machine how it meets the corner behind the row (empty: all of them). ValueError
-    when columns disagree.
+    leaves to the machine how it meets the corner behind the row; without modes all of them are.
+    ValueError when columns disagree.
     """
 
     kind: Ints
@@ -111,7 +111,7 @@ class Toolpath:
 
     def __post_init__(self) -> None:
         count = len(self.kind)
-        if len(self.mode) == 0:
+        if not self.modes:
             object.__setattr__(self, "mode", np.full(count, -1))
         shapes = {
             "kind": (count,),

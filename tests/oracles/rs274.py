@@ -62,8 +62,8 @@ def interpreted(data: bytes, folder: Path) -> list[Call]:
         for call in found
         if call
     ]
-    if not any(name == "PROGRAM_END" for name, _, _ in calls):
-        raise ProgramError(run.stderr.strip() or "the program does not end")
+    if run.returncode != 0:
+        raise ProgramError(run.stderr.strip())
     return calls
 
 
@@ -81,9 +81,22 @@ def motions(calls: list[Call]) -> np.ndarray:
             rows.append((_MOVES[name], x * mm, y * mm, z * mm, none, none, rate))
         elif name == "ARC_FEED":
             x, y, cx, cy, turn, z = values[:6]
-            kind = Kind.ARC_CCW if turn > 0 else Kind.ARC_CW
-            rows.append((kind, x * mm, y * mm, z * mm, cx * mm, cy * mm, feed * mm))
+            arc = np.array([x, y, z, cx, cy, feed]) * mm
+            rows += _turns(rows[-1] if rows else (0.0,) * 7, arc, int(turn))
     return np.array(rows, dtype=np.float64).reshape(-1, 7)
+
+
+def _turns(before: tuple[float, ...], arc: np.ndarray, turns: int) -> list[tuple[float, ...]]:
+    """An arc of some turns as whole circles and the rest, each with its share of the height."""
+    kind = Kind.ARC_CCW if turns > 0 else Kind.ARC_CW
+    start, end, centre = np.array(before[1:4]), arc[:3], arc[3:5]
+    a, b = (np.arctan2(*(p[:2] - centre)[::-1]) for p in (start, end))
+    own = np.mod((b - a) * np.sign(turns), 2.0 * np.pi)
+    own = own if own > 1e-6 else 2.0 * np.pi
+    whole = abs(turns) - 1
+    rise = (end[2] - start[2]) * 2.0 * np.pi / (whole * 2.0 * np.pi + own)
+    circles = [(kind, *start[:2], start[2] + k * rise, *arc[3:]) for k in range(1, whole + 1)]
+    return [*circles, (kind, *arc)]
 
 
 def motions_of(path: Toolpath) -> np.ndarray:

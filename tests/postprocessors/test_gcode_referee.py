@@ -90,6 +90,12 @@ ONLY_LINUXCNC = [
     "G21 G17 F100\nG0 X1 Y1\nG2 I0.5 J0.5\nG3 J-2\nG1 X3\nM2",
     "G21 F100 (Fräsen µ ⌀)\nG1 X3 ; größer\nM2",
     "G64 P.02 Q.01 G0 X1\nG97 S100 M3\nG98 X2\nM2",
+    "G21 F100 G2 I5 J0 P2\nG3 X10 Y0 I5 P3 Z-2\nG2 X0 Y0 R7 P2 Z1\nM2",
+    "M3\nG21 G0 X1\nS500\nM2",
+    "G21 F10 G1 X1\nG20 F20 X2\nX3\nM2",
+    "%\nG0 X1\n%\nX5 nothing\n",
+    "N1.5 G8 G0 X1\nM2\nG0 X7 never\n",
+    "G21 F100 G2 Z-1 I5\nM2",
 ]
 
 
@@ -183,6 +189,15 @@ def test_the_slack_of_a_radius_is_theirs(short: float, tmp_path: Path) -> None:
         "P1\nM2",
         "G90.1 F100\nG2 X1 I1\nM2",
         "G53 G1 X0 Y0 F100 P2\nM2",
+        "G0 X1\n",
+        "%\nG0 X1\n",
+        "G0 X1\n%\n",
+        "(c)\n%\nG0 X1\nM2\n%\n",
+        "% foo\nG0 X1\n%\n",
+        "%\nG0 X1\n% foo\nM2\n",
+        "F9 G2 X1 I1 P0\nM2",
+        "F9 G2 X1 I1 P1.5\nM2",
+        "G61 P1\nM2",
     ],
 )
 def test_what_they_refuse_we_refuse(text: str, tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ FREE = Lexing(
     parentheses=True,
     semicolon=True,
     block_numbers=True,
-    percent=True,
 )
 STRICT = Lexing(letters="GMXYZIJF", blanks="between")
 TIGHT = Lexing(letters="GMXYZIJF", blanks="none")
@@ -34,7 +33,7 @@ def words(data: bytes, lexing: Lexing = FREE) -> list[list[tuple[str, str]]]:
         (b"g1x+2.", [[("G", "1"), ("X", "+2.")]]),
         (b"N10 G0\nn20G1", [[("G", "0")], [("G", "1")]]),
         (b"G 1 X - 1 . 5\t2", [[("G", "1"), ("X", "-1.52")]]),
-        (b"%\n(only a comment)\n; another\n\n G1 (in) X2 ; end\n%\n", [[("G", "1"), ("X", "2")]]),
+        (b"(only a comment)\n; another\n\n G1 (in) X2 ; end\n", [[("G", "1"), ("X", "2")]]),
         (b"G0\r\nG1\rG2\n\rG3", [[("G", "0")], [("G", "1")], [("G", "2")], [("G", "3")]]),
         (b"N5\n", []),
         (b"", []),
@@ -92,8 +91,8 @@ def test_columns_count_the_block_number() -> None:
         (b"G1 (a)", STRICT, "block 1, line 1, column 4", "this dialect has no comments"),
         (b"G1 ; a", STRICT, "block 1, line 1, column 4", "this dialect has no comments"),
         (b"N1 G1", STRICT, "block 1, line 1, column 1", "the letter N"),
-        (b"%", STRICT, "block 1, line 1, column 1", "a % that is not alone"),
-        (b"G1%", FREE, "block 1, line 1, column 3", "a % that is not alone"),
+        (b"%", STRICT, "block 1, line 1, column 1", "a %, which is no word"),
+        (b"G1%", FREE, "block 1, line 1, column 3", "a %, which is no word"),
         (b"G1 X1", TIGHT, "block 1, line 1, column 3", "a blank within the block"),
         (b"1", TIGHT, "block 1, line 1, column 1", "a number without its letter, '1'"),
     ],

@@ -207,7 +207,10 @@ def test_rounding_is_told() -> None:
             ToolpathBuilder().rapid(1, 0).arc(0, 1.1, centre=(0.0, 0.0), ccw=True, feed=9),
             "radii at start and end of an arc differ by 0.1000 mm",
         ),
-        (ToolpathBuilder().event(Kind.SPINDLE_CW), "a SPINDLE_CW without a value"),
+        (
+            ToolpathBuilder().event(Kind.SPINDLE_CW, -1),
+            "a SPINDLE_CW without a value of 0 or more",
+        ),
         (ToolpathBuilder().event(Kind.DWELL, -1), "a DWELL without a value of 0 or more"),
         (ToolpathBuilder().event(Kind.DWELL, math.inf), "a DWELL without a value"),
         (ToolpathBuilder().event(Kind.END).rapid(1, 1), "moves follow the end"),

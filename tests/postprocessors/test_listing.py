@@ -169,15 +169,15 @@ def test_a_stream_is_listed_as_it_is_sent(settings: tuple[str, ...]) -> None:
 
 
 def test_lines_without_a_word_are_no_blocks() -> None:
-    text = b"%\n\n(a G1 X1)\r\nG1 X1 ; Y2\r N10\nN20 G0Z3\n ;X\n(x)(y) M30\n%"
+    text = b"\n\n(a G1 X1)\r\nG1 X1 ; Y2\r N10\nN1.5\nN20 G0Z3\n ;X\n(x)(y) M30\n"
     lexing = Lexing(
         letters="GMXYZ",
         parentheses=True,
         semicolon=True,
         block_numbers=True,
-        percent=True,
     )
     assert lines_of(text).blocks == tuple(b.text.strip() for b in blocks_of(text, lexing))
+    assert lines_of(b"%\n" + text + b"%\n").blocks == lines_of(text).blocks
     assert lines_of(text).blocks == ("G1 X1 ; Y2", "N20 G0Z3", "(x)(y) M30")
 
 

@@ -199,7 +199,7 @@ REFUSED = {
     ),
     "arc of two radii": (builder().arc(1, 0, centre=(0.4, 0), ccw=True, feed=1), "differ by 0.2"),
     "spindle too fast": (builder().event(Kind.SPINDLE_CW, 10000), "spindle speed 10000"),
-    "spindle without speed": (builder().event(Kind.SPINDLE_CW), "spindle speed nan"),
+    "spindle without speed": (builder().event(Kind.SPINDLE_CW), "without a speed"),
     "tool of three digits": (builder().event(Kind.TOOL_CHANGE, 100), "tool 100"),
     "half a tool": (builder().event(Kind.TOOL_CHANGE, 1.5), "tool 1.5"),
     "negative dwell": (builder().event(Kind.DWELL, -1), "dwell -1"),
