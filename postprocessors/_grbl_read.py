@@ -5,9 +5,15 @@ Commands of grbl itself (`$H`, `$J=…`) and its realtime characters are the sen
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.controllers import GrblController
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
@@ -18,6 +24,9 @@ from ._grbl_options import Dialect, dialect_of
 
 MOST_TOOL: Final = 255
 """Beyond it grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
+
+SLOW_GUARD: Final = 1e-6
+"""Part of a feed: one below the slowest by less is the slowest."""
 
 MIST: Final = 70
 """M7, tenfold: grbl's error 20 as it ships (ENABLE_M7 of config.h is off)."""
@@ -72,7 +81,39 @@ def read_grbl(data: bytes, machine: Machine) -> Toolpath:
         empty = False
     if empty:
         raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
-    return reader.finish()
+    path = reader.finish()
+    return replace(path, findings=(*path.findings, *_too_slow(path, machine)))
+
+
+def _too_slow(path: Toolpath, machine: Machine) -> Iterator[Finding]:
+    """FEED_TOO_SLOW: cuts slower than the longest tick of the timer allows.
+
+    A line of d mm whose leading axis makes n steps is never slower than d/n mm times the least
+    rate of steps; an arc not slower than where it runs along an axis.
+    """
+    if not isinstance(machine.controller, GrblController):
+        return
+    step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    way = np.abs(path.end - path.starts)
+    steps = (way / step_mm).max(axis=1, initial=0.0)
+    along = np.linalg.norm(way, axis=1) / np.maximum(steps, 1.0)
+    along = np.where(path.is_arc, step_mm[:2].min(), along)
+    least = 60.0 * machine.controller.least_step_hz * along
+    with np.errstate(invalid="ignore"):
+        slow = np.flatnonzero(path.is_feed & (path.feed < least * (1.0 - SLOW_GUARD)))
+    if len(slow):
+        worst = int(slow[(path.feed[slow] / least[slow]).argmin()])
+        yield Finding(
+            Code.FEED_TOO_SLOW,
+            Severity.WARNING,
+            f"{len(slow)} cuts are slower than the controller can step (it makes no less than "
+            f"{machine.controller.least_step_hz:g} steps a second): F{path.feed[worst]:g} runs "
+            f"at {least[worst]:.3g} mm/min, and is simulated so",
+            where=f"block {int(path.block[worst]) + 1}",
+            measured=float(path.feed[worst]),
+            limit=float(least[worst]),
+            unit="mm_min",
+        )
 
 
 def rules_of(dialect: Dialect) -> Rules:

@@ -24,13 +24,16 @@ from camtool.errors import MachineError
 from camtool.kernels.step_lines import step_lines_fill, steps_taken
 from camtool.machine.controllers import GrblController
 from camtool.machine.model import Machine, controller_of
-from camtool.simulation.grbl_blocks import Blocks, blocks_of, speeds_of
+from camtool.simulation.grbl_blocks import Blocks, blocks_of, speeds_of, stops
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Floats, Ints
 from camtool.simulation.options import Options
 from camtool.simulation.path import check_positions, check_rows, placed
 from camtool.simulation.row_chunks import RowTotals, row_chunks
 from camtool.toolpath.moves import Kind, Toolpath
+
+ALWAYS_ON = 255
+"""The $1 that leaves the motors on, and holds nothing at a stop."""
 
 DWELL_STEP_S = 0.05
 """Dwells are counted in whole steps of this, rounded up (DWELL_TIME_STEP, `delay_sec`)."""
@@ -48,6 +51,9 @@ def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chun
     plan = speeds_of(blocks, path, machine)
     seconds = np.zeros(rows)
     np.add.at(seconds, blocks.row, plan.seconds(controller.buffer_blocks - 1))
+    if controller.idle_delay_ms != ALWAYS_ON:
+        held_s = controller.idle_delay_ms / 1000.0
+        np.add.at(seconds, blocks.row[stops(blocks, path)], held_s)
     dwell = path.kind == Kind.DWELL
     seconds[dwell] = [_dwell_s(value) for value in path.value[dwell].tolist()]
     mechanics = Mechanics(machine, samples.start_mm(path.start), options.effects)

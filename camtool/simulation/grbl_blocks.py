@@ -88,6 +88,8 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: Machine) -> SpeedPlan:
     At a corner between u1 and u2, with θ the angle between −u1 and u2, a circle touches both at
     `junction_deviation_mm` δ from the corner, and is followed (for its speed alone) at the
     acceleration a that u2 − u1 allows:  v² = a δ sin(θ/2) / (1 − sin(θ/2)).
+
+    The timer cannot wait longer than `least_step_hz` says, so slower blocks run at that rate.
     """
     controller = machine.controller
     assert isinstance(controller, GrblController)
@@ -100,6 +102,7 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: Machine) -> SpeedPlan:
     highest = allowed_along(rate, unit)
     feed = np.where(path.is_feed, path.feed, np.inf)[blocks.row] / 60.0
     speed = np.maximum(np.minimum(feed, highest), LEAST_SPEED_MM_S)
+    speed = np.maximum(speed, controller.least_step_hz * length / blocks.events)
     turn = np.zeros_like(unit)
     turn[1:] = unit[1:] - unit[:-1]
     across = np.sqrt((turn**2).sum(axis=1))
@@ -111,6 +114,12 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: Machine) -> SpeedPlan:
     corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
     corner[(cosine > STRAIGHT_COS) | _from_rest(blocks, path)] = 0.0
     return SpeedPlan(length, speed, allowed_along(acceleration, unit), corner)
+
+
+def stops(blocks: Blocks, path: Toolpath) -> Ints:
+    """The blocks (S,) behind which the machine comes to rest."""
+    begins = np.flatnonzero(_from_rest(blocks, path))
+    return np.append(begins[1:], len(blocks.row))[: len(begins)] - 1
 
 
 def _from_rest(blocks: Blocks, path: Toolpath) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from camtool.errors import MachineError, ProgramError
+from camtool.findings import Code, Severity
 from camtool.machine.model import Machine
+from camtool.machine.registry import load_target
 from camtool.simulation.options import CHUNK_STEPS, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
@@ -20,6 +22,11 @@ STEP = 0.004
 
 def run(path: Toolpath, machine: Machine, chunk_steps: int = CHUNK_STEPS) -> list[RowMotion]:
     return rows_of(simulate(path, machine, Options(chunk_steps=chunk_steps)))
+
+
+def awake(*settings: str) -> Machine:
+    """grbl whose stops hold nothing."""
+    return grbl_machine("controller.idle_delay_ms=255", *settings)
 
 
 def seconds(path: Toolpath, machine: Machine) -> list[float]:
@@ -107,20 +114,20 @@ def test_one_trapezoid() -> None:
     """100 mm at 500 mm/min, 10 mm/s²: d/v + v/a."""
     path = ToolpathBuilder().rapid(100.0, 0.0, 0.0).finish()
     v = 500.0 / 60.0
-    assert seconds(path, grbl_machine()) == pytest.approx([100.0 / v + v / 10.0])
+    assert seconds(path, awake()) == pytest.approx([100.0 / v + v / 10.0])
 
 
 def test_one_triangle() -> None:
     """2 mm is too short to reach 500 mm/min: 2 √(d/a)."""
     path = ToolpathBuilder().rapid(2.0, 0.0, 0.0).finish()
-    assert seconds(path, grbl_machine()) == pytest.approx([2.0 * math.sqrt(2.0 / 10.0)])
+    assert seconds(path, awake()) == pytest.approx([2.0 * math.sqrt(2.0 / 10.0)])
 
 
 def test_two_axes_share_the_limits() -> None:
     """At 45° each axis may have its own 500 mm/min and 10 mm/s²."""
     path = ToolpathBuilder().rapid(100.0, 100.0, 0.0).finish()
     v, a, d = 500.0 / 60.0 * math.sqrt(2.0), 10.0 * math.sqrt(2.0), 100.0 * math.sqrt(2.0)
-    assert seconds(path, grbl_machine()) == pytest.approx([d / v + v / a])
+    assert seconds(path, awake()) == pytest.approx([d / v + v / a])
 
 
 def test_a_rectangle() -> None:
@@ -128,7 +135,7 @@ def test_a_rectangle() -> None:
     builder = ToolpathBuilder()
     for x, y in ((40.0, 0.0), (40.0, 20.0), (0.0, 20.0), (0.0, 0.0)):
         builder.line(x, y, 0.0, feed=300.0)
-    machine = grbl_machine()
+    machine = awake()
     s = math.sqrt(0.5)
     corner = math.sqrt(10.0 * math.sqrt(2.0) * 0.01 * s / (1.0 - s))
     v, a = 5.0, 10.0
@@ -153,7 +160,7 @@ def test_a_circle_takes_its_polygon() -> None:
     v = 400.0 / 60.0
     way = n * 20.0 * math.sin(math.pi / n)
     fine = ("axes.x.coded_step_mm=0.0001", "axes.y.coded_step_mm=0.0001")
-    found = seconds(circle(10.0), grbl_machine(*fine))[0]
+    found = seconds(circle(10.0), awake(*fine))[0]
     assert found == pytest.approx(way / v + v / 10.0, rel=2e-4)
 
 
@@ -208,18 +215,18 @@ def test_chords_lie_inside_by_their_sagitta_and_the_drift(tolerance: float) -> N
 def test_events_bring_the_machine_to_rest() -> None:
     v, a = 5.0, 10.0
     one = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).line(10.0, 0.0, 0.0, feed=300.0)
-    passing = sum(seconds(one.finish(), grbl_machine()))
+    passing = sum(seconds(one.finish(), awake()))
     assert passing == pytest.approx(10.0 / v + v / a)
     for kind in (Kind.SPINDLE_CW, Kind.SPINDLE_OFF, Kind.TOOL_CHANGE):
         two = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).event(kind, 1.0)
-        found = seconds(two.line(10.0, 0.0, 0.0, feed=300.0).finish(), grbl_machine())
+        found = seconds(two.line(10.0, 0.0, 0.0, feed=300.0).finish(), awake())
         assert sum(found) == pytest.approx(10.0 / v + 2.0 * v / a)
 
 
 def test_a_message_stops_nothing() -> None:
     two = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).message("on we go")
     path = two.line(10.0, 0.0, 0.0, feed=300.0).finish()
-    assert sum(seconds(path, grbl_machine())) == pytest.approx(10.0 / 5.0 + 0.5)
+    assert sum(seconds(path, awake())) == pytest.approx(10.0 / 5.0 + 0.5)
 
 
 @pytest.mark.parametrize(("said", "taken"), [(2.0, 2.0), (0.21, 0.25), (0.0, 0.0), (0.001, 0.05)])
@@ -230,7 +237,7 @@ def test_dwells_are_whole_twentieths(said: float, taken: float) -> None:
 
 def test_a_way_back_starts_from_rest() -> None:
     path = ToolpathBuilder().rapid(2.0, 0.0, 0.0).rapid(0.0, 0.0, 0.0).finish()
-    assert seconds(path, grbl_machine()) == pytest.approx([2.0 * math.sqrt(0.2)] * 2)
+    assert seconds(path, awake()) == pytest.approx([2.0 * math.sqrt(0.2)] * 2)
 
 
 def test_play_shows_at_reversals() -> None:
@@ -268,3 +275,39 @@ def test_a_feed_is_needed() -> None:
     path = ToolpathBuilder().line(1.0, 0.0, 0.0, feed=float("nan")).finish()
     with pytest.raises(ProgramError, match="without a feed"):
         simulate(path, grbl_machine())
+
+
+@pytest.mark.parametrize("idle_ms", [0, 1, 25, 254])
+def test_each_stop_holds_what_comes_next(idle_ms: int) -> None:
+    """One behind the last block before a wait, however many waits follow; none where nothing
+    moved."""
+    builder = ToolpathBuilder().event(Kind.SPINDLE_CW, 1000.0).rapid(1.0, 0.0, 0.0)
+    builder.line(2.0, 1.0, 0.0, feed=100.0).event(Kind.SPINDLE_OFF).event(Kind.DWELL, 0.1)
+    builder.event(Kind.DWELL, 0.1).line(2.0, 3.0, 0.0, feed=100.0).message("on")
+    path = builder.line(2.0, 3.0, 0.0, feed=100.0).event(Kind.END).finish()
+    held = grbl_machine(f"controller.idle_delay_ms={idle_ms}")
+    longer = np.array(seconds(path, held)) - seconds(path, awake())
+    assert longer == pytest.approx([0, 0, idle_ms / 1000, 0, 0, 0, idle_ms / 1000, 0, 0, 0])
+    assert seconds(ToolpathBuilder().event(Kind.END).finish(), held) == [0.0]
+
+
+@pytest.mark.parametrize("feed", [1.0, 3.0, 5.0])
+def test_no_step_takes_longer_than_the_timer_s_longest_tick(feed: float) -> None:
+    """65535 · 8 cycles of 16 MHz a step, along an axis and aslant."""
+    path = ToolpathBuilder().line(1.0, 0.0, 0.0, feed=feed).line(2.0, 0.5, 0.0, feed=feed).finish()
+    assert seconds(path, awake()) == pytest.approx([250 * 65535 * 8 / 16e6] * 2, rel=0.002)
+    fine = awake("controller.least_step_hz=3.815")
+    assert seconds(path, fine)[0] == pytest.approx(60.0 / max(feed, 0.9156), rel=0.001)
+
+
+def test_a_feed_that_is_too_slow_is_found() -> None:
+    """7.32 mm/min are 30.518 steps of 0.004 mm a second; √2 of it at 45°."""
+    target = load_target("grbl")
+    read = target.post.read
+    (found,) = read(b"G1 X1 F5\nX2 Y1 F9\nM2\n", target.machine).findings
+    assert (found.code, found.severity) == (Code.FEED_TOO_SLOW, Severity.WARNING)
+    assert found.message.startswith("2 cuts are slower")
+    assert (found.measured, found.limit) == (5.0, pytest.approx(7.324, abs=1e-3))
+    assert read(b"G1 X1 F7.33\nX2 Y1 F10.36\nG2 X0 I-1 F7.33\nM2\n", target.machine).findings == ()
+    faster = load_target("grbl", settings=["controller.least_step_hz=1"]).machine
+    assert read(b"G1 X1 F5\nM2\n", faster).findings == ()

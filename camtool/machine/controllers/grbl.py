@@ -16,10 +16,15 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
     `arc_tolerance_mm` is its $12 and `junction_deviation_mm` its $11 (defaults.h, general
     machine). `buffer_blocks`: places of its planner's ring, of which one stays empty
     (BLOCK_BUFFER_SIZE, planner.h). `arc_correction`: chords between two that it computes by sine
-    and cosine (N_ARC_CORRECTION, config.h).
+    and cosine (N_ARC_CORRECTION, config.h). `idle_delay_ms` is its $1: each stop holds what comes
+    next for so long, 255 keeps the motors on and holds nothing (`st_go_idle`, stepper.c).
+    `least_step_hz`: no axis that has the most steps makes fewer a second: 16 MHz / (65535 · 8),
+    the longest tick of its timer at the highest smoothing (`st_prep_buffer`, stepper.c).
     """
 
     arc_tolerance_mm: Tolerance = 0.002
     junction_deviation_mm: Slack = 0.01
     buffer_blocks: Annotated[int, Meta(ge=3, le=10_000)] = 16
     arc_correction: Annotated[int, Meta(ge=1, le=10_000)] = 12
+    idle_delay_ms: Annotated[int, Meta(ge=0, le=255)] = 25
+    least_step_hz: Annotated[float, Meta(ge=0.01, le=10_000.0)] = 30.518
