@@ -58,6 +58,8 @@ class Code(IntEnum):
     HOLE_SIZE = 217
     TOOL_NOT_SAID = 218
     SIDE_BY_UNCUT = 219
+    TAB_SHARED = 225
+    CORNER_FAR = 226
 
     BLOCK_TOO_LONG = 301
     FEED_ROUNDED = 302

@@ -52,8 +52,9 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
 
 
 def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:
-    """Where the tool, beside one contour, comes over another one."""
-    radius = operation.tool.radius_mm
+    """Where the tool, beside one contour, comes over another one, or into the allowance that its
+    operation leaves on that."""
+    radius, allowance = operation.tool.radius_mm, operation.allowance_mm
     beside = [
         item for item in work.items if isinstance(item, Contour) and item.material_left is not None
     ]
@@ -66,13 +67,26 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         wanted[chosen.source] = False
     others = np.flatnonzero(wanted)
     walls = sides.lines.select(others.tolist())
-    for one, which in near_paths(Polylines.of(item.path for item in beside), walls, radius):
+    paths = Polylines.of(item.path for item in beside)
+    for one, which in near_paths(paths, walls, radius + allowance):
         item, other = beside[one], int(others[which])
         wall = walls[which]
         if item.source == other:
             continue
         near = approach(item.path, wall)
         if near.distance >= radius - GOUGE_TOLERANCE_MM:
+            if other in own and near.distance < radius + allowance - GOUGE_TOLERANCE_MM:
+                left = radius + allowance - near.distance
+                yield Finding(
+                    Code.GOUGE,
+                    Severity.WARNING,
+                    f"{tool_name(operation.tool)} beside {item.name} cuts {left:.4g} mm into the"
+                    f" allowance on {sides.names[other]}",
+                    where=at_place(item.name, near.point),
+                    measured=near.distance,
+                    limit=radius + allowance,
+                    unit="mm",
+                )
             continue
         drawn = sides.lines[item.source]
         kept = bool(sided[other])

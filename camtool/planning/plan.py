@@ -13,13 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
 from camtool.planning.choose import choose
 from camtool.planning.contours.levels import carved_levels, levels
@@ -31,14 +31,19 @@ from camtool.planning.places import operation_name
 from camtool.planning.sides import Sides
 from camtool.toolpath.moves import Toolpath
 
+if TYPE_CHECKING:
+    from camtool.planning.contours.bridges import Bridge
+    from camtool.planning.contours.leads import KeepOut
+
 Point = tuple[float, float]
 HOME: Point = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What became of one operation: what it took, its items as the operation made them, the
-    runs in order of cutting, and how far rapids go in XY: as drawn, and as ordered, mm."""
+    """What became of one operation: what it took, its items as the operation made them, the runs
+    in order of cutting, how far rapids go in XY: as drawn, and as ordered, mm; and the bridges
+    that its tabs leave."""
 
     operation: Operation
     chosen: Chosen
@@ -47,6 +52,7 @@ class Step:
     findings: tuple[Finding, ...]
     rapid_drawn_mm: float
     rapid_mm: float
+    bridges: tuple[Bridge, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +80,13 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
     sides = Sides.of(placed, job, machine.defaults.cut_depth_mm)
     here: Point = HOME
     steps: list[Step] = []
-    for rank, operation in enumerate(job.operations, 1):
-        there = HOME if rank == len(job.operations) else None
-        setting = setting_of(operation, job, machine)
+    settings = [setting_of(operation, job, machine) for operation in job.operations]
+    for rank, setting in enumerate(settings, 1):
+        there = HOME if rank == len(settings) else None
         step = _step(placed, job, setting, machine, (here, there), sides)
         here = _end(step.runs, here)
         steps.append(step)
+    steps = _sparing(steps, settings)
     worked = [Worked(step.operation, step.runs) for step in steps]
     approaches = None
     if job.approach or job.minimise == "reversals":
@@ -167,26 +174,55 @@ def _step(
     rows = best_order(choices, must_precede(items), *way)
     keep_out = _walls(placed, job, setting.operation)
     runs: list[Run] = []
+    bridges: list[Bridge] = []
     for row in rows.tolist():
         item = items[int(choices.owner[row])]
         if isinstance(item, Contour):
-            made, said = runs_of(item, chosen_path(items, choices, row), keep_out)
-            findings += said
-            runs += made
+            cut = runs_of(item, chosen_path(items, choices, row), keep_out)
+            findings += cut.findings
+            runs += cut.runs
+            bridges += cut.bridges
         else:
             runs += item.runs
     after = travel_mm(choices, rows, *way)
-    return Step(setting.operation, chosen, work, tuple(runs), tuple(findings), before, after)
+    return Step(
+        setting.operation,
+        chosen,
+        work,
+        tuple(runs),
+        tuple(findings),
+        before,
+        after,
+        tuple(bridges),
+    )
 
 
-def _walls(placed: Drawing, job: Job, operation: Operation) -> Polylines | None:
+def _sparing(steps: list[Step], settings: list[Setting]) -> list[Step]:
+    """The steps, their runs raised over the bridges that any of them leaves."""
+    bridges = [bridge for step in steps for bridge in step.bridges]
+    if not bridges:
+        return steps
+    from camtool.planning.contours.bridges import spared
+
+    made = []
+    for step, setting in zip(steps, settings, strict=True):
+        kept = spared(step.runs, step.operation, setting.feeds, bridges)
+        findings = (*step.findings, *kept.findings)
+        made.append(replace(step, runs=kept.runs, findings=findings))
+    return made
+
+
+def _walls(placed: Drawing, job: Job, operation: Operation) -> KeepOut:
     """The closed lines that ways to and from a contour must leave alone: those of the operation
-    itself, and those that any operation makes walls of; None when there are none."""
+    itself, and those that any operation makes walls of."""
+    from camtool.planning.contours.leads import KeepOut
+
     makers = [each for each in job.operations if each.kind in ("profile", "pocket")]
-    names = zip(placed.layers, placed.colours, strict=True)
-    walls = [any(each.takes(*name) for each in (operation, *makers)) for name in names]
-    rows = np.flatnonzero(np.array(walls, dtype=np.bool_) & placed.paths.closed)
-    return placed.paths.select(rows.tolist()) if len(rows) else None
+    names = list(zip(placed.layers, placed.colours, strict=True))
+    own = np.array([operation.takes(*name) for name in names], dtype=np.bool_)
+    walls = [any(each.takes(*name) for each in makers) for name in names]
+    rows = np.flatnonzero((own | np.array(walls, dtype=np.bool_)) & placed.paths.closed)
+    return KeepOut(placed.paths.select(rows.tolist()), own[rows])
 
 
 def _with_starts(item: Item) -> Item:

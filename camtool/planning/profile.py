@@ -28,6 +28,10 @@ from camtool.planning.sides import runs_beside
 ROOM_TOLERANCE_MM = 1e-4
 """Two contours may be nearer than the tool is wide by this much before they count as joined."""
 
+FAR_CORNER = 5.0
+"""Joins that take the tool farther from a corner than so many times its distance from the wall
+are told: corners sharper than 23 degrees."""
+
 SLOT_TOLERANCE_MM = 5e-4
 """A slot or hole narrower than the tool by this much or less counts as wide as the tool."""
 
@@ -66,6 +70,8 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
         for k in closed:
             _alone(chosen, k, setting, found)
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
+    if operation.joins != "round":
+        found.findings += told_together(list(_far(chosen, setting, found.lines)), "corners")
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
     items = [_beside(line, chosen, setting) for line in found.lines]
@@ -301,3 +307,26 @@ def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
         f"an open contour has no {side}: the tool runs on the line",
         where=at_place(chosen.names[k], chosen.lines[k].start.tolist()),
     )
+
+
+def _far(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Finding]:
+    """Corners of the tool's path that lie far from the drawn corner that they go round.
+
+    At a corner of the angle α the straight sides meet at away / sin(α/2) from it.
+    """
+    most = FAR_CORNER * _away(setting)
+    for line in lines:
+        drawn = Segments.of(chosen.lines.select(line.of))
+        corners = line.path.vertices[:, :2]
+        distance = nearest(corners, drawn).distance
+        for k in np.flatnonzero(distance > most).tolist():
+            yield Finding(
+                Code.CORNER_FAR,
+                Severity.WARNING,
+                f"{setting.operation.joins} joins take the tool {distance[k]:.4g} mm beyond a"
+                ' needle-like corner: use joins = "round", or "mitre" with a low limit',
+                where=at_place(chosen.names[line.of[0]], corners[k].tolist()),
+                measured=float(distance[k]),
+                limit=most,
+                unit="mm",
+            )

@@ -9,10 +9,19 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from camtool.planning.items import Run
+from camtool.findings import Finding
+from camtool.geometry.polylines import Polyline
+from camtool.planning.contours.runs import runs_of as cut_of
+from camtool.planning.items import Contour, Run
 from tests.oracles.arcs import FLAT, centre_of
 
 Floats = npt.NDArray[np.float64]
+
+
+def runs_of(contour: Contour, path: Polyline) -> tuple[list[Run], list[Finding]]:
+    """The runs that cut a contour that keeps away from nothing else, and what is said of them."""
+    cut = cut_of(contour, path)
+    return list(cut.runs), list(cut.findings)
 
 
 def run_points(vertices: Floats, step_mm: float) -> Floats:

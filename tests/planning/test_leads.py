@@ -18,15 +18,16 @@ from camtool.planning.contours.along import Along
 from camtool.planning.contours.leads import (
     LEAD_HALVINGS,
     LEAD_SLACK_MM,
+    KeepOut,
     leads_of,
     left_of,
     runs_back,
     segments_near,
 )
-from camtool.planning.contours.runs import runs_of
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Lead, Operation, Tool
 from tests.oracles.arcs import chain_distances, chain_points
+from tests.oracles.runs import runs_of
 from tests.strategies import contours, open_contours, polylines
 
 ARC, LINE = Lead("arc", 2.0), Lead("line", 2.0)
@@ -43,7 +44,9 @@ def contour(path: Polyline, left: bool | None, radius: float = 0.5, **kind: Any)
 
 def leads(path: Polyline, left: bool | None, keep_out: list[Polyline] | None = None, **kind: Any):
     along = Along.of(path)
-    lines = None if keep_out is None else Polylines.of(keep_out)
+    lines = None
+    if keep_out is not None:
+        lines = KeepOut(Polylines.of(keep_out), np.zeros(len(keep_out), dtype=np.bool_))
     return leads_of(contour(path, left, **kind), along, (0.0, along.total_mm), lines)
 
 

@@ -17,10 +17,9 @@ from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import mirrored, reverse, rolled, rotated, scaled
 from camtool.planning.contours.levels import levels
-from camtool.planning.contours.runs import runs_of
 from camtool.planning.items import Contour, Feeds, Run, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
-from tests.oracles.runs import cut_over, most_at_a_time, move_length, run_points, steepest
+from tests.oracles.runs import cut_over, most_at_a_time, move_length, run_points, runs_of, steepest
 from tests.strategies import contours, open_contours
 
 STEP = 0.05

@@ -6,7 +6,8 @@
                               ╰────P ═══ T ══▶         C − T R and ends at P along T
 
 A lead may lie where the tool does no harm: nowhere on the other side of the contour, on which the
-material is that is to stay, and nowhere nearer to other wanted lines than the tool's radius. Both
+material is that is to stay, and nowhere nearer to other wanted lines than the tool's radius (and
+the allowance, where the operation leaves one on them). Both
 are decided exactly: cut where it meets the contour, each of its pieces lies on one side, and so
 its middle tells which. A lead that does no good is halved, and at last left out.
 """
@@ -24,7 +25,14 @@ from camtool.geometry.frames import Frames, dot
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import point_at, signed_area
 from camtool.geometry.nest import inside
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Bools,
+    Floats,
+    Polyline,
+    Polylines,
+    Segments,
+)
 from camtool.planning.contours.along import Along, backwards
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
@@ -41,32 +49,54 @@ LEAD_HALVINGS = 4
 
 
 @dataclass(frozen=True, eq=False)
+class KeepOut:
+    """The closed `lines` that leads must leave alone; the operation leaves its allowance on those
+    that are its `own` (M,)."""
+
+    lines: Polylines
+    own: Bools
+
+    @classmethod
+    def none(cls) -> KeepOut:
+        """Nothing to keep away from."""
+        return cls(Polylines.of([]), np.empty(0, dtype=np.bool_))
+
+
+@dataclass(frozen=True, eq=False)
 class Border:
     """What leads must keep to: `line`, the contour, with the tool free on its left or right
-    (`free_left`; None: nowhere); and `keep_out`, with the distance `reach_mm` to stay away."""
+    (`free_left`; None: nowhere); and `keep_out`, with the distance `reach_mm` to stay away, and
+    besides `allowance_mm` from what is the operation's own."""
 
     line: Polyline
     free_left: bool | None
-    keep_out: Polylines
+    keep_out: KeepOut
     reach_mm: float
+    allowance_mm: float
 
     @classmethod
-    def of(cls, contour: Contour, keep_out: Polylines | None) -> Border:
+    def of(cls, contour: Contour, keep_out: KeepOut | None) -> Border:
         """The border of a contour."""
         line, left = contour.path, contour.material_left
         if contour.outline is not None:
             line = contour.outline
             left = None if left is None else left != runs_back(line, contour.path)
-        reach = contour.setting.operation.tool.radius_mm
-        others = Polylines.of([]) if keep_out is None else keep_out
-        return cls(line, None if left is None else not left, others, reach)
+        operation = contour.setting.operation
+        return cls(
+            line,
+            None if left is None else not left,
+            KeepOut.none() if keep_out is None else keep_out,
+            operation.tool.radius_mm,
+            operation.allowance_mm,
+        )
 
     def near(self, place: Floats, size_mm: float) -> Segments:
         """What a lead of this size from a place (2,) of the contour must stay away from.
 
         What an engraved contour itself cuts there is not kept from its leads.
         """
-        found = segments_near(self.keep_out, place, 2.0 * size_mm + self.reach_mm)
+        reach = 2.0 * size_mm + self.reach_mm + self.allowance_mm
+        found = segments_near(self.keep_out.lines, place, reach)
         if self.free_left is None and len(found):
             cut = points_to_segments(place[None], found)[0] < self.reach_mm
             found = found[~np.isin(found.path, found.path[cut])]
@@ -75,7 +105,8 @@ class Border:
     def allows(self, lead: Segments, near: Segments) -> bool:
         """Whether the tool does no harm along this one line or arc."""
         distance, _ = paired_distances(lead[np.zeros(len(near), dtype=np.int64)], near)
-        far = bool((distance >= self.reach_mm - LEAD_SLACK_MM).all())
+        wanted = self.reach_mm + np.where(self.keep_out.own[near.path], self.allowance_mm, 0.0)
+        far = bool((distance >= wanted - LEAD_SLACK_MM).all())
         return far and (self.free_left is None or self._is_beside(lead))
 
     def _is_beside(self, lead: Segments) -> bool:
@@ -98,7 +129,7 @@ class Leads:
 
 
 def leads_of(
-    contour: Contour, along: Along, ends: tuple[float, float], keep_out: Polylines | None
+    contour: Contour, along: Along, ends: tuple[float, float], keep_out: KeepOut | None
 ) -> Leads:
     """The leads of a contour that is cut as `along` from one length to another, its `ends`."""
     operation = contour.setting.operation

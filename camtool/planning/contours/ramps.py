@@ -15,6 +15,9 @@ ramp begins so far before the start that B falls on it, and the last lap begins 
          │               ╲_B____________________
       z2 │                 S                    S
 
+Where a lead goes out of the contour, it is cut at every level: at the place where the last lap
+ends the tool goes out and back, once it is down at the level.
+
 On an open path the tool goes down to and fro near the end where it is, back to that end, and then
 along the level to the other end, which takes away what the ramp left.
 """
@@ -47,6 +50,11 @@ def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> Knot
     return knots
 
 
+def apart(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> list[Knots]:
+    """Round a closed path at each level on its own."""
+    return [[(0.0, z), (total_mm + overlap_mm, z)] for z in levels_mm]
+
+
 def spiral(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
 ) -> Knots:
@@ -61,6 +69,27 @@ def spiral(
     knots.append((bottom + total_mm + overlap_mm, above))
     before = bottom % total_mm
     return [(length - before, z) for length, z in knots]
+
+
+def spiral_with_stops(
+    total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
+) -> tuple[Knots, list[float]]:
+    """The same, and a length at each level but the last where the tool is down at it, always at
+    the place where the last lap ends.
+
+    All ramps are as long as that of the largest step, so that all end at one place.
+    """
+    above = (0.0, *levels_mm[:-1])
+    ramp = max(a - z for a, z in zip(above, levels_mm, strict=True)) / math.tan(angle_rad)
+    laps_each = math.ceil((ramp + overlap_mm) / total_mm)
+    knots: Knots = []
+    stops = []
+    for turn, z in enumerate(levels_mm):
+        bottom = turn * laps_each * total_mm
+        stops.append(bottom + overlap_mm)
+        knots += [(bottom - ramp, above[turn]), (bottom, z), (stops[-1], z)]
+    knots[-1] = (bottom + total_mm + overlap_mm, levels_mm[-1])
+    return knots, stops[:-1]
 
 
 def to_and_fro(

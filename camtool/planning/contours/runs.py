@@ -2,27 +2,33 @@
 
     path ──Along──▶ lengths ──ramps: profile of z──▶ ──tabs: raised──▶ lifted ──leads──▶ Run
 
-A closed contour is one run: the way to it, down, round and round, the overlap, the way out. An
-open one is one run, to and fro, when it is reversible, and else one run for each pass; the ways to
-it and out belong to it at all depths.
+A closed contour is one run: down, round and round, the overlap. With leads it is one run for each
+pass, from the way to it to the way out; where it ramps down, it stays one run, and goes out and
+back at each level. An open one is one run, to and fro, when it is reversible, and else one run for
+each pass. So the ways to a contour and out of it are cut step by step, as the contour itself.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import Floats, Polyline, Polylines
+from camtool.geometry.polylines import Floats, Polyline
 from camtool.planning.contours.along import Along
-from camtool.planning.contours.leads import Leads, leads_of
+from camtool.planning.contours.bridges import Bridge, bridges_of
+from camtool.planning.contours.leads import KeepOut, Leads, leads_of
 from camtool.planning.contours.ramps import (
     MOST_LAPS,
+    Knots,
+    apart,
     feeds_along,
     laps,
     lifted,
     spiral,
+    spiral_with_stops,
     to_and_fro,
 )
 from camtool.planning.contours.tabs import Tab, raised, tabs_of
@@ -33,52 +39,93 @@ Heights = tuple[float | None, list[Tab]]
 """What decides the height of the tool: the angle of its ramps (None: it plunges), and the tabs."""
 
 
-def runs_of(
-    contour: Contour, path: Polyline, keep_out: Polylines | None = None
-) -> tuple[list[Run], list[Finding]]:
-    """The runs that cut a contour, and what did not go as the operation asks.
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """The runs that cut a contour, what did not go as the operation asks, and the bridges that
+    its tabs leave."""
+
+    runs: tuple[Run, ...]
+    findings: tuple[Finding, ...]
+    bridges: tuple[Bridge, ...]
+
+
+def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut | None = None) -> Cut:
+    """How a contour is cut.
 
     `path` is the contour's path from the chosen start in the chosen direction. On the ways to it
-    and out, the tool comes nowhere nearer to the lines of `keep_out` than its radius. A ramp
-    slopes by the entry's angle. OptionError for tabs that cannot be.
+    and out, the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
+    OptionError for tabs that cannot be.
     """
     along = Along.of(path)
     angle, findings = _slope(contour, along)
     tabs, left_out = tabs_of(contour, along)
-    if path.closed:
-        vertices, leads = _round(contour, along, (angle, tabs), keep_out)
-        ways = [vertices]
-    else:
-        ways, leads = _along(contour, along, (angle, tabs), keep_out)
+    made = _round if path.closed else _along
+    ways, leads = made(contour, along, (angle, tabs), keep_out)
     feeds = contour.setting.feeds
     runs = [
         Run(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, contour.name)
         for vertices in ways
     ]
-    return runs, [*findings, *left_out, *leads.findings]
+    findings += [*left_out, *leads.findings]
+    bridges = bridges_of(along, tabs, contour.setting.operation.tool, contour.name)
+    return Cut(tuple(runs), tuple(findings), tuple(bridges))
 
 
 def _round(
-    contour: Contour, along: Along, heights: Heights, keep_out: Polylines | None
-) -> tuple[Floats, Leads]:
-    """The one run (n, 4) round a closed contour."""
+    contour: Contour, along: Along, heights: Heights, keep_out: KeepOut | None
+) -> tuple[list[Floats], Leads]:
+    """The runs (n, 4) round a closed contour."""
     angle, tabs = heights
     levels, overlap = contour.setting.levels_mm, contour.setting.operation.overlap_mm
     total = along.total_mm
+    stops: list[float] = []
     if angle is None:
-        profile = laps(total, levels, overlap)
+        profiles = apart(total, levels, overlap)
     else:
-        profile = spiral(total, levels, overlap, angle)
-    leads = leads_of(contour, along, (profile[0][0], profile[-1][0]), keep_out)
-    vertices = lifted(along, raised(profile, tabs, total))
-    vertices[-1, 3] = leads.away[0, 2] if len(leads.away) else 0.0
-    flat = np.insert(leads.to[:-1], 2, vertices[0, 2], axis=1)
-    out = np.insert(leads.away[1:], 2, vertices[-1, 2], axis=1)
-    return np.concatenate([flat, vertices, out]), leads
+        profile, stops = spiral_with_stops(total, levels, overlap, angle)
+        profiles = [profile]
+    ends = profiles[0][0][0], profiles[-1][-1][0]
+    leads = leads_of(contour, along, ends, keep_out)
+    if len(leads.away) == 0 and angle is not None:
+        profiles, stops = [spiral(total, levels, overlap, angle)], []
+        leads = leads_of(contour, along, (profiles[0][0][0], ends[1]), keep_out)
+    elif len(leads.away) == len(leads.to) == 0:
+        profiles = [laps(total, levels, overlap)]
+    ways = []
+    for profile in profiles:
+        knots = raised(profile, tabs, total)
+        parts = [lifted(along, part) for part in _split(knots, stops)]
+        ways.append(_led(parts, leads))
+    return ways, leads
+
+
+def _split(knots: Knots, stops: list[float]) -> list[Knots]:
+    """The profile in parts that end and begin at these lengths."""
+    parts: list[Knots] = []
+    begin = 0
+    for stop in stops:
+        end = next(k for k in range(begin, len(knots)) if knots[k][0] == stop)
+        parts.append(knots[begin : end + 1])
+        begin = end
+    return [*parts, knots[begin:]]
+
+
+def _led(parts: list[Floats], leads: Leads) -> Floats:
+    """The run (n, 4) along parts (n, 4) of a contour: the way to it before the first of them, the
+    way out behind the last, and out and back between two."""
+    rows = [np.insert(leads.to[:-1], 2, parts[0][0, 2], axis=1)]
+    for part in parts[:-1]:
+        out = np.insert(leads.away[1:], 2, part[-1, 2], axis=1)
+        part[-1, 3] = leads.away[0, 2]
+        out[-1, 3] = 0.0 - leads.away[0, 2]
+        rows += [part, out]
+    last = parts[-1]
+    last[-1, 3] = leads.away[0, 2] if len(leads.away) else 0.0
+    return np.concatenate([*rows, last, np.insert(leads.away[1:], 2, last[-1, 2], axis=1)])
 
 
 def _along(
-    contour: Contour, along: Along, heights: Heights, keep_out: Polylines | None
+    contour: Contour, along: Along, heights: Heights, keep_out: KeepOut | None
 ) -> tuple[list[Floats], Leads]:
     """The runs (n, 4) along an open contour."""
     angle, tabs = heights

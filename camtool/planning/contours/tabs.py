@@ -71,6 +71,10 @@ class Tab:
         """The tab so much further along."""
         return Tab(self.begin + by_mm, self.end + by_mm, self.top_mm, self.fall)
 
+    def holds(self, length: float) -> bool:
+        """Whether a tool that stands at this length stands on the tab; not at a straight edge."""
+        return not math.isinf(self.fall) or self.begin < length < self.end
+
     def height(self, length: float) -> float:
         """The lowest z that the tab allows at this length."""
         apart = max(self.begin - length, length - self.end, 0.0)
@@ -114,13 +118,19 @@ def raised(knots: Knots, tabs: list[Tab], total_mm: float | None) -> Knots:
     they come again, None for an open one."""
     if not tabs:
         return knots
-    result = knots[:1]
+    result: Knots = []
     for (begin, z_begin), (end, z_end) in pairwise(knots):
+        # Only passes below its top know of a tab.
+        near = [
+            tab
+            for tab in _between(tabs, total_mm, min(begin, end), max(begin, end))
+            if min(z_begin, z_end) < tab.top_mm - POSITION_EPS_MM
+        ]
         if begin == end:
-            result.append((end, z_end))
+            floor = max([tab.height(begin) for tab in near if tab.holds(begin)], default=-math.inf)
+            result += [(place, max(z, floor)) for place, z in ((begin, z_begin), (end, z_end))]
             continue
         slope = (z_end - z_begin) / (end - begin)
-        near = _between(tabs, total_mm, min(begin, end), max(begin, end))
         places = {begin, end}
         for tab in near:
             places.update(_breaks(tab, begin, z_begin, slope))
@@ -130,10 +140,8 @@ def raised(knots: Knots, tabs: list[Tab], total_mm: float | None) -> Knots:
             over = [tab for tab in near if tab.height(0.5 * (p + q)) > -math.inf]
             for place in (p, q):
                 line = z_end if place == end else z_begin + slope * (place - begin)
-                knot = (place, max([line, *(tab.height(place) for tab in over)]))
-                if knot != result[-1]:
-                    result.append(knot)
-    return result
+                result.append((place, max([line, *(tab.height(place) for tab in over)])))
+    return [knot for k, knot in enumerate(result) if k == 0 or knot != result[k - 1]]
 
 
 def _between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -> list[Tab]:
