@@ -58,6 +58,7 @@ class Code(IntEnum):
     HOLE_SIZE = 217
     TOOL_NOT_SAID = 218
     SIDE_BY_UNCUT = 219
+    CUT_DOUBTFUL = 220
     TAB_SHARED = 225
     CORNER_FAR = 226
 

@@ -14,6 +14,7 @@ class GrblPost:
     """Writes and reads grbl programs; the two share no code but the options of `[dialect]`."""
 
     name = "grbl"
+    starts_spindle = True
 
     def check(self, machine: Machine) -> None:
         """Raise MachineError when the machine's `[dialect]` table does not fit."""

@@ -14,6 +14,7 @@ class LinuxCncPost:
     """Writes and reads linuxcnc programs; the two share no code but the options of `[dialect]`."""
 
     name = "linuxcnc"
+    starts_spindle = True
 
     def check(self, machine: Machine) -> None:
         """Raise MachineError when the machine's `[dialect]` table does not fit."""

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
-    from camtool.planning.plan import Plan
+    from camtool.planning.plan import Plan, Step
     from camtool.simulation.options import Effects
     from camtool.toolpath.bent import Bent
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
     from camtool.verify.asked import Asked
     from camtool.verify.gates import Gates
-    from camtool.verify.records import Before
+    from camtool.verify.records import Before, PlannedOperation
     from camtool.verify.verify import Verification, VerifyOptions
 
 
@@ -84,11 +84,13 @@ def post_drawing(
     """Plan, write, read back, simulate and judge; `check=False` leaves out the last two;
     `compensate` bends what is written against the machine's mechanics; `trace_points` of the
     slides' path are kept at most (None: as usual)."""
+    from camtool.planning.doubts import doubts
     from camtool.planning.plan import planned
 
     plan = planned(drawing, job, target.machine)
     wanted = plan.toolpath
-    findings = _merged(drawing.findings, wanted.findings)
+    doubtful = doubts(plan.steps, starts_spindle=getattr(target.post, "starts_spindle", False))
+    findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return Posted(wanted, None, None, None, findings)
     sent = _bent(wanted, target.machine) if compensate else None
@@ -125,6 +127,7 @@ def post_drawing(
         Planned(
             rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in plan.steps)),
             rapid_mm=certain(sum(step.rapid_mm for step in plan.steps)),
+            operations=tuple(_reported(step) for step in plan.steps if step.runs),
         ),
         _before(plain),
     )
@@ -208,6 +211,26 @@ def convert_program(
     judged = _judged(program.data, again, target, Goal(wanted), options)
     findings = _merged(findings, judged.findings)
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
+
+
+def _reported(step: Step) -> PlannedOperation:
+    """How an operation cuts, for the report."""
+    from camtool.planning.doubts import IN_PASSES, deepest_pass
+    from camtool.verify.records import PlannedOperation
+
+    operation, setting = step.operation, step.setting
+    in_passes = operation.kind in IN_PASSES
+    return PlannedOperation(
+        name=operation.name,
+        kind=operation.kind,
+        tool_diameter_mm=operation.tool.diameter_mm,
+        spindle_rpm=operation.spindle_rpm,
+        feed_mm_min=setting.feeds.cut_mm_min,
+        plunge_mm_min=setting.feeds.plunge_mm_min,
+        depth_mm=-setting.levels_mm[-1],
+        passes=len(setting.levels_mm) if in_passes else None,
+        deepest_pass_mm=deepest_pass(setting) if in_passes else None,
+    )
 
 
 def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, ...]:

@@ -41,11 +41,12 @@ HOME: Point = (0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What became of one operation: what it took, its items as the operation made them, the runs
-    in order of cutting, how far rapids go in XY: as drawn, and as ordered, mm; and the bridges
-    that its tabs leave."""
+    """What became of one operation: its setting, what it took, its items as the operation made
+    them, the runs in order of cutting, how far rapids go in XY: as drawn, and as ordered, mm; and
+    the bridges that its tabs leave."""
 
     operation: Operation
+    setting: Setting
     chosen: Chosen
     work: Work
     runs: tuple[Run, ...]
@@ -86,7 +87,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
         step = _step(placed, job, setting, machine, (here, there), sides)
         here = _end(step.runs, here)
         steps.append(step)
-    steps = _sparing(steps, settings)
+    steps = _sparing(steps)
     worked = [Worked(step.operation, step.runs) for step in steps]
     approaches = None
     if job.approach or job.minimise == "reversals":
@@ -187,6 +188,7 @@ def _step(
     after = travel_mm(choices, rows, *way)
     return Step(
         setting.operation,
+        setting,
         chosen,
         work,
         tuple(runs),
@@ -197,7 +199,7 @@ def _step(
     )
 
 
-def _sparing(steps: list[Step], settings: list[Setting]) -> list[Step]:
+def _sparing(steps: list[Step]) -> list[Step]:
     """The steps, their runs raised over the bridges that any of them leaves."""
     bridges = [bridge for step in steps for bridge in step.bridges]
     if not bridges:
@@ -205,8 +207,8 @@ def _sparing(steps: list[Step], settings: list[Setting]) -> list[Step]:
     from camtool.planning.contours.bridges import spared
 
     made = []
-    for step, setting in zip(steps, settings, strict=True):
-        kept = spared(step.runs, step.operation, setting.feeds, bridges)
+    for step in steps:
+        kept = spared(step.runs, step.operation, step.setting.feeds, bridges)
         findings = (*step.findings, *kept.findings)
         made.append(replace(step, runs=kept.runs, findings=findings))
     return made

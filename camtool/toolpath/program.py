@@ -44,7 +44,8 @@ class PostProcessor(Protocol):
     post has besides `line_bytes(data, machine) -> int`: how many bytes do. One whose moves may
     leave the wanted path on purpose has `stray_mm(machine) -> float`: how far at most. One whose
     coordinates are finer or coarser than the machine's steps has `unit_mm(machine) -> float`:
-    their finest difference. One that can show which part of a program each block is has
+    their finest difference. One whose programs start the spindle, at the speed that they say, has
+    `starts_spindle = True`. One that can show which part of a program each block is has
     `listing(data, machine) -> Listing`, of a program that `read` takes.
     """
 

@@ -208,12 +208,28 @@ class FindingReport(msgspec.Struct, frozen=True):
     unit: str = ""
 
 
+class PlannedOperation(msgspec.Struct, frozen=True):
+    """How an operation cuts; feeds in mm/min. `spindle_rpm` is None where nobody says a speed;
+    `passes` and the depth of the deepest one are of those kinds that have any."""
+
+    name: str
+    kind: str
+    tool_diameter_mm: float
+    spindle_rpm: float | None
+    feed_mm_min: float
+    plunge_mm_min: float
+    depth_mm: float
+    passes: int | None = None
+    deepest_pass_mm: float | None = None
+
+
 class Planned(msgspec.Struct, frozen=True):
     """What planning gained: how far rapids go in XY, mm, with everything in the order and from
-    the starts in which it was drawn, and as it was put into order."""
+    the starts in which it was drawn, and as it was put into order; and how the operations cut."""
 
     rapid_drawn_mm: float
     rapid_mm: float
+    operations: tuple[PlannedOperation, ...] = ()
 
 
 class Before(msgspec.Struct, frozen=True):

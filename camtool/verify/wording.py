@@ -5,12 +5,16 @@ Its tables stand in `camtool.verify.sheets`, its pages in `markdown` and `html` 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from camtool.verify.records import AskedReport, ShapeReport
+    from camtool.verify.records import AskedReport, PlannedOperation, ShapeReport
     from camtool.verify.report import Report
+
+
+MOST_OPERATIONS = 6
+"""So many operations are told one by one."""
 
 
 def clock(seconds: float) -> str:
@@ -73,6 +77,7 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
         f"X {total.x}, Y {total.y}, Z {total.z} (while cutting X {cutting.x}, Y {cutting.y})",
     )
     if report.planned is not None:
+        yield from (("cut", line) for line in _cuts(report.planned.operations))
         far, drawn = report.planned.rapid_mm, report.planned.rapid_drawn_mm
         yield "rapids", f"{mm(far)} mm in XY (as drawn {mm(drawn)} mm)"
     if report.before is not None:
@@ -101,6 +106,23 @@ def _asked(asked: AskedReport) -> str:
         f"{asked.alike} of {asked.moves} cutting moves are those that camtool writes, the others"
         f" up to {asked.off_um:.2f} µm off ({asked.limit_um:.2f} µm allowed)"
     )
+
+
+def _cuts(operations: Sequence[PlannedOperation]) -> Iterator[str]:
+    """Tool, spindle, feeds, depth and passes of the operations, one to a line."""
+    for each in operations[:MOST_OPERATIONS]:
+        name = one_line(each.name or each.kind)
+        tool = f"tool {each.tool_diameter_mm:g} mm" if each.tool_diameter_mm else "no tool width"
+        speed = "no spindle speed" if each.spindle_rpm is None else f"spindle {each.spindle_rpm:g}"
+        passes = "" if each.passes is None else f" in {each.passes} pass"
+        if each.passes is not None and each.passes > 1:
+            passes += f"es of {each.deepest_pass_mm:.4g} at most"
+        yield (
+            f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g}, plunge {each.plunge_mm_min:g}"
+            f" mm/min, {each.depth_mm:.4g} mm deep{passes}"
+        )
+    if len(operations) > MOST_OPERATIONS:
+        yield f"and {len(operations) - MOST_OPERATIONS} operations more"
 
 
 def _shape(shape: ShapeReport) -> str:
