@@ -156,6 +156,7 @@ def _step(
     """One operation from what it takes to its runs, for a tool that comes from the first point
     of its `way` and goes to the second (None: stays)."""
     from camtool.planning.contours.runs import runs_of
+    from camtool.planning.contours.tabs import with_tabs
     from camtool.planning.gouges import side_findings
     from camtool.planning.order import best_order, choices_of, chosen_path, drawn, travel_mm
     from camtool.planning.precedence import must_precede
@@ -163,7 +164,8 @@ def _step(
     chosen = choose(placed, setting.operation, sides)
     work = work_of(chosen, setting)
     items: tuple[Item, ...] = tuple(_with_starts(item) for item in work.items)
-    findings = [*work.findings, *side_findings(work, chosen, sides, setting.operation)]
+    items, bare = with_tabs(items)
+    findings = [*work.findings, *side_findings(work, chosen, sides, setting.operation), *bare]
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), *way)
     if job.minimise == "reversals":

@@ -19,7 +19,7 @@ path is where two shares meet, so that no tab stands on the seam.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -27,12 +27,13 @@ import numpy as np
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
+from camtool.geometry.measure import path_lengths, signed_areas
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polylines, Segments
 from camtool.planning.contours.along import Along
 from camtool.planning.contours.ramps import Knots
-from camtool.planning.items import Contour
+from camtool.planning.items import Contour, Item
 from camtool.planning.job import Operation
-from camtool.planning.places import at_place, key_of
+from camtool.planning.places import at_place, key_of, operation_name
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
 """How steep the sides of ramped tabs are when the tool may plunge."""
@@ -81,6 +82,60 @@ class Tab:
         return self.top_mm - (self.fall * apart if apart else 0.0)
 
 
+def with_tabs(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], list[Finding]]:
+    """The items of an operation, those without tabs that are to have none; and how many.
+
+    Tabs hold parts: where an operation cuts parts free, its holes and open paths go without, as
+    do contours that are too short. Where it cuts none free, what it cuts has tabs as asked. Where
+    nothing is long enough, `tabs_of` says so.
+    """
+    asked = [each for each in items if isinstance(each, Contour) and each.setting.operation.tabs]
+    if not asked:
+        return items, []
+    parts = [each for each in asked if each.path.closed and not _is_hole(each)]
+    held = {id(each) for each in parts or asked if _is_long_enough(each)}
+    bare = {id(each): each for each in asked if held and id(each) not in held}
+    if not bare:
+        return items, []
+    opens = sum(not each.path.closed for each in bare.values())
+    holes = sum(each.path.closed and _is_hole(each) for each in bare.values())
+    kinds = ((holes, "holes"), (opens, "open"), (len(bare) - holes - opens, "too short for them"))
+    finding = Finding(
+        Code.TAB_LEFT_OUT,
+        Severity.WARNING,
+        f"{len(bare)} contours go without tabs: "
+        + ", ".join(f"{count} {kind}" for count, kind in kinds if count)
+        + "; an operation of their own may give them some",
+        where=operation_name(asked[0].setting.operation),
+        measured=float(len(bare)),
+        unit="contours",
+    )
+    return tuple(_bare(each) if id(each) in bare else each for each in items), [finding]
+
+
+def _bare(item: Item) -> Item:
+    """The item without tabs."""
+    operation = replace(item.setting.operation, tabs=None)
+    return replace(item, setting=replace(item.setting, operation=operation))
+
+
+def _is_hole(contour: Contour) -> bool:
+    """Whether what is to stay lies around a closed contour, and not within it."""
+    if contour.material_left is None:
+        return False
+    ccw = bool(signed_areas(Polylines.of([contour.path]))[0] > 0.0)
+    return ccw != contour.material_left
+
+
+def _is_long_enough(contour: Contour) -> bool:
+    """Whether a contour is at least as long as its tabs."""
+    operation = contour.setting.operation
+    total = float(path_lengths(Polylines.of([contour.path]))[0])
+    model, foot = _model(operation, contour.setting.levels_mm[-1])
+    count = _wanted(total, operation)
+    return count * (model.end + 2.0 * foot) <= total * (1.0 + COUNT_SLACK)
+
+
 def tabs_of(contour: Contour, along: Along) -> tuple[list[Tab], list[Finding]]:
     """The tabs of a contour whose path, from its start, is `along`; and those that do not fit.
 
@@ -97,12 +152,7 @@ def tabs_of(contour: Contour, along: Along) -> tuple[list[Tab], list[Finding]]:
             where=key_of(operation, "tabs"),
             mend="lower the tabs, or cut deeper",
         )
-    model = Tab(0.0, tabs.width_mm + operation.tool.diameter_mm, bottom + tabs.height_mm, math.inf)
-    if tabs.ramped:
-        slopes = operation.entry.kind != "plunge"
-        angle = min(SIDE_ANGLE_RAD, operation.entry.angle_rad) if slopes else SIDE_ANGLE_RAD
-        model = Tab(0.0, model.end, model.top_mm, math.tan(angle))
-    foot = model.foot(bottom)
+    model, foot = _model(operation, bottom)
     count = _count(along.total_mm, operation, model.end + 2.0 * foot)
     found = [_fitted(along, model, foot, (which, count)) for which in range(count)]
     findings = [
@@ -111,6 +161,20 @@ def tabs_of(contour: Contour, along: Along) -> tuple[list[Tab], list[Finding]]:
         if tab is None
     ]
     return [tab for tab in found if tab is not None], findings
+
+
+def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
+    """A tab of the operation, from the length 0, and how long the slope to each side of it is."""
+    tabs = operation.tabs
+    assert tabs is not None
+    end, top = tabs.width_mm + operation.tool.diameter_mm, bottom_mm + tabs.height_mm
+    if not tabs.ramped:
+        model = Tab(0.0, end, top, math.inf)
+    else:
+        slopes = operation.entry.kind != "plunge"
+        angle = min(SIDE_ANGLE_RAD, operation.entry.angle_rad) if slopes else SIDE_ANGLE_RAD
+        model = Tab(0.0, end, top, math.tan(angle))
+    return model, model.foot(bottom_mm)
 
 
 def raised(knots: Knots, tabs: list[Tab], total_mm: float | None) -> Knots:
@@ -169,12 +233,7 @@ def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]
 
 def _count(total_mm: float, operation: Operation, length_mm: float) -> int:
     """How many tabs of this length; OptionError when together they are longer than the path."""
-    tabs = operation.tabs
-    assert tabs is not None
-    count = tabs.count
-    if tabs.spacing_mm is not None:
-        count = math.ceil(total_mm / tabs.spacing_mm * (1.0 - COUNT_SLACK))
-    assert count is not None
+    count = _wanted(total_mm, operation)
     if count * length_mm > total_mm * (1.0 + COUNT_SLACK):
         raise OptionError(
             f"{count} tabs of {length_mm:.4g} mm (with the tool's diameter) are longer than the"
@@ -183,6 +242,16 @@ def _count(total_mm: float, operation: Operation, length_mm: float) -> int:
             mend="give fewer or narrower tabs, or leave small contours to another operation",
         )
     return count
+
+
+def _wanted(total_mm: float, operation: Operation) -> int:
+    """How many tabs the operation asks of a path of this length."""
+    tabs = operation.tabs
+    assert tabs is not None
+    if tabs.spacing_mm is not None:
+        return math.ceil(total_mm / tabs.spacing_mm * (1.0 - COUNT_SLACK))
+    assert tabs.count is not None
+    return tabs.count
 
 
 def _fitted(along: Along, model: Tab, foot: float, share: tuple[int, int]) -> Tab | None:
