@@ -173,7 +173,8 @@ def _placement(file: Said, flags: Said) -> Placement:
 def _stock(table: Table | None) -> Stock | None:
     if table is None:
         return None
-    for name in STOCK:
+    needed = [name for name, key in STOCK.items() if key.field in _ANY_STOCK]
+    for name in needed:
         if name not in table.given:
-            raise table.refused(f"key {name} is missing", f"give {', '.join(STOCK)}")
+            raise table.refused(f"key {name} is missing", f"give {', '.join(needed)}")
     return record_of(Stock, STOCK, table, _ANY_STOCK)

@@ -90,8 +90,9 @@ STOCK = {
     "corner": Key("corner_mm", plain(lengths)),
     "size": Key("size_mm", plain(lengths)),
     "thickness": Key("thickness_mm", plain(length)),
+    "spoilboard": Key("spoilboard_mm", plain(length)),
 }
-"""Keys of `[stock]`: all of them."""
+"""Keys of `[stock]`: all but the last must be there."""
 
 _TIPS = ("v", "drill")
 TOOL = {

@@ -110,6 +110,7 @@ def job_template(drawing: Drawing, machine: Machine | None = None) -> str:
         '# corner = ["0mm", "0mm"]',
         f'# size = ["{size[0]:.6g}mm", "{size[1]:.6g}mm"]',
         '# thickness = "1mm"',
+        '# spoilboard = "0.5mm"',
         "",
         f"[tools.{TOOL_NAME}]",
         _row('diameter = "0mm"', TOOL["diameter"].help),

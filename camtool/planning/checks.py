@@ -67,7 +67,7 @@ def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
 
 
 def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
-    """Cuts deeper than the stock is thick, and what is cut wholly beside it."""
+    """Cuts through the stock and deeper than may be, and what is cut wholly beside it."""
     stock = job.stock
     cuts = _cuts(toolpath)
     if stock is None or not cuts.any():
@@ -76,14 +76,28 @@ def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     low = np.minimum(toolpath.starts[rows, 2], toolpath.end[rows, 2])
     deepest = int(rows[low.argmin()])
     depth = STOCK_TOP_MM - float(low.min())
-    if depth > stock.thickness_mm + POSITION_EPS_MM:
+    through = depth - stock.thickness_mm
+    if POSITION_EPS_MM < through <= stock.through_mm + POSITION_EPS_MM:
+        yield Finding(
+            Code.OUT_OF_STOCK,
+            Severity.INFO,
+            f"the tool goes {through:.4g} mm through the stock of {stock.thickness_mm:g} mm into"
+            f" what lies below; up to {stock.through_mm:g} mm are allowed",
+            where=_place(toolpath, deepest),
+            measured=depth,
+            limit=stock.thickness_mm + stock.through_mm,
+            unit="mm",
+        )
+    elif through > POSITION_EPS_MM:
         yield Finding(
             Code.OUT_OF_STOCK,
             Severity.ERROR,
-            f"the tool cuts {depth:.4g} mm deep into a stock of {stock.thickness_mm:g} mm",
+            f"the tool cuts {depth:.4g} mm deep into a stock of {stock.thickness_mm:g} mm, more"
+            f" than {stock.through_mm:g} mm into what lies below: cut less deep, or say with"
+            " spoilboard in [stock] how far it may",
             where=_place(toolpath, deepest),
             measured=depth,
-            limit=stock.thickness_mm,
+            limit=stock.thickness_mm + stock.through_mm,
             unit="mm",
         )
     _, sweeps = _radii(toolpath, job)

@@ -59,6 +59,12 @@ GOALS = ("rapids", "reversals")
 FRAMES = ("*border*", "*frame*", "*title*")
 """Layers, by patterns of their names, of what belongs to the sheet of paper."""
 
+THROUGH_MM = 1.0
+"""How far cuts may go below a stock, into the spoilboard, where nobody says how far."""
+
+THROUGH_SHARE = 0.5
+"""And no farther than this part of its thickness: thin stock has a thin board under it."""
+
 TOOL_KINDS = ("flat", "v", "drill")
 """Shapes of tools: an end mill (or a point of no width), a V bit, a drill."""
 
@@ -248,15 +254,27 @@ class Placement:
 
 @dataclass(frozen=True)
 class Stock:
-    """A block whose top is Z0: its lower-left corner and size in the work frame, mm."""
+    """A block whose top is Z0: its lower-left corner and size in the work frame, mm. Cuts may go
+    `spoilboard_mm` below it, into what it lies on (None: up to THROUGH_MM, and no more than
+    THROUGH_SHARE of its thickness)."""
 
     corner_mm: tuple[float, float]
     size_mm: tuple[float, float]
     thickness_mm: float
+    spoilboard_mm: float | None = None
 
     def __post_init__(self) -> None:
         all_above_zero("stock size", self.size_mm, "mm")
         above_zero("stock thickness", self.thickness_mm, "mm")
+        if self.spoilboard_mm is not None:
+            at_least_zero("spoilboard", self.spoilboard_mm, "mm")
+
+    @property
+    def through_mm(self) -> float:
+        """How far below the stock cuts may go, mm."""
+        if self.spoilboard_mm is not None:
+            return self.spoilboard_mm
+        return min(THROUGH_MM, THROUGH_SHARE * self.thickness_mm)
 
 
 @dataclass(frozen=True)

@@ -48,15 +48,33 @@ def test_travel_counts_part_zero_and_the_bulge_of_arcs() -> None:
     assert (finding.code, finding.measured, finding.limit) == (Code.OUT_OF_TRAVEL, 5.0, 4.9)
 
 
-def test_cuts_end_at_the_bottom_of_the_stock() -> None:
-    job = job_of(stock=STOCK)
-    assert codes(down(1, 1, -2.0).line(2, 1, feed=10), job) == []
-    path = down(1, 1, -2.0).line(2, 1, -2.01, feed=10)
+@pytest.mark.parametrize(
+    ("thickness", "board", "through", "allowed"),
+    [
+        (2.0, None, 0.2, 1.0),
+        (2.0, None, 1.0, 1.0),
+        (2.0, None, 1.01, None),
+        (0.1, None, 0.05, 0.05),  # thin stock has a thin board
+        (0.1, None, 0.06, None),
+        (2.0, 5.0, 5.0, 5.0),
+        (2.0, 5.0, 5.01, None),
+        (2.0, 0.0, 0.01, None),
+    ],
+)
+def test_cuts_may_go_through_the_stock_as_far_as_the_spoilboard_lets_them(
+    thickness: float, board: float | None, through: float, allowed: float | None
+) -> None:
+    job = job_of(stock=Stock(STOCK.corner_mm, STOCK.size_mm, thickness, board))
+    assert codes(down(1, 1, -thickness).line(2, 1, feed=10), job) == []
+    path = down(1, 1, -thickness).line(2, 1, -thickness - through, feed=10)
     (finding,) = found(path, job)
     assert finding.code == Code.OUT_OF_STOCK
-    assert finding.severity == Severity.ERROR
-    assert finding.measured == pytest.approx(2.01)
+    assert finding.severity == (Severity.ERROR if allowed is None else Severity.INFO)
+    assert finding.measured == pytest.approx(thickness + through)
     assert finding.where == "move 3"
+    assert ("spoilboard in [stock]" in finding.message) == (allowed is None)
+    if allowed is not None:
+        assert finding.limit == pytest.approx(thickness + allowed)
     assert codes(path) == []
 
 
