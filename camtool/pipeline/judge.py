@@ -109,7 +109,9 @@ def post_drawing(
 
     plain = _plainly(drawing, job, target, compensate=compensate)
     # Runs that never turn back are judged by the whole contours that they are parts of.
-    goal = wanted if plain is None or sent is not None else plain.wanted
+    goal = wanted
+    if _plain(job) != job and sent is None:
+        goal = planned(drawing, job, target.machine, undivided=True).toolpath
     verification = _judged(
         program.data,
         decoded,
@@ -157,7 +159,7 @@ def verify_program(
     if drawing is not None:
         from camtool.planning.plan import planned
 
-        plan = planned(drawing, _plain(job or Job()), target.machine)
+        plan = planned(drawing, job or Job(), target.machine, undivided=True)
         sent = _bent(plan.toolpath, target.machine) if judging.compensated else None
         asked = _asked(drawing, job or Job(), target, plan, sent)
         goal = Goal(plan.toolpath, plan.placed, sent, asked)
@@ -317,8 +319,8 @@ def _asked(
     drawing: Drawing, job: Job, target: LoadedTarget, plain: Plan, sent: Bent | None
 ) -> Asked | None:
     """What the job asks for, in moves as the dialect would say them; None where it asks for what
-    cannot be made, which is said already. `plain` is the plan of the job without what it does
-    against reversals, `sent` that bent against the mechanics."""
+    cannot be made, which is said already. `plain` is the plan with whole contours, `sent` that
+    bent against the mechanics."""
     from camtool.planning.link import feeds_of, safe_z_of
     from camtool.planning.plan import planned
     from camtool.verify.asked import Asked

@@ -73,8 +73,13 @@ def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
     return planned(drawing, job, machine).toolpath
 
 
-def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
-    """The plan with all its stages; see `plan`."""
+def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = False) -> Plan:
+    """The plan with all its stages; see `plan`.
+
+    `undivided`: what the program is held against. Contours that are cut as runs against reversals
+    are whole again, those that stay whole are cut from the starts that were chosen for them (on
+    which their ramps, leads and tabs depend), and nothing is approached.
+    """
     from camtool.planning.checks import checked
 
     placed = place(drawing, job)
@@ -85,12 +90,16 @@ def planned(drawing: Drawing, job: Job, machine: Machine) -> Plan:
     for rank, setting in enumerate(settings, 1):
         there = HOME if rank == len(settings) else None
         step = _step(placed, job, setting, machine, (here, there), sides)
-        here = _end(step.runs, here)
+        end = _end(step.runs, here)
+        if undivided and _is_divided(job, setting.operation):
+            plain = replace(job, minimise="rapids")
+            step = _step(placed, plain, setting, machine, (here, there), sides)
+        here = end
         steps.append(step)
     steps = _sparing(steps)
     worked = [Worked(step.operation, step.runs) for step in steps]
     approaches = None
-    if job.approach or job.minimise == "reversals":
+    if not undivided and (job.approach or job.minimise == "reversals"):
         from camtool.planning.reversing.approach import Approaches
 
         approaches = partial(Approaches, machine)
@@ -199,6 +208,15 @@ def _step(
         after,
         tuple(bridges),
     )
+
+
+def _is_divided(job: Job, operation: Operation) -> bool:
+    """Whether contours of the operation are cut as runs, against reversals."""
+    if job.minimise != "reversals":
+        return False
+    from camtool.planning.reversing.reversals import may_divide
+
+    return may_divide(operation)
 
 
 def _sparing(steps: list[Step]) -> list[Step]:

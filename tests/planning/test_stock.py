@@ -15,7 +15,7 @@ import pytest
 from camtool.errors import OptionError
 from camtool.findings import Finding, Severity
 from camtool.machine.registry import LoadedTarget, load_target
-from camtool.pipeline import post_drawing
+from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool
 from camtool.planning.plan import plan
 from tests.drawings import drawing_of
@@ -164,6 +164,37 @@ FAILED = {
 @pytest.mark.parametrize("name", FAILED)
 def test_past_failures(name: str) -> None:
     assert judged(FAILED[name]) == []
+
+
+WHOLE: dict[str, dict[str, Any]] = {
+    "tabs": {"tabs": Tabs(count=2, width_mm=3.0, height_mm=0.5)},
+    "ramped tabs": {"tabs": Tabs(count=3, width_mm=3.0, height_mm=0.5, ramped=True)},
+    "ramp": {"entry": Entry("ramp", math.radians(3.0))},
+    "leads": {"lead_in": Lead("arc", 2.0), "lead_out": Lead("arc", 2.0)},
+    "none": {},
+}
+"""What a contour is not divided for, whatever is done against reversals."""
+
+
+@pytest.mark.parametrize("path", [circle(0.0, 0.0, 12.0), star(5, 5.0, 12.0)])
+@pytest.mark.parametrize(
+    ("kind", "name"), [*(("profile", name) for name in WHOLE), ("engrave", "ramp")]
+)
+def test_what_is_done_against_reversals_is_accepted(kind: str, name: str, path: Path) -> None:
+    play = ("axes.x.backlash_mm=0.05", "axes.y.backlash_mm=0.03")
+    target = load_target("linuxcnc", settings=play)
+    first = Operation(kind=kind, tool=Tool(3.0), depth_mm=1.0, **WHOLE[name])
+    # The first operation ends elsewhere when it is divided, and the second begins from there.
+    job = Job((Operation(tool=Tool(3.0), depth_mm=0.5), first), minimise="reversals")
+    drawing = drawing_of([closed(*path)])
+    posted = post_drawing(drawing, job, target)
+    assert not posted.failed, [str(finding) for finding in posted.findings]
+    assert posted.program is not None
+    _, verification = verify_program(
+        posted.program.data, target, source="x.ngc", drawing=drawing, job=job
+    )
+    errors = [each for each in verification.findings if each.severity is Severity.ERROR]
+    assert errors == []
 
 
 ROUNDED = [(8.78, 8.265, 1.0), (16.15, 15.585, 0.5), (10.0, 8.0, 1.0), (4.244, 7.383, 1.5)]

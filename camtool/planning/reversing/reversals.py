@@ -153,6 +153,11 @@ def _keeps_direction(contour: Contour) -> bool:
     return operation.direction != "drawn" and wide
 
 
+def may_divide(operation: Operation) -> bool:
+    """Whether contours of this operation may be cut as several runs."""
+    return not _stays_whole(operation)
+
+
 def _stays_whole(operation: Operation) -> str:
     """Why contours of this operation are not divided; "" when they may be."""
     if operation.tabs is not None:
