@@ -39,6 +39,11 @@ WITHOUT_SIGN = (1 << 63) - 1
 BLOCK = 768
 """Samples that are judged together: their columns about fill a processor's first cache."""
 
+FARTHEST_MM = 1e9
+"""No slide is farther from zero (a thousand kilometres): squares of such positions and their sums
+stay finite, which all loops here and below take for granted. What judges steps on the way keeps to
+it by its own limits: five digits of micrometres, and the ranges of a machine file."""
+
 (
     SAMPLES,
     INNER_MAX,
@@ -213,17 +218,23 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> 
 
 
 @kernel
-def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> None:
+def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> int:
     """Judge K samples in order: row (K,), commanded and slide (K, 3) mm, whose Z is not looked at;
-    any number of rows."""
+    any number of rows. Returns the first sample that is no place within `FARTHEST_MM`, none of
+    which is judged from its block on, or −1."""
     bench = np.empty((BENCH_ROWS, BLOCK))
     done = 0
     while done < len(row):
         count = 0
         while count < BLOCK and done + count < len(row) and row[done + count] == row[done]:
             k = done + count
+            for axis in range(2):  # NaN fails too
+                near = abs(commanded[k, axis]) <= FARTHEST_MM
+                if not (near and abs(slide[k, axis]) <= FARTHEST_MM):
+                    return k
             bench[X, count], bench[Y, count] = commanded[k, 0], commanded[k, 1]
             bench[SLIDE_X, count], bench[SLIDE_Y, count] = slide[k, 0], slide[k, 1]
             count += 1
         judge_block(row[done], count, task, sums, bench)
         done += count
+    return -1

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camtool.errors import ProgramError
 from camtool.geometry.polylines import Floats, Ints
 from camtool.simulation.models import StepsOnTheWay
 from camtool.simulation.motion import Chunk, still_ledger
@@ -80,13 +81,23 @@ class SlidePass:
         cuts = np.searchsorted(chunk.row, bounds)
         for (low, high), row in zip(pairwise(cuts.tolist()), bounds[:-1], strict=True):
             self._close(row)
-            judge_samples(
+            lost = judge_samples(
                 np.ascontiguousarray(chunk.row[low:high]),
                 np.ascontiguousarray(chunk.commanded[low:high]),
                 np.ascontiguousarray(chunk.slide[low:high]),
                 self._task,
                 self._sums,
             )
+            if lost >= 0:
+                raise self._lost(int(chunk.row[low + lost]))
+
+    def _lost(self, row: int) -> ProgramError:
+        block = int(self._cuts.toolpath.block[row])
+        return ProgramError(
+            "the slides would leave every machine",
+            where=f"move {row}" if block < 0 else f"block {block + 1}",
+            mend="check its numbers, and the coded and real steps of the axes",
+        )
 
     def run(self, steps: StepsOnTheWay) -> None:
         """All rows of a controller that is run on the way."""

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from camtool.errors import ProgramError
 from camtool.findings import Severity
+from camtool.simulation.motion import one_row
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
+from camtool.verify.cuts import cut_moves
 from camtool.verify.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import (
     circle,
@@ -177,3 +180,31 @@ def test_air_moves_count_in_time_and_steps_but_not_in_errors() -> None:
     assert found.time_split_s.cutting == 0.0
     assert found.steps.x == 3 * 400
     assert found.error_um.total.max is None
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e308, -1e300, 1.1e9])
+@pytest.mark.parametrize("mover", ["commanded", "slide"])
+def test_places_beyond_all_machines_are_refused_and_never_judged(mover: str, value: float) -> None:
+    """The judge is compiled with the promise of finite numbers: others led its indices astray."""
+    decoded = sample_part().finish()
+    case = Case(decoded, MACHINE, decoded, None, VerifyOptions(), None)
+    for axis in (0, 1):
+        for sample in (0, 37, 999):
+            points = np.zeros((1000, 3))
+            chunk = one_row(2, points, points.copy())
+            getattr(chunk, mover)[sample, axis] = value
+            with pytest.raises(ProgramError, match="leave every machine"):
+                judge(case, [chunk])
+    points = np.full((1000, 3), np.nan)
+    points[:, :2] = 0.0  # Z is not looked at
+    judge(case, [one_row(2, points, points.copy())])
+
+
+def test_positions_at_the_very_limit_are_judged() -> None:
+    decoded = sample_part().finish()
+    case = Case(decoded, MACHINE, decoded, None, VerifyOptions(), None)
+    row = int(np.flatnonzero(cut_moves(decoded, flat_cuts=False).is_cut)[0])
+    points = np.full((1000, 3), 1e9)
+    found = judge(case, [one_row(row, points, -points)]).report
+    assert found.error_um.mechanics.max == pytest.approx(2e9 * np.sqrt(2) * UM)
+    assert np.isfinite(found.error_um.total.max)
