@@ -115,7 +115,7 @@ def colour_named(text: str) -> str:
     word = text.strip().lower()
     if _HEX.fullmatch(word):
         return word if len(word) > 4 else "#" + "".join(2 * digit for digit in word[1:])
-    if word.isdecimal() and 1 <= int(word) <= 255:
+    if re.fullmatch(r"\d{1,3}", word) and 1 <= int(word) <= 255:
         from ezdxf.colors import aci2rgb
 
         # 7 is the foreground: white on a black screen, black on paper, and read as black.

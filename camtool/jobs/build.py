@@ -8,6 +8,7 @@ A key that no operation of the job can use is refused, wherever it was given.
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,9 @@ from camtool.jobs.given import Table, record_of, why_idle
 from camtool.jobs.keys import OPERATION, PLACE, STOCK, WHOLE
 from camtool.jobs.tools import Tools, refuse_bad_tools, with_table
 from camtool.planning.job import Job, Operation, Placement, Stock
+
+_NUMBER = re.compile(r"\d{1,6}")
+"""An operation by its number."""
 
 _TABLE_KEYS = ("tool_table", "tool_table_units")
 _ANY_STOCK = {"corner_mm": (0.0, 0.0), "size_mm": (1.0, 1.0), "thickness_mm": 1.0}
@@ -131,7 +135,7 @@ def _rows(operations: list[Operation], chosen: tuple[str, ...]) -> list[int]:
     for text in chosen:
         if text in names:
             rows.add(names.index(text))
-        elif text.isdecimal() and 1 <= int(text) <= len(names):
+        elif _NUMBER.fullmatch(text) and 1 <= int(text) <= len(names):
             rows.add(int(text) - 1)
         else:
             near = difflib.get_close_matches(text, names, n=1)

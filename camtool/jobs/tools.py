@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,6 +13,9 @@ from camtool.jobs.given import Given, Table, record_of, refuse_idle
 from camtool.jobs.keys import TOOL, TOOL_KEYS, TOOL_NAME
 from camtool.planning.job import Tool
 from camtool.planning.tooltable import TableTool, read_tool_table
+
+_NUMBER = re.compile(r"\d{1,9}")
+"""A tool by its number."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,7 @@ class Tools:
         value = given.value
         if isinstance(value, str) and value in self.named:
             return value, self._completed(self.named[value])
-        if isinstance(value, str) and value.strip().isdecimal():
+        if isinstance(value, str) and _NUMBER.fullmatch(value.strip()):
             value = int(value)
         if type(value) is int:
             return self._numbered(value, given)

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
+from camtool.planning.ranges import FARTHEST_MM, MOST
 
 if TYPE_CHECKING:
     from camtool.planning.job import Entry, Operation, Placement, Tool
@@ -63,10 +64,9 @@ def refuse_placement(placement: Placement) -> None:
                 where="key scale",
                 mend="give one of the two",
             )
-    place = () if isinstance(placement.origin, str) else placement.origin
-    for key, numbers in (("pitch", placement.pitch_mm), ("origin", place)):
-        if not all(map(math.isfinite, numbers)):
-            raise OptionError(f"{numbers} are no lengths", where=f"key {key}")
+    _refuse_beyond("pitch", placement.pitch_mm, -MOST["mm"], MOST["mm"])
+    if not isinstance(placement.origin, str):
+        _refuse_beyond("origin", placement.origin, -FARTHEST_MM, FARTHEST_MM)
     for what, count, pitch in zip(
         ("columns", "rows"), placement.copies, placement.pitch_mm, strict=True
     ):
@@ -85,13 +85,24 @@ def refuse_placement(placement: Placement) -> None:
 
 
 def _refuse_fit(fit_mm: tuple[float, float]) -> None:
-    sane = all(math.isfinite(room) and room >= 0.0 for room in fit_mm)
-    if not sane or not any(fit_mm):
+    _refuse_beyond("fit", fit_mm, 0.0, MOST["mm"])
+    if not any(fit_mm):
         raise OptionError(
             f"nothing fits into {fit_mm[0]:g} by {fit_mm[1]:g} mm",
             where="key fit",
             mend="give a width and a height above 0, or one of them and 0 for any",
         )
+
+
+def _refuse_beyond(key: str, lengths: tuple[float, float], least: float, most: float) -> None:
+    """Refuse lengths that are none, or not plausible."""
+    for length in lengths:
+        if not least <= length <= most:
+            raise OptionError(
+                f"{length:g} mm is not between {least:g} and {most:g}",
+                where=f"key {key}",
+                mend="give lengths of a machine",
+            )
 
 
 def _named(operation: Operation) -> str:

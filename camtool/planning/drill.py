@@ -20,7 +20,8 @@ from camtool.geometry.measure import path_extents, sample
 from camtool.geometry.polylines import Bools, Floats, Polyline, Polylines, Segments
 from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
-from camtool.planning.places import operation_name
+from camtool.planning.places import key_of, operation_name
+from camtool.planning.ranges import refuse_endless
 
 ROUND_SHARE = 1e-3
 """A closed path is a circle when its points are off the mean radius by no more than this share
@@ -46,6 +47,9 @@ PECK_CLEARANCE_MM = 0.2
 
 PECK_SHARE = 1e-9
 """A last peck shorter than this share of the others is none."""
+
+MOVES_OF_PECK = 3
+"""Down, out, and back to just above."""
 
 NAMES_SHOWN = 3
 """So many paths are named in a finding; the others are counted."""
@@ -86,6 +90,14 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
         *_other_sizes(holes, operation),
         *_nothing(holes, operation),
     ]
+    if operation.peck_mm is not None:
+        pecks = -setting.levels_mm[-1] / operation.peck_mm
+        refuse_endless(
+            MOVES_OF_PECK * pecks * len(holes),
+            key_of(operation, "peck"),
+            f"{len(holes)} holes in pecks of {operation.peck_mm:g} mm",
+            "give a larger peck",
+        )
     items = (
         Fixed((_run(hole, setting),), setting, hole.name, hole.source, hole.outline)
         for hole in holes

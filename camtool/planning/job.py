@@ -19,7 +19,15 @@ from camtool.planning.contradictions import (
     refuse_placement,
     refuse_tool,
 )
-from camtool.planning.ranges import above_zero, all_above_zero, at_least_zero, finite, one_of
+from camtool.planning.ranges import (
+    FARTHEST_MM,
+    MOST_WIDE_MM,
+    above_zero,
+    all_above_zero,
+    at_least_zero,
+    finite,
+    one_of,
+)
 
 KINDS = ("profile", "pocket", "engrave", "drill", "vcarve")
 """Kinds of operation."""
@@ -82,8 +90,8 @@ class Tool:
     name: str = ""
 
     def __post_init__(self) -> None:
-        at_least_zero("tool diameter", self.diameter_mm, "mm")
-        at_least_zero("tip diameter", self.tip_diameter_mm, "mm")
+        at_least_zero("tool diameter", self.diameter_mm, "mm", MOST_WIDE_MM)
+        at_least_zero("tip diameter", self.tip_diameter_mm, "mm", MOST_WIDE_MM)
         one_of("kind of tool", self.kind, TOOL_KINDS)
         refuse_tool(self)
 
@@ -196,6 +204,9 @@ class Operation:
         one_of("corners", self.corners, CORNERS)
         if isinstance(self.start, str):
             one_of("start", self.start, STARTS)
+        else:
+            for place in self.start:
+                finite("start", place, "mm", FARTHEST_MM)
         for name, value, unit in (
             ("feed", self.feed_mm_min, "mm/min"),
             ("plunge feed", self.plunge_feed_mm_min, "mm/min"),
@@ -208,7 +219,7 @@ class Operation:
             ("largest hole", self.max_hole_mm, "mm"),
         ):
             above_zero(name, value, unit)
-        at_least_zero("allowance", self.allowance_mm, "mm")
+        at_least_zero("allowance", self.allowance_mm, "mm", MOST_WIDE_MM)
         at_least_zero("overlap", self.overlap_mm, "mm")
         at_least_zero("dwell", self.dwell_s, "s")
         finite("angle", self.angle_rad, "rad")

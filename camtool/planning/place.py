@@ -22,6 +22,12 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polylines
 from camtool.geometry.repeats import encloses, without_repeats
 from camtool.planning.job import Job, Placement
 
+MOST_SIZE_MM = 1e5
+"""What is cut is no larger than this: 100 m, as the longest travel of a machine file."""
+
+MOST_AWAY_MM = 1e6
+"""And it lies no farther from part zero than a kilometre."""
+
 MOST_POINTS = 10_000_000
 """No more vertices than this are made by copies: far beyond any program, well within memory."""
 
@@ -60,15 +66,20 @@ def place(drawing: Drawing, job: Job) -> Drawing:
     Copies come one after the other, row by row: all paths and marks of the first, then of the
     second, whose sources say so ("CIRCLE 2F copy 2"). Fit, lower left and centre take the box
     around all that the operations take. What was found on reading stays in the drawing's frame.
-    Points that the scale brings together are
-    merged (`collapsed` tells). Raises OptionError for a fit that cannot be, and for a scale that
-    leaves no shape at all.
+    Points that the scale brings together are merged (`collapsed` tells). Raises OptionError for
+    a fit that cannot be, for a scale that leaves no shape at all, and for what is larger than
+    any machine.
     """
+    placed = drawing if job.placement == Placement() else _placed(drawing, job)
+    _refuse_too_large(placed, job.placement)
+    return placed
+
+
+def _placed(drawing: Drawing, job: Job) -> Drawing:
+    """The drawing where the job's placement says, however large."""
     placement = job.placement
-    if placement == Placement():
-        return drawing
-    first, shifts = _first_map(drawing, job), _copy_shifts(placement)
     _refuse_too_many(drawing, placement)
+    first, shifts = _first_map(drawing, job), _copy_shifts(placement)
     first = first.moved(-_origin(drawing, job, first, shifts))
     if len(shifts) == 1 and _is_identity(first):
         return drawing
@@ -218,6 +229,39 @@ def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
             where="key copies",
             mend="make fewer copies",
         )
+
+
+def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
+    """OptionError for a drawing in the work frame that is larger than any machine, or away."""
+    places = placed.paths.vertices[:, :2]
+    if len(places) == 0:
+        return
+    size = float(np.ptp(places, axis=0).max())
+    if not size <= MOST_SIZE_MM:
+        key = _what_enlarges(placement)
+        raise OptionError(
+            f"what is cut is {size:.4g} mm long, more than {MOST_SIZE_MM:g} mm",
+            file=placed.file,
+            where=f"key {key}" if key else None,
+            mend=f"give a smaller {key}" if key else "give --units, or a scale",
+        )
+    away = float(np.abs(places).max())
+    if away > MOST_AWAY_MM:
+        raise OptionError(
+            f"what is cut lies {away:.4g} mm from part zero, more than {MOST_AWAY_MM:g} mm",
+            file=placed.file,
+            where="key origin",
+            mend="let part zero be a place of what is cut: origin lower-left or centre",
+        )
+
+
+def _what_enlarges(placement: Placement) -> str:
+    """The key that makes a drawing large; "" when none does."""
+    if placement.scale > 1.0:
+        return "scale"
+    if placement.fit_mm is not None:
+        return "fit"
+    return "pitch" if placement.copies != (1, 1) else ""
 
 
 def _is_identity(where: _Map) -> bool:

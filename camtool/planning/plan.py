@@ -20,6 +20,8 @@ import numpy as np
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
+from camtool.geometry.measure import path_lengths
+from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
 from camtool.planning.choose import choose
 from camtool.planning.contours.levels import carved_levels, levels
@@ -27,7 +29,8 @@ from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
 from camtool.planning.job import Job, Operation
 from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
 from camtool.planning.place import collapsed, place
-from camtool.planning.places import operation_name
+from camtool.planning.places import key_of, operation_name
+from camtool.planning.ranges import refuse_endless
 from camtool.planning.sides import Sides
 from camtool.toolpath.moves import Toolpath
 
@@ -37,6 +40,9 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 HOME: Point = (0.0, 0.0)
+
+MOST_OVERLAPS = 20
+"""Contours are cut no more times round than this beyond their starts: once is enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +189,7 @@ def _step(
         items, noticed = fewer_reversals(items, machine)
         findings += noticed
         choices = choices_of(items)
+    _refuse_endless(items, setting)
     rows = best_order(choices, must_precede(items), *way)
     keep_out = _walls(placed, job, setting.operation)
     runs: list[Run] = []
@@ -232,6 +239,30 @@ def _sparing(steps: list[Step]) -> list[Step]:
         findings = (*step.findings, *kept.findings)
         made.append(replace(step, runs=kept.runs, findings=findings))
     return made
+
+
+def _refuse_endless(items: tuple[Item, ...], setting: Setting) -> None:
+    """OptionError for passes, or an overlap, that go round what is drawn too often."""
+    operation, passes = setting.operation, len(setting.levels_mm)
+    paths = [item.path for item in items if isinstance(item, Contour)]
+    each = np.array([len(path.vertices) for path in paths], dtype=np.float64)
+    if passes > 1:
+        refuse_endless(
+            passes * float(each.sum()),
+            key_of(operation, "step_down"),
+            f"{passes} passes",
+            "give a larger step",
+        )
+    rings = [path for path in paths if path.closed]
+    if operation.overlap_mm > 0.0 and rings:
+        shortest = float(path_lengths(Polylines.of(rings)).min())
+        if operation.overlap_mm > MOST_OVERLAPS * shortest:
+            raise OptionError(
+                f"{operation.overlap_mm:g} mm goes {operation.overlap_mm / shortest:.3g} times"
+                f" round a contour of {shortest:.4g} mm",
+                where=key_of(operation, "overlap"),
+                mend=f"give {MOST_OVERLAPS * shortest:.4g} mm or less",
+            )
 
 
 def _walls(placed: Drawing, job: Job, operation: Operation) -> KeepOut:

@@ -40,7 +40,9 @@ DIMPLES = (
     b'<svg xmlns="http://www.w3.org/2000/svg" width="20mm" height="12mm" viewBox="0 0 20 12">'
     b'<circle cx="4" cy="4" r="0.5"/><circle cx="9" cy="4" r="0.5"/></svg>'
 )
-PROGRAM = b"G21\nG90\nG17\nG94\nG0 Z5\nG0 X1 Y1\nG1 Z-1 F100\nG1 X9 F200\nG2 X9 Y5 I0 J2\nG0 Z5\nM2\n"
+PROGRAM = (
+    b"G21\nG90\nG17\nG94\nG0 Z5\nG0 X1 Y1\nG1 Z-1 F100\nG1 X9 F200\nG2 X9 Y5 I0 J2\nG0 Z5\nM2\n"
+)
 TABLE = b"T1 P1 D3.0 ;flat\n"
 JOB = b'[[operation]]\nname = "all"\nlayers = ["*"]\n'
 
@@ -77,7 +79,10 @@ BASES: Mapping[str, tuple[str, ...]] = {
     "job check": (),
     "targets new": ("--extends", "grbl", "-o", "mine.toml"),
     "coupon": ("-t", "linuxcnc", "-o", "out.svg"),
-    "calibrate": ("-t", "linuxcnc",),
+    "calibrate": (
+        "-t",
+        "linuxcnc",
+    ),
 }
 """Flags that each command needs."""
 
@@ -104,7 +109,6 @@ class Flag:
 
     command: str
     name: str
-    text: bool
 
     @property
     def base(self) -> list[str]:
@@ -169,7 +173,7 @@ def flags_of(command: click.Command = cli, path: tuple[str, ...] = ()) -> Iterat
             return
     for option in command.params:
         if isinstance(option, click.Option) and not option.is_flag and " ".join(path) in BASES:
-            yield Flag(" ".join(path), option.opts[0], isinstance(option.type, click.types.StringParamType))
+            yield Flag(" ".join(path), option.opts[0])
 
 
 @dataclass(frozen=True)
@@ -211,9 +215,9 @@ def _become(words: Sequence[str], folder: Path, said: Path) -> None:
         nothing = os.open(os.devnull, os.O_RDONLY)
         for to, stream in ((nothing, 0), (out, 1), (out, 2)):
             os.dup2(to, stream)
-        sys.stdin = open(0, closefd=False)  # noqa: SIM115, PTH123
-        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115, PTH123
-        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115, PTH123
+        sys.stdin = open(0, closefd=False)  # noqa: SIM115
+        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
         os.chdir(folder)
         resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
         sys.argv = ["camtool", *words]

@@ -237,12 +237,43 @@ def test_errors_gaps_and_doubtful_places_come_along() -> None:
     )
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1e308])
-def test_a_scale_that_leaves_no_shape_is_refused(scale: float) -> None:
+def test_a_scale_that_leaves_no_shape_is_refused() -> None:
     with pytest.raises(OptionError, match="path 0, vertex 0") as caught:
-        place(drawing_of([_box(3, 3, 4, 4)]), job_of(scale=scale))
+        place(drawing_of([_box(3, 3, 3.2, 3.2)]), job_of(scale=1e-6))
     assert caught.value.where == "key scale"
     assert caught.value.mend
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e308, math.nan, math.inf])
+def test_a_scale_that_nobody_means_is_refused(scale: float) -> None:
+    with pytest.raises(OptionError, match="scale"):
+        job_of(scale=scale)
+
+
+@pytest.mark.parametrize(
+    ("settings", "where"),
+    [
+        ({"scale": 2e5}, "key scale"),
+        ({"copies": (2, 1), "pitch_mm": (99_999.5, 1.0)}, "key pitch"),
+        ({"origin": (-2e6, 0.0)}, "key origin"),
+    ],
+)
+def test_what_is_larger_than_any_machine_is_refused_by_what_makes_it_so(
+    settings: dict[str, Any], where: str
+) -> None:
+    with pytest.raises(OptionError, match="what is cut") as caught:
+        place(drawing_of([_box(0, 0, 1, 1)]), job_of(**settings))
+    assert caught.value.where == where
+
+
+def test_a_drawing_in_wrong_units_is_refused_and_one_far_from_its_zero_is_not() -> None:
+    with pytest.raises(OptionError, match="--units"):
+        place(drawing_of([_box(0, 0, 2e5, 1)]), job_of())
+    far = drawing_of([_box(5e8, 5e8, 5e8 + 64, 5e8 + 32)])
+    with pytest.raises(OptionError, match="lower-left"):
+        place(far, job_of())
+    placed = place(far, job_of(origin="lower-left"))
+    assert placed.paths.vertices[:, :2].max() == 64.0
 
 
 def test_copies_beyond_all_measure_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

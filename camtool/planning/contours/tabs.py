@@ -34,6 +34,7 @@ from camtool.planning.contours.ramps import Knots
 from camtool.planning.items import Contour, Item
 from camtool.planning.job import Operation
 from camtool.planning.places import at_place, key_of, operation_name
+from camtool.planning.ranges import refuse_endless
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
 """How steep the sides of ramped tabs are when the tool may plunge."""
@@ -249,6 +250,12 @@ def _wanted(total_mm: float, operation: Operation) -> int:
     tabs = operation.tabs
     assert tabs is not None
     if tabs.spacing_mm is not None:
+        refuse_endless(
+            total_mm / tabs.spacing_mm,
+            key_of(operation, "tabs"),
+            f"tabs each {tabs.spacing_mm:g} mm",
+            "give a larger spacing",
+        )
         return math.ceil(total_mm / tabs.spacing_mm * (1.0 - COUNT_SLACK))
     assert tabs.count is not None
     return tabs.count
