@@ -118,10 +118,10 @@ class _Reader:
         return (
             Finding(
                 Code.FEED_ABOVE_LIMIT,
-                Severity.ERROR,
+                Severity.WARNING,
                 f"{self._fast.count} blocks have a feed above what the machine's shortest half "
                 f"period gives, up to {self._fast.most:g} mm/min where {self._max_feed:.4g} is "
-                "the limit",
+                "the limit: that half period holds them, and so does the simulation",
                 where=self._fast.where,
                 measured=self._fast.most,
                 limit=self._max_feed,

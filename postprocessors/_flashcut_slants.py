@@ -35,7 +35,9 @@ def split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:
     way = toolpath.end[:, :2] - begin[:, :2]
     steps = np.column_stack([to_steps(way[:, axis], float(q_mm[axis])) for axis in (0, 1)])
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    exact = np.maximum(half_periods_ms(feed, float(q_mm.max()), controller) - 1.0, 1.0)
+    alone = (steps == 0).any(axis=1)
+    half_period = half_periods_ms(feed, float(q_mm.max()), alone, controller)
+    exact = np.maximum(half_period - 1.0, 1.0)
     slanted = toolpath.kind == Kind.LINE
     pieces = np.where(slanted, np.ceil(np.abs(steps).min(axis=1) / exact), 1.0)
     count = np.maximum(pieces, 1.0)

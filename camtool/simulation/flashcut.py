@@ -9,7 +9,8 @@ What it does with a row of the toolpath, in the order of this file and `flashcut
 3. The timers run until the longer axis has made its steps; the shorter one makes as many as its
    own timer gives, at least what it should and often more (`camtool.kernels.timers`). With
    "programmed" nobody ever sees what is too much, and it stays for the rest of the program.
-4. The half period comes from the feed and is at least `controller.half_period_ms`; a step takes
+4. The half period comes from the feed and is at least `controller.half_period_ms`, where one
+   axis moves alone `controller.single_axis_half_period_ms`; a step takes
    `controller.half_periods_per_step` of them, and each is a millisecond late.
 5. At each change of an axis's direction the compensation steps are issued, a step's time each
    (`controller.compensation_half_period_ms`).
@@ -26,6 +27,7 @@ import numpy as np
 from camtool.kernels.lattice import HALF_STEP_GUARD
 from camtool.kernels.timers import Counters, Issued, Rules, timers_fill
 from camtool.machine.controllers import FlashcutController
+from camtool.machine.controllers.flashcut_timers import feeds_of, shortest_ms
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation.flashcut_moves import (
     MoveTable,
@@ -65,13 +67,14 @@ def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str
 def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
     """What times and figures take for granted."""
     controller = controller_of(machine, FlashcutController)
-    parts, shortest = controller.half_periods_per_step, controller.half_period_ms
-    fastest_s = parts * (shortest + 1) / 1000.0
+    shortest = shortest_ms(np.array([False, True]), controller)
     step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    both, one = feeds_of(shortest, step_mm, controller).tolist()
     return (
-        f"a step takes {parts} half periods of at least {shortest} ms "
-        "(controller.half_period_ms), each a millisecond late: no move is faster than "
-        f"{60.0 * step_mm / fastest_s:.3g} mm/min, whatever its F",
+        f"a step takes {controller.half_periods_per_step} half periods of at least "
+        f"{shortest[0]:g} ms (controller.half_period_ms), or {shortest[1]:g} ms where one axis "
+        "moves alone (controller.single_axis_half_period_ms), each a millisecond late: no move "
+        f"is faster than {both:.3g} or {one:.3g} mm/min, whatever its F",
         "the longer axis of a move keeps the feed; speeds change at once",
         f"an arc becomes {controller.chords_per_turn} chords a turn (controller.chords_per_turn)",
         f"displacements are counted from where the program {_FROM[controller.goes_on_from]} "

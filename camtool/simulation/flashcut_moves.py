@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.errors import ProgramError
+from camtool.kernels.lattice import to_steps
 from camtool.kernels.timers import HOME_X, HOME_Y, HOME_Z, XY, Moves, Z
 from camtool.machine.controllers import FlashcutController
 from camtool.machine.controllers.flashcut_timers import half_periods_ms
 from camtool.machine.model import Machine, controller_of
-from camtool.simulation.motion import Floats, Ints
+from camtool.simulation.motion import Bools, Floats, Ints
 from camtool.simulation.path import check_positions, placed
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -48,13 +49,14 @@ def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
     return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
 
 
-def half_periods(toolpath: Toolpath, machine: Machine, step_mm: float) -> Ints:
+def half_periods(toolpath: Toolpath, machine: Machine, step_mm: float, alone: Bools) -> Ints:
     """(N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the shortest.
+    `alone` (N,): rows of one axis.
 
     ProgramError for feeds whose half period the controller cannot count.
     """
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    wanted = half_periods_ms(feed, step_mm, controller_of(machine, FlashcutController))
+    wanted = half_periods_ms(feed, step_mm, alone, controller_of(machine, FlashcutController))
     slow = wanted >= MOST_LONG
     if slow.any():
         raise ProgramError(
@@ -65,6 +67,13 @@ def half_periods(toolpath: Toolpath, machine: Machine, step_mm: float) -> Ints:
     return wanted.astype(np.int64)
 
 
+def _alone(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
+    """(N,) true for rows that move X or Y alone, by their steps of `x_mm` and `y_mm`: no arcs."""
+    way = np.abs(toolpath.end - toolpath.starts)
+    apart = np.minimum(to_steps(way[:, 0], x_mm), to_steps(way[:, 1], y_mm)) == 0
+    return np.asarray(~toolpath.is_arc & (apart | (toolpath.kind >= Kind.HOME_XY)))
+
+
 @dataclass(frozen=True, eq=False)
 class MoveTable:
     """How many moves each row of a placed toolpath makes, and the moves of any window of rows."""
@@ -73,7 +82,7 @@ class MoveTable:
     starts: Floats
     sweeps: Floats
     chords: Ints
-    rises: npt.NDArray[np.bool_]
+    rises: Bools
     half_period_xy: Ints
     half_period_z: Ints
 
@@ -94,8 +103,8 @@ class MoveTable:
             sweeps,
             parts.astype(np.int64),
             rises,
-            half_periods(toolpath, machine, max(x, y)),
-            half_periods(toolpath, machine, z),
+            half_periods(toolpath, machine, max(x, y), _alone(toolpath, x, y)),
+            half_periods(toolpath, machine, z, np.ones(len(toolpath), dtype=np.bool_)),
         )
 
     @property

@@ -133,9 +133,11 @@ def chord_ends(
 
 
 def run_rows(
-    toolpath: Toolpath, pc: Pc, shortest: int, parts: int, per_turn: int, home: Point
+    toolpath: Toolpath, pc: Pc, shortest: tuple[int, int], parts: int, per_turn: int, home: Point
 ) -> tuple[list[int], list[float]]:
-    """The row of each sample that `pc` has seen, and the seconds of each row up to the end."""
+    """The row of each sample that `pc` has seen, and the seconds of each row up to the end.
+    `shortest`: half periods of moves of both axes, and of one alone."""
+    both, one = shortest[0], min(shortest)
     rows: list[int] = []
     seconds: list[float] = []
     x, y, z = toolpath.start.tolist()
@@ -143,18 +145,20 @@ def run_rows(
     for index, row in enumerate(toolpath):
         move = replace(row, start=at)  # homing leads elsewhere than its row says
         before, waited = pc.spent_ms, 0.0
-        p_xy = p_z = shortest
+        way = [abs(b - a) / q for a, b, q in zip(at, move.end, pc.q_mm, strict=True)]
+        alone = move.centre is None and min(way[:2]) < 0.5 - 1e-7
+        p_xy, p_z = one if alone else both, one
         if move.feed is not None:
-            p_xy = half_period(move.feed, max(pc.q_mm[:2]), shortest, parts)
-            p_z = half_period(move.feed, pc.q_mm[2], shortest, parts)
+            p_xy = half_period(move.feed, max(pc.q_mm[:2]), p_xy, parts)
+            p_z = half_period(move.feed, pc.q_mm[2], one, parts)
         if move.kind == Kind.DWELL:
             waited = move.value or 0.0
         elif move.kind == Kind.HOME_XY:
-            pc.one(1, home[1], shortest, sensor=True)
-            pc.one(0, home[0], shortest, sensor=True)
+            pc.one(1, home[1], one, sensor=True)
+            pc.one(0, home[0], one, sensor=True)
             at = home[0], home[1], at[2]
         elif move.kind == Kind.HOME_Z:
-            pc.one(2, home[2], shortest, sensor=True)
+            pc.one(2, home[2], one, sensor=True)
             at = at[0], at[1], home[2]
         elif move.kind <= Kind.ARC_CCW:
             ends = [move.end[:2]]

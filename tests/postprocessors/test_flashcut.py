@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from camtool.errors import MachineError, PostError, ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Code, Finding, Severity
 from camtool.machine.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -140,24 +140,49 @@ def test_rapids_above_the_stock_go_along_one_axis_at_a_time() -> None:
     assert back.end[back.block == 7].tolist() == [[1.0, 1.0, 0.0]]
 
 
+def too_long(program: bytes, *settings: str) -> list[Finding]:
+    found = read(program, *settings).findings
+    return [one for one in found if one.code == Code.EXECUTED_OTHERWISE]
+
+
 def test_what_the_timers_make_too_long_is_found() -> None:
     program = b"G00 X1.9 Y0.95\nG01 X0.0 Y0.0 F3.0\nG01 X1.9 Y0.0\nG01 X1.928 Y0.028\nM30\n"
-    (finding,) = read(program).findings
+    (finding,) = too_long(program)
     # At 20 ms ⌊1000·21 / (20·1000/500 + 1)⌋ = 512 steps instead of 500; F3.0 would be 18 ms.
     assert (finding.code, finding.severity) == (Code.EXECUTED_OTHERWISE, Severity.WARNING)
     assert finding.message.startswith("2 straight moves of both axes")
     assert (finding.where, finding.measured) == ("block 1", pytest.approx(12 * 1.9))
     assert "it stays in all that follows" in finding.message
-    (late,) = read(program, "controller.clock=late-longer").findings
+    (late,) = too_long(program, "controller.clock=late-longer")
     assert late.measured == pytest.approx(25 * 1.9)
-    (seen,) = read(
-        program, "controller.goes_on_from=reached", "controller.half_period_ms=3"
-    ).findings
+    (seen,) = too_long(program, "controller.goes_on_from=reached", "controller.half_period_ms=3")
     assert seen.measured == pytest.approx(71 * 1.9)  # the rapid at 3 ms, ⌊4000 / 7⌋
     assert "stays" not in seen.message
     for gone in ("controller.half_period_ms=1000", "controller.model=path"):
-        assert read(program, gone).findings == ()
-    assert read(b"G01 X1.0 Y0.0 F3.0\nG01 X1.03 Y0.03\nM30\n").findings == ()
+        assert too_long(program, gone) == []
+    assert too_long(b"G01 X1.0 Y0.0 F3.0\nG01 X1.03 Y0.03\nM30\n") == []
+
+
+def test_what_a_feed_becomes_is_said() -> None:
+    """14.25 mm/min at 3 ms along one axis, 2.71 at 20 ms along two; Z is one axis."""
+
+    def held(program: bytes, *settings: str) -> list[tuple[Severity, str, float | None]]:
+        found = [one for one in read(program, *settings).findings if one.code == Code.FEED_HELD]
+        return [(one.severity, one.where, one.measured) for one in found]
+
+    square = b"G01 X1.0 Y0.0 F14.1\nG01 X1.0 Y1.0\nG01 Z-0.1\nG00 X3.0 Y3.0\n"
+    assert held(square + b"M30\n") == []
+    slant = square + b"G01 X4.0 Y3.5\nG02 X5.0 Y3.5 I0.5 J0.0\nM30\n"
+    assert held(slant) == [(Severity.WARNING, "block 5", pytest.approx(2.714, abs=1e-3))]
+    assert held(slant.replace(b"F14.1", b"F5.0")) == [
+        (Severity.INFO, "block 5", pytest.approx(2.714, abs=1e-3))
+    ]
+    assert held(slant.replace(b"F14.1", b"F2.7")) == []
+    assert held(slant, "controller.half_period_ms=3") == []
+    alone = ("controller.single_axis_half_period_ms=10",)
+    assert held(square + b"M30\n", *alone) == [
+        (Severity.WARNING, "block 1", pytest.approx(5.182, abs=1e-3))
+    ]
 
 
 def test_the_spindle_may_not_stop() -> None:
@@ -312,8 +337,10 @@ def test_settings_let_more_be_taken() -> None:
 
 def test_feeds_above_the_limit_are_found() -> None:
     path = read(b"M03\nG01 X1.0 Y1.0 F14.1\nG01 X2.0 Y1.0 F15.0\nG01 X3.0 Y1.0 F20")
-    (finding,) = path.findings
-    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.ERROR)
+    finding, held = path.findings
+    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.WARNING)
+    assert (held.code, held.measured) == (Code.FEED_HELD, pytest.approx(2.714, abs=1e-3))
+    assert path.feed[path.is_feed].tolist() == [14.1, 15.0, 20.0]  # as programmed
     assert (finding.where, finding.measured, finding.limit) == ("block 3", 20.0, 14.1)
 
 

@@ -34,6 +34,7 @@ def rows(toolpath: Toolpath, *settings: str, chunk_steps: int = 1 << 16) -> list
 
 OPTIONS = {
     "half_period_ms": st.sampled_from([1, 3, 4, 7]),
+    "single_axis_half_period_ms": st.sampled_from([1, 3, 9]),
     "clock": st.sampled_from(["whole-ms", "late-longer"]),
     "half_periods_per_step": st.sampled_from([1, 2]),
     "rounding": st.sampled_from(["nearest", "truncate"]),
@@ -88,7 +89,8 @@ def test_programs_are_what_the_twin_makes_of_them(
         truncates=options["rounding"] == "truncate",
         sees=options["goes_on_from"] == "reached",
     )
-    shortest, parts = options["half_period_ms"], options["half_periods_per_step"]
+    shortest = options["half_period_ms"], options["single_axis_half_period_ms"]
+    parts = options["half_periods_per_step"]
     per_turn = options["chords_per_turn"]
     row, seconds = run_rows(toolpath, pc, shortest, parts, per_turn, (0.01, -0.02, 0.03))
     found = rows(toolpath, *settings, chunk_steps=chunk_steps)
@@ -164,13 +166,24 @@ def test_half_periods_of_feeds(feed: float, parts: int) -> None:
     (found,) = rows(path, "controller.half_period_ms=3", one)
     wanted = half_period(feed, STEP, 3, parts)
     assert found.duration_s == pytest.approx(100 * parts * (wanted + 1) / 1000.0)
-    (slow,) = rows(path, "controller.half_period_ms=20", one)
+    (same,) = rows(path, "controller.half_period_ms=20", one)
+    assert same.duration_s == pytest.approx(found.duration_s)  # one axis alone: 3 ms as shipped
+    alone = "controller.single_axis_half_period_ms=20"
+    (slow,) = rows(path, "controller.half_period_ms=40", alone, one)
     assert slow.duration_s == pytest.approx(100 * parts * (max(wanted, 20) + 1) / 1000.0)
+    (both,) = rows(ToolpathBuilder().line(0.19, 0.02, feed=feed).finish(), one)
+    assert both.duration_s == pytest.approx(100 * parts * (max(wanted, 20) + 1) / 1000.0)
 
 
 def test_rapids_have_the_shortest_half_period() -> None:
-    (found,) = rows(ToolpathBuilder().rapid(0.19, 0.0).finish(), "controller.half_period_ms=6")
-    assert found.duration_s == pytest.approx(100 * 0.014)
+    half = "controller.half_period_ms=6"
+    path = ToolpathBuilder().rapid(0.19, 0.0).rapid(0.38, 0.1).rapid(z=0.19).event(Kind.HOME_Z)
+    alone, both, z, home = rows(path.finish(), half)
+    assert alone.duration_s == pytest.approx(100 * 0.008)
+    assert both.duration_s == pytest.approx(100 * 0.014)
+    assert z.duration_s == home.duration_s == pytest.approx(100 * 0.008)
+    (shorter,) = rows(ToolpathBuilder().rapid(0.19, 0.0).finish(), "controller.half_period_ms=1")
+    assert shorter.duration_s == pytest.approx(100 * 0.004)  # no longer than for two
 
 
 def test_what_was_too_much_stays_or_is_seen() -> None:

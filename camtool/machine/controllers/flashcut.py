@@ -17,6 +17,8 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
 
     `half_period_ms`: the "periodo medio" of the configuration window (L1404), the shortest that
     any move has (L1127); rapids have it, and a feed can only lengthen it.
+    `single_axis_half_period_ms`: the shortest of a move of one axis alone, which may be shorter
+    "sin afectar el resultado" (L1202); as for the others where left out.
     `compensation_half_period_ms` of the steps at a reversal: as the move's own where left out
     (they are issued by the same routine, L1147, L1388). `clock`: how a timer
     sees its half period go by: "whole-ms": every axis fires at the first whole millisecond above
@@ -28,6 +30,7 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     """
 
     half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] = 3
+    single_axis_half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] | None = None
     compensation_half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] | None = None
     clock: Literal["whole-ms", "late-longer"] = "whole-ms"
     half_periods_per_step: Annotated[int, Meta(ge=1, le=2)] = 2

@@ -9,13 +9,29 @@ from camtool.machine.controllers.flashcut import FlashcutController
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 PERIOD_GUARD = 1e-6
 """ms. Half periods of feeds that are decimals may lie this much below a half of a millisecond."""
 
 
-def half_periods_ms(feed_mm_min: Floats, step_mm: float, controller: FlashcutController) -> Floats:
-    """(N,) whole ms: half periods of the longer axis at these feeds (inf: rapids).
+def shortest_ms(alone: Bools, controller: FlashcutController) -> Floats:
+    """(N,) ms: the shortest half period of moves, which are of one axis `alone` (N,) or of two."""
+    both = float(controller.half_period_ms)
+    one = controller.single_axis_half_period_ms
+    return np.where(alone, both if one is None else min(float(one), both), both)
+
+
+def feeds_of(half_period_ms: Floats, step_mm: float, controller: FlashcutController) -> Floats:
+    """(N,) mm/min of the longer axis at these half periods."""
+    return 60_000.0 * step_mm / (controller.half_periods_per_step * (half_period_ms + 1.0))
+
+
+def half_periods_ms(
+    feed_mm_min: Floats, step_mm: float, alone: Bools, controller: FlashcutController
+) -> Floats:
+    """(N,) whole ms: half periods of the longer axis at these feeds (inf: rapids), of moves of one
+    axis `alone` (N,) or of two.
 
     A step takes some half periods P, each of which is a millisecond late:
 
@@ -24,7 +40,7 @@ def half_periods_ms(feed_mm_min: Floats, step_mm: float, controller: FlashcutCon
     with np.errstate(over="ignore"):
         step_ms = 60_000.0 * step_mm / feed_mm_min
     wanted = np.floor(step_ms / controller.half_periods_per_step - 1.0 + 0.5 + PERIOD_GUARD)
-    return np.maximum(wanted, float(controller.half_period_ms))
+    return np.maximum(wanted, shortest_ms(alone, controller))
 
 
 def steps_too_many(
