@@ -78,6 +78,7 @@ class Code(IntEnum):
     NEVER_READ = 320
     FEED_TOO_SLOW = 321
     FEED_HELD = 322
+    READ_TWO_WAYS = 323
 
     ARC_MISSES_END = 401
     CONTOUR_MISSING = 402

@@ -40,7 +40,7 @@ class ListingReader:
 
     def __init__(self, machine: Machine, dialect: Dialect) -> None:
         self._step_mm = [axis.coded_step_mm for axis in machine.axes]
-        self._most = dialect.most_steps
+        self._most = dialect.sayable_steps
         self._steps: list[list[int]] = []
         self._waits: list[tuple[int, int]] = []
         self._rounded = 0

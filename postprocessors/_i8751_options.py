@@ -22,12 +22,17 @@ MOST_DWELL_BYTE_S: Final = 255
 """Seconds that one byte of a dwell pair can say (L4136-4147)."""
 
 
+MOST_LOW_BYTE: Final = 255
+"""Pulses that PL says alone."""
+
+
 class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How programs look, how near lines are followed, and one reading for each open question.
 
     `tolerance_mm`: how far the dog-leg of a line may stray from it; `arc_tolerance_mm`: how far
     the chords of an arc may. `plus_backward`: axes ("xz") whose motors turn backward for +. The
-    options of `Firmware` are those on pulses.
+    options of `Firmware` are those on pulses. `long_runs`: a motor may be sent more steps at once
+    than the low byte can say; without them a program means the same whatever the high byte counts.
     """
 
     tolerance_mm: Tolerance
@@ -37,8 +42,9 @@ class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
     key: Literal["once", "each-packet"] = "once"
     dwell_mark: Literal["00H", "30H"] = "00H"
     motor_reply: Literal["B", "8"] = "B"
-    dwell_reply: Literal["unstated", "M", "none"] = "unstated"
+    dwell_reply: Literal["B M", "M", "none", "unstated"] = "B M"
     z_alone: Literal["plain", "with-step"] = "plain"
+    long_runs: bool = False
 
     @property
     def high_byte_steps(self) -> int:
@@ -52,8 +58,23 @@ class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     @property
     def most_steps(self) -> int:
-        """Steps that one record can move a motor."""
-        return 255 * self.high_byte_steps + 255 - self.lost_pulses
+        """Steps that one record may move a motor."""
+        return self.sayable_steps if self.long_runs else MOST_LOW_BYTE - self.lost_pulses
+
+    @property
+    def sayable_steps(self) -> int:
+        """Steps that PH and PL can say."""
+        return MOST_LOW_BYTE * self.high_byte_steps + MOST_LOW_BYTE - self.lost_pulses
+
+    @property
+    def dwell_replies(self) -> list[str]:
+        """What the controller answers to the two bytes of a dwell pair."""
+        return {
+            "B M": [self.motor_reply, "M"],
+            "M": ["M", "M"],
+            "none": ["-", "-"],
+            "unstated": ["?", "?"],
+        }[self.dwell_reply]
 
     @property
     def signs(self) -> tuple[int, int, int]:

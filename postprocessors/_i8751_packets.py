@@ -148,7 +148,7 @@ class PacketReader:
 
 def replies(data: bytes, decoded: Decoded, dialect: Dialect) -> list[str]:
     """What the controller is expected to answer to each byte of a stream that was read."""
-    to_wait = {"unstated": ["?"], "M": ["M"], "none": ["-"]}[dialect.dwell_reply] * 2
+    to_wait = dialect.dwell_replies
     standing = [dialect.motor_reply, "M"]
     moving = [dialect.motor_reply, "M", "M", "M"]
     answers: list[str] = []

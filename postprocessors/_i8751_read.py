@@ -11,6 +11,8 @@ and dog-leg included.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import numpy.typing as npt
 
@@ -89,7 +91,7 @@ def _toolpath(decoded: Decoded, machine: Machine, dialect: Dialect) -> Toolpath:
         source=np.full(count, -1),
         block=np.append(record, len(steps)),
         start=np.zeros(3),
-        findings=_findings(decoded),
+        findings=(*_findings(decoded), *_two_ways(decoded, dialect)),
     )
 
 
@@ -115,6 +117,26 @@ def _feeds(
             60.0 * way_xy / times.legs_s(steps[:, :2]).sum(axis=1),
             60.0 * way_z / times.alone_s(steps[:, 2]),
         ]
+
+
+def _two_ways(decoded: Decoded, dialect: Dialect) -> Iterator[Finding]:
+    """READ_TWO_WAYS: runs that say a high byte, whose unit is 256 steps or 255."""
+    pulses = dialect.pulses(decoded.steps)
+    high = pulses // dialect.high_byte_steps
+    count = int((high > 0).sum())
+    if count and not dialect.long_runs:
+        record = int((high > 0).any(axis=1).argmax())
+        yield Finding(
+            Code.READ_TWO_WAYS,
+            Severity.WARNING,
+            f"{count} runs of a motor have more than 255 steps; they are read by "
+            f"dialect.high_byte = {dialect.high_byte}, and by the other reading (255 or 256) a "
+            f"motor ends up to {int(high.sum(axis=0).max())} steps elsewhere: post again in "
+            "shorter runs, or say dialect.long_runs=true where it is known",
+            where=f"record {record + 1}",
+            measured=float(count),
+            unit="runs",
+        )
 
 
 def _findings(decoded: Decoded) -> tuple[Finding, ...]:

@@ -142,7 +142,7 @@ def _cut_rows(
     reach = np.where(toolpath.is_feed, reaches(xy, step_mm, dialect.tolerance_mm), FREE)
     strays = (reach != FREE) & (elbows(xy) > reach)
     far = np.abs(deltas).max(axis=1, initial=0) > most
-    counts.long_moves = int(far.sum())
+    counts.long_moves = int((far & ~strays).sum())
     counts.cut_lines = int(strays.sum())
     of_elbows = np.where(strays, elbows(xy) / (2.0 * np.maximum(reach, 1)), 0.0)
     _refuse_too_many(np.abs(deltas).max(axis=1, initial=0) / most + of_elbows)

@@ -86,7 +86,7 @@ class _Dump:
         self._records = records
         self._steps_mm = [axis.coded_step_mm for axis in machine.axes]
         self._digits = decimals_of(machine)
-        self._wait_reply = {"unstated": "? ?", "M": "M M", "none": "- -"}[dialect.dwell_reply]
+        self._wait_reply = " ".join(dialect.dwell_replies)
         self._moving_reply = f"{dialect.motor_reply} M M M"
         self._standing_reply = f"{dialect.motor_reply} M"
         self._table, self._used = byte_table(records, dialect)

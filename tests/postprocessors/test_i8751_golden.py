@@ -23,7 +23,7 @@ def part() -> Toolpath:
     path = ToolpathBuilder().rapid(z=1.0).rapid(2.5, 1.25).line(z=-0.5, feed=30)
     path.line(5.0, 2.25, feed=30).arc(6.0, 3.25, centre=(5.0, 3.25), ccw=True, feed=30)
     path.event(Kind.DWELL, 2).line(2.5, 1.25, feed=30).rapid(z=1.0)
-    path.message("turn the part").event(Kind.DWELL, 300).rapid(70_000 * STEP_MM, 0.0)
+    path.message("turn the part").event(Kind.DWELL, 300).rapid(700 * STEP_MM, 0.0)
     path.rapid(4.0, 4.0, 0.5).rapid(0.0, 0.0, 1.0)
     return path.event(Kind.END).finish()
 

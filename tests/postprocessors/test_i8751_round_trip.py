@@ -199,7 +199,7 @@ def test_arcs_are_followed_to_their_end(radius: float, turn: float, ccw: bool) -
 def test_kinds_come_back_from_a_planned_path() -> None:
     path = ToolpathBuilder().rapid(z=1).rapid(1, 2).line(z=-0.5, feed=30).line(1, 5, feed=30)
     path.rapid(z=1).rapid(0, 0).event(Kind.END)
-    target = TARGETS["packets", ""]
+    target = loaded("long_runs=true")
     toolpath = path.finish()
     read = target.post.read(target.post.write(toolpath, target.machine).data, target.machine)
     np.testing.assert_array_equal(read.kind, toolpath.kind)

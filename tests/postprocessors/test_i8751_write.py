@@ -50,7 +50,7 @@ def codes(program: Program) -> set[Code]:
     ],
 )
 def test_readings_of_the_thesis(setting: str, data: str) -> None:
-    assert records(write(line(300, 0), setting)) == bytes.fromhex(data)
+    assert records(write(line(300, 0), setting, "long_runs=true")) == bytes.fromhex(data)
 
 
 @pytest.mark.parametrize(
@@ -69,10 +69,28 @@ def test_readings_of_the_thesis(setting: str, data: str) -> None:
 )
 def test_the_most_steps_of_a_record(steps: int, setting: str, count: int, first: str) -> None:
     for path in (line(-steps, 0), ToolpathBuilder().line(z=-steps * STEP_MM, feed=30)):
-        program = write(path, setting)
+        program = write(path, setting, "long_runs=true")
         assert len(program.row_of_block) == count + 1
         assert (Code.MOVE_SPLIT in codes(program)) == (count > 1)
         assert bytes.fromhex("04 " + first) in program.data
+
+
+@pytest.mark.parametrize("steps", [255, 256, 510, 511, 1000, 65535])
+@pytest.mark.parametrize("setting", ["high_byte='256'", "first_pulse=repeats"])
+def test_no_run_needs_a_high_byte(steps: int, setting: str) -> None:
+    """So a program leads to the same places whatever a unit of PH is worth."""
+    most = 255 - (setting == "first_pulse=repeats")
+    for path in (line(-steps, 0), line(steps, -steps), line(0, steps // 2 + 1)):
+        program = write(path, setting)
+        as_256, as_255 = (
+            loaded(setting.replace("high_byte='256'", "key=once"), f"high_byte='{unit}'")
+            for unit in (256, 255)
+        )
+        there, here = (made.post.read(program.data, made.machine) for made in (as_256, as_255))
+        np.testing.assert_array_equal(there.end, here.end)
+        np.testing.assert_allclose(there.end[-1], path.finish().end[-1], atol=1e-9)
+        assert Code.READ_TWO_WAYS not in {one.code for one in there.findings}
+    assert len(write(line(-steps, 0), setting).row_of_block) == -(-steps // most) + 1
 
 
 def test_five_records_a_packet() -> None:
@@ -122,7 +140,7 @@ def test_z_never_alone() -> None:
 
 
 def test_rapids_are_not_cut_for_their_dog_leg() -> None:
-    rapid = write(ToolpathBuilder().rapid(400 * STEP_MM, 160 * STEP_MM))
+    rapid = write(ToolpathBuilder().rapid(250 * STEP_MM, 100 * STEP_MM))
     assert len(rapid.row_of_block) == 2
     cut = write(line(400, 160))
     # e = 160·240/430.8 = 89 steps, the tolerance is 4: n = (89/4 + 1)/2 = 11.6
