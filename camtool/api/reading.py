@@ -25,6 +25,7 @@ class Reading(TypedDict, total=False):
     units: str | None
     tolerance_mm: float
     gap_mm: float
+    scale: float
     dpi: float
     format: str | None
     chain_gaps: bool
@@ -51,9 +52,9 @@ def read_drawing(
 
     `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
     `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines
-    and arcs are exact, other curves become arcs within `tolerance_mm`: that of the `target` if one
-    is given. Raises DrawingError, and OptionError for a way of reading that cannot be. Source:
-    docs/formats.md.
+    and arcs are exact, other curves become arcs within `tolerance_mm`: that of the `target` if
+    one is given. Tolerances are of the part: give its `scale` where a job scales it. Raises
+    DrawingError, and OptionError for a way of reading that cannot be. Source: docs/formats.md.
     """
     from camtool.importers.options import ReadOptions, Selection
     from camtool.importers.read import read_drawing as read
@@ -101,11 +102,15 @@ def as_drawing(
     """The drawing, or what is in its file on the layers that the job's operations take."""
     from camtool.importers.select import NoMatchError
     from camtool.jobs.layers import layers_of, refuse_unmatched, unmatched
+    from camtool.jobs.reading import read_to_scale
 
     if isinstance(drawing, DrawingRecord):
         return drawing
     try:
-        read = read_drawing(drawing, target=target, layers=layers_of(job))
+        read = read_to_scale(
+            lambda scale: read_drawing(drawing, target=target, layers=layers_of(job), scale=scale),
+            job,
+        )
     except NoMatchError as error:
         raise unmatched(error, job) from error
     refuse_unmatched(read, job)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,13 +43,15 @@ class DrawingFlags:
         """The drawing (`-` is stdin), of the layers that the job's operations take.
 
         `data` is the file's content where it has been read already. Tolerances that no flag
-        gives are the machine's, or else the importer's. OptionError for a layer or colour of
+        gives are the machine's, or else the importer's; they are of the part, whose scale the
+        job says. OptionError for a layer or colour of
         the job that the drawing has not, unless flags restrict it.
         """
         from camtool.importers.options import ReadOptions, Selection
-        from camtool.importers.read import read_bytes, read_drawing
+        from camtool.importers.read import content, read_bytes
         from camtool.importers.select import NoMatchError, colour_named
         from camtool.jobs.layers import layers_of, refuse_unmatched, unmatched
+        from camtool.jobs.reading import read_to_scale
 
         settings: dict[str, Any] = {}
         if machine is not None:
@@ -64,10 +66,10 @@ class DrawingFlags:
         )
         try:
             options = ReadOptions(**settings)
-            if data is None:
-                drawing = read_drawing(Path(name), options=options)
-            else:
-                drawing = read_bytes(data, name, options)
+            data, file = content(Path(name)) if data is None else (data, name)
+            drawing = read_to_scale(
+                lambda scale: read_bytes(data, file, replace(options, scale=scale)), job
+            )
         except NoMatchError as error:
             if job is None or error.pattern not in layers_of(job) or self.layers:
                 raise
@@ -96,7 +98,10 @@ def _make_drawing(
 
 def _read_flags() -> list[Callable[..., Any]]:
     """How geometry is read."""
-    tolerance, gap = "How near arcs come to fitted curves.", "Ends nearer than this are joined."
+    tolerance, gap = (
+        "How near arcs come to curves of the part.",
+        "Ends nearer than this are joined.",
+    )
     return [
         option(_READ, "--format", type=click.Choice(FORMATS), help="Do not guess it."),
         option(_READ, "--units", metavar="UNIT", help="Unit of the drawing: mm, in, um, px ..."),

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
 
 from camtool.findings import Finding
-from camtool.geometry.polylines import Polylines
+from camtool.geometry.measure import segment_lengths
+from camtool.geometry.polylines import Floats, Polylines, Segments, segment_rows
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,8 @@ class Healing:
 
 @dataclass(frozen=True)
 class FitError:
-    """Distance between fitted arcs and the true curves, mm; zeros when nothing was fitted."""
+    """Distance between what was drawn and the paths that stand for it, mm: largest, and rms over
+    what is not drawn so itself; zeros when all is."""
 
     max_mm: float = 0.0
     rms_mm: float = 0.0
@@ -110,9 +116,13 @@ class Drawing:
 
     `layers`, `colours` ("#rrggbb" or "") and `sources` (entity handle or element id, such as
     "CIRCLE 2F") have one item per path, and so has `line_types` ("" is continuous; left out, all
-    are). `used` counts the entities of each kind that became geometry; `skipped` the others, with
-    the reason. `marks` are single points; a drawing of marks alone has no paths. `gaps` stay
-    open, `closed_gaps` were bridged. `unchosen`: the closed contours that were left out by choice.
+    are). `off_mm` (N, 2): the largest and the rms distance, mm, between the segment that leaves
+    each vertex of `paths` and what was drawn there: curves to the arcs fitted to them, and all
+    that was joined, merged, recognised or left out on reading; left out, zeros. `made_for`: the
+    scale of the part that it was read for (`ReadOptions.scale`). `used` counts the entities of
+    each kind that became geometry; `skipped` the others, with the reason. `marks` are single
+    points; a drawing of marks alone has no paths. `gaps` stay open, `closed_gaps` were bridged.
+    `unchosen`: the closed contours that were left out by choice.
     """
 
     paths: Polylines
@@ -121,7 +131,6 @@ class Drawing:
     sources: tuple[str, ...]
     file: str
     units: Units
-    fit: FitError = field(default_factory=FitError)
     used: dict[str, int] = field(default_factory=dict)
     skipped: tuple[Skipped, ...] = ()
     gaps: tuple[Gap, ...] = ()
@@ -131,11 +140,30 @@ class Drawing:
     healing: Healing = field(default_factory=Healing)
     line_types: tuple[str, ...] = ()
     unchosen: Unchosen = field(default_factory=Unchosen)
+    off_mm: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    made_for: float = 1.0
 
     def __post_init__(self) -> None:
         count = len(self.paths)
+        if not len(self.off_mm):
+            object.__setattr__(self, "off_mm", np.zeros((len(self.paths.vertices), 2)))
+        if self.off_mm.shape != (len(self.paths.vertices), 2):
+            raise ValueError(
+                f"off_mm has shape {self.off_mm.shape} for {len(self.paths.vertices)} vertices"
+            )
         if not self.line_types:
             object.__setattr__(self, "line_types", ("",) * count)
         for name in ("layers", "colours", "sources", "line_types"):
             if len(getattr(self, name)) != count:
                 raise ValueError(f"{name}: {len(getattr(self, name))} items for {count} paths")
+
+    @cached_property
+    def fit(self) -> FitError:
+        """How far the paths are from what was drawn."""
+        rows = segment_rows(self.paths)
+        largest, rms = self.off_mm[rows].T
+        length = np.where(largest > 0.0, segment_lengths(Segments.of(self.paths)), 0.0)
+        whole = float(length.sum())
+        if not whole:
+            return FitError()
+        return FitError(float(largest.max()), math.sqrt(float((length * rms**2).sum()) / whole))

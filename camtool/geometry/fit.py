@@ -27,7 +27,6 @@ from camtool.geometry.curves import (
     Pieces,
     SplineCurve,
 )
-from camtool.geometry.drawing import FitError
 from camtool.geometry.nodes import Nodes, curve_nodes
 from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Floats
 from camtool.kernels.fit_limits import (
@@ -51,7 +50,6 @@ __all__ = [
     "arc_vertices",
     "fit_curve",
     "fit_curves",
-    "overall",
     "split_bulges",
 ]
 
@@ -76,6 +74,12 @@ class Fit:
     max_mm: float
     rms_mm: float
     length_mm: float = 0.0
+
+    @property
+    def off_mm(self) -> Floats:
+        """(n, 2) mm: the largest and the rms distance, at every vertex those of the whole
+        chain."""
+        return np.tile([self.max_mm, self.rms_mm], (len(self.vertices), 1))
 
 
 def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
@@ -136,16 +140,6 @@ def split_bulges(vertices: Floats, closed: bool) -> Floats:
     split = vertices.copy()
     split[rows, 2] = half
     return np.insert(split, rows + 1, np.column_stack([middle, half]), axis=0)
-
-
-def overall(fits: Iterable[Fit]) -> FitError:
-    """The error of many fits together: the largest, and the rms weighted by length."""
-    items = list(fits)
-    length = sum(fit.length_mm for fit in items)
-    if length == 0.0:
-        return FitError()
-    square = sum(fit.rms_mm**2 * fit.length_mm for fit in items) / length
-    return FitError(max(fit.max_mm for fit in items), math.sqrt(square))
 
 
 def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:

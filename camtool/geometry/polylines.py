@@ -141,6 +141,13 @@ class Polylines:
         return lines
 
 
+def segment_rows(lines: Polylines) -> Ints:
+    """(K,) the vertex that each segment leaves, in the order of `Segments.of`."""
+    keep = np.ones(len(lines.vertices), dtype=np.bool_)
+    keep[lines.offsets[1:][~lines.closed] - 1] = False
+    return np.flatnonzero(keep)
+
+
 @dataclass(frozen=True, eq=False)
 class Segments:
     """Lines and arcs in columns, K rows; `path` (K,) says which polyline each came from.
@@ -168,12 +175,11 @@ class Segments:
         """All segments of the paths, in order."""
         if isinstance(lines, Polyline):
             lines = Polylines.of([lines])
-        vertices, offsets, closed = lines.vertices, lines.offsets, lines.closed
-        path = np.repeat(np.arange(len(closed)), np.diff(offsets))
+        vertices, offsets = lines.vertices, lines.offsets
+        path = np.repeat(np.arange(len(lines)), np.diff(offsets))
         following = np.arange(1, len(vertices) + 1)
         following[offsets[1:] - 1] = offsets[:-1]
-        keep = np.ones(len(vertices), dtype=np.bool_)
-        keep[offsets[1:][~closed] - 1] = False
+        keep = segment_rows(lines)
         return cls.between(
             vertices[keep, :2], vertices[following[keep], :2], vertices[keep, 2], path[keep]
         )

@@ -2,8 +2,9 @@
 
 Every reader ends here, so that a DXF and an SVG of the same part give the same Drawing:
 
-    pieces ──select.py──▶ wanted ──clean.py──▶ checked, once ──heal.py──▶ contours ──told.py──▶
-    findings            └▶ the others, cleaned and healed on their own ──▶ unchosen closed contours
+    pieces ──select.py──▶ wanted ──clean.py──▶ checked, once ──heal.py──▶ contours
+                        └▶ the others, cleaned and healed on their own ──▶ unchosen closed contours
+    wanted × contours ──off.py──▶ how far they are apart         contours ──told.py──▶ findings
 
 A *piece* is one entity or one subpath, in mm, Y up. A *gap* lies between two open ends.
 Tolerances: POSITION_EPS_MM (two points are one), `options.gap_mm` (two ends are joined), and
@@ -19,10 +20,11 @@ import numpy as np
 
 from camtool.errors import DrawingError
 from camtool.findings import Finding
-from camtool.geometry.drawing import Drawing, FitError, Mark, Skipped, Unchosen, Units
+from camtool.geometry.drawing import Drawing, Mark, Skipped, Unchosen, Units
 from camtool.importers.clean import DRAWN_TWICE, cleaned, is_placed
 from camtool.importers.heal import gap_of, healed
 from camtool.importers.marks import cleaned_marks, selected_with_marks
+from camtool.importers.off import off_drawn
 from camtool.importers.options import ReadOptions
 from camtool.importers.piece import MAX_COORDINATE_MM, Piece
 from camtool.importers.told import (
@@ -44,7 +46,6 @@ def assemble(
     *,
     file: str,
     units: Units,
-    fit: FitError,
     used: dict[str, int],
     skipped: list[Skipped],
     findings: list[Finding],
@@ -74,7 +75,6 @@ def assemble(
         sources=tuple(_source([pieces[index] for index in row]) for row in result.members),
         file=file,
         units=units,
-        fit=fit,
         used=dict(used),
         skipped=tuple(every_skip),
         gaps=result.open_gaps,
@@ -83,6 +83,8 @@ def assemble(
         healing=result.healing,
         line_types=tuple(piece.line_type for piece in first),
         unchosen=_unchosen(every, pieces, file, options),
+        off_mm=off_drawn(pieces, result.lines),
+        made_for=options.scale,
     )
     # What is drawn twice has a finding of its own.
     once = [item for item in clean.skipped if item.reason != DRAWN_TWICE]

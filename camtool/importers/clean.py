@@ -130,8 +130,8 @@ _Words = npt.NDArray[np.uint64]
 def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
     """(M,) false for each path that is one before it again: same style, same segments.
 
-    Each segment is a number mixed from its rounded ends and bulge, the same in both directions;
-    a path is the sum of its segments, the same from any start. 64 bits: two different ones of
+    Each segment is a number (`segment_numbers`); a path is the sum of its segments, the same from
+    any start. 64 bits: two different ones of
     a million paths are taken for one with a chance of one in thirty million.
     """
     count = len(lines)
@@ -139,21 +139,27 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
         return np.empty(0, dtype=np.bool_)
     following = np.arange(1, len(lines.vertices) + 1)
     following[lines.offsets[1:] - 1] = lines.offsets[:-1]
-    # Adding 0 makes −0 and 0 one.
-    grid = (np.round(lines.vertices / POSITION_EPS_MM) + 0.0).astype(np.int64).view(np.uint64)
-    bulge = grid[:, 2].view(np.int64)
-    point = _mixed(_mixed(grid[:, 0]) + grid[:, 1])
-    onward = point[following]
-    turned = onward < point
-    bend = np.where(turned, -bulge, bulge).view(np.uint64)
-    segment = _mixed(_mixed(np.minimum(point, onward)) + np.maximum(point, onward))
-    segment = _mixed(segment + bend)
+    segment = segment_numbers(lines.vertices, lines.vertices[following])
     segment[lines.offsets[1:][~lines.closed] - 1] = 0
     kind = 2 * numbered(list(styles), count) + lines.closed
     key = _mixed(np.add.reduceat(segment, lines.offsets[:-1]) + _mixed(kind.view(np.uint64)))
     once = np.zeros(count, dtype=np.bool_)
     once[np.unique(key, return_index=True)[1]] = True
     return once
+
+
+def segment_numbers(begin: Floats, end: Floats) -> _Words:
+    """(K,) a number mixed from the rounded ends and the bulge of the segment between two vertices
+    (K, 3), the same in both directions."""
+    # Adding 0 makes −0 and 0 one.
+    grid = (np.round(begin / POSITION_EPS_MM) + 0.0).astype(np.int64).view(np.uint64)
+    ahead = (np.round(end[:, :2] / POSITION_EPS_MM) + 0.0).astype(np.int64).view(np.uint64)
+    bulge = grid[:, 2].view(np.int64)
+    point = _mixed(_mixed(grid[:, 0]) + grid[:, 1])
+    onward = _mixed(_mixed(ahead[:, 0]) + ahead[:, 1])
+    bend = np.where(onward < point, -bulge, bulge).view(np.uint64)
+    segment = _mixed(_mixed(np.minimum(point, onward)) + np.maximum(point, onward))
+    return _mixed(segment + bend)
 
 
 def _mixed(words: _Words) -> _Words:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from camtool.errors import OptionError
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.units import MM_PER_UNIT
 
 FORMATS = ("dxf", "svg", "points", "solid")
@@ -45,10 +46,11 @@ class ReadOptions:
     """How to read a drawing; every field has a default that suits most files.
 
     `units`: the unit of the file's numbers, over what the file says (a name of
-    `units.MM_PER_UNIT`). `tolerance_mm`: how far fitted arcs may lie from a curve. `gap_mm`:
-    open ends nearer than this are joined; with `chain_gaps` false only equal ends are;
-    `across_layers` joins ends of different layers too. `dpi`: pixels per inch of SVG's px.
-    `format`: one of FORMATS, over what the content looks like. `select`: which entities.
+    `units.MM_PER_UNIT`). `tolerance_mm`: how far fitted arcs may lie from a curve; `gap_mm`: open
+    ends nearer than this are joined: both on the part, which is `scale` times as large as what
+    is drawn. With `chain_gaps` false only equal ends are joined; `across_layers` joins ends of
+    different layers too. `dpi`: pixels per inch of SVG's px. `format`: one of FORMATS, over what
+    the content looks like. `select`: which entities.
 
     `text`: one of TEXTS. `recognise_arcs`: chords on one circle become arcs again. `layout`: a
     layout of a DXF by name instead of model space; `dimensions`: read the lines of dimensions.
@@ -59,6 +61,7 @@ class ReadOptions:
     units: str | None = None
     tolerance_mm: float = TOLERANCE_MM
     gap_mm: float = GAP_MM
+    scale: float = 1.0
     dpi: float = DPI
     format: str | None = None
     chain_gaps: bool = True
@@ -86,12 +89,25 @@ class ReadOptions:
             )
         if self.section_z_mm is not None and not math.isfinite(self.section_z_mm):
             raise OptionError(f"section_z_mm is {self.section_z_mm}, it must be a height")
-        for name in ("tolerance_mm", "dpi"):
+        for name in ("tolerance_mm", "dpi", "scale"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise OptionError(f"{name} is {value}, it must be above 0")
         if not (math.isfinite(self.gap_mm) and self.gap_mm >= 0.0):
             raise OptionError(f"gap_mm is {self.gap_mm}, it must be 0 or more")
+
+    def as_drawn(self) -> ReadOptions:
+        """The same with lengths of the part as they are in the drawing; `scale` says so still.
+
+        A tolerance does not come below POSITION_EPS_MM by that: positions nearer than this are
+        one."""
+        return replace(
+            self,
+            tolerance_mm=max(
+                self.tolerance_mm / self.scale, min(self.tolerance_mm, POSITION_EPS_MM)
+            ),
+            gap_mm=self.gap_mm / self.scale,
+        )
 
     def mm_per(self, unit: str) -> float:
         """One `unit` in mm; a px is as large as `dpi` makes it."""

@@ -15,7 +15,9 @@ class Piece:
     """One entity: `vertices` (n, 3) of x, y, bulge in mm, and where it came from.
 
     A closed piece may repeat its first point at its end. `source` begins with the kind of the
-    entity ("CIRCLE 2F", "path outline"). `line_type` as a DXF names it, "" elsewhere.
+    entity ("CIRCLE 2F", "path outline"). `line_type` as a DXF names it, "" elsewhere. `off_mm`
+    (n, 2): the largest and the rms distance of what is drawn from the segment that leaves each
+    vertex; None where the segments are what is drawn.
     """
 
     vertices: Floats
@@ -24,6 +26,7 @@ class Piece:
     colour: str
     source: str
     line_type: str = ""
+    off_mm: Floats | None = None
 
     @property
     def where(self) -> str:

@@ -16,7 +16,15 @@ from camtool.importers.read_format import find_format
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
-__all__ = ["MAX_FILE_BYTES", "STDIN", "file_bytes", "find_format", "read_bytes", "read_drawing"]
+__all__ = [
+    "MAX_FILE_BYTES",
+    "STDIN",
+    "content",
+    "file_bytes",
+    "find_format",
+    "read_bytes",
+    "read_drawing",
+]
 
 MAX_FILE_BYTES = 500_000_000
 """A larger file is refused before it is read: its drawing would not fit into memory."""
@@ -34,9 +42,15 @@ class _Reader(Protocol):
 
 def read_drawing(path: Path, *, options: ReadOptions = DEFAULTS) -> Drawing:
     """The Drawing in a file, in mm; `-` is standard input. DrawingError when there is none."""
+    return read_bytes(*content(path), options)
+
+
+def content(path: Path) -> tuple[bytes, str]:
+    """What is in a file, and its name in messages; `-` is standard input. DrawingError when there
+    is none."""
     if str(path) == "-":
-        return read_bytes(_standard_input(), STDIN, options)
-    return read_bytes(file_bytes(path), str(path), options)
+        return _standard_input(), STDIN
+    return file_bytes(path), str(path)
 
 
 def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawing:
@@ -48,7 +62,7 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
         raise DrawingError("is empty", file=file, mend=_EXPORT_AGAIN)
     name = options.format or find_format(data, Path(file).suffix, file)
     module = importlib.import_module(f"camtool.importers.{name}.reader")
-    return cast(_Reader, module).read(data, file, options)
+    return cast(_Reader, module).read(data, file, options.as_drawn())
 
 
 def _standard_input() -> bytes:

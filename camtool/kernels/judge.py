@@ -6,8 +6,8 @@ that cuts:
 
     interpolation = commanded position to the row's own move
     mechanics     = |slide − commanded|
-    total         = slide to the nearest wanted move that the row may be compared with,
-                    positive to its left
+    total         = slide to the nearest wanted move that the row may be compared with, and how
+                    far what was drawn may lie from that
 
 Memory is that of the rows, the moves and the circles; it does not grow with the samples.
 Distances are exact (`camtool.kernels.move_errors`, `camtool.kernels.near_moves`); sums are taken
@@ -32,9 +32,6 @@ from camtool.kernels.wide import first_of, larger, smaller, wide
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
-
-WITHOUT_SIGN = (1 << 63) - 1
-"""The bits of a float64 that are its size."""
 
 BLOCK = 768
 """Samples that are judged together: their columns about fill a processor's first cache."""
@@ -82,7 +79,8 @@ class Task(NamedTuple):
     own (J, 16) moves of the rows that cut (`move_errors`), the K moves that are wanted; rows
     (N, 5): which of `own` a row is, −1 where nothing is cut, first and last of the moves that it
     is compared with, the circle that it goes round or −1, and the bins of that; window (N, 2)
-    between which heights moves are compared; centre (C, 2) mm of circles; directions (721, 2) of
+    between which heights moves are compared; off (N,) mm: how far what was drawn lies at most from
+    the moves that a row is compared with; centre (C, 2) mm of circles; directions (721, 2) of
     `circle_bins`.
     """
 
@@ -90,6 +88,7 @@ class Task(NamedTuple):
     moves: Moves
     rows: Ints
     window: Floats
+    off: Floats
     centre: Floats
     directions: Floats
 
@@ -137,18 +136,20 @@ def _spread(
 
 
 @wide
-def _sizes(errors: Floats, size: Floats, places: Ints) -> tuple[float, float, float]:
-    """Sizes of errors and their places in a histogram, where four samples take turns so that none
-    waits for the one before; returns the largest, the sum of squares and the signed sum."""
+def _sizes(errors: Floats, off: float, size: Floats, places: Ints) -> tuple[float, float, float]:
+    """Sizes of errors, all `off` larger than they are alone, and their places in a histogram,
+    where four samples take turns so that none waits for the one before; returns the largest, the
+    sum of squares, and the sum of the errors alone with their signs."""
     largest, squares, signed = 0.0, 0.0, 0.0
-    bits = errors.view(np.int64)
     for k in range(len(errors)):
-        error = errors[k]
-        size[k] = abs(error)
-        signed += error
+        error = abs(errors[k]) + off
+        size[k] = error
+        signed += errors[k]
         squares += error * error
-        largest = larger(largest, abs(error))
-        leading = ((bits[k] & WITHOUT_SIGN) >> SHIFT) - BEFORE_FIRST
+        largest = larger(largest, error)
+    bits = size.view(np.int64)
+    for k in range(len(errors)):
+        leading = (bits[k] >> SHIFT) - BEFORE_FIRST
         places[k] = 4 * min(max(leading, 0), BINS - 1) + (k & 3)
     return largest, squares, signed
 
@@ -202,12 +203,12 @@ def judge_block(row: int, count: int, task: Task, sums: Sums, bench: Floats) -> 
         figures[LAG_MAX] = max(figures[LAG_MAX], math.sqrt(lag))
         figures[LAG_SQUARES] += lags
         lower_errors(task.own[own], x, y, errors, True)
-        _inner(figures, _sizes(errors, size, places))
+        _inner(figures, _sizes(errors, 0.0, size, places))
         _count(places, sums.histograms[0])
         only = about[FIRST], about[LAST], task.window[row, 0], task.window[row, 1]
         nearest_errors(slide_x, slide_y, only, task.moves, sums.near, bench[SPOT], errors)
         if sums.near.memo[COUNT] > 0.0:
-            found = _sizes(errors, size, places)
+            found = _sizes(errors, task.off[row], size, places)
             _total(figures, found, slide_x, slide_y, size)
             _count(places, sums.histograms[1])
             largest = found[0]

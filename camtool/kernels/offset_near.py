@@ -79,6 +79,37 @@ def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats:
     return found
 
 
+@kernel
+def curves_within(points: Floats, reach: Floats, curves: Floats, tree: Floats) -> Ints:
+    """(J, 2) pairs of a point (P, 2) and a curve that is no farther from it than `reach` (P,), in
+    the order of the points."""
+    found = np.empty((len(points) + LEAF, 2), np.int64)
+    stack = np.empty(DEPTH, np.int64)
+    leaves, count = len(tree) // 2, 0
+    for i in range(len(points)):
+        x, y, limit = points[i, 0], points[i, 1], reach[i]
+        height, stack[0] = 1, 1
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if apart_square(tree, node, x, y) > limit * limit:
+                continue
+            if node < leaves:
+                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+                height += 2
+                continue
+            if count + LEAF > len(found):
+                more = np.empty((2 * len(found), 2), np.int64)
+                more[:count] = found[:count]
+                found = more
+            low = (node - leaves) * LEAF
+            for row in range(low, min(low + LEAF, len(curves))):
+                if distance_to(curves, row, x, y) <= limit:
+                    found[count, 0], found[count, 1] = i, row
+                    count += 1
+    return found[:count]
+
+
 @inner
 def gathered(
     curves: Floats, tree: Floats, point: tuple[float, float], reach: float, rows: Ints

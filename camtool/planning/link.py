@@ -83,12 +83,13 @@ def link(
 ) -> ToolpathBuilder:
     """All moves of a program: the tool starts at part zero on the stock and ends above it.
 
-    `approaches` gives what tells where runs are come to from, a new one after a tool change.
-    """
+    Rows know their run, counted through all of `worked`. `approaches` gives what tells where runs
+    are come to from, a new one after a tool change."""
     builder = ToolpathBuilder().rapid(z=safe_z_mm)
     approach = approaches() if approaches is not None else None
     tool: Tool | None = None
     speed: float | None = None
+    done = 0
     for each in worked:
         if not each.runs:
             continue
@@ -100,7 +101,10 @@ def link(
         tool = each.operation.tool
         speed = _spin(builder, speed, each.operation.spindle_rpm)
         for run in each.runs:
+            builder.run = done
             _cut_one(builder, run, safe_z_mm, approach)
+            done += 1
+        builder.run = -1
     builder.source = ""
     _spin(builder, speed, None)
     return builder.rapid(0.0, 0.0).event(Kind.END)

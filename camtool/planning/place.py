@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.errors import GeometryError, OptionError
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.drawing import Drawing, FitError, Gap, Healing, Unchosen
+from camtool.geometry.drawing import Drawing, Gap, Healing, Unchosen
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polylines
 from camtool.geometry.repeats import encloses, without_repeats
@@ -30,6 +30,9 @@ MOST_AWAY_MM = 1e6
 
 MOST_POINTS = 10_000_000
 """No more vertices than this are made by copies: far beyond any program, well within memory."""
+
+SCALE_SHARE = 1e-3
+"""A drawing counts as read for a scale that differs by no more than this share of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +87,15 @@ def _placed(drawing: Drawing, job: Job) -> Drawing:
     if len(shifts) == 1 and _is_identity(first):
         return drawing
     maps = [first.moved(shift) for shift in shifts]
-    return replace(
-        _repeated(drawing, maps),
-        fit=FitError(drawing.fit.max_mm * first.scale, drawing.fit.rms_mm * first.scale),
-    )
+    return _repeated(drawing, maps)
+
+
+def part_scale(drawing: Drawing, job: Job) -> float:
+    """How many times as large as what is drawn the part is, whose size the job's placement says.
+
+    Raises OptionError for a fit that cannot be.
+    """
+    return _first_map(drawing, job).scale
 
 
 def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
@@ -270,12 +278,15 @@ def _is_identity(where: _Map) -> bool:
 
 def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
     """All that has a place, once for each map; paths that the scale makes a point are left out."""
-    paths, rows = _lines(drawing.paths, maps)
+    paths, rows, kept = _lines(drawing.paths, maps)
+    off = np.tile(maps[0].scale * drawing.off_mm, (len(maps), 1))
     copy, path = np.divmod(rows, max(1, len(drawing.paths)))
     which = list(zip(copy.tolist(), path.tolist(), strict=True))
     return replace(
         drawing,
         paths=paths,
+        # What left points that went now leaves the one before them.
+        off_mm=np.maximum.reduceat(off, kept, axis=0) if len(kept) else off,
         layers=tuple(drawing.layers[each] for _, each in which),
         colours=tuple(drawing.colours[each] for _, each in which),
         sources=tuple(_copy_name(drawing.sources[each], n) for n, each in which),
@@ -292,9 +303,10 @@ def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
     )
 
 
-def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints]:
-    """The paths under each map, one map after the other, and which of these (copy · paths + path)
-    are left: points that the scale brings together are merged, and a path of one point is none.
+def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints, Ints]:
+    """The paths under each map, one map after the other, which of these (copy · paths + path) are
+    left, and which of all vertices: points that the scale brings together are merged, and a path
+    of one point is none.
 
     OptionError when numbers are lost, or no path is left of any.
     """
@@ -307,17 +319,17 @@ def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints]:
     try:
         if keep.all():
             offsets = np.concatenate([[0], np.cumsum(counts)])
-            return Polylines(vertices, offsets, closed), np.arange(count)
+            return Polylines(vertices, offsets, closed), np.arange(count), np.arange(len(keep))
         owner = np.repeat(np.arange(count), counts)[keep]
         left = np.bincount(owner, minlength=count)
         rows = np.flatnonzero(left >= 2)
         if not len(rows):
             offsets = np.concatenate([[0], np.cumsum(counts)])
             Polylines(vertices, offsets, closed)  # raises: it names the first point
-        vertices = vertices[keep]
-        closed &= encloses(vertices, owner, left)
+        closed &= encloses(vertices[keep], owner, left)
         offsets = np.concatenate([[0], np.cumsum(left[rows])])
-        return Polylines(vertices[left[owner] >= 2], offsets, closed[rows]), rows
+        kept = np.flatnonzero(keep)[left[owner] >= 2]
+        return Polylines(vertices[kept], offsets, closed[rows]), rows, kept
     except GeometryError as error:
         raise OptionError(
             f"scaled {maps[0].scale:g} times, {error.where or 'a path'} has no shape:"
@@ -330,7 +342,7 @@ def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints]:
 def _around(unchosen: Unchosen, maps: list[_Map]) -> Unchosen:
     """What was not chosen, once for each map, but for contours that shrink to points."""
     try:
-        paths, rows = _lines(unchosen.paths, maps)
+        paths, rows, _ = _lines(unchosen.paths, maps)
     except OptionError:  # nothing is left of them; what is chosen has been placed already
         return Unchosen()
     copy, path = np.divmod(rows, max(1, len(unchosen.paths)))

@@ -9,7 +9,7 @@ Operations follow each other as the job lists them; each is put into order on it
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import PurePath
@@ -28,7 +28,7 @@ from camtool.planning.contours.levels import carved_levels, levels
 from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
 from camtool.planning.job import Job, Operation
 from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
-from camtool.planning.place import collapsed, place
+from camtool.planning.place import SCALE_SHARE, collapsed, place
 from camtool.planning.places import key_of, operation_name
 from camtool.planning.ranges import refuse_endless
 from camtool.planning.sides import Sides
@@ -48,14 +48,15 @@ MOST_OVERLAPS = 20
 @dataclass(frozen=True, eq=False)
 class Step:
     """What became of one operation: its setting, what it took, its items as the operation made
-    them, the runs in order of cutting, how far rapids go in XY: as drawn, and as ordered, mm; and
-    the bridges that its tabs leave."""
+    them, the runs in order of cutting with the item that each is of, how far rapids go in XY: as
+    drawn, and as ordered, mm; and the bridges that its tabs leave."""
 
     operation: Operation
     setting: Setting
     chosen: Chosen
     work: Work
     runs: tuple[Run, ...]
+    owners: tuple[Item, ...]
     findings: tuple[Finding, ...]
     rapid_drawn_mm: float
     rapid_mm: float
@@ -87,6 +88,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     which their ramps, leads and tabs depend), and nothing is approached.
     """
     from camtool.planning.checks import checked
+    from camtool.planning.drawn import drawn_of
 
     placed = place(drawing, job)
     sides = Sides.of(placed, job, machine.defaults.cut_depth_mm)
@@ -109,14 +111,39 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
         from camtool.planning.reversing.approach import Approaches
 
         approaches = partial(Approaches, machine)
-    toolpath = link(worked, safe_z_of(job, machine), approaches).finish()
+    builder = link(worked, safe_z_of(job, machine), approaches)
+    toolpath = builder.finish()
     findings = collapsed(drawing, placed, job)
     findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, job, any(step.runs for step in steps))
+    findings += _coarse(drawing, placed)
     findings += checked(toolpath, job, machine)
     made_from = PurePath(drawing.file).name
-    toolpath = replace(toolpath, findings=tuple(findings), made_from=made_from)
+    toolpath = replace(
+        toolpath,
+        findings=tuple(findings),
+        made_from=made_from,
+        drawn=drawn_of(toolpath, builder.runs, steps, placed),
+    )
     return Plan(placed, tuple(steps), toolpath)
+
+
+def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:
+    """FIT_COARSE for curves that were fitted for a smaller part than the job makes of them."""
+    if not drawing.fit.max_mm or not placed.fit.max_mm:
+        return
+    scale = placed.fit.max_mm / drawing.fit.max_mm
+    if scale > drawing.made_for * (1.0 + SCALE_SHARE):
+        yield Finding(
+            Code.FIT_COARSE,
+            Severity.WARNING,
+            f"the drawing was read for a part {drawing.made_for:.4g} times its size and is scaled"
+            f" {scale:.4g} times: its curves lie up to {placed.fit.max_mm * 1000.0:.4g} µm off;"
+            f" read it with scale={scale:.6g}",
+            where=placed.file,
+            measured=placed.fit.max_mm,
+            unit="mm",
+        )
 
 
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
@@ -194,6 +221,7 @@ def _step(
     keep_out = _walls(placed, job, setting.operation)
     runs: list[Run] = []
     bridges: list[Bridge] = []
+    owners: list[Item] = []
     for row in rows.tolist():
         item = items[int(choices.owner[row])]
         if isinstance(item, Contour):
@@ -203,17 +231,18 @@ def _step(
             bridges += cut.bridges
         else:
             runs += item.runs
-    after = travel_mm(choices, rows, *way)
+        owners += [item] * (len(runs) - len(owners))
     return Step(
-        setting.operation,
-        setting,
-        chosen,
-        work,
-        tuple(runs),
-        tuple(findings),
-        before,
-        after,
-        tuple(bridges),
+        operation=setting.operation,
+        setting=setting,
+        chosen=chosen,
+        work=work,
+        runs=tuple(runs),
+        owners=tuple(owners),
+        findings=tuple(findings),
+        rapid_drawn_mm=before,
+        rapid_mm=travel_mm(choices, rows, *way),
+        bridges=tuple(bridges),
     )
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from camtool.findings import Finding
-from camtool.toolpath.moves import Kind, PathMode, Toolpath
+from camtool.toolpath.moves import Ints, Kind, PathMode, Toolpath
 
 Coordinate = float | None
 
@@ -29,8 +29,11 @@ class ToolpathBuilder:
         """Program block given to the rows that follow."""
         self.mode: PathMode | None = None
         """How the rows that follow meet their corners; None: as the machine does."""
+        self.run = -1
+        """The run of the plan that the rows that follow are of; −1: links between runs."""
         self._start = start
         self._rows: list[tuple[float, ...]] = []
+        self._runs: list[int] = []
         self._texts: dict[str, int] = {}
         self._modes: dict[PathMode, int] = {}
 
@@ -77,6 +80,11 @@ class ToolpathBuilder:
         self.position = (x, y, z)
         return self
 
+    @property
+    def runs(self) -> Ints:
+        """(N,) the run that each row is of."""
+        return np.array(self._runs, dtype=np.int64)
+
     def finish(self, findings: tuple[Finding, ...] = ()) -> Toolpath:
         """The rows so far as a Toolpath."""
         table = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), 11)
@@ -121,6 +129,7 @@ class ToolpathBuilder:
         mode = -1
         if self.mode is not None:
             mode = self._modes.setdefault(self.mode, len(self._modes))
+        self._runs.append(self.run)
         self._rows.append((kind, *end, *centre, feed, number, source, self.block, mode))
         return self
 

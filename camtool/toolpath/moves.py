@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.findings import Finding
+from camtool.toolpath.drawn import Drawn
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -91,8 +92,8 @@ class Toolpath:
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
     program block that the row was read from, −1 when planned; start (3,) mm; `made_from` the name
     of the drawing, "" when nobody knows; mode (N,) index into `modes` or −1, where the program
-    leaves to the machine how it meets the corner behind the row; without modes all of them are.
-    ValueError when columns disagree.
+    leaves to the machine how it meets the corner behind the row; without modes all of them are;
+    `drawn` what the rows stand for, None but for plans. ValueError when columns disagree.
     """
 
     kind: Ints
@@ -108,6 +109,7 @@ class Toolpath:
     made_from: str = ""
     mode: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     modes: tuple[PathMode, ...] = ()
+    drawn: Drawn | None = None
 
     def __post_init__(self) -> None:
         count = len(self.kind)
@@ -131,6 +133,8 @@ class Toolpath:
                 raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
             column.flags.writeable = False
             object.__setattr__(self, name, column)
+        if self.drawn is not None and len(self.drawn.edge) != count:
+            raise ValueError(f"drawn is of {len(self.drawn.edge)} rows, not of {count}")
         if not (np.isfinite(self.end).all() and np.isfinite(self.start).all()):
             raise ValueError("a position is not finite")
 
@@ -185,7 +189,8 @@ class Toolpath:
         """Rows (M,) of this one, in that order and as often as they are named; `others`: columns
         that take the place of theirs."""
         columns = {name: getattr(self, name)[row] for name in COLUMNS}
-        return replace(self, **{**columns, **others})
+        drawn = None if self.drawn is None else self.drawn.picked(row)
+        return replace(self, **{**columns, **others}, drawn=drawn)
 
     def text(self, row: int) -> str:
         """Provenance of a row ("" when it has none)."""

@@ -21,8 +21,8 @@ step of an interpolator's last rounding is none."""
 @dataclass(frozen=True)
 class ContourFigures:
     """The total error of one wanted contour, mm: the largest with its place and toolpath row, root
-    of the mean square, and mean with sign (+ to the left of the way); and the largest errors of
-    interpolation and mechanics on it."""
+    of the mean square, and mean with sign (+ to the left of the way) without the fit; and the
+    largest errors of interpolation, mechanics and fit on it."""
 
     contour: int
     row: int
@@ -32,6 +32,7 @@ class ContourFigures:
     mean_mm: float
     interpolation_mm: float
     mechanics_mm: float
+    fit_mm: float
 
 
 def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
@@ -44,7 +45,8 @@ def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
     samples = np.bincount(of, rows.known[known], count)
     squares = np.bincount(of, rows.total_squares[known], count)
     sums = np.bincount(of, rows.total_sum[known], count)
-    inner, lag = np.zeros((2, count))
+    inner, lag, off = np.zeros((3, count))
+    np.maximum.at(off, of, match.off_mm[known, 0])
     np.maximum.at(inner, of, rows.interpolation[known])
     np.maximum.at(lag, of, rows.mechanics[known])
     order = known[np.lexsort((known, -rows.total[known], of))]
@@ -60,6 +62,7 @@ def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
             mean_mm=float(sums[contour] / samples[contour]),
             interpolation_mm=float(inner[contour]),
             mechanics_mm=float(lag[contour]),
+            fit_mm=float(off[contour]),
         )
 
 

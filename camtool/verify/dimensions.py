@@ -2,7 +2,12 @@
 
 Of a contour that is cut in several passes the deepest, last one counts, without leads and ramps:
 its loop (`camtool.verify.loops`). The part is all loops and open contours together. Sizes are
-those of the tool centre's path: the tool's own radius is nothing that motion changes.
+those of the cut edges, nominally as they are drawn, where the plan says which edges those are
+(`camtool.toolpath.drawn`); the slides move an edge as they move the box of the tool's centre:
+
+    predicted edge = planned edge + (box of the slides − box of the wanted moves)
+
+Where nobody knows edges, sizes are those of the tool centre's path.
 
     error_percent = (predicted − nominal) / nominal · 100
 
@@ -27,11 +32,13 @@ from camtool.verify.match import Match
 
 @dataclass(frozen=True)
 class Size:
-    """One dimension: "part X", "contour 3 Y"; mm. `error_percent` None when nominally 0."""
+    """One dimension: "part X", "contour 3 Y"; mm. `error_percent` None when nominally 0.
+    `of_edge`: of the cut edge, not of the tool's centre."""
 
     name: str
     nominal_mm: float
     predicted_mm: float
+    of_edge: bool
 
     @property
     def error_percent(self) -> float | None:
@@ -92,16 +99,40 @@ def sizes(
     low, high = _predicted(cuts, slides, mine, match.contour)
     segments = wanted.segments[np.flatnonzero(counts[wanted.segments.path])]
     boxes = segment_boxes(segments)
-    yield from _pair(
-        "part",
-        boxes[:, 2:].max(axis=0) - boxes[:, :2].min(axis=0),
-        high[mine].max(axis=0) - low[mine].min(axis=0),
-    )
-    nominal = _extents(wanted.contour[segments.path], boxes[:, :2], boxes[:, 2:], wanted)
-    predicted = _extents(match.contour[mine], low[mine], high[mine], wanted)
+    centre = _extents(wanted.contour[segments.path], boxes[:, :2], boxes[:, 2:], wanted)
+    slide = _extents(match.contour[mine], low[mine], high[mine], wanted)
+    known = wanted.toolpath.drawn is not None
+    nominal, predicted = _edges(wanted, closed, centre, slide) if known else (centre, slide)
+    seen = np.isfinite(slide[:, 0, 0]) & np.isfinite(centre[:, 0, 0])
+    # What the program does not cut at all is still a part of its nominal size.
+    yield from _pair("part", _whole(nominal), _whole(predicted[seen]), known)
     final = _final(segments, boxes, wanted, gap_mm)
-    for index in np.flatnonzero(closed & final & np.isfinite(predicted[:, 0])):
-        yield from _pair(f"contour {index + 1}", nominal[index], predicted[index])
+    for index in np.flatnonzero(closed & final & seen):
+        sizes_mm = np.diff(nominal[index])[:, 0], np.diff(predicted[index])[:, 0]
+        yield from _pair(f"contour {index + 1}", *sizes_mm, known)
+
+
+def _edges(
+    wanted: CutMoves, closed: Bools, centre: Floats, slide: Floats
+) -> tuple[Floats, Floats]:
+    """Nominal and predicted boxes (C, 2, 2) of the edges that contours cut, from the boxes of the
+    wanted moves and of the slides; those boxes themselves where a contour cuts no edge."""
+    drawn, rows = wanted.toolpath.drawn, wanted.rows
+    of = np.full(len(centre), -1, dtype=np.int64)
+    if drawn is not None:
+        np.maximum.at(of, wanted.contour[rows], drawn.edge[rows])
+    has = closed & (of >= 0)
+    nominal, predicted = centre.copy(), slide.copy()
+    if drawn is not None:
+        nominal[has] = drawn.nominal[of[has]]
+        predicted[has] = drawn.planned[of[has]] + (slide - centre)[has]
+    return nominal, predicted
+
+
+def _whole(boxes: Floats) -> Floats:
+    """(2,) size in X and Y of all boxes (C, 2, 2) together; of those that are known."""
+    known = boxes[np.isfinite(boxes[:, 0, 0])]
+    return np.asarray(known[:, :, 1].max(axis=0) - known[:, :, 0].min(axis=0))
 
 
 def _final(segments: Segments, boxes: Floats, wanted: CutMoves, gap_mm: float) -> Bools:
@@ -150,14 +181,15 @@ def _predicted(
 
 
 def _extents(contour: Ints, low: Floats, high: Floats, wanted: CutMoves) -> Floats:
-    """(C, 2) size in X and Y of the items of each contour; −inf where it has none."""
+    """(C, 2, 2) box [[x low, x high], [y low, y high]] of the items of each contour; infinite
+    where it has none."""
     least = np.full((wanted.contour_count, 2), np.inf)
     most = np.full((wanted.contour_count, 2), -np.inf)
     np.minimum.at(least, contour, low)
     np.maximum.at(most, contour, high)
-    return np.where(np.isfinite(most), most, 0.0) - np.where(np.isfinite(least), least, np.inf)
+    return np.stack([least, most], axis=2)
 
 
-def _pair(name: str, nominal: Floats, predicted: Floats) -> Iterator[Size]:
+def _pair(name: str, nominal: Floats, predicted: Floats, of_edge: bool) -> Iterator[Size]:
     for axis, nominal_mm, predicted_mm in zip("XY", nominal, predicted, strict=True):
-        yield Size(f"{name} {axis}", float(nominal_mm), float(predicted_mm))
+        yield Size(f"{name} {axis}", float(nominal_mm), float(predicted_mm), of_edge)

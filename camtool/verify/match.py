@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.geometry.polylines import POSITION_EPS_MM, Ints
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
 from camtool.verify.circles import Circle
 from camtool.verify.compare import ANY_CONTOUR, Found, Groups, Target
 from camtool.verify.cuts import Bools, CutMoves, Samples
@@ -38,13 +38,15 @@ class Match:
 
     `row` (N,) the wanted row nearest to its middle, −1 for rows that do not cut; `contour` (N,)
     likewise; `only` (N,) that contour when the slides may be compared with it alone, else
-    ANY_CONTOUR; `circle` (N,) index of the full circle that the row follows, −1.
+    ANY_CONTOUR; `circle` (N,) index of the full circle that the row follows, −1. `off_mm` (N, 2):
+    how far what was drawn lies from the wanted rows that it is near (`Drawn.off_mm`), at most.
     """
 
     row: Ints
     contour: Ints
     only: Ints
     circle: Ints
+    off_mm: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     count = len(cuts.contour)
     row = np.where(cuts.is_cut, np.arange(count), -1)
     circle = _circle_of_row(circles, count)
-    return Match(row, cuts.contour, cuts.contour, circle)
+    return Match(row, cuts.contour, cuts.contour, circle, np.zeros((count, 2)))
 
 
 def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
@@ -73,9 +75,11 @@ def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
     row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
     contour = np.where(known, goal.target.cuts.contour[np.maximum(row, 0)], -1)
     circle = _circle_of_row(goal.circles, len(goal.target.cuts.contour))
+    off = np.where(known[:, None], _off(goal)[np.maximum(row, 0)], 0.0)
     return replace(
         match,
         row=row,
+        off_mm=_beside(off, contour),
         contour=contour,
         only=np.where(match.only == ANY_CONTOUR, ANY_CONTOUR, contour),
         circle=np.where(known, circle[np.maximum(row, 0)], -1),
@@ -190,6 +194,7 @@ def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, go
         contour=np.full(count, -1, dtype=np.int64),
         only=np.full(count, ANY_CONTOUR, dtype=np.int64),
         circle=np.full(count, -1, dtype=np.int64),
+        off_mm=np.zeros((count, 2)),
     )
     if len(rows) == 0 or len(wanted.contour) == 0:
         return match
@@ -205,7 +210,26 @@ def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, go
     match.contour[row] = np.where(known, belongs[begin], nearest[middle])
     match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))
     match.circle[row] = _unanimous(circle, offsets)
-    return match
+    followed = wanted.cuts.segments.path[found.segment]
+    match.off_mm[row] = np.maximum.reduceat(_off(goal)[followed], begin, axis=0)
+    return replace(match, off_mm=_beside(match.off_mm, match.contour))
+
+
+def _off(goal: Goal) -> Floats:
+    """(W, 2) mm: how far what was drawn lies from the wanted rows; 0 where nobody knows."""
+    wanted = goal.target.cuts.toolpath
+    return np.zeros((len(wanted), 2)) if wanted.drawn is None else wanted.drawn.off_mm
+
+
+def _beside(off_mm: Floats, contour: Ints) -> Floats:
+    """The largest of each row (N, 2) and its neighbours in its contour: slides lag behind."""
+    rows = np.flatnonzero(contour >= 0)
+    most = off_mm.copy()
+    same = contour[rows[1:]] == contour[rows[:-1]]
+    before, after = rows[:-1][same], rows[1:][same]
+    most[before] = np.maximum(most[before], off_mm[after])
+    most[after] = np.maximum(most[after], off_mm[before])
+    return most
 
 
 def _unanimous(values: Ints, offsets: Ints) -> Ints:

@@ -40,12 +40,14 @@ class InterpolationFigures(msgspec.Struct, frozen=True):
 class Errors(msgspec.Struct, frozen=True):
     """Predicted errors by source, µm.
 
-    fit: drawn curves to the arcs that stand for them. rounding: moves as the controller holds
-    them (the dialect's digits and whole steps) to the wanted ones. interpolation: commanded
-    positions to the moves as held. mechanics: slides to commanded positions. total: slides to the
-    wanted moves (to those as held where nothing was wanted). depth_max: heights of the slide to
-    those of the moves as held, while cutting.
-    """
+    fit: what was drawn to the lines and arcs that stand for it, at the part's size: curves, and
+    all that was joined, merged, recognised or left out on reading; None where no drawing is
+    known. rounding: moves as the controller holds them (the dialect's digits and whole steps) to
+    the wanted ones. interpolation: commanded positions to the moves as held. mechanics: slides to
+    commanded positions. total: slides to the wanted moves and the fit there on top, so never less
+    than their distance to what was drawn; to the moves as held where nothing was wanted. Its mean
+    is without the fit. depth_max: heights of the slide to those of the moves as held, while
+    cutting."""
 
     fit: MaxRms = MaxRms()
     rounding: MaxRms = MaxRms()
@@ -102,20 +104,23 @@ class TimeSplit(msgspec.Struct, frozen=True):
 
 
 class Dimension(msgspec.Struct, frozen=True):
-    """A size of the tool centre's path; error_percent > 0 when it comes out too large. Of a
-    contour in several passes the deepest and last one counts, without leads and ramps."""
+    """A size of the cut edge, nominally as drawn; of the tool centre's path where no drawing is
+    known (`of`: "edge", "centre"). error_percent > 0 when it comes out too large. Of a contour in
+    several passes the deepest and last one counts, without leads and ramps."""
 
     name: str
     nominal_mm: float
     predicted_mm: float
     error_percent: float | None
+    of: str = "centre"
 
 
 class CircleReport(msgspec.Struct, frozen=True):
     """A full circle: G, F max and F min as ISO 230-4 defines them; D is the mean of r − R. A
     circle in several passes, or at the end of a helix, is reported once: its deepest level turn.
     `step_um` and `spike_um` at 0°, 90°, 180° and 270°, where X, Y, X, Y turn, and B the reversal
-    values of X and Y: see `camtool.verify.ballbar`.
+    values of X and Y: see `camtool.verify.ballbar`. All are about the programmed circle; `fit_um`:
+    how far what was drawn lies from that at most.
     """
 
     centre_mm: tuple[float, float]
@@ -129,6 +134,7 @@ class CircleReport(msgspec.Struct, frozen=True):
     step_um: tuple[float | None, ...] = ()
     spike_um: tuple[float | None, ...] = ()
     B_um: tuple[float | None, ...] = ()
+    fit_um: float | None = None
 
 
 class BothWaysReport(msgspec.Struct, frozen=True):
@@ -153,6 +159,7 @@ class ContourReport(msgspec.Struct, frozen=True):
     block: int | None
     interpolation_um: float
     mechanics_um: float
+    fit_um: float | None = None
 
 
 class WorstReport(msgspec.Struct, frozen=True):
@@ -165,6 +172,7 @@ class WorstReport(msgspec.Struct, frozen=True):
     interpolation_um: float | None
     mechanics_um: float | None
     source: str
+    fit_um: float | None = None
 
 
 class UnreachedReport(msgspec.Struct, frozen=True):

@@ -21,7 +21,9 @@ DECIMALS = 6
 
 
 class Report(msgspec.Struct, frozen=True):
-    """Everything that a verification found. `blocks`, `bytes` None when no program was given."""
+    """Everything that a verification found. `blocks`, `bytes` None when no program was given.
+    `against`: "drawing" where errors are those to what was drawn, "program" where no drawing is
+    known, and they are those to the program's own moves, or to another program's."""
 
     target: str
     source: str
@@ -50,6 +52,7 @@ class Report(msgspec.Struct, frozen=True):
     worst: tuple[record.WorstReport, ...] = ()
     assumptions: tuple[str, ...] = ()
     asked: record.AskedReport | None = None
+    against: str = "program"
 
     def to_json(self) -> str:
         """Indented JSON with keys in the order of the record, and a newline at the end."""

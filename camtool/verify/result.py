@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from camtool import __version__
 from camtool.findings import Finding
@@ -20,7 +23,7 @@ from camtool.verify.by_row import (
 from camtool.verify.case import Case
 from camtool.verify.circles import UNSEEN
 from camtool.verify.coverage import Coverage
-from camtool.verify.cuts import CutMoves
+from camtool.verify.cuts import CutMoves, moved_lengths
 from camtool.verify.depth import depth_error_mm
 from camtool.verify.dimensions import RowSlides, closure_mm, places_between, sizes
 from camtool.verify.figures import Figure
@@ -84,22 +87,18 @@ class Result:
             worst=self._worst(),
             assumptions=assumptions(case),
             asked=self._asked(),
+            against="program" if case.wanted is None or case.wanted.drawn is None else "drawing",
         )
 
     def _errors(self) -> record.Errors:
-        slides, drawing = self.slides, self.case.drawing
-        fit = record.MaxRms()
-        if drawing is not None:
-            fit = record.MaxRms(
-                number(drawing.fit.max_mm, UM_PER_MM), number(drawing.fit.rms_mm, UM_PER_MM)
-            )
+        slides = self.slides
         inside, step = slides.interpolation(), self.case.step_mm
         is_arc = self.cuts.toolpath.is_arc
         lines_mm = largest(self.rows.interpolation, ~is_arc)
         arcs_mm = largest(self.rows.interpolation, is_arc)
         total = slides.total()
         return record.Errors(
-            fit=fit,
+            fit=self._fit(),
             rounding=_max_rms(self.coverage.rounding),
             interpolation=record.InterpolationFigures(
                 max=number(inside.max, UM_PER_MM),
@@ -120,6 +119,24 @@ class Result:
             depth_max=number(depth_error_mm(self.case, self.cuts), UM_PER_MM),
         )
 
+    def _fit(self) -> record.MaxRms:
+        """How far what was drawn lies from the wanted moves that cut; the rms over those moves
+        that it lies off."""
+        drawn, rows = self.wanted.toolpath.drawn, self.wanted.rows
+        if self.case.wanted is None or drawn is None or not len(rows):
+            return record.MaxRms()
+        largest, rms = drawn.off_mm[rows].T
+        length = np.where(largest > 0.0, moved_lengths(self.wanted.toolpath)[rows], 0.0)
+        mean = float((length * rms**2).sum()) / (float(length.sum()) or 1.0)
+        return record.MaxRms(
+            certain(float(largest.max()) * UM_PER_MM), certain(math.sqrt(mean) * UM_PER_MM)
+        )
+
+    def _off_um(self, off_mm: Floats) -> float | None:
+        """The largest of some rows' distances from what was drawn; None where nobody knows."""
+        known = self.case.wanted is not None and self.case.wanted.drawn is not None
+        return certain(float(off_mm[:, 0].max(initial=0.0)) * UM_PER_MM) if known else None
+
     def _dimensions(self, slides: RowSlides) -> tuple[record.Dimension, ...]:
         match = self.coverage.match
         found = sizes(self.cuts, slides, self.wanted, match, self.case.coverage_mm)
@@ -129,6 +146,7 @@ class Result:
                 nominal_mm=certain(size.nominal_mm),
                 predicted_mm=certain(size.predicted_mm),
                 error_percent=number(size.error_percent),
+                of="edge" if size.of_edge else "centre",
             )
             for size in found
         )
@@ -147,8 +165,10 @@ class Result:
                 step_um=tuple(number(value, UM_PER_MM) for value in turned.step),
                 spike_um=tuple(number(value, UM_PER_MM) for value in turned.spike),
                 B_um=tuple(number(value, UM_PER_MM) for value in turned.value),
+                fit_um=self._off_um(self.coverage.match.off_mm[self.coverage.match.circle == k]),
             )
-            for circle, figures, turned in zip(
+            for k, circle, figures, turned in zip(
+                range(len(self.slides.circles)),
                 self.slides.circles,
                 self.slides.circle_figures,
                 self.slides.reversing,
@@ -179,6 +199,7 @@ class Result:
                 block=_block(self.case, one.row),
                 interpolation_um=certain(one.interpolation_mm * UM_PER_MM),
                 mechanics_um=certain(one.mechanics_mm * UM_PER_MM),
+                fit_um=self._off_um(np.array([[one.fit_mm]])),
             )
             for one in contour_figures(self.rows, self.coverage.match)
         )
@@ -194,6 +215,7 @@ class Result:
                 interpolation_um=number(rows.interpolation[row], UM_PER_MM),
                 mechanics_um=number(rows.mechanics[row], UM_PER_MM),
                 source=self._source(row),
+                fit_um=self._off_um(self.coverage.match.off_mm[row : row + 1]),
             )
             for row in worst_rows(rows, self.case.options.worst).tolist()
         )

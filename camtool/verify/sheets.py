@@ -68,13 +68,13 @@ def _dimensions(report: Report) -> Sheet:
 
 
 def _circles(report: Report) -> Sheet:
-    heads = ("circle at mm", "way", "radius mm", "G µm", "Fmax µm", "Fmin µm", "D µm")
+    heads = ("circle at mm", "way", "radius mm", "G µm", "Fmax µm", "Fmin µm", "D µm", "fit µm")
     rows = tuple(
         (
             _place(item.centre_mm),
             item.direction,
             f"{item.radius_mm:.4f}",
-            *map(um, (item.G_um, item.Fmax_um, item.Fmin_um, item.D_um)),
+            *map(um, (item.G_um, item.Fmax_um, item.Fmin_um, item.D_um, item.fit_um)),
         )
         for item in report.circles
     )
@@ -92,7 +92,16 @@ def _both_ways(report: Report) -> Sheet:
 
 def _contours(report: Report) -> Sheet:
     """The contours, those with the largest errors first."""
-    heads = ("contour", "where", "max µm", "rms µm", "mean µm", "interpolation µm", "mechanics µm")
+    heads = (
+        "contour",
+        "where",
+        "max µm",
+        "rms µm",
+        "mean µm",
+        "fit µm",
+        "interpolation µm",
+        "mechanics µm",
+    )
     rows = tuple(
         (
             item.name,
@@ -100,6 +109,7 @@ def _contours(report: Report) -> Sheet:
             um(item.max_um),
             um(item.rms_um),
             um(item.mean_um),
+            um(item.fit_um),
             um(item.interpolation_um),
             um(item.mechanics_um),
         )
@@ -109,13 +119,22 @@ def _contours(report: Report) -> Sheet:
 
 
 def _worst(report: Report) -> Sheet:
-    heads = ("worst moves", "where", "drawn as", "error µm", "interpolation µm", "mechanics µm")
+    heads = (
+        "worst moves",
+        "where",
+        "drawn as",
+        "error µm",
+        "fit µm",
+        "interpolation µm",
+        "mechanics µm",
+    )
     rows = tuple(
         (
             named(item.block, item.move),
             _place(item.at_mm),
             item.source,
             um(item.total_um),
+            um(item.fit_um),
             um(item.interpolation_um),
             um(item.mechanics_um),
         )

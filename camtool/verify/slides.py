@@ -189,6 +189,7 @@ def _task(decoded: Target, goal: Goal, match: Match, slot: Ints) -> Task:
             else [own.of_row, wanted.ranges(match.only), match.circle, match.circle]
         ),
         window=_heights(decoded, goal.depth_mm),
+        off=np.ascontiguousarray(match.off_mm[:, 0]),
         centre=np.array([circle.centre_mm for circle in goal.circles]).reshape(-1, 2),
         directions=bin_directions(),
     )

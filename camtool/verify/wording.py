@@ -40,7 +40,7 @@ def notes(report: Report) -> tuple[str, ...]:
     total = report.error_um.total
     return (
         f"{report.target}: {clock(report.time_s)} h, {_cutting_reversals(report)} reversals",
-        f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm",
+        f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{to_what(report)}",
     )
 
 
@@ -56,7 +56,8 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
     if report.dimensions:
         x, y = report.dimensions[:2]
         shown = f"error {percent(x.error_percent)}, {percent(y.error_percent)}"
-        yield "size", f"{x.nominal_mm:.3f} × {y.nominal_mm:.3f} mm; predicted {shown}"
+        what = "" if x.of == "edge" else " of the tool's centre"
+        yield "size", f"{x.nominal_mm:.3f} × {y.nominal_mm:.3f} mm{what}; predicted {shown}"
     spans = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
     yield "travel", ", ".join(f"{axis} {mm(low)} to {mm(high)}" for axis, (low, high) in spans)
     program = f"{report.contours} contours, {report.moves} moves"
@@ -85,7 +86,10 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
     if report.asked is not None:
         yield "as asked", _asked(report.asked)
     error = report.error_um.total
-    yield "error", f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}"
+    yield (
+        "error",
+        f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}{to_what(report)}",
+    )
     yield "by source", _error_sources(report)
     if report.error_um.depth_max:
         yield "depth", f"{um(report.error_um.depth_max)} µm off at most"
@@ -123,6 +127,11 @@ def _cuts(operations: Sequence[PlannedOperation]) -> Iterator[str]:
         )
     if len(operations) > MOST_OPERATIONS:
         yield f"and {len(operations) - MOST_OPERATIONS} operations more"
+
+
+def to_what(report: Report) -> str:
+    """What errors are measured to, where that is not what was drawn."""
+    return "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
 
 
 def _shape(shape: ShapeReport) -> str:

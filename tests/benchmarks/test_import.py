@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from camtool.geometry.chain import chain
-from camtool.geometry.drawing import Drawing, FitError, Units
+from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.facts import drawing_facts
 from camtool.geometry.polylines import Polylines
 from camtool.importers.assemble import assemble
@@ -84,7 +84,6 @@ def assembled(parts: list[Piece]) -> Drawing:
         parts,
         file="t.dxf",
         units=Units("mm", 1.0, "in a benchmark"),
-        fit=FitError(),
         used={},
         skipped=[],
         findings=[],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,10 +19,10 @@ from camtool.geometry.fit import (
     SplineCurve,
     arc_vertices,
     fit_curve,
-    overall,
 )
 from camtool.geometry.nodes import curve_nodes
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
+from tests.drawings import drawing_of
 from tests.oracles import arcs
 
 TOLERANCE_MM = 0.0005
@@ -303,10 +304,12 @@ def test_a_full_circle_ends_exactly_where_it_begins():
 def test_overall_weighs_by_length():
     small = fit_curve(BezierCurve(np.array([[0, 0], [1, 1], [2, 0.0]])), 0.01)
     large = fit_curve(BezierCurve(np.array([[0, 0], [90, 90], [200, 0.0]])), 0.001)
-    both = overall([small, large])
+    paths = Polylines.of([Polyline(small.vertices), Polyline(large.vertices)])
+    off = np.concatenate([small.off_mm, large.off_mm])
+    both = replace(drawing_of(list(paths)), off_mm=off).fit
     assert both.max_mm == small.max_mm
     assert large.rms_mm < both.rms_mm < 2.0 * large.rms_mm
-    assert overall([]).max_mm == 0.0
+    assert drawing_of(list(paths)).fit.max_mm == 0.0
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf, 1e-9])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
-from camtool.geometry.drawing import Drawing, FitError, Skipped, Units
+from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.measure import signed_areas
 from camtool.importers.assemble import Piece, assemble
 from camtool.importers.clean import cleaned
@@ -29,7 +29,6 @@ def put(*pieces: Piece, skipped: tuple[Skipped, ...] = (), **options: object) ->
         list(pieces),
         file="t.dxf",
         units=MM,
-        fit=FitError(),
         used={"LINE": len(pieces)},
         skipped=list(skipped),
         findings=[],

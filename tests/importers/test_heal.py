@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
-from camtool.geometry.drawing import Drawing, FitError, Mark, Skipped, Units
+from camtool.geometry.drawing import Drawing, Mark, Skipped, Units
 from camtool.geometry.facts import drawing_facts
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline
@@ -43,7 +43,6 @@ def put(*pieces: Piece, marks: tuple[Mark, ...] = (), **options: object) -> Draw
         list(pieces),
         file="t.dxf",
         units=Units("mm", 1.0, "in a test"),
-        fit=FitError(),
         used={},
         skipped=[],
         findings=[],

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Severity
-from camtool.geometry.drawing import Branch, Drawing, FitError, Gap, Healing, Mark, SelfCrossing
+from camtool.geometry.drawing import Branch, Drawing, Gap, Healing, Mark, SelfCrossing
 from camtool.geometry.measure import extents, path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline, Segments
 from camtool.planning import place as module
@@ -216,7 +216,7 @@ def test_the_centre_of_copies_is_that_of_all() -> None:
 def test_errors_gaps_and_doubtful_places_come_along() -> None:
     made: Drawing = replace(
         drawing_of([_box(0, 0, 2, 1), _line(0, 0, 1, 1)]),
-        fit=FitError(1e-3, 5e-4),
+        off_mm=np.tile([1e-3, 5e-4], (6, 1)),
         gaps=(Gap((1.0, 2.0), 0.5, "0"),),
         closed_gaps=(Gap((3.0, 4.0), 0.01, "0"),),
         healing=Healing(
@@ -226,7 +226,9 @@ def test_errors_gaps_and_doubtful_places_come_along() -> None:
         ),
     )
     placed = place(made, job_of(scale=2.0, copies=(2, 1), pitch_mm=(10.0, 0.0)))
-    assert placed.fit == FitError(2e-3, 1e-3)
+    assert placed.fit.max_mm == 2e-3
+    assert placed.fit.rms_mm == pytest.approx(1e-3)
+    assert len(placed.off_mm) == 12
     assert placed.gaps == (Gap((2.0, 4.0), 1.0, "0"), Gap((12.0, 4.0), 1.0, "0"))
     assert placed.closed_gaps[1] == Gap((16.0, 8.0), 0.02, "0")
     assert placed.healing.duplicates == 3

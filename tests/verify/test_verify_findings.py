@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.drawing import Drawing, FitError, Units
+from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.drawn import Drawn
 from camtool.toolpath.moves import Kind
 from camtool.verify.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import (
@@ -159,10 +160,13 @@ def test_findings_of_all_stages_are_merged_once() -> None:
     plain = sample_part().finish()
     paths = Polylines.of([Polyline(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))])
     drawing = Drawing(
-        paths, ("0",), ("",), ("",), "a.dxf", Units("mm", 1.0, "said"), FitError(2e-4, 1e-4),
+        paths, ("0",), ("",), ("",), "a.dxf", Units("mm", 1.0, "said"),
         findings=(drawn, shared),
     )  # fmt: skip
     decoded, wanted = replace(plain, findings=(shared,)), replace(plain, findings=(other, shared))
+    off, nothing = np.tile([2e-4, 1e-4], (len(wanted), 1)), np.zeros((0, 2, 2))
+    edge = np.full(len(wanted), -1)
+    wanted = replace(wanted, drawn=Drawn(off, edge, nothing, nothing))
     found = judge(Case(decoded, MACHINE, wanted, drawing, VerifyOptions()), follow(decoded, 10))
     assert codes(found)[:3] == [Code.UNITLESS, Code.FEED_ABOVE_LIMIT, Code.CONTOUR_TOO_SMALL]
     assert codes(found).count(Code.FEED_ABOVE_LIMIT) == 1

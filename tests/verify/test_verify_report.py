@@ -58,12 +58,15 @@ WANTED_KEYS = {
 
 ADDED_KEYS = {
     "": "contours time_split_s interpolator camtool_version planned before contour_errors "
-    "bidirectional unreached shape worst assumptions asked",
+    "bidirectional unreached shape worst assumptions asked against",
     "error_um": "depth_max",
     "error_um.total": "mean",
     "reversals": "cutting air",
     "error_um.interpolation": "lines_max arcs_max lines_steps arcs_steps",
-    "circles.0": "D_um direction z_mm step_um spike_um B_um",
+    "circles.0": "D_um direction z_mm step_um spike_um B_um fit_um",
+    "contour_errors.0": "fit_um",
+    "worst.0": "fit_um",
+    "dimensions.0": "of",
     "findings.0": "measured limit unit",
 }
 

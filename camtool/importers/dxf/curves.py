@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from camtool.errors import GeometryError
-from camtool.geometry.fit import BezierCurve, Fit, SplineCurve
+from camtool.geometry.fit import BezierCurve, SplineCurve
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats
 from camtool.importers.dxf.frames import Frame, Shape, Unusable, fitted, numbers, straight
 
@@ -77,24 +77,27 @@ def spline_of(
         curve = SplineCurve(degree, knots, control, weights if len(weights) else None)
     except GeometryError as error:
         raise Unusable(f"has no curve: {error.message}") from error
-    shape = fitted(curve, control, tolerance_mm)
+    shape = Shape.of(fitted(curve, control, tolerance_mm))
     ends = shape.vertices[[0, -1], :2]
     closed = len(shape.vertices) > 2 and math.dist(*ends) <= POSITION_EPS_MM
-    return Shape(shape.vertices[:-1] if closed else shape.vertices, closed, shape.fits)
+    return shape.ring() if closed else shape
 
 
 def outline(parts: list[Floats], closed: bool, frame: Frame, tolerance_mm: float) -> Shape:
     """Béziers of 2 (a line), 3 or 4 control points (k, 3) in world coordinates, end to end."""
     vertices: list[Floats] = []
-    fits: list[Fit] = []
+    off: list[Floats] = []
     flat = frame.flat(np.concatenate([numbers(list(part)) for part in parts]))
     counts = np.cumsum([len(part) for part in parts])
     for control in np.split(flat, counts[:-1]):
         if len(control) == _LINE_POINTS:
             vertices.append(straight(control[:1]))
+            off.append(np.zeros((1, 2)))
             continue
-        shape = fitted(BezierCurve(control), control, tolerance_mm)
-        vertices.append(shape.vertices[:-1] if len(shape.vertices) > 1 else shape.vertices)
-        fits.extend(shape.fits)
+        fit = fitted(BezierCurve(control), control, tolerance_mm)
+        count = max(len(fit.vertices) - 1, 1)
+        vertices.append(fit.vertices[:count])
+        off.append(fit.off_mm[:count])
     vertices.append(straight(flat[-1:]))
-    return Shape(np.concatenate(vertices), closed, tuple(fits))
+    off.append(np.zeros((1, 2)))
+    return Shape(np.concatenate(vertices), closed, np.concatenate(off))

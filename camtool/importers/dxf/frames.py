@@ -139,12 +139,22 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """`vertices` (n, 3) mm, and the fits that it took; `lacks` names what was not applied."""
+    """`vertices` (n, 3) mm and `off_mm` of a `Piece`; `lacks` names what was not applied."""
 
     vertices: Floats
     closed: bool
-    fits: tuple[Fit, ...] = ()
+    off_mm: Floats | None = None
     lacks: str = ""
+
+    @classmethod
+    def of(cls, fit: Fit) -> Shape:
+        """The arcs that stand for a curve."""
+        return cls(fit.vertices, False, fit.off_mm)
+
+    def ring(self) -> Shape:
+        """The same closed, whose last vertex is its first one."""
+        off = None if self.off_mm is None else self.off_mm[:-1]
+        return Shape(self.vertices[:-1], True, off, self.lacks)
 
 
 def require(entity: Any, names: tuple[str, ...]) -> None:
@@ -169,7 +179,7 @@ def straight(points: Floats) -> Floats:
     return np.column_stack([points, np.zeros(len(points))])
 
 
-def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Shape:
+def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
     """Arcs for a curve whose place and size these numbers tell."""
     furthest = float(np.abs(size).max())
     if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
@@ -177,5 +187,4 @@ def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Shape:
             f"is {furthest:.6g} mm large or away, where micrometres are lost",
             mend="move the drawing to its origin, or name its unit with --units",
         )
-    fit = fit_curve(curve, tolerance_mm)
-    return Shape(fit.vertices, False, (fit,))
+    return fit_curve(curve, tolerance_mm)

@@ -14,7 +14,6 @@ from typing import Any
 from camtool.errors import DrawingError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped
-from camtool.geometry.fit import overall
 from camtool.importers.assemble import assemble
 from camtool.importers.dxf.load import load, quiet, without_collector
 from camtool.importers.dxf.units import units_of
@@ -39,7 +38,6 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         marks=walk.marks,
         file=file,
         units=units,
-        fit=overall(walk.fits),
         used=dict(walk.used),
         skipped=[Skipped(kind, count, why) for (kind, why), count in walk.skipped.items()],
         findings=[

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from camtool.geometry.fit import EllipseCurve, Fit, arc_vertices, split_bulges
+from camtool.geometry.fit import EllipseCurve, arc_vertices, split_bulges
 from camtool.geometry.polylines import Floats, Segments
 from camtool.importers.dxf.frames import (
     Frame,
@@ -128,10 +129,11 @@ def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> S
     plane = Plane.of(np.append(u, 0.0), np.append(v, 0.0), np.append(centre, 0.0))
     if plane.scale:
         turn = plane.turn + plane.sign * start
-        shape = Shape(arc_vertices(centre, plane.scale, turn, plane.sign * sweep), closed)
+        shape = Shape(arc_vertices(centre, plane.scale, turn, plane.sign * sweep), False)
     else:
-        shape = fitted(EllipseCurve(centre, u, v, start, start + sweep), axes, tolerance_mm)
-    return Shape(shape.vertices[:-1] if closed else shape.vertices, closed, shape.fits)
+        curve = EllipseCurve(centre, u, v, start, start + sweep)
+        shape = Shape.of(fitted(curve, axes, tolerance_mm))
+    return shape.ring() if closed else shape
 
 
 def lwpolyline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
@@ -169,7 +171,7 @@ def polyline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
 
 
 def _with_width(shape: Shape) -> Shape:
-    return Shape(shape.vertices, shape.closed, shape.fits, WIDTH)
+    return replace(shape, lacks=WIDTH)
 
 
 def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Shape:
@@ -188,16 +190,17 @@ def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Sh
     if not closed:
         is_arc[-1] = False
     parts: list[Floats] = []
-    fits: list[Fit] = []
+    off: list[Floats] = []
     for k, row in enumerate(rows):
         if is_arc[k]:
             centre = plane.points(arcs.centre[k : k + 1])[0]
             u, v = arcs.radius[k] * plane.u, arcs.radius[k] * plane.v
             ends = float(arcs.start_angle[k]), float(arcs.start_angle[k] + arcs.sweep[k])
             curve = EllipseCurve(centre, u, v, *ends)
-            shape = fitted(curve, np.array([centre, u, v]), tolerance_mm)
-            parts.append(shape.vertices[:-1])
-            fits.extend(shape.fits)
+            fit = fitted(curve, np.array([centre, u, v]), tolerance_mm)
+            parts.append(fit.vertices[:-1])
+            off.append(fit.off_mm[:-1])
         else:
             parts.append(np.array([[row[0], row[1], 0.0]]))
-    return Shape(np.concatenate(parts), closed, tuple(fits))
+            off.append(np.zeros((1, 2)))
+    return Shape(np.concatenate(parts), closed, np.concatenate(off))

@@ -15,7 +15,6 @@ import numpy as np
 
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Mark
-from camtool.geometry.fit import Fit
 from camtool.importers.dxf.blocks import MAX_INSERTED, BlockSizes, block_key, matrix, places
 from camtool.importers.dxf.frames import Frame, Shape, Unusable, numbers, require
 from camtool.importers.dxf.kinds import (
@@ -62,7 +61,6 @@ class Walk:
     options: ReadOptions
     pieces: list[Piece] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
-    fits: list[Fit] = field(default_factory=list)
     used: Counter[str] = field(default_factory=Counter)
     skipped: Counter[tuple[str, str]] = field(default_factory=Counter)
     lacking: Counter[tuple[str, str]] = field(default_factory=Counter)
@@ -167,10 +165,15 @@ class Walk:
         for shape in shapes:
             self.pieces.append(
                 Piece(
-                    shape.vertices, shape.closed, look.layer, look.colour, source, look.line_type
+                    shape.vertices,
+                    shape.closed,
+                    look.layer,
+                    look.colour,
+                    source,
+                    look.line_type,
+                    shape.off_mm,
                 )
             )
-            self.fits.extend(shape.fits)
             if shape.lacks:
                 self.lacking[entity.dxftype(), shape.lacks] += 1
         self._use(entity, scope)

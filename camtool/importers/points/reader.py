@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from camtool.errors import DrawingError
-from camtool.geometry.drawing import Drawing, FitError, Units
+from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.fit import split_bulges
 from camtool.importers.assemble import Piece, assemble
 from camtool.importers.options import ReadOptions
@@ -34,7 +34,6 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         [_piece(stroke, units.mm_per_unit) for stroke in table.strokes],
         file=file,
         units=units,
-        fit=FitError(),
         used={"stroke": len(table.strokes)},
         skipped=[],
         findings=[],

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from camtool.geometry.curves import Curve, EllipseCurve, FunctionCurve, SplineCurve
-from camtool.geometry.fit import Fit, arc_vertices, fit_curve
-from camtool.geometry.polylines import Floats
+from camtool.geometry.fit import arc_vertices, fit_curve
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats
 
 LEVEL_RAD = 1e-6
 """A face or a circle whose axis leaves the vertical by no more is level: 1 nm over 1 mm."""
@@ -32,11 +32,11 @@ files of other programs to 1e-5 and more."""
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Vertices (n, 3) in the model's unit, x, y, bulge; `fits` of what was no line or circle."""
+    """Vertices (n, 3) x, y, bulge and `off` (n, 2) of a `Piece`, in the model's unit."""
 
     vertices: Floats
     closed: bool
-    fits: tuple[Fit, ...]
+    off: Floats
 
 
 def edge_path(edge: Any, tolerance: float) -> Path:
@@ -46,14 +46,15 @@ def edge_path(edge: Any, tolerance: float) -> Path:
 
     curve = BRepAdaptor_Curve(edge)
     start, end = curve.FirstParameter(), curve.LastParameter()
-    fits: tuple[Fit, ...] = ()
     exact = _exact(curve, start, end)
     if exact is None:
         fit = fit_curve(_free(curve, start, end), tolerance)
-        exact, fits = fit.vertices, (fit,)
+        exact, off = fit.vertices, fit.off_mm
+    else:
+        off = np.zeros((len(exact), 2))
     if edge.Orientation() == TopAbs_REVERSED:
-        exact = reversed_vertices(exact)
-    return Path(exact, False, fits)
+        exact = reversed_vertices(exact)  # and all of one edge is equally far off
+    return Path(exact, False, off)
 
 
 def reversed_vertices(vertices: Floats) -> Floats:
@@ -65,17 +66,24 @@ def reversed_vertices(vertices: Floats) -> Floats:
 
 
 def joined(edges: list[Path]) -> Path:
-    """Edges one after the other as one closed path."""
+    """Edges one after the other as one closed path; each ends where the next one begins."""
     vertices = np.concatenate([path.vertices[:-1] for path in edges])
-    return Path(vertices, True, tuple(fit for path in edges for fit in path.fits))
+    off = [path.off[:-1].copy() for path in edges]
+    for row, step in zip(off, _steps(edges).tolist(), strict=True):
+        row[-1] += step if step > POSITION_EPS_MM else 0.0
+    return Path(vertices, True, np.concatenate(off))
 
 
 def follow(edges: list[Path]) -> bool:
     """Whether each edge begins where the one before ends, the last one closing the ring."""
+    return bool((_steps(edges) <= JOINT_MM).all())
+
+
+def _steps(edges: list[Path]) -> Floats:
+    """(E,) how far from the end of each edge the next one begins."""
     ends = np.array([path.vertices[-1, :2] for path in edges])
     starts = np.array([path.vertices[0, :2] for path in edges])
-    steps = np.hypot(*(np.roll(starts, -1, axis=0) - ends).T)
-    return bool((steps <= JOINT_MM).all())
+    return np.asarray(np.hypot(*(np.roll(starts, -1, axis=0) - ends).T))
 
 
 def _exact(curve: Any, start: float, end: float) -> Floats | None:

@@ -24,7 +24,6 @@ import numpy as np
 from camtool.errors import DrawingError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
-from camtool.geometry.fit import Fit, overall
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.assemble import Piece, assemble
 from camtool.importers.options import ReadOptions
@@ -49,17 +48,15 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         "tolerance": max(options.tolerance_mm / scale, POSITION_EPS_MM),
     }
     found = outlined(data, wanted, file)
-    pieces, fits = _pieces(found["outlines"], scale)
     units = (
         Units("mm", 1.0, unit.why)
         if options.units is None
         else Units(options.units.lower(), options.mm_per(options.units), "as asked")
     )
     return assemble(
-        pieces,
+        _pieces(found["outlines"], scale),
         file=file,
         units=units,
-        fit=overall(fits),
         used=dict(Counter(outline["kind"] for outline in found["outlines"])),
         skipped=[Skipped("body", count, why) for why, count in found["missed"].items()],
         findings=[*_faults(found), *_chosen(found, scale, height)],
@@ -88,22 +85,18 @@ def _kind(data: bytes, file: str, options: ReadOptions) -> tuple[str, FileUnit]:
     return "script", script_unit()
 
 
-def _pieces(outlines: list[dict[str, Any]], scale: float) -> tuple[list[Piece], list[Fit]]:
-    """A piece for each wire, in mm, and how well its curves were fitted."""
+def _pieces(outlines: list[dict[str, Any]], scale: float) -> list[Piece]:
+    """A piece for each wire, in mm."""
     pieces: list[Piece] = []
-    fits: list[Fit] = []
     for number, outline in enumerate(outlines, start=1):
         for wire, path in enumerate(outline["paths"], start=1):
             vertices = np.array(path["vertices"], dtype=np.float64).reshape(-1, 3)
             vertices[:, :2] *= scale
             source = f"{outline['kind']} {number} wire {wire}"
-            pieces.append(
-                Piece(vertices, path["closed"], outline["layer"], outline["colour"], source)
-            )
-            fits.extend(
-                Fit(vertices[:0], *(scale * size for size in sizes)) for sizes in path["fits"]
-            )
-    return pieces, fits
+            off = scale * np.array(path["off"], dtype=np.float64).reshape(-1, 2)
+            look = outline["layer"], outline["colour"]
+            pieces.append(Piece(vertices, path["closed"], *look, source, off_mm=off))
+    return pieces
 
 
 def _faults(found: dict[str, Any]) -> list[Finding]:

@@ -98,7 +98,7 @@ def _plain(result: Outlines) -> dict[str, Any]:
                     {
                         "closed": path.closed,
                         "vertices": path.vertices.tolist(),
-                        "fits": [[fit.max_mm, fit.rms_mm, fit.length_mm] for fit in path.fits],
+                        "off": path.off.tolist(),
                     }
                     for path in outline.paths
                 ],

@@ -15,15 +15,12 @@ import cmath
 import numpy as np
 
 from camtool.errors import DrawingError, GeometryError
-from camtool.geometry.drawing import FitError
 from camtool.geometry.fit import (
     BezierCurve,
     Curve,
     EllipseCurve,
-    Fit,
     arc_vertices,
     fit_curve,
-    overall,
 )
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats
 from camtool.importers.piece import MAX_COORDINATE_MM
@@ -38,37 +35,41 @@ MAX_CURVE_MM = 1e6
 """A curve that reaches further is left out: its fit to micrometres would take millions of arcs."""
 
 
+Fitted = tuple[Floats, Floats | None]
+"""Vertices (n, 3), and `off_mm` (n, 2) of a `Piece` made of them."""
+
+
 class CurveFitter:
-    """Maps subpaths into mm; fits curves within one tolerance and remembers how well that went."""
+    """Maps subpaths into mm; fits curves within one tolerance."""
 
     def __init__(self, tolerance_mm: float) -> None:
         self.tolerance_mm = tolerance_mm
-        self._fits: list[Fit] = []
 
-    def vertices(self, subpath: Subpath, to_mm: Affine) -> Floats:
-        """(n, 3) x, y, bulge in mm, the last one the end; DrawingError when out of bounds."""
+    def vertices(self, subpath: Subpath, to_mm: Affine) -> Fitted:
+        """(n, 3) x, y, bulge in mm, the last one the end, and how far the curves lie from them;
+        DrawingError when out of bounds."""
         first = subpath.segments[0]
         if len(subpath.segments) == 1 and isinstance(first, Lines):
-            return _in_reach(
-                _straight(to_mm, np.concatenate([subpath.start[None, :], first.points]))
-            )
-        rows = [_straight(to_mm, subpath.start[None, :])]
+            points = np.concatenate([subpath.start[None, :], first.points])
+            return _in_reach(_straight(to_mm, points)), None
+        rows, off = [_straight(to_mm, subpath.start[None, :])], [np.zeros((1, 2))]
         for segment in subpath.segments:
-            piece = self._segment(rows[-1][-1, :2], segment, to_mm)
-            # The segment's first vertex is the last one so far, and its bulge goes there.
+            piece, apart = self._segment(rows[-1][-1, :2], segment, to_mm)
+            # The segment's first vertex is the last one so far; what leaves it goes there.
             rows[-1][-1, 2] = piece[0, 2]
             rows.append(piece[1:])
-        return _in_reach(np.concatenate(rows))
+            if apart is None:
+                off.append(np.zeros((len(piece) - 1, 2)))
+            else:
+                off[-1][-1] = apart[0]
+                off.append(apart[1:].copy())
+        return _in_reach(np.concatenate(rows)), np.concatenate(off)
 
-    def error(self) -> FitError:
-        """How far all fitted arcs lie from their curves."""
-        return overall(self._fits)
-
-    def _segment(self, here: Floats, segment: Segment, to_mm: Affine) -> Floats:
+    def _segment(self, here: Floats, segment: Segment, to_mm: Affine) -> Fitted:
         """(n, 3) from `here` (2,) mm to the segment's end, both exact."""
         if isinstance(segment, Lines):
             points = _straight(to_mm, segment.points)
-            return np.concatenate([[[here[0], here[1], 0.0]], points])
+            return np.concatenate([[[here[0], here[1], 0.0]], points]), None
         if isinstance(segment, Bezier):
             control = np.concatenate([here[None, :], to_mm.points(segment.control)])
             return self._fitted(BezierCurve(control), control)
@@ -77,20 +78,22 @@ class CurveFitter:
         u, v = to_mm.vectors(np.array([segment.u, segment.v]))
         circle = _circle(centre, u, v, segment)
         if circle is not None:
-            return _with_ends(circle, ends)
+            return _with_ends(circle, ends), None
         curve = EllipseCurve(centre, u, v, segment.begin, segment.begin + segment.sweep)
         bounds = np.array([centre, np.abs(u) + np.abs(v)])
-        return _with_ends(self._fitted(curve, bounds), ends)
+        vertices, off = self._fitted(curve, bounds)
+        return _with_ends(vertices, ends), off
 
-    def _fitted(self, curve: Curve, bounds: Floats) -> Floats:
+    def _fitted(self, curve: Curve, bounds: Floats) -> Fitted:
         """Arcs for a curve whose size and place `bounds` (n, 2) tell."""
         _in_reach(bounds, MAX_CURVE_MM)
         try:
             fit = fit_curve(curve, self.tolerance_mm)
         except GeometryError as error:
             raise DrawingError(f"a curve cannot be fitted: {error.message}") from error
-        self._fits.append(fit)
-        return fit.vertices if len(fit.vertices) > 1 else np.repeat(fit.vertices, 2, axis=0)
+        if len(fit.vertices) > 1:
+            return fit.vertices, fit.off_mm
+        return np.repeat(fit.vertices, 2, axis=0), None
 
 
 def _straight(to_mm: Affine, points: Floats) -> Floats:

@@ -33,7 +33,6 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         walk.pieces,
         file=file,
         units=page.units,
-        fit=walk.fitter.error(),
         used=dict(walk.notes.used),
         skipped=walk.notes.skipped(),
         findings=[*page.findings, *walk.notes.findings()],

@@ -173,7 +173,7 @@ class Walk:
         if scope.uses:
             self._spend(_cost(found), node)
         try:
-            rows = [(self.fitter.vertices(one, scope.to_mm), one.closed) for one in found]
+            rows = [(*self.fitter.vertices(one, scope.to_mm), one.closed) for one in found]
         except DrawingError as error:
             self.notes.fault(node.tag, "cannot be drawn", node, error)
             return
@@ -185,9 +185,9 @@ class Walk:
                 self.notes.left_out[node.tag, "draws nothing"] += 1
             return
         source = node.label + (f" by use {scope.uses[-1]}" if scope.uses else "")
-        for vertices, closed in rows:
+        for vertices, off, closed in rows:
             self.pieces.append(
-                Piece(vertices, closed, scope.layer, style.colour, source, style.line_type)
+                Piece(vertices, closed, scope.layer, style.colour, source, style.line_type, off)
             )
         self.notes.used[node.tag] += 1
 

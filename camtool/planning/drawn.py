@@ -1,0 +1,154 @@
+"""What was drawn, for each row of a plan: how far it lies from it, and the edge that it cuts.
+
+A row stands for the lines of its operation that are nearest to it: a tool that runs beside a line
+has no other line nearer than that one. What was drawn lies off this line by as much as reading
+says (`Drawing.off_mm`), and so does the wall that the tool leaves from the one that it should.
+
+The edge of a closed contour is the drawn line. Its size, and that of what the tool leaves:
+
+    tool             nominal     planned
+    on the line      drawn       box of the tool's centre
+    within it        drawn       that box and a tool's radius all round
+    round it         drawn       drawn, and the allowance all round
+
+where a line is cut by one contour alone; of contours that share a line, or that run round several
+ones, both are what the tool leaves. Round a line the box of the centre would not do: sharp joins
+reach farther out than the radius.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from camtool.geometry.measure import extents
+from camtool.geometry.polylines import Floats, Ints, Polylines, Segments
+from camtool.planning.items import Contour, Fixed, Item
+from camtool.toolpath.drawn import Drawn
+from camtool.toolpath.moves import Toolpath
+
+if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
+    from camtool.planning.plan import Step
+
+PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
+"""Where on a row it is asked which lines are nearest; its ends lie beside its neighbours' too."""
+
+AS_NEAR_MM = 1e-4
+"""Lines that are farther away by no more than this are as near."""
+
+SAME_SIZE_MM = 1e-3
+"""A contour whose size is that of its line, but for the tool, within this runs round it alone."""
+
+
+def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> Drawn:
+    """What is drawn for each row of a toolpath, whose rows are of the runs (N,) of these steps,
+    counted through all of them; the drawing in the work frame."""
+    off = np.zeros((len(toolpath), 2))
+    edge = np.full(len(toolpath), -1, dtype=np.int64)
+    boxes: list[tuple[Floats, Floats]] = []
+    first = 0
+    for step in steps:
+        rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
+        mine = rows[toolpath.is_feed[rows]]
+        off[mine] = _off(toolpath, mine, step, placed)
+        of_run = np.full(len(step.runs), -1, dtype=np.int64)
+        for item, box in _edges(step, placed):
+            of_run[[owner is item for owner in step.owners]] = len(boxes)
+            boxes.append(box)
+        edge[rows] = of_run[runs[rows] - first]
+        first += len(step.runs)
+    both = np.array(boxes, dtype=np.float64).reshape(-1, 2, 2, 2)
+    return Drawn(off, edge, both[:, 0], both[:, 1])
+
+
+def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
+    """(R, 2) how far what was drawn lies from the lines that the rows were planned along, mm."""
+    from camtool.planning.carving.vcarve import CARVE_TOLERANCE_MM
+
+    made = CARVE_TOLERANCE_MM if step.operation.kind == "vcarve" else 0.0
+    found = np.full((len(rows), 2), made)
+    lines = step.chosen.lines
+    of = placed.off_mm[_vertices(placed.paths, step.chosen.source)]
+    if not len(rows) or not of.any():
+        return found
+    from camtool.geometry.offset.curves import Curves
+    from camtool.geometry.polylines import segment_rows
+    from camtool.kernels.offset_near import curves_within, nearest_distances
+
+    curves = Curves.of(Segments.of(lines))
+    of = of[segment_rows(lines)]
+    points = np.ascontiguousarray(_points(toolpath, rows))
+    apart = nearest_distances(points, curves.rows, curves.tree)
+    pairs = curves_within(points, apart + AS_NEAR_MM, curves.rows, curves.tree)
+    most = np.zeros((len(rows), 2))
+    np.maximum.at(most, pairs[:, 0] // len(PLACES), of[pairs[:, 1]])
+    return found + most
+
+
+def _vertices(lines: Polylines, chosen: Ints) -> Ints:
+    """The vertices of the chosen paths, in their order."""
+    counts = np.diff(lines.offsets)[chosen]
+    begin = lines.offsets[:-1][chosen]
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.asarray(np.repeat(begin, counts) + within)
+
+
+def _points(toolpath: Toolpath, rows: Ints) -> Floats:
+    """(R · P, 2) mm: the places on each row, one row after the other."""
+    share = np.array(PLACES)
+    begin, end = toolpath.starts[rows, None, :2], toolpath.end[rows, None, :2]
+    points = begin + share[:, None] * (end - begin)
+    arcs = np.flatnonzero(toolpath.is_arc[rows])
+    turn = toolpath.sweeps()[rows[arcs], None] * share
+    centre = toolpath.centre[rows[arcs]]
+    x, y = (begin[arcs, 0] - centre).T[:, :, None]
+    round_ = np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)])
+    points[arcs] = centre[:, None] + np.moveaxis(round_, 0, 2)
+    return np.asarray(points.reshape(-1, 2))
+
+
+def _edges(step: Step, placed: Drawing) -> Iterator[tuple[Item, tuple[Floats, Floats]]]:
+    """Items that cut an edge, each with its nominal and its planned box."""
+    items = list({id(owner): owner for owner in step.owners if _cuts_edge(owner)}.values())
+    share = Counter(item.source for item in items)
+    for item in items:
+        nominal, planned = _boxes(item, placed)
+        yield item, (nominal if share[item.source] == 1 else planned, planned)
+
+
+def _cuts_edge(item: Item) -> bool:
+    """Whether the item follows a closed line whose size it decides."""
+    if isinstance(item, Fixed):
+        return item.setting.operation.kind == "pocket"
+    return item.path.closed
+
+
+def _boxes(item: Item, placed: Drawing) -> tuple[Floats, Floats]:
+    """Nominal and planned box of the edge that an item cuts, as if its line were its own."""
+    drawn = extents(placed.paths.select([item.source]))
+    operation = item.setting.operation
+    radius, allowance = operation.tool.radius_mm, operation.allowance_mm
+    if isinstance(item, Contour):
+        centre = extents(Polylines.of([item.path]))
+        if item.material_left is None:
+            return drawn, centre
+    else:
+        points = np.concatenate([run.vertices[:, :2] for run in item.runs])
+        centre = np.column_stack([points.min(axis=0), points.max(axis=0)])
+    wider = np.array([-1.0, 1.0])
+    more = np.diff(centre - drawn)[:, 0] - 2.0 * (radius + allowance)
+    if isinstance(item, Fixed) or more.max() < -SAME_SIZE_MM:
+        # Reliefs reach farther into corners than the walls are apart.
+        low, high = (drawn - allowance * wider).T
+        return drawn, np.clip(centre + radius * wider, low[:, None], high[:, None])
+    # A sharp join reaches farther out than the tool is wide, as far as its limit lets it.
+    spare = 0.0
+    if operation.joins != "round":
+        spare = 2.0 * (radius + allowance) * (operation.mitre_limit - 1.0)
+    if more.max() <= SAME_SIZE_MM + spare:
+        return drawn, drawn + allowance * wider
+    return centre - (radius + allowance) * wider, centre - radius * wider
