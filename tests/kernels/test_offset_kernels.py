@@ -62,6 +62,12 @@ def test_distances(seed: int) -> None:
     every = points_to_segments(points, some)
     got = offset_near.nearest_distances(points, curves.rows, curves.tree)
     assert np.allclose(got, every.min(axis=1), atol=1e-13)
+    limits = rng.uniform(0.0, 4.0, len(points))
+    pairs = offset_near.curves_within(points, limits, curves.rows, curves.tree)
+    assert (np.diff(pairs[:, 0]) >= 0).all()
+    assert sorted(map(tuple, pairs.tolist())) == [
+        (int(i), int(j)) for i, j in zip(*np.nonzero(every <= limits[:, None]), strict=True)
+    ]
     room, reach = np.empty(64, np.int64), float(rng.uniform(0.5, 4.0))
     for point, row in zip(points, every, strict=True):
         at = (float(point[0]), float(point[1]))
