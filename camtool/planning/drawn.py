@@ -55,10 +55,11 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
         mine = rows[toolpath.is_feed[rows]]
         off[mine] = _off(toolpath, mine, step, placed)
-        of_run = np.full(len(step.runs), -1, dtype=np.int64)
+        of_item: dict[int, int] = {}
         for item, box in _edges(step, placed):
-            of_run[[owner is item for owner in step.owners]] = len(boxes)
+            of_item[id(item)] = len(boxes)
             boxes.append(box)
+        of_run = np.array([of_item.get(id(owner), -1) for owner in step.owners], dtype=np.int64)
         edge[rows] = of_run[runs[rows] - first]
         first += len(step.runs)
     both = np.array(boxes, dtype=np.float64).reshape(-1, 2, 2, 2)
