@@ -15,6 +15,7 @@ class GrblPost:
 
     name = "grbl"
     starts_spindle = True
+    any_machine = True
 
     def check(self, machine: Machine) -> None:
         """Raise MachineError when the machine's `[dialect]` table does not fit."""

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from camtool.pipeline import Posted
 
 
+ANY_MACHINE = "travel, rates and backlash are placeholders: camtool targets new NAME --extends {}"
+"""What is said where nobody has told what the machine is."""
+
+
 @dataclass(frozen=True)
 class Asked:
     """What the user wants written; `source` names what it is made of, None is not wanted.
@@ -96,6 +100,8 @@ def finish(
     write_all(files)
     if made.verification is not None and not quiet:
         said = made.verification.report.to_text(findings=False)
+        if target.any_machine:
+            said += f"\n{'machine':<10} {ANY_MACHINE.format(target.machine.target.name)}"
         show_facts(said, REPORT_NAMES, report_marks(made.findings), err=True)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(made.program.data)} bytes)", quiet=quiet)

@@ -155,6 +155,12 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return min(self._feed_limits(self.axes.x, self.axes.y))
 
     @property
+    def most_sayable_mm_min(self) -> float:
+        """Highest feed that a program may ask for, mm/min, inf where nothing is said: above the
+        rates of the axes controllers hold a move back by themselves."""
+        return min(self._feed_limits())
+
+    @property
     def max_plunge_mm_min(self) -> float:
         """Highest feed along Z, mm/min; like `max_feed_mm_min` with the highest rate of Z."""
         return min(self._feed_limits(self.axes.z))

@@ -25,11 +25,13 @@ GROUP = "camtool.postprocessors"
 
 @dataclass(frozen=True)
 class LoadedTarget:
-    """A machine and the post-processor that speaks to it (a `PostProcessor`)."""
+    """A machine and the post-processor that speaks to it (a `PostProcessor`). `any_machine`: the
+    numbers are those of no particular machine, and nobody has said others."""
 
     machine: Machine
     post: Any
     file: Path
+    any_machine: bool = False
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,8 @@ def load_target(
     post, file = _load(_found(name))
     machine = build_machine(read_table(file), str(file), machine_file, settings)
     post.check(machine)
-    return LoadedTarget(machine, post, file)
+    said = machine_file is not None or any(each.startswith("axes.") for each in settings)
+    return LoadedTarget(machine, post, file, getattr(post, "any_machine", False) and not said)
 
 
 def list_target(name: str) -> ListedTarget:

@@ -11,12 +11,15 @@ _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 _TABLE = re.compile(r"\[([\w.-]+)\]")
 _KEY = re.compile(r"([\w-]+)\s*=")
 _OWN = ("target", "needs")
+_AXES = ("axes.x", "axes.y", "axes.z")
+_BACKLASH = "# backlash_mm = 0.0         # measure yours: camtool coupon, camtool calibrate"
 
 
 def machine_template(name: str, base: str, base_text: str, needs: Iterable[str] = ()) -> str:
     """TOML text of the machine `name`, which extends the target `base`.
 
-    Every value of the target's own file (`base_text`) stands there as a comment, with its source:
+    `backlash_mm` stands with every axis, for no machine is without. Every value of the target's
+    own file (`base_text`) stands there as a comment, with its source:
     what differs is uncommented and changed. `needs` are the keys that must be. OptionError for a
     name that is no word of small letters, digits and hyphens.
     """
@@ -37,10 +40,13 @@ def machine_template(name: str, base: str, base_text: str, needs: Iterable[str] 
         f'title = "{name}"',
     ]
     table = ""
+    said: set[str] = set()
     for line in _own_part(base_text):
         heading, key = _TABLE.match(line), _KEY.match(line)
         if heading:
-            table = heading[1]
+            if table in _AXES and "backlash_mm" not in said:
+                lines.append(_BACKLASH)
+            table, said = heading[1], set()
             lines += ["", line]
             given = f"{table}."
             lines += [
@@ -50,8 +56,10 @@ def machine_template(name: str, base: str, base_text: str, needs: Iterable[str] 
             ]
         elif key and f"{table}.{key[1]}" not in needed:
             lines.append(f"# {line}")
+            said.add(key[1])
         elif line.startswith("#") and table:
             lines.append(line)
+            said.update(word for word in ("backlash_mm",) if word in line)
     return "\n".join(lines) + "\n"
 
 

@@ -7,6 +7,7 @@ rapids. What earlier cuts have cleared is that of `camtool.toolpath.cleared`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -16,7 +17,8 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Stock, Tool
-from camtool.planning.places import operation_name
+from camtool.planning.link import lowered_feeds
+from camtool.planning.places import operation_name, own_numbers
 from camtool.toolpath.cleared import STOCK_TOP_MM, Reach, rapids_through_stock
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Kind, Toolpath
@@ -39,6 +41,7 @@ def checked(toolpath: Toolpath, job: Job, machine: Machine) -> tuple[Finding, ..
     """
     return (
         *out_of_travel(toolpath, machine),
+        *lowered_feeds(job, machine),
         *_out_of_stock(toolpath, job),
         *_tools_not_said(job),
         *_rapids_in_stock(toolpath, job),
@@ -58,12 +61,28 @@ def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
             Code.OUT_OF_TRAVEL,
             Severity.ERROR,
             f"{name} spans {span:.4f} mm with part zero, more than its travel of"
-            f" {axis.travel_mm:g} mm: use --origin lower-left, or scale the drawing",
+            f" {axis.travel_mm:g} mm: {_into_travel(toolpath, machine, name)}",
             where=f"axis {name}, from {low:.4f} to {high:.4f} mm",
             measured=span,
             limit=axis.travel_mm,
             unit="mm",
         )
+
+
+def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
+    """What brings a toolpath into the travel of an axis: only what does, and a larger machine."""
+    axis = AXES.index(name)
+    needed = math.ceil(np.ptp(toolpath_extents(toolpath)[axis]))
+    yours = own_numbers(machine, [f"axes.{name.lower()}.travel_mm={needed}"])
+    if name == "Z":
+        return f"lower safe_z or the depth; {yours}"
+    room = [each.travel_mm or math.inf for each in machine.axes]
+    spans = np.ptp(toolpath_extents(toolpath, cuts=True), axis=1)
+    if spans[axis] <= room[axis]:
+        return f"use --origin lower-left; {yours}"
+    if spans[0] <= room[1] and spans[1] <= room[0]:
+        return f"use --rotate 90 --origin lower-left; {yours}"
+    return f"scale the drawing, or cut it in parts; {yours}"
 
 
 def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:

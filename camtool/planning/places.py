@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from camtool.findings import Finding
+from camtool.machine.model import Machine
 from camtool.planning.job import Operation, Tool
 
 MOST_PLACES = 12
@@ -31,6 +32,15 @@ def key_of(operation: Operation, key: str) -> str:
 def operation_name(operation: Operation) -> str:
     """An operation by its name, or by its kind when it has none."""
     return f"operation {operation.name or operation.kind!r}"
+
+
+def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
+    """How to say what a machine can do, where what is known of it may not be true of it."""
+    keys = " ".join(f"--set {each}" for each in settings)
+    return (
+        f"if yours can do more, say so ({keys}), or begin its own file with camtool targets new"
+        f" NAME --extends {machine.target.dialect} and give it with --machine"
+    )
 
 
 def told_together(findings: Sequence[Finding], what: str) -> list[Finding]:

@@ -7,12 +7,16 @@ import numpy as np
 from camtool.toolpath.moves import Floats, Kind, Toolpath
 
 
-def toolpath_extents(toolpath: Toolpath) -> Floats:
-    """(3, 2) mm: lowest and highest X, Y and Z that any move reaches, the start included.
+def toolpath_extents(toolpath: Toolpath, *, cuts: bool = False) -> Floats:
+    """(3, 2) mm: lowest and highest X, Y and Z that any move reaches, the start included; with
+    `cuts` those that moves at a feed reach.
 
     An arc reaches centre ± radius where its sweep passes the direction of an axis.
     """
     points = np.concatenate([toolpath.start[None, :], toolpath.end])
+    if cuts and toolpath.is_feed.any():
+        rows = toolpath.is_feed
+        points = np.concatenate([toolpath.starts[rows], toolpath.end[rows]])
     low, high = points.min(axis=0), points.max(axis=0)
     tops = _arc_extremes(toolpath)
     if len(tops):

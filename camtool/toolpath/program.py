@@ -45,8 +45,9 @@ class PostProcessor(Protocol):
     leave the wanted path on purpose has `stray_mm(machine) -> float`: how far at most. One whose
     coordinates are finer or coarser than the machine's steps has `unit_mm(machine) -> float`:
     their finest difference. One whose programs start the spindle, at the speed that they say, has
-    `starts_spindle = True`. One that can show which part of a program each block is has
-    `listing(data, machine) -> Listing`, of a program that `read` takes.
+    `starts_spindle = True`; one whose machine file stands for any machine, with travel and rates
+    of none in particular, `any_machine = True`. One that can show which part of a program each
+    block is has `listing(data, machine) -> Listing`, of a program that `read` takes.
     """
 
     name: str

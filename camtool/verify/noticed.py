@@ -10,6 +10,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
+from camtool.planning.places import own_numbers
 from camtool.toolpath.cleared import CLEARED_MM, Reach, Through, rapids_through_stock
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
@@ -94,7 +95,8 @@ def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
             yield Finding(
                 Code.OUT_OF_TRAVEL,
                 Severity.ERROR,
-                f"the program spans {span:.3f} mm of {name}, the axis has {axis.travel_mm:g} mm",
+                f"the program spans {span:.3f} mm of {name}, the axis has {axis.travel_mm:g} mm: "
+                + own_numbers(machine, [f"axes.{name.lower()}.travel_mm={math.ceil(span)}"]),
                 where=f"axis {name}, {low:.3f} to {high:.3f} mm",
                 measured=span,
                 limit=axis.travel_mm,

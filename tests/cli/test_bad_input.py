@@ -37,7 +37,7 @@ CASES = [
     ("nan.csv", b"0,0\nnan,1\n", [], 2, ["nan.csv", "line 2"]),
     ("inf.svg", INF_SVG, [], 2, ["inf.svg", "wild"]),
     ("inf.json", b"[[0,0],[1e999,0]]", [], 2, ["inf.json"]),
-    ("large.csv", LINE_100, [], 1, ["OUT_OF_TRAVEL", "10", "--origin"]),
+    ("large.csv", LINE_100, [], 1, ["OUT_OF_TRAVEL", "10", "scale"]),
     ("far.csv", b"0,0\n999,0\n", ["--set", "axes.x.travel_mm=2000"], 2, ["five digits"]),
     ("a.csv", b"0,0\n1,0\n", ["--feed", "0"], 2, ["feed"]),
     ("a.csv", b"0,0\n1,0\n", ["--feed", "-1"], 2, ["feed"]),

@@ -49,6 +49,30 @@ def test_travel_counts_part_zero_and_the_bulge_of_arcs() -> None:
 
 
 @pytest.mark.parametrize(
+    ("corner", "other", "depth", "advice"),
+    [
+        ((4, 0), (13, 3), 1, "use --origin lower-left"),  # 9 wide, 4 away from part zero
+        ((0, 0), (13, 3), 1, "scale the drawing"),
+        ((0, 0), (3, 11), 1, "use --rotate 90 --origin lower-left"),
+        ((0, 0), (11, 9), 1, "scale the drawing"),
+        ((0, 0), (3, 3), 9, "lower safe_z or the depth"),
+    ],
+)
+def test_only_what_helps_is_advised(
+    corner: tuple[int, int], other: tuple[int, int], depth: int, advice: str
+) -> None:
+    path = down(*corner, -float(depth)).line(*other, feed=10)
+    machine = path_machine(
+        "axes.x.travel_mm=12.0", "axes.y.travel_mm=8.0", "axes.z.travel_mm=12.0"
+    )
+    (finding,) = (each for each in found(path, None, machine) if each.code == Code.OUT_OF_TRAVEL)
+    assert f": {advice}" in finding.message
+    axis = finding.where.split()[1].rstrip(",").lower()
+    assert f"--set axes.{axis}.travel_mm=" in finding.message
+    assert "--machine" in finding.message
+
+
+@pytest.mark.parametrize(
     ("thickness", "board", "through", "allowed"),
     [
         (2.0, None, 0.2, 1.0),

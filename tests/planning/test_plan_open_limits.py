@@ -7,8 +7,8 @@ from camtool.errors import OptionError
 from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline
 from camtool.planning.items import Feeds
-from camtool.planning.job import Operation, job_of
-from camtool.planning.link import feeds_of
+from camtool.planning.job import Job, Operation, job_of
+from camtool.planning.link import feeds_of, lowered_feeds
 from camtool.planning.plan import plan
 from camtool.verify.verify import verify
 from tests.drawings import drawing_of
@@ -32,7 +32,6 @@ def test_without_limits_every_feed_and_every_size_is_taken() -> None:
     ("setting", "highest"),
     [
         ("limits.max_feed_mm_min=250.5", "250"),
-        ("axes.y.max_rate_mm_min=80.2", "80"),
         ("limits.max_feed_mm_min=500", "500"),
     ],
 )
@@ -44,9 +43,35 @@ def test_the_limit_that_is_said_holds_and_the_mend_can_be_said(setting: str, hig
     assert feeds_of(Operation(feed_mm_min=float(highest)), machine).cut_mm_min == float(highest)
 
 
+HARD = ("limits.max_feed_mm_min=35", "feed.default_mm_min=20")
+
+
 def test_plunges_that_nobody_asked_for_are_no_faster_than_z() -> None:
     machine = path_machine("axes.z.max_rate_mm_min=30.5")
     assert feeds_of(Operation(), machine) == Feeds(100.0, 30.0)
     assert feeds_of(Operation(feed_mm_min=20.0), machine) == Feeds(20.0, 20.0)
+    assert feeds_of(Operation(plunge_feed_mm_min=40.0), machine) == Feeds(100.0, 30.0)
     with pytest.raises(OptionError, match="plunge feed 40"):
-        feeds_of(Operation(plunge_feed_mm_min=40.0), machine)
+        feeds_of(
+            Operation(plunge_feed_mm_min=40.0), path_machine("limits.max_feed_mm_min=35", *OWN)
+        )
+
+
+def test_feeds_above_the_rates_of_the_axes_are_lowered_with_a_word() -> None:
+    """Controllers hold a move to what its axes can do; the rates may be no one's in particular."""
+    machine = path_machine("axes.y.max_rate_mm_min=80.2", "axes.z.max_rate_mm_min=30.5")
+    slow = Operation(feed_mm_min=60.0, plunge_feed_mm_min=30.0)
+    fast = Operation(feed_mm_min=600.0, plunge_feed_mm_min=40.0)
+    assert feeds_of(slow, machine) == Feeds(60.0, 30.0)
+    assert feeds_of(fast, machine) == Feeds(80.0, 30.0)
+    assert list(lowered_feeds(Job(operations=(slow,)), machine)) == []
+    cut, plunge = lowered_feeds(Job(operations=(fast, fast)), machine)
+    assert {each.severity for each in (cut, plunge)} == {Severity.WARNING}
+    assert (cut.measured, cut.limit) == (600.0, 80.2)
+    assert "becomes 80" in cut.message
+    assert "--set axes.y.max_rate_mm_min=600)" in cut.message
+    assert "--set axes.z.max_rate_mm_min=40)" in plunge.message
+    assert "camtool targets new NAME --extends" in cut.message
+    drawing = drawing_of([Polyline(np.array([[0.0, 0, 0], [4, 0, 0]]))])
+    made = plan(drawing, Job(operations=(fast,)), machine)
+    assert float(made.feed[made.is_feed].max()) == 80.0
