@@ -52,9 +52,7 @@ def test_plunges_that_nobody_asked_for_are_no_faster_than_z() -> None:
     assert feeds_of(Operation(feed_mm_min=20.0), machine) == Feeds(20.0, 20.0)
     assert feeds_of(Operation(plunge_feed_mm_min=40.0), machine) == Feeds(100.0, 30.0)
     with pytest.raises(OptionError, match="plunge feed 40"):
-        feeds_of(
-            Operation(plunge_feed_mm_min=40.0), path_machine("limits.max_feed_mm_min=35", *OWN)
-        )
+        feeds_of(Operation(plunge_feed_mm_min=40.0), path_machine(*HARD))
 
 
 def test_feeds_above_the_rates_of_the_axes_are_lowered_with_a_word() -> None:
