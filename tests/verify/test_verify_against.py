@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.machine.registry import LoadedTarget, load_target
@@ -113,6 +114,10 @@ def test_a_setting_that_the_job_names_is_held(target: LoadedTarget, fault: str) 
     text = program(target)
     damaged = damage(text)
     assert damaged != text
+    if code is Code.END_DIFFERS and target.machine.target.name == "linuxcnc":
+        with pytest.raises(ProgramError, match="the file ends and the program does not"):
+            held(damaged, target)
+        damaged = f"%\n{damaged}%\n"  # an end, and yet no M2
     found = [each for each in held(damaged, target).findings if each.code is code]
     assert found
     assert found[0].severity is Severity.ERROR
