@@ -1,10 +1,16 @@
 """Where an arc block may end, so that the controller really stops there.
 
-The controller stops an arc only when it stands exactly on the end step (L1859-1862), and start,
-end and centre are rounded each on its own: with such numbers nearly half of all arcs never meet
-their end and would run on. So the writer walks the controller's own path (camtool.kernels) from
-the step where the controller will stand, and lets the block end on a step of that path. What is
-left to the wanted end is mended by a line.
+How the controller knows the end of an arc is not said (L1859-1862), nor with which error D it
+starts; by the strictest reading it stops only when it stands exactly on the end step. Start, end
+and centre are rounded each on its own: with such numbers nearly half of all arcs never stand
+there. So the writer walks the controller's own paths (camtool.kernels), one for each start of D,
+from the step where the controller will stand, and lets the block end on a step that all of them
+pass: there every reading stops (`camtool.kernels.arc_stops`). What is left to the wanted end is
+mended by a line.
+
+Two such paths lie about circles whose radii differ by half a step at most. Each is the best of
+the lattice beside its circle, so they part only for runs, longest where they run along an axis:
+there the run of one distance from the axis is some √R steps, no longer than a line may be.
 
 How many iterations n an arc of length L (in steps) takes: each iteration moves one step along X,
 along Y or along both, so n ≥ L/√2; and direct search follows the axis that moves faster, which
@@ -25,6 +31,10 @@ from ._pic_mmh_format import Bools, Floats, Grid, Ints
 WINDOW: Final = (0.6, 1.1)
 WINDOW_SLACK: Final = 4
 """The end is looked for from WINDOW[0]·L − slack to WINDOW[1]·L + slack iterations."""
+
+APART: Final = 16
+"""So many iterations more or less may another start of D take to a step: the paths may be one step
+apart at each of eight diagonals, and at the start."""
 
 LEAST_RADIUS_STEPS: Final = 4.0
 """An arc of a smaller radius is written as lines: its path has too few steps to be an arc."""
@@ -47,8 +57,13 @@ class Arc:
     centre: tuple[int, int]
     clockwise: bool
     sweep_rad: float
-    error: int = 0
-    """D that the controller starts with."""
+
+    @property
+    def errors(self) -> tuple[int, ...]:
+        """The values of D that the controller may start with: 0, or against the rounded radius."""
+        x, y = self.start
+        rounded = x * x + y * y - round(self.radius) ** 2
+        return (0, rounded) if rounded else (0,)
 
     @property
     def radius(self) -> float:
@@ -64,51 +79,79 @@ class Landing:
     iteration: int
 
 
-def hits(arc: Arc, at: tuple[int, int], limit: int) -> int:
-    """The iteration at which the controller would stop if the block's end were `at`, or −1."""
+def hits(arc: Arc, at: tuple[int, int], low: int, high: int) -> int:
+    """The iteration in low … high at which the controller, D = 0 at the start, would stop if the
+    block's end were `at`; −1 when it would not, or not there with any other start of D."""
     from camtool.kernels.direct_search import direct_search_hits
 
-    return int(direct_search_hits(*arc.start, arc.clockwise, *at, limit, arc.error))
+    found = -1
+    for error in arc.errors:
+        met = int(direct_search_hits(*arc.start, arc.clockwise, *at, high, error))
+        if met < low:
+            return -1
+        if found < 0:
+            found, low, high = met, max(1, met - APART), met + APART
+    return found
 
 
 def land(arc: Arc, grid: Grid) -> Landing | None:
-    """Where to end the arc: at its end if the path meets it, otherwise at a step before it.
+    """Where to end the arc: at its end if the paths meet it, otherwise at a step before it.
 
     In this order: the end itself; the last step from which the mending line goes on without
     turning an axis round (each such reversal costs the machine a whole compensation) and does not
     leave the arc by more than `LINE_SAGITTA`; the step nearest to the end within that reach; the
     last step that can be said at all. None when lines do as well: the whole arc lies within that
-    reach, or no step of its path can be said.
+    reach, or no step of its paths can be said.
     """
-    from camtool.kernels.direct_search import direct_search_nearest, direct_search_path
+    from camtool.kernels.direct_search import direct_search_nearest
 
     length = arc.radius * arc.sweep_rad
     low = max(1, math.floor(WINDOW[0] * length) - WINDOW_SLACK)
     high = math.ceil(WINDOW[1] * length) + WINDOW_SLACK
-    met = hits(arc, arc.end, high)
-    if met >= low:
+    met = hits(arc, arc.end, low, high)
+    if met >= 0:
         return Landing(arc.end, met)
     state = (*arc.start, arc.clockwise)
-    near = int(direct_search_nearest(*state, *arc.end, low, high, arc.error)[0])
+    near = int(direct_search_nearest(*state, *arc.end, low, high)[0])
     first = max(0, near - _reach(arc, grid))
-    path = direct_search_path(*state, first, near - first, arc.error)
-    sayable = _sayable(arc, grid, path)
-    onward = sayable & _onward(arc, path)
+    path, common = _common(arc, first, near - first)
+    common &= _sayable(arc, grid, path)
+    onward = common & _onward(arc, path)
     for row in np.flatnonzero(onward)[::-1].tolist():
         if landing := _landing(arc, path, row, first):
             return landing
     if first == 0:
         return None
-    rest = np.flatnonzero(sayable & ~onward)[::-1]
+    rest = np.flatnonzero(common & ~onward)[::-1]
     square = ((path[rest] - np.array(arc.end)) ** 2).sum(axis=1)
     for row in rest[np.argsort(square, kind="stable")].tolist():
         if landing := _landing(arc, path, row, first):
             return landing
-    path = direct_search_path(*state, 0, first, arc.error)
-    for row in np.flatnonzero(_sayable(arc, grid, path))[::-1].tolist():
+    path, common = _common(arc, 0, first)
+    for row in np.flatnonzero(common & _sayable(arc, grid, path))[::-1].tolist():
         if landing := _landing(arc, path, row, 0):
             return landing
     return None
+
+
+def _common(arc: Arc, first: int, count: int) -> tuple[Ints, Bools]:
+    """The path (count, 2) after the iterations first + 1 … first + count, D = 0 at the start, and
+    which of its steps the paths of all other starts of D pass as well."""
+    from camtool.kernels.direct_search import direct_search_path
+
+    state = (*arc.start, arc.clockwise)
+    path = direct_search_path(*state, first, count, 0)
+    common = np.ones(count, dtype=np.bool_)
+    for error in arc.errors[1:]:
+        low = max(0, first - APART)
+        other = direct_search_path(*state, low, first - low + count + APART, error)
+        common &= np.isin(_numbered(path), _numbered(other))
+    return path, common
+
+
+def _numbered(points: Ints) -> Ints:
+    """A number for each of the points (K, 2), whose coordinates stay below 2³¹."""
+    return np.asarray((points[:, 0] << 32) + points[:, 1])
 
 
 def _reach(arc: Arc, grid: Grid) -> int:
@@ -146,7 +189,7 @@ def _landing(arc: Arc, path: Ints, row: int, first: int) -> Landing | None:
     """The landing at this row, unless the controller comes there earlier and would stop then."""
     at = (int(path[row, 0]), int(path[row, 1]))
     iteration = first + row + 1
-    return Landing(at, iteration) if hits(arc, at, iteration) == iteration else None
+    return Landing(at, iteration) if hits(arc, at, iteration, iteration) == iteration else None
 
 
 def turned_rad(start: Floats, at: Floats, centre: Floats, clockwise: bool) -> float:

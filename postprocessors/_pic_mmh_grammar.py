@@ -33,9 +33,11 @@ SHAPES: Final[dict[str, tuple[Shape, ...]]] = {
     "M30": ((),),
 }
 
-_COORDINATES: Final = {"example": r"(-?\d{5})\.(\d\d)", "annex": r"([+-]\d{5})()"}
+# The routine of the sign asks for "-" and takes anything else for the other sense (L1765-1768);
+# "JX+;" shows it a "+" (L1730), so that the example form may have one too.
+_COORDINATES: Final = {"example": r"([+-]?\d{5})\.(\d\d)", "annex": r"([+-]\d{5})()"}
 _COORDINATE_WORDS: Final = {
-    "example": "five digits, a point and two digits (a sign only when negative)",
+    "example": "five digits, a point and two digits (in front of them a sign or none)",
     "annex": "a sign and five digits",
 }
 _VALUES: Final = {"2": r"(\d\d)", "4": r"(\d{4})", "0": "0"}

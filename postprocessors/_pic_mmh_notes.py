@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from camtool.findings import Code, Finding, Severity
 
@@ -91,22 +92,37 @@ class Notes:
         return found
 
 
-def too_long(blocks: list[str], buffer_chars: int) -> list[Finding]:
-    """One BLOCK_TOO_LONG finding when blocks do not fit the controller's buffer."""
+BUFFER_CHARS: Final = 35
+"""Characters of the thesis's buffer (L1740-1742), which cannot have taken its own sample block."""
+
+
+def too_long(blocks: list[str], buffer_chars: int | None) -> list[Finding]:
+    """One BLOCK_TOO_LONG finding when blocks do not fit the controller's buffer: a remark where
+    it is that of the thesis, which contradicts itself, and a warning where the user knows it."""
     lengths = [len(block) for block in blocks]
-    count = sum(length > buffer_chars for length in lengths)
+    limit = BUFFER_CHARS if buffer_chars is None else buffer_chars
+    count = sum(length > limit for length in lengths)
     if not count:
         return []
     longest = max(lengths)
+    message = (
+        f"{count} blocks are longer than the controller's buffer of {limit} characters, the "
+        f"longest has {longest}; use --set dialect.form=annex"
+    )
+    if buffer_chars is None:
+        message = (
+            f"{count} blocks have more than {limit} characters, up to {longest}: the thesis's "
+            "sample block has 43, its buffer would hold 35; see that the controller's echo of the "
+            "first one is whole, otherwise use --set dialect.form=annex"
+        )
     return [
         Finding(
             Code.BLOCK_TOO_LONG,
-            Severity.WARNING,
-            f"{count} blocks are longer than the controller's buffer of {buffer_chars} "
-            f"characters, the longest has {longest}; use --set dialect.form=annex",
+            Severity.INFO if buffer_chars is None else Severity.WARNING,
+            message,
             where=f"block {lengths.index(longest) + 1}",
             measured=float(longest),
-            limit=float(buffer_chars),
+            limit=float(limit),
             unit="chars",
         )
     ]

@@ -111,7 +111,7 @@ class _Reader:
         """One block, without its `;` and the blanks around it."""
         if self._ended:
             _fail(index, 1, "a block after M30, the end of the program", "remove it")
-        if len(text) >= self._buffer_chars:
+        if self._buffer_chars is not None and len(text) >= self._buffer_chars:
             self._long.add(index, len(text) + 1)
         code = text[:3]
         for letters, pattern in self._patterns.get(code, ()):
@@ -139,7 +139,7 @@ class _Reader:
                     "use --set dialect.form=annex",
                     where=f"block {self._long.first + 1}",
                     measured=self._long.most,
-                    limit=float(self._buffer_chars),
+                    limit=float(self._buffer_chars or 0),
                     unit="chars",
                 )
             )
@@ -147,9 +147,9 @@ class _Reader:
             found.append(
                 Finding(
                     Code.FEED_ABOVE_LIMIT,
-                    Severity.ERROR,
+                    Severity.WARNING,
                     f"{self._fast.count} blocks have a feed above what the link carries, up to "
-                    f"{self._fast.most:g} mm/min where {self._max_feed:.4g} is the limit",
+                    f"{self._fast.most:g} mm/min: it holds them at {self._max_feed:.4g}",
                     where=f"block {self._fast.first + 1}",
                     measured=self._fast.most,
                     limit=self._max_feed,

@@ -15,8 +15,7 @@ import numpy as np
 
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.machine.controllers import PicMmhController
-from camtool.machine.model import Machine, controller_of
+from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
@@ -190,16 +189,12 @@ class _Writer:
         cx, cy = self._numbers.centre_steps[row]
         ex, ey, _ = self._numbers.end_steps[row]
         x, y = self._steps[0] - cx, self._steps[1] - cy
-        error = 0
-        if controller_of(self._machine, PicMmhController).initial_error == "rounded-radius":
-            error = x * x + y * y - round(math.hypot(x, y)) ** 2
         return Arc(
             start=(x, y),
             end=(ex - cx, ey - cy),
             centre=(cx, cy),
             clockwise=kind == Kind.ARC_CW,
             sweep_rad=abs(self._numbers.sweeps[row]),
-            error=error,
         )
 
     def _said_end(self, row: int, arc: Arc, landing: Landing) -> list[int] | None:
@@ -224,7 +219,7 @@ class _Writer:
         """The numbers just sent, taken as the controller takes them, must end the arc."""
         x, y = self._grid.steps(np.array(self._units[:2])).tolist()
         at = (x - arc.centre[0], y - arc.centre[1])
-        if hits(arc, at, landing.iteration) != landing.iteration:
+        if hits(arc, at, landing.iteration, landing.iteration) != landing.iteration:
             raise PostError(
                 "internal fault: the arc as written would not end where it was planned to",
                 where=self._place(row),

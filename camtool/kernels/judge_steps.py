@@ -4,8 +4,9 @@ The positions of a leg (`camtool.kernels.leg_steps`) go to a small buffer, the s
 (`camtool.kernels.play_blocks`), and the block is judged (`camtool.kernels.judge`) before the next
 one is made: nothing is kept of the steps themselves.
 
-An arc runs until it stands on its end. One that passes it must stop at its nearest approach, so
-near the end, on the turn that is expected, the arc is first run ahead to see what becomes of it
+An arc runs for as many samples as are known (`camtool.kernels.arc_stops`), or until it stands on
+its end. One that passes it must stop at its nearest approach, so near the end, on the turn that is
+expected, the arc is first run ahead to see what becomes of it
 (`camtool.simulation.interpolators.arc_reach` does that with whole arcs, always). A path of direct
 search or stairs is never farther than one step from the circle through its start; so the end,
 when it is within `NEAR_RADIUS` of that circle, is passed within `NEAR_STEPS`, and no nearest
@@ -43,6 +44,7 @@ from camtool.kernels.leg_steps import (
     SIGN_X,
     SIGN_Y,
     STATE,
+    STOP,
     A,
     B,
     fill_leg,
@@ -209,7 +211,7 @@ def judge_legs(
     task: Task,
     sums: Sums,
 ) -> None:
-    """Run and judge legs (L, 13) in order; `counts` (L, 9) is filled.
+    """Run and judge legs (L, 14) in order; `counts` (L, 9) is filled.
 
     `how`: the method of arcs, and whether their error starts as that against the rounded radius;
     `mechanics`: axes (3, 5) and states (3, 6) of `camtool.kernels.play`, which go on.
@@ -252,6 +254,8 @@ def _judge_leg(
         apart = abs(math.hypot(x, y) - math.hypot(leg[END_X], leg[END_Y]))
         careful = method == DDA or apart > NEAR_RADIUS or max(abs(x), abs(y)) < LEAST_RADIUS
     entered, left, met = 0, -1, False
+    if arc and leg[STOP] >= 0:
+        left, count[ENDED] = leg[STOP], 1
     while left != 0 and not (left < 0 and met):
         if careful and left < 0:
             left, met = _run_ahead(leg, method, entered, (low, high), room)

@@ -19,13 +19,16 @@ from camtool.kernels.stairs import stairs_fill, stairs_start
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-ROW, KIND, FROM_X, FROM_Y, A, B, ORIGIN_X, ORIGIN_Y, SIGN_X, SIGN_Y, END_X, END_Y, CW = range(13)
+(ROW, KIND, FROM_X, FROM_Y, A, B, ORIGIN_X, ORIGIN_Y, SIGN_X, SIGN_Y, END_X, END_Y, CW, STOP) = (
+    range(14)
+)
 """Columns of a leg, in steps: the row; what it is; where X and Y stand before; how far a line
 goes (of Z: in A, its sign in CW), or where an arc starts about its centre; the start of a
 line or the centre of an arc, and the signs that its positions are taken with; the end of an arc
-about its centre; whether it is clockwise."""
+about its centre; whether it is clockwise; after how many samples an arc stops, −1: where it stands
+on its end."""
 
-LEG_COLUMNS = 13
+LEG_COLUMNS = 14
 """How many columns."""
 
 LINE, ARC, DEPTH = range(3)

@@ -90,13 +90,14 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     `max_step_rate_hz` bounds feed / coded step, `max_feed_mm_min` the feed itself; rapids run at
     `rapid_step_rate_hz` or `rapid_mm_min`; `max_reversals` is the count above which parts were
-    seen to fail."""
+    seen to fail that are no larger in XY than `small_part_mm` (None: parts of any size)."""
 
     max_step_rate_hz: Rate | None = None
     rapid_step_rate_hz: Rate | None = None
     max_feed_mm_min: FeedRate | None = None
     rapid_mm_min: FeedRate | None = None
     max_reversals: Annotated[int, Meta(ge=0, le=1_000_000_000)] | None = None
+    small_part_mm: Length | None = None
 
 
 class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import Any, Protocol, cast
 
+from camtool.findings import Finding
 from camtool.machine.controllers import (
     FlashcutController,
     GrblController,
@@ -75,6 +76,14 @@ def steps_on_the_way(
     made = getattr(model_of(machine), "judged_steps", None)
     steps: StepsOnTheWay | None = made and made(toolpath, machine, options)
     return steps
+
+
+def findings_of(toolpath: Toolpath, machine: Machine, options: Options) -> tuple[Finding, ...]:
+    """What the controller's model alone knows of a program, from models whose module has
+    `findings`."""
+    made = getattr(model_of(machine), "findings", None)
+    found: tuple[Finding, ...] = made(toolpath, machine, options) if made else ()
+    return found
 
 
 def model_of(machine: Machine) -> ControllerModel:

@@ -7,14 +7,17 @@ What it does with a row of the toolpath, in the order of this file:
 2. XY first, then Z (2.5 axes). Lines, rapids and homing are DDA lines; arcs go by
    `controller.arcs` about the rounded centre until the position equals the rounded end.
 3. Every output takes one period 1/f, f = feed / (60 · coded step), rapids run at
-   `limits.rapid_step_rate_hz` (equation 3.1, L853-878). `time_base` "event": a pass without a
+   `limits.rapid_step_rate_hz` (equation 3.1, L853-878). The link reports each step, and holds
+   faster feeds at `limits.max_step_rate_hz` (L3196-3199). `time_base` "event": a pass without a
    pulse costs nothing (annex A.3 loops back at once); "iteration": each pass takes one period.
 4. At each change of an axis's direction the compensation steps are issued, a period each.
 
-An arc that passes its end without standing on it goes round again on the real machine, mostly for
-ever. Here its samples stop at the nearest approach to the end in the expected sweep, `ended` is
-False, and the next row goes on from the programmed end, without a reversal on the way there. An
-arc that starts at its centre has no samples and the same fate.
+What the controller takes for the end of an arc is not said (`controller.arc_end`,
+`camtool.kernels.arc_stops`); it goes on from where the arc stopped. By "equal" an arc that passes
+its end without standing on it goes round again on the real machine, mostly for ever. Here its
+samples stop at the nearest approach to the end in the expected sweep, `ended` is False, and the
+next row goes on from the programmed end, without a reversal on the way there. An arc that starts
+at its centre has no samples and the same fate.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from camtool.findings import Finding
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import PicMmhController
 from camtool.machine.model import Machine, controller_of
@@ -55,6 +59,15 @@ def judged_steps(toolpath: Toolpath, machine: Machine, options: Options) -> Judg
     """The same motion as that of `run`, judged as it is made, without chunks; None where the
     mechanics needs these. Raises as `run` does, all at once."""
     return PicMmh(toolpath, machine, options).judged_steps()
+
+
+def findings(toolpath: Toolpath, machine: Machine, options: Options) -> tuple[Finding, ...]:
+    """Arcs that do not end alike by every reading of the thesis."""
+    if interpolation(toolpath, machine, options) != "dsm" or not toolpath.is_arc.any():
+        return ()
+    from camtool.simulation.pic_mmh_ends import arc_end_findings
+
+    return arc_end_findings(toolpath, machine, PicMmh(toolpath, machine, options).legs_as_said())
 
 
 def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:

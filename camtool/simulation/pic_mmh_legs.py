@@ -6,17 +6,21 @@ every leg begins is known before any is run.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from camtool.machine.controllers import Interpolator
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Floats, Ints, Ledger
 from camtool.toolpath.moves import Kind, Toolpath
 
 if TYPE_CHECKING:
     from camtool.kernels.judge import Sums, Task
-    from camtool.machine.controllers import Interpolator
+
+
+METHODS: Final[dict[Interpolator, int]] = {"dsm": 0, "stairs": 1, "dda": 2}
+"""The numbers of `camtool.kernels.leg_steps`, which a run without numba need not load."""
 
 
 def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
@@ -34,9 +38,9 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
     return places
 
 
-def legs_of(toolpath: Toolpath, places: Ints, centres: Ints) -> Ints:
-    """(L, 13) legs of `camtool.kernels.judge_steps` of all rows; `places` (N + 1, 3) of
-    `positions`, `centres` (N, 2) steps."""
+def legs_of(toolpath: Toolpath, places: Ints, centres: Ints, stops: Ints) -> Ints:
+    """(L, 14) legs of `camtool.kernels.judge_steps` of all rows; `places` (N + 1, 3) of
+    `positions`, `centres` (N, 2) steps, `stops` (N,) samples of arcs or −1."""
     from camtool.kernels import leg_steps as columns
 
     count = len(toolpath)
@@ -55,6 +59,7 @@ def legs_of(toolpath: Toolpath, places: Ints, centres: Ints) -> Ints:
     flat[:, [columns.A, columns.B]] = np.where(arc[:, None], spoke, np.abs(way[:, :2]))
     flat[:, [columns.END_X, columns.END_Y]] = places[1:, :2] - about
     flat[:, columns.CW] = toolpath.kind == Kind.ARC_CW
+    flat[:, columns.STOP] = stops
     deep[:, columns.KIND] = columns.DEPTH
     deep[:, [columns.FROM_X, columns.FROM_Y]] = places[1:, :2]  # XY first, then Z
     deep[:, [columns.ORIGIN_X, columns.ORIGIN_Y]] = places[1:, :2]
@@ -76,7 +81,7 @@ class JudgedSteps:
         how: tuple[Interpolator, bool, bool, float],
         mechanics: Mechanics,
     ) -> None:
-        """`legs` (L, 13); periods_s (N, 2) of an output in XY and in Z of each row; still_s (N,)
+        """`legs` (L, 14); periods_s (N, 2) of an output in XY and in Z of each row; still_s (N,)
         what rows take that do not move. `how`: the method of arcs, whether their error starts as
         that of the rounded radius, whether only outputs take time, mm of a step. `mechanics` is
         plain."""
@@ -97,7 +102,7 @@ class JudgedSteps:
         first, last = np.searchsorted(self._legs[:, columns.ROW], [low, high])
         legs = self._legs[first:last]
         counts = np.zeros((len(legs), judging.COUNT_COLUMNS), dtype=np.int64)
-        number = {"dsm": columns.DSM, "stairs": columns.STAIRS, "dda": columns.DDA}[method]
+        number = METHODS[method]
         mechanics = self._mechanics.axes, self._mechanics.states
         judging.judge_legs(legs, (number, rounded), step_mm, mechanics, counts, task, sums)
         row = legs[:, columns.ROW] - low

@@ -16,7 +16,7 @@ from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach,
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, one_row
 from camtool.simulation.options import Options
-from camtool.simulation.pic_mmh_legs import JudgedSteps, legs_of, positions
+from camtool.simulation.pic_mmh_legs import METHODS, JudgedSteps, legs_of, positions
 from camtool.toolpath.moves import Kind, Toolpath
 
 MAX_STEPS = 1 << 30
@@ -37,6 +37,16 @@ class _Leg:
     ended: bool = True
 
 
+def _counted(fill: Filler) -> Filler:
+    """The same, which does not end at the end: it may be passed on an earlier turn."""
+
+    def on(buffer: Ints) -> tuple[int, int, bool]:
+        filled, passes, _ = fill(buffer)
+        return filled, passes, False
+
+    return on
+
+
 class PicMmh:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
@@ -50,6 +60,8 @@ class PicMmh:
                 mend="use --set limits.rapid_step_rate_hz=HZ",
             )
         self._rapid_period_s = 1.0 / machine.limits.rapid_step_rate_hz
+        most_hz = machine.limits.max_step_rate_hz
+        self._least_period_s = 0.0 if most_hz is None else 1.0 / most_hz
         self._coded_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         if self._coded_mm[0] != self._coded_mm[1]:
             raise MachineError(
@@ -63,6 +75,8 @@ class PicMmh:
         home_mm = np.array([self._controller.machine_zero_mm], dtype=np.float64)
         self._home: Ints = self._steps(home_mm, range(3), named=False)[0]
         self._position: Ints = self._steps(toolpath.start[None, :], range(3), named=False)[0]
+        self._said = self._ends.copy()
+        self._stops = self._stopped()
         self._mechanics = Mechanics(machine, self._position * self._coded_mm, options.effects)
         self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
 
@@ -91,8 +105,9 @@ class PicMmh:
         feeds = toolpath.is_feed[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             feed_s = 60.0 * self._coded_mm[None, [0, 2]] / toolpath.feed[:, None]
+            feed_s = np.maximum(feed_s, self._least_period_s)
         waits = toolpath.kind[:rows] == Kind.DWELL
-        legs = legs_of(toolpath, places, self._centres)
+        legs = legs_of(toolpath, places, self._centres, self._stops)
         return JudgedSteps(
             legs=legs,
             periods_s=np.where(feeds, feed_s, self._rapid_period_s),
@@ -105,6 +120,38 @@ class PicMmh:
             ),
             mechanics=self._mechanics,
         )
+
+    def _stopped(self) -> Ints:
+        """(N,) samples of each arc up to its stop, by `controller.arc_end`; −1 for other rows, and
+        where it is "equal". The ends of arcs become their stops: the controller counts steps, and
+        goes on from where it is."""
+        toolpath, controller = self._toolpath, self._controller
+        stops = np.full(len(toolpath), -1, dtype=np.int64)
+        if controller.arc_end == "equal" or not toolpath.is_arc.any():
+            return stops
+        from camtool.kernels import arc_stops as stopping
+
+        homes = toolpath.kind == Kind.HOME_XY
+        moves = (toolpath.is_motion | homes).astype(np.int64)
+        moves[toolpath.kind == Kind.ARC_CCW] = 2
+        moves[toolpath.kind == Kind.ARC_CW] = 3
+        ends = np.where(homes[:, None], self._home[:2], self._ends[:, :2])
+        how = (
+            METHODS[self._options.interpolator or controller.arcs],
+            controller.initial_error == "rounded-radius",
+            stopping.READINGS[controller.arc_end],
+        )
+        stopping.run_on(moves, self._position[:2].copy(), ends, self._centres, how, stops)
+        self._ends[:, :2] = np.where(toolpath.is_motion[:, None], ends, self._ends[:, :2])
+        return stops
+
+    def legs_as_said(self) -> Ints:
+        """(L, 14) legs of the rows up to the end of the program as if each stopped on its end."""
+        toolpath = self._toolpath
+        places = positions(toolpath, self._position, self._said, self._home)
+        unknown = np.full(len(toolpath), -1, dtype=np.int64)
+        legs = legs_of(toolpath, places, self._centres, unknown)
+        return np.asarray(legs[legs[:, 0] < toolpath.running])
 
     def _suspect(self, places: Ints) -> Bools:
         """(N,) true for the rows that `_check` has to look at."""
@@ -151,7 +198,7 @@ class PicMmh:
                 where=self._place(row),
                 mend="give it one (F)",
             )
-        return 60.0 * float(self._coded_mm[axis]) / feed
+        return max(60.0 * float(self._coded_mm[axis]) / feed, self._least_period_s)
 
     def _line(self, axes: tuple[int, ...], target: Ints, period_s: float) -> _Leg:
         """A DDA line of one or two axes from here to `target`."""
@@ -177,8 +224,11 @@ class PicMmh:
             return _Leg(line_filler(0, 0), 0, (0, 1), origin, sign, period_s, ended=False)
         method = self._options.interpolator or self._controller.arcs
         rounded = self._controller.initial_error == "rounded-radius"
-        samples, met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
         fill = arc_filler(arc, method, rounded=rounded)
+        if self._stops[row] >= 0:
+            samples = int(self._stops[row])
+            return _Leg(_counted(fill), samples, (0, 1), origin, sign, period_s)
+        samples, met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
         return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=met)
 
     def _emit(self, row: int, leg: _Leg) -> Iterator[Chunk]:

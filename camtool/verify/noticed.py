@@ -11,6 +11,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
 from camtool.planning.places import own_numbers
+from camtool.simulation.models import findings_of
 from camtool.toolpath.cleared import CLEARED_MM, Reach, Through, rapids_through_stock
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
@@ -38,10 +39,11 @@ def motion_findings(
     decoded, machine = cuts.toolpath, case.machine
     return (
         *_endless_arcs(decoded, machine, tally),
+        *findings_of(case.decoded, machine, case.simulation),
         *_missed_ends(decoded, case, tally, rows),
         *_out_of_travel(machine, extents),
         *_rapids_in_stock(decoded, case),
-        *_many_reversals(machine, tally),
+        *_many_reversals(machine, tally, cuts),
         *_nothing_moves(cuts),
         *_homing(decoded, machine),
         *_unknown_play(machine, tally),
@@ -136,18 +138,32 @@ def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
     ]
 
 
-def _many_reversals(machine: Machine, tally: Tally) -> Iterator[Finding]:
+def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:
+    """Too many for the part's size: each leaves an error that does not grow with the part."""
     count, limit = int(tally.cutting_reversals[:2].sum()), machine.limits.max_reversals
-    if limit is not None and count > limit:
-        yield Finding(
-            Code.MANY_REVERSALS,
-            Severity.WARNING,
-            f"X and Y reverse {count} times while cutting; small parts were seen to fail above "
-            f"{limit}",
-            measured=float(count),
-            limit=float(limit),
-            unit="reversals",
-        )
+    if limit is None or count <= limit:
+        return
+    small_mm, size_mm = machine.limits.small_part_mm, _size_mm(cuts)
+    if small_mm is not None and size_mm > small_mm:
+        return
+    yield Finding(
+        Code.MANY_REVERSALS,
+        Severity.WARNING,
+        f"X and Y reverse {count} times while cutting a part of {size_mm:.3g} mm; small parts "
+        f"were seen to fail above {limit}",
+        measured=float(count),
+        limit=float(limit),
+        unit="reversals",
+    )
+
+
+def _size_mm(cuts: CutMoves) -> float:
+    """The larger side of the box around the ends of all cuts."""
+    if not len(cuts.rows):
+        return 0.0
+    toolpath = cuts.toolpath
+    ends = np.concatenate([toolpath.starts[cuts.rows, :2], toolpath.end[cuts.rows, :2]])
+    return float(np.ptp(ends, axis=0).max())
 
 
 def _nothing_moves(cuts: CutMoves) -> Iterator[Finding]:

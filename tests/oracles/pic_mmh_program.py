@@ -39,6 +39,21 @@ def run(data: bytes, form: str) -> list[Ran]:
     return ran
 
 
+def arcs(data: bytes, form: str) -> list[tuple[str, Point, Point]]:
+    """Each arc block with its start and end about its centre, in steps, if all before it ended."""
+    at, found = (0, 0), []
+    for line in data.decode("ascii").splitlines():
+        if line[:3] not in ("G00", "G01", "G02", "G03") or line[3] == "Z":
+            continue
+        letters, numbers = fields(line[3:], form)
+        x, y = numbers[:2]
+        if letters.startswith("XYIJ"):
+            i, j = numbers[2:]
+            found.append((line, (at[0] - i, at[1] - j), (x - i, y - j)))
+        at = (x, y)
+    return found
+
+
 def fields(text: str, form: str) -> tuple[str, list[int]]:
     """Letters of the words and their values in steps, read column by column."""
     letters, steps, at = "", [], 0

@@ -7,19 +7,23 @@ import numpy as np
 import pytest
 
 from camtool.errors import PostError
-from camtool.findings import Code
+from camtool.findings import Code, Severity
 from camtool.kernels.lattice import to_steps
 from camtool.machine.registry import LoadedTarget, load_target
+from camtool.simulation.models import findings_of
 from camtool.simulation.options import IDEAL, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
+from camtool.verify.verify import verify
+from tests.oracles import arc_ends
 from tests.oracles import pic_mmh_program as oracle
 from tests.oracles.motion_rows import RowMotion, each_row, rows_of
 
 STEP_MM = 0.00014
 SEED = 20240607
+EQUAL = ["controller.arc_end=equal"]
 
 Floats = np.typing.NDArray[np.float64]
 
@@ -100,7 +104,7 @@ def check_ends(target: LoadedTarget, wanted: Toolpath, within_steps: float) -> P
 
 
 def test_ten_thousand_arcs_and_lines_end_where_they_were_programmed_to() -> None:
-    target = load_target("pic-mmh")
+    target = load_target("pic-mmh", settings=EQUAL)
     wanted = random_path(np.random.default_rng(SEED), 10_000, 0.05, 3.0)
     program = check_ends(target, wanted, within_steps=4.0)
     sent = program.row_of_block[program.row_of_block >= 0]
@@ -110,7 +114,7 @@ def test_ten_thousand_arcs_and_lines_end_where_they_were_programmed_to() -> None
 
 
 def test_a_thousand_in_the_annex_form() -> None:
-    target = load_target("pic-mmh", settings=["dialect.form=annex"])
+    target = load_target("pic-mmh", settings=["dialect.form=annex", *EQUAL])
     wanted = random_path(np.random.default_rng(SEED), 1_000, 0.05, 3.0)
     program = check_ends(target, wanted, within_steps=25.0)
     assert program.data.count(b"G02") + program.data.count(b"G03") > 600
@@ -118,7 +122,7 @@ def test_a_thousand_in_the_annex_form() -> None:
 
 @pytest.mark.parametrize("form", ["example", "annex"])
 def test_arcs_of_a_few_steps(form: str) -> None:
-    target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
+    target = load_target("pic-mmh", settings=[f"dialect.form={form}", *EQUAL])
     wanted = random_path(np.random.default_rng(SEED), 1_000, 0.0001, 0.02)
     check_ends(target, wanted, within_steps=4.0 if form == "example" else 25.0)
 
@@ -133,6 +137,125 @@ def test_the_literal_controller_ends_every_block(form: str) -> None:
     for motion in ran:
         assert motion.met, motion.block
     assert ran[-1].end == tuple(to_steps(wanted.end[-1, :2], STEP_MM).tolist()) or form == "annex"
+
+
+def check_readings(seed: int, count: int, largest_mm: float, form: str) -> None:
+    """Each arc block of random paths stops on its own end by every reading of the thesis and with
+    both starts of D, by the literal controller."""
+    target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
+    wanted = random_path(np.random.default_rng(seed), count, 0.001, largest_mm)
+    program = target.post.write(wanted, target.machine)
+    blocks = oracle.arcs(program.data, form)
+    assert len(blocks) > 0.4 * count
+    for block, start, end in blocks:
+        clockwise = block.startswith("G02")
+        square = start[0] ** 2 + start[1] ** 2
+        rounded = square - math.floor(math.sqrt(square) + 0.5) ** 2
+        stops = [
+            arc_ends.stop(start, end, clockwise, error, reading)
+            for error in (0, rounded)
+            for reading in arc_ends.READINGS
+        ]
+        assert all(stop.met for stop in stops), (block, stops)
+        samples = [stop.samples for stop in stops]
+        assert max(samples) - min(samples) <= 16, (block, stops)
+        assert len(set(samples[:3])) == len(set(samples[3:])) == 1
+
+
+@pytest.mark.parametrize("form", ["example", "annex"])
+def test_arcs_end_by_every_reading_and_both_starts_of_d(form: str) -> None:
+    check_readings(SEED + 2, 400, 0.03, form)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["example", "annex"])
+def test_thousands_of_arcs_end_by_every_reading_and_both_starts_of_d(form: str) -> None:
+    check_readings(SEED + 3, 5_000, 0.1, form)
+
+
+@pytest.mark.parametrize("reading", ["final-quadrant", "nearest"])
+@pytest.mark.parametrize("error", ["zero", "rounded-radius"])
+def test_large_arcs_end_by_every_reading(reading: str, error: str) -> None:
+    """Written for any machine, simulated on one of these: as on the strictest, step for step."""
+    writer = load_target("pic-mmh", settings=EQUAL)
+    wanted = random_path(np.random.default_rng(SEED + 4), 300, 0.05, 3.0)
+    program: Program = writer.post.write(wanted, writer.machine)
+    options = [f"controller.arc_end={reading}", f"controller.initial_error={error}"]
+    other = load_target("pic-mmh", settings=options)
+    assert other.post.write(wanted, other.machine).data == program.data
+    for now, motion in last_of_rows(other, program):
+        assert motion.ended, f"row {now} never ends"
+    decoded = other.post.read(program.data, other.machine)
+    assert not findings_of(decoded, other.machine, Options())
+
+
+def foreign(rng: np.random.Generator, target: LoadedTarget, count: int) -> bytes:
+    """A program of lines and arcs whose numbers nobody has planned."""
+    path = ToolpathBuilder()
+    for _ in range(count):
+        path.line(*rng.uniform(-1, 1, 2), feed=0.8)
+        x, y, _z = path.position
+        angle = rng.uniform(0.0, 6.0)
+        to, radius = angle + rng.uniform(0.5, 5.0), rng.uniform(0.02, 0.4)
+        cx, cy = x - radius * math.cos(angle), y - radius * math.sin(angle)
+        end = cx + radius * math.cos(to), cy + radius * math.sin(to)
+        path.arc(*end, centre=(cx, cy), ccw=True, feed=1)
+    blocks = [target.post.format_block(move, target.machine) for move in path.finish()]
+    return "\n".join(["G54;", *blocks, "M30;"]).encode()
+
+
+def test_a_foreign_program_is_told_what_each_reading_does_to_it() -> None:
+    target = load_target("pic-mmh")
+    data = foreign(np.random.default_rng(SEED), target, 40)
+    decoded = target.post.read(data, target.machine)
+    (told,) = findings_of(decoded, target.machine, Options())
+    assert (told.code, told.severity) == (Code.ARC_END_UNSURE, Severity.WARNING)
+    fates = [
+        {arc_ends.stop(start, end, False, 0, reading).met for reading in arc_ends.READINGS}
+        for _, start, end in oracle.arcs(data, "example")
+    ]
+    missed = sum(
+        not arc_ends.stop(start, end, False, 0, "equal").met
+        for _, start, end in oracle.arcs(data, "example")
+    )
+    assert f"by equal {missed} run on" in told.message
+    assert 10 < missed < 30
+    assert told.measured is not None
+    assert told.measured >= sum(fate != {True} for fate in fates)
+
+
+@pytest.mark.parametrize("error", ["zero", "rounded-radius"])
+@pytest.mark.parametrize("reading", ["equal", "final-quadrant", "nearest"])
+def test_foreign_arcs_run_as_the_reading_says(reading: str, error: str) -> None:
+    """Step for step where each arc stops, the next one from there; judged on the way or not."""
+    settings = [f"controller.arc_end={reading}", f"controller.initial_error={error}"]
+    target = load_target("pic-mmh", settings=settings)
+    data = foreign(np.random.default_rng(SEED + 5), target, 25)
+    decoded = target.post.read(data, target.machine)
+    at, endless = (0, 0), 0
+    for row, motion in enumerate(
+        each_row(simulate(decoded, target.machine, Options(effects=IDEAL)))
+    ):
+        end = tuple(to_steps(decoded.end[row, :2], STEP_MM).tolist())
+        if decoded.is_arc[row]:
+            cx, cy = to_steps(decoded.centre[row], STEP_MM).tolist()
+            start, goal = (at[0] - cx, at[1] - cy), (end[0] - cx, end[1] - cy)
+            square = start[0] ** 2 + start[1] ** 2
+            rounded = square - math.floor(math.sqrt(square) + 0.5) ** 2
+            used = rounded if error == "rounded-radius" else 0
+            stop = arc_ends.stop(start, goal, False, used, reading)
+            assert motion.iterations == stop.samples
+            last = to_steps(motion.commanded[-1, :2], STEP_MM).tolist()
+            assert (last[0] - cx, last[1] - cy) == stop.at
+            assert motion.ended == (stop.met or reading != "equal")
+            endless += not motion.ended
+            end = end if reading == "equal" else (stop.at[0] + cx, stop.at[1] + cy)
+        at = (int(end[0]), int(end[1]))
+    assert (endless > 5) == (reading == "equal")
+    report = verify(decoded, target.machine).report
+    assert report.steps.iterations > 0
+    unended = [each for each in report.findings if each.code == "ARC_MISSES_END"]
+    assert bool(unended) == (reading == "equal")
 
 
 def test_arcs_of_other_origin_do_miss_their_ends() -> None:
@@ -158,7 +281,7 @@ def test_arcs_of_other_origin_do_miss_their_ends() -> None:
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.123456, -0.05), (0.00007, 0.00007)])
 @pytest.mark.parametrize("radius", [0.001, 0.0137, 0.15, 1.0])
 def test_full_circles_turn_once(ccw: bool, start: tuple[float, float], radius: float) -> None:
-    target = load_target("pic-mmh")
+    target = load_target("pic-mmh", settings=EQUAL)
     for angle in np.linspace(0.0, 6.0, 13):
         path = ToolpathBuilder().line(*start, feed=1)
         centre = (start[0] + radius * math.cos(angle), start[1] + radius * math.sin(angle))
@@ -167,6 +290,12 @@ def test_full_circles_turn_once(ccw: bool, start: tuple[float, float], radius: f
         program = target.post.write(wanted, target.machine)
         decoded = target.post.read(program.data, target.machine)
         turned = sum(decoded.sweeps())
+        behind = np.arange(len(decoded)) > int(decoded.is_arc.argmax())
+        mends = behind & decoded.is_feed & ~decoded.is_arc
+        for row in np.flatnonzero(mends).tolist():
+            arms = np.array([decoded.starts[row, :2], decoded.end[row, :2]]) - centre
+            cross = arms[0, 0] * arms[1, 1] - arms[0, 1] * arms[1, 0]
+            turned += math.atan2(cross, float(arms[0] @ arms[1]))
         assert abs(abs(turned) - 2.0 * math.pi) < 4.0 * STEP_MM / radius
         assert (turned > 0.0) == ccw
 
@@ -225,14 +354,14 @@ def test_mends_are_counted_once_and_go_on_the_same_way() -> None:
 
 
 def test_the_other_initial_error_ends_too() -> None:
-    target = load_target("pic-mmh", settings=["controller.initial_error=rounded-radius"])
+    target = load_target("pic-mmh", settings=["controller.initial_error=rounded-radius", *EQUAL])
     check_ends(target, random_path(np.random.default_rng(SEED), 500, 0.01, 0.5), 4.0)
 
 
 def test_arcs_end_with_another_step() -> None:
     step = "0.000139509"
     settings = [f"axes.{axis}.coded_step_mm={step}" for axis in "xyz"]
-    target = load_target("pic-mmh", settings=settings)
+    target = load_target("pic-mmh", settings=[*settings, *EQUAL])
     wanted = random_path(np.random.default_rng(SEED), 500, 0.01, 0.5)
     program = target.post.write(wanted, target.machine)
     assert all(motion.ended for _, motion in last_of_rows(target, program))

@@ -104,7 +104,7 @@ BAD = {
     "one decimal": (b"G00X00001.00Y00001.0;", "column 14: 'G00X00001.00Y00001.0': wanted Y with"),
     "three decimals": (b"G00X00001.000Y00001.00;", "column 13"),
     "no decimals": (b"G00X00001Y00001;", "column 5"),
-    "plus": (b"G00X+00001.00Y00001.00;", "column 5"),
+    "plus and minus": (b"G00X+-00001.00Y00001.00;", "column 5"),
     "two signs": (b"G00X--0001.00Y00001.00;", "column 5"),
     "blank inside": (b"G00X00001.00 Y00001.00;", "column 13"),
     "line end inside": (b"G00X00001.00\nY00001.00;", "column 13"),
@@ -172,10 +172,16 @@ def test_ten_megabytes_of_nothing_are_refused_shortly(data: bytes) -> None:
     assert len(str(caught.value)) < 250
 
 
+def test_a_plus_is_no_other_sense_than_none() -> None:
+    signed = read(b"G01X+00100.00Y-00001.50F08;G00X00002.00Y+00003.00;")
+    plain = read(b"G01X00100.00Y-00001.50F08;G00X00002.00Y00003.00;")
+    np.testing.assert_array_equal(signed.end, plain.end)
+
+
 def test_a_feed_above_the_link_is_decoded_and_found() -> None:
     path = read(b"G01X00001.00Y00001.00F13;G01X00002.00Y00001.00F14;G01X00003.00Y00001.00F99;")
     (finding,) = path.findings
-    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.ERROR)
+    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.WARNING)
     assert finding.where == "block 2"
     assert finding.measured == 9.9
     assert finding.limit == pytest.approx(1.3944)
@@ -183,10 +189,11 @@ def test_a_feed_above_the_link_is_decoded_and_found() -> None:
 
 
 def test_long_blocks_are_one_finding() -> None:
-    (finding,) = read(b"G90;" + THESIS + THESIS).findings
+    (finding,) = read(b"G90;" + THESIS + THESIS, "dialect.buffer_chars=35").findings
     assert (finding.code, finding.severity) == (Code.BLOCK_TOO_LONG, Severity.WARNING)
     assert (finding.measured, finding.limit, finding.where) == (43.0, 35.0, "block 2")
     assert "2 blocks" in finding.message
+    assert read(b"G90;" + THESIS + THESIS).findings == ()
     assert read(ANNEX, "dialect.form=annex").findings == ()
 
 

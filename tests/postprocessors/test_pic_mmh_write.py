@@ -162,15 +162,19 @@ def test_no_coordinate_lies_half_way_between_two_steps() -> None:
 def test_long_blocks_are_one_finding() -> None:
     path = ToolpathBuilder().line(1, 0, feed=1).arc(1, 0, centre=(0, 0), ccw=True, feed=1)
     path.arc(1, 0, centre=(-1, 0), ccw=True, feed=1)
-    target = load_target("pic-mmh")
-    (finding,) = target.post.write(path.finish(), target.machine).findings
-    assert finding.code == Code.BLOCK_TOO_LONG
-    assert finding.severity == Severity.WARNING
-    assert (finding.measured, finding.limit) == (44.0, 35.0)
-    assert "2 blocks" in finding.message
-    assert "dialect.form=annex" in finding.message
-    assert findings(path, "dialect.form=annex") == {}
-    assert findings(path, "dialect.buffer_chars=44") == {}
+    for setting, severity in (
+        ([], Severity.INFO),
+        (["dialect.buffer_chars=35"], Severity.WARNING),
+    ):
+        target = load_target("pic-mmh", settings=setting)
+        found = target.post.write(path.finish(), target.machine).findings
+        (finding,) = [each for each in found if each.code == Code.BLOCK_TOO_LONG]
+        assert finding.severity == severity
+        assert (finding.measured, finding.limit) == (44.0, 35.0)
+        assert "2 blocks" in finding.message
+        assert "dialect.form=annex" in finding.message
+    assert Code.BLOCK_TOO_LONG not in findings(path, "dialect.form=annex")
+    assert Code.BLOCK_TOO_LONG not in findings(path, "dialect.buffer_chars=44")
 
 
 def builder() -> ToolpathBuilder:

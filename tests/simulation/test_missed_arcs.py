@@ -1,6 +1,7 @@
 """Arcs whose stop test is never met, arcs that cannot start, and how many of all there are."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,6 +15,12 @@ from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.motion_rows import RowMotion, rows_of
 
 STEP = 0.00014
+
+
+@pytest.fixture
+def strict(make_machine: Callable[..., Machine]) -> Machine:
+    """An arc ends on its end only."""
+    return make_machine("controller.arc_end=equal")
 
 
 def run(path: ToolpathBuilder, machine: Machine) -> list[RowMotion]:
@@ -92,11 +99,11 @@ def test_an_end_behind_the_start_is_reached_after_a_whole_turn() -> None:
     assert ahead <= 2
 
 
-def test_the_next_row_goes_on_from_the_programmed_end(machine: Machine) -> None:
+def test_the_next_row_goes_on_from_the_programmed_end(strict: Machine) -> None:
     """Without a compensation on the way, although the step there goes the other way."""
     path = ToolpathBuilder((0.14, 0.0, 0.0)).arc(0, 0.14028, centre=(0, 0), ccw=True, feed=0.8)
     path.line(-0.014, 0.14028, feed=0.8)
-    arc, line = run(path, machine)
+    arc, line = run(path, strict)
     assert not arc.ended
     assert steps_of(arc)[-1, :2].tolist() == [0, 1000]
     assert arc.reversals.tolist() == [1, 0, 0]
@@ -106,6 +113,20 @@ def test_the_next_row_goes_on_from_the_programmed_end(machine: Machine) -> None:
     assert line.ended
     assert line.reversals.tolist() == [0, 0, 0]
     assert line.steps.tolist() == [100, 0, 0]
+
+
+def test_by_the_other_readings_it_goes_on_from_where_it_stopped(
+    make_machine: Callable[..., Machine],
+) -> None:
+    """Here at (0, 1000), two steps short of the end; the line makes them too."""
+    path = ToolpathBuilder((0.14, 0.0, 0.0)).arc(0, 0.14028, centre=(0, 0), ccw=True, feed=0.8)
+    path.line(-0.014, 0.14028, feed=0.8)
+    arc, line = run(path, make_machine("controller.arc_end=nearest"))
+    assert arc.ended
+    assert steps_of(arc)[-1, :2].tolist() == [0, 1000]
+    assert steps_of(line)[-1].tolist() == [-100, 1002, 0]
+    assert line.steps.tolist() == [100, 2, 0]
+    assert line.reversals.tolist() == [0, 0, 0]
 
 
 def test_an_arc_that_starts_at_its_centre_has_no_samples(machine: Machine) -> None:
@@ -119,13 +140,13 @@ def test_an_arc_that_starts_at_its_centre_has_no_samples(machine: Machine) -> No
     assert len(rapid.commanded) == 7
 
 
-def test_a_missed_arc_with_z_says_so(machine: Machine) -> None:
+def test_a_missed_arc_with_z_says_so(strict: Machine) -> None:
     whole = ToolpathBuilder((0.14, 0.0, 0.0)).arc(0, 0.14028, centre=(0, 0), ccw=True, feed=0.8)
     toolpath = whole.finish()
     end = toolpath.end.copy()
     end[0, 2] = 0.0014
     climbing = type(toolpath)(**{**vars(toolpath), "end": end})
-    (row,) = rows_of(simulate(climbing, machine))
+    (row,) = rows_of(simulate(climbing, strict))
     assert not row.ended
     assert steps_of(row)[-1].tolist() == [0, 1002, 10]
 

@@ -11,6 +11,7 @@ from camtool.machine.model import Machine
 from camtool.simulation import IDEAL, Options, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verify.verify import verify
 from tests.oracles import motion_rows
 from tests.oracles.motion_rows import RowMotion
 from tests.oracles.pic_mmh_run import LiteralRun
@@ -80,7 +81,9 @@ def test_random_programs_equal_the_literal_run(
     make_machine: MakeMachine, settings: tuple[str, ...]
 ) -> None:
     """Samples, slides, times, passes, steps and reversals of every row."""
-    small = ("axes.x.backlash_mm=0.0033", "axes.x.compensation_mm=0.00412")
+    # By the strictest reading: the literal machine runs on until an arc stands on its end.
+    equal = "controller.arc_end=equal"
+    small = (equal, "axes.x.backlash_mm=0.0033", "axes.x.compensation_mm=0.00412")
     machine = make_machine(
         *small, "axes.y.backlash_mm=0.002", "axes.z.backlash_mm=0.001", *settings
     )
@@ -105,8 +108,12 @@ def test_random_programs_equal_the_literal_run(
     assert arcs > 20
 
 
+@pytest.mark.parametrize("reading", ["equal", "final-quadrant", "nearest"])
 @pytest.mark.parametrize("size", [1, 3, 50, 4096])
-def test_the_size_of_chunks_does_not_matter(machine: Machine, size: int) -> None:
+def test_the_size_of_chunks_does_not_matter(
+    make_machine: MakeMachine, size: int, reading: str
+) -> None:
+    machine = make_machine(f"controller.arc_end={reading}")
     path = ToolpathBuilder().rapid(0.01, 0.003, 0.002).line(-0.002, 0.01, feed=0.8)
     path.arc(-0.002, 0.01, centre=(0.005, 0.004), ccw=True, feed=0.4).rapid(0.14, 0, 0)
     path.arc(0, 0.14028, centre=(0, 0), ccw=True, feed=0.4)
@@ -114,7 +121,7 @@ def test_the_size_of_chunks_does_not_matter(machine: Machine, size: int) -> None
     chunks = list(simulate(toolpath, machine, Options(chunk_steps=size)))
     assert all(len(chunk.commanded) <= size for chunk in chunks)
     whole, parts = rows_of(toolpath, machine), motion_rows.rows_of(chunks)
-    assert not whole[-1].ended
+    assert whole[-1].ended == (reading != "equal")
     for one, many in zip(whole, parts, strict=True):
         assert np.array_equal(one.commanded, many.commanded)
         assert np.array_equal(one.slide, many.slide)
@@ -200,6 +207,18 @@ def test_times_by_hand(make_machine: MakeMachine) -> None:
     assert diagonal.duration_s == pytest.approx(2 * diagonal.iterations / HZ)
     assert diagonal.iterations == pytest.approx(100 * math.sqrt(2.0), abs=1.0)
     assert rapid.duration_s == pytest.approx(101 / 166.0)
+
+
+def test_the_link_holds_what_is_faster(make_machine: MakeMachine) -> None:
+    """From F14 on the times are those of 166 steps a second, in chunks and on the way."""
+    machine = make_machine()
+    for feed, hertz in ((1.3, 1.3 / (60.0 * STEP)), (1.4, 166.0), (9.9, 166.0)):
+        path = ToolpathBuilder().line(101 * STEP, 0.0, feed=feed).line(z=-50 * STEP, feed=feed)
+        toolpath = path.finish()
+        flat, deep = rows_of(toolpath, machine)
+        assert flat.duration_s == pytest.approx(101 / hertz)
+        assert deep.duration_s == pytest.approx(50 / hertz)
+        assert verify(toolpath, machine).report.time_s == pytest.approx(151 / hertz)
 
 
 def test_a_reversal_takes_the_compensation_at_the_same_rate(machine: Machine) -> None:

@@ -54,13 +54,19 @@ def random_program(rng: np.random.Generator) -> Toolpath:
 
 # Play that is small beside the circles: the centre of one that is torn apart is anybody's guess.
 SMALL = ("axes.x.backlash_mm=0.003", "axes.y.backlash_mm=0.002", "axes.x.compensation_mm=0.0041")
+EQUAL = "controller.arc_end=equal"
 SETTINGS = [
+    (EQUAL,),
+    (EQUAL, "controller.arcs=dda", "controller.time_base=iteration"),
+    (EQUAL, *SMALL, "controller.arcs=stairs", "controller.start_play=centred"),
+    (EQUAL, *SMALL, "axes.y.real_step_mm=0.000139"),
+    (EQUAL, "controller.initial_error=rounded-radius", "controller.start_direction=-"),
+    (EQUAL, "controller.machine_zero_mm=[0.014, -0.028, 0.0028]", "axes.z.coded_step_mm=0.0002"),
     (),
-    ("controller.arcs=dda", "controller.time_base=iteration"),
-    (*SMALL, "controller.arcs=stairs", "controller.start_play=centred"),
-    (*SMALL, "axes.y.real_step_mm=0.000139"),
-    ("controller.initial_error=rounded-radius", "controller.start_direction=-"),
-    ("controller.machine_zero_mm=[0.014, -0.028, 0.0028]", "axes.z.coded_step_mm=0.0002"),
+    (*SMALL, "controller.initial_error=rounded-radius"),
+    ("controller.arcs=dda", "controller.machine_zero_mm=[0.014, -0.028, 0.0028]"),
+    ("controller.arc_end=nearest",),
+    ("controller.arc_end=nearest", "controller.arcs=stairs", "controller.time_base=iteration"),
 ]
 
 
@@ -96,7 +102,7 @@ def test_rows_judged_as_they_are_made_are_those_of_the_chunks(settings: tuple[st
         assert made.trace.points.shape == chunked.trace.points.shape
         assert np.array_equal(made.trace.points, chunked.trace.points)
         missed += int((~one.ledger.ended).sum())
-    assert missed > 5
+    assert missed > 5 if EQUAL in settings else missed <= 5  # those about their own start
 
 
 def test_mechanics_that_need_samples_are_judged_by_chunks() -> None:
