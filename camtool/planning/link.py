@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
@@ -14,10 +16,14 @@ from camtool.planning.items import Feeds, Run
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.places import key_of, operation_name, own_numbers
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind
+from camtool.toolpath.moves import Kind, Toolpath
 
 FEED_TOLERANCE = 1e-9
 """A feed may exceed the highest one by this part of it: by rounding alone."""
+
+SETTLED_DECIMALS = 10
+"""Places are rounded to so many decimals of a mm: far above the noise of doubles, and far below
+what any machine or tolerance knows."""
 
 Approach = Callable[[Run], tuple[float, float] | None]
 """Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
@@ -106,6 +112,20 @@ def _sayable(highest_mm_min: float, machine: Machine) -> float:
     unit = machine.feed.unit_mm_min
     units = math.floor(highest_mm_min / unit * (1.0 + FEED_TOLERANCE))
     return units * unit or highest_mm_min
+
+
+def settled(toolpath: Toolpath) -> Toolpath:
+    """The same moves with their places rounded to SETTLED_DECIMALS.
+
+    The ends of a straight wall differ by some 1e-15 of their size, as offsets, tabs and ramps come
+    to them. Where a dialect's last decimal is a tie (a cutter of 1/8 inch has a radius of 1.5875)
+    one end would be rounded up and the other down, and the wall written askew.
+    """
+    # Adding 0 makes −0 and 0 one.
+    end, centre = (
+        np.round(each, SETTLED_DECIMALS) + 0.0 for each in (toolpath.end, toolpath.centre)
+    )
+    return replace(toolpath, end=end, centre=centre)
 
 
 def link(

@@ -27,7 +27,7 @@ from camtool.planning.choose import choose
 from camtool.planning.contours.levels import carved_levels, levels
 from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
 from camtool.planning.job import Job, Operation
-from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of
+from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of, settled
 from camtool.planning.place import SCALE_SHARE, collapsed, place
 from camtool.planning.places import key_of, operation_name
 from camtool.planning.ranges import refuse_endless
@@ -112,7 +112,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
 
         approaches = partial(Approaches, machine)
     builder = link(worked, safe_z_of(job, machine), approaches)
-    toolpath = builder.finish()
+    toolpath = settled(builder.finish())
     findings = collapsed(drawing, placed, job)
     findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, job, any(step.runs for step in steps))
