@@ -18,6 +18,8 @@ Anything else that escapes is a fault of camtool itself: exit code 3.
 
 from __future__ import annotations
 
+from camtool.plain import one_line
+
 
 class CamtoolError(Exception):
     """One line for the user: `[file: ][where: ]message[; mend]`."""
@@ -40,9 +42,9 @@ class CamtoolError(Exception):
 
     def __str__(self) -> str:
         head = "".join(f"{part}: " for part in (self.file, self.where) if part)
-        tail = f"; {self.mend}" if self.mend else ""
-        # One line whatever a file name or a layer name holds.
-        return " ".join(f"{head}{self.message}{tail}".split())
+        message, mend = (" ".join(words.split()) for words in (self.message, self.mend))
+        # One line that can be seen whatever a file name or a layer name holds.
+        return one_line(f"{head}{message}{f'; {mend}' if mend else ''}")
 
 
 class InputError(CamtoolError, ValueError):

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from camtool.plain import one_line
+
 
 class Severity(IntEnum):
     """How grave: an ERROR makes a command exit with 1 and write nothing."""
@@ -116,7 +118,7 @@ class Finding:
 
     def __str__(self) -> str:
         place = f" [{self.where}]" if self.where else ""
-        return f"{self.severity.name.lower()} {self.code.name}{place}: {self.message}"
+        return one_line(f"{self.severity.name.lower()} {self.code.name}{place}: {self.message}")
 
 
 def worst(findings: tuple[Finding, ...] | list[Finding]) -> Severity:

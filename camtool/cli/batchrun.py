@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-import click
-
 from camtool.batch.lock import NAME as LOCK
 from camtool.batch.manifest import NAME as MANIFEST
 from camtool.batch.manifest import Manifest
@@ -97,7 +95,7 @@ class Batched:
             ended, number = Ended((), None), int(signal.SIGINT)
         if number is not None:
             text = "interrupted; what is written is whole, and the same command goes on"
-            click.echo(f"camtool: {text}", err=True)
+            say(f"camtool: {text}", quiet=False)
             return EXIT_SIGNAL + number
         if ended.error is not None:
             raise ended.error
@@ -233,7 +231,7 @@ class Batched:
         try:
             manifest.tidy(write_all)
         except OutputError as error:  # its lines so far are there
-            click.echo(f"camtool: warning: {error}", err=True)
+            say(f"camtool: warning: {error}", quiet=False)
         say_summary(outcomes, seconds, quiet=self.loudness.quiet)
         if self.summary is not None:
             target = self.work.target.machine.target.name

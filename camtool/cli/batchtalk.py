@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections import Counter
@@ -12,11 +11,10 @@ from dataclasses import asdict, dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Protocol
 
-import click
-
 from camtool import __version__
 from camtool.batch.records import Outcome, State
-from camtool.cli.talk import one_line, say
+from camtool.cli.talk import say
+from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -80,14 +78,14 @@ class Lines:
         """One line, and those of its findings."""
         self._done += 1
         for line in said_of(outcome, self._loudness):
-            click.echo(line, err=True)
+            say(line, quiet=False)
         if outcome.state is not State.UP_TO_DATE or self._loudness.verbose:
             place = f"{self._done:>{len(str(self._total))}}/{self._total}"
-            say(f"{place} {one_line(_line(outcome))}", quiet=self._loudness.quiet)
+            say(f"{place} {_line(outcome)}", quiet=self._loudness.quiet)
 
     def noted(self, text: str) -> None:
         """One line."""
-        say(f"camtool: {one_line(text)}", quiet=self._loudness.quiet)
+        say(f"camtool: {text}", quiet=self._loudness.quiet)
 
 
 class Bar:
@@ -143,9 +141,9 @@ _PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False}
 
 def said_of(outcome: Outcome, loudness: Loudness) -> list[str]:
     """The lines for one drawing: its error always, its findings unless quiet."""
-    lines = [] if outcome.error is None else [f"camtool: error: {one_line(outcome.error)}"]
+    lines = [] if outcome.error is None else [f"camtool: error: {outcome.error}"]
     if loudness.verbose:
-        lines += [f"camtool: {one_line(remark)}" for remark in outcome.remarks]
+        lines += [f"camtool: {remark}" for remark in outcome.remarks]
     return lines
 
 
@@ -189,8 +187,7 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> by
         **{state.name.lower(): counts[state] for state in State},
         "drawings": rows,
     }
-    text = json.dumps(whole, indent=2, ensure_ascii=False)
-    return f"{text}\n".encode("utf-8", "backslashreplace")
+    return to_json(whole).encode()
 
 
 def _line(outcome: Outcome) -> str:
@@ -212,9 +209,9 @@ def _lines(failed: Sequence[Outcome]) -> None:
         return
     listed = failed[:LISTED]
     width = max(len(one_line(each.source)) for each in listed)
-    click.echo(f"{'failed':<{width}} | why", err=True)
+    say(f"{'failed':<{width}} | why", quiet=False)
     for each in listed:
-        click.echo(f"{one_line(each.source):<{width}} | {_why(each)}", err=True)
+        say(f"{one_line(each.source):<{width}} | {_why(each)}", quiet=False)
     _say_more(len(failed))
 
 
@@ -252,7 +249,7 @@ def _common(outcomes: Sequence[Outcome]) -> str:
 
 def _say_more(rows: int) -> None:
     if rows > LISTED:
-        click.echo(f"… and {rows - LISTED} more; --json FILE names all", err=True)
+        say(f"… and {rows - LISTED} more; --json FILE names all", quiet=False)
 
 
 def _why(outcome: Outcome) -> str:

@@ -14,7 +14,7 @@ from camtool.cli.drawing import DrawingFlags
 from camtool.cli.jobflags import JobFlags
 from camtool.cli.pictureflags import PictureFlags
 from camtool.cli.seal import sealed
-from camtool.cli.talk import one_line
+from camtool.plain import one_line
 
 if TYPE_CHECKING:
     from camtool.findings import Finding

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +40,8 @@ def calibrate(
     from camtool.calibration.measurements import read_measurements
     from camtool.calibration.report import outliers, to_data, to_text
     from camtool.cli.options import MachineFlags
-    from camtool.cli.talk import one_line, say
+    from camtool.cli.talk import say, show_text
+    from camtool.plain import one_line, to_json
 
     check_places([measurements, machine], [output, report])
     said = read_measurements(Path(measurements))
@@ -53,12 +53,11 @@ def calibrate(
         own = _own_table(machine, str(flags.name()))
         files[output] = machine_file(found, said, known, own).encode()
     if report is not None:
-        data = json.dumps(to_data(found, known), indent=2, ensure_ascii=False)
-        files[report] = f"{data}\n".encode()
+        files[report] = to_json(to_data(found, known)).encode()
     write_all(files)
     if STDOUT not in files and not quiet:
         for line in to_text(found, known).splitlines():
-            click.echo(one_line(line))
+            show_text(one_line(line))
     for line in outliers(found):
         say(f"camtool: warning: outlier: {one_line(line)}", quiet=quiet)
     if output is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +13,11 @@ from camtool.cli.options import talk_options
 from camtool.cli.output import STDOUT, check_places, write_all
 from camtool.cli.pictureflags import DRAWING, PictureFlags, picture_options
 from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say, say_findings, say_first_run
+from camtool.cli.talk import say_error, say_findings, say_first_run
 from camtool.cli.terminal import DRAWING_MARKS, show_facts
 from camtool.cli.types import picture as picture_name
 from camtool.errors import CamtoolError
+from camtool.plain import to_json
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -75,7 +75,7 @@ def _tried(source: str, drawing: DrawingFlags, asked: Asked) -> int:
     try:
         return _checked(source, drawing, asked)
     except CamtoolError as error:
-        say(f"camtool: error: {error}", quiet=False)
+        say_error(error)
         return error.exit_code
 
 
@@ -89,8 +89,7 @@ def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
     facts = _facts(read)
     files: dict[str, bytes] = {}
     if asked.report is not None:
-        text = json.dumps(facts, indent=2, ensure_ascii=False) + "\n"
-        files[asked.report] = text.encode()
+        files[asked.report] = to_json(facts).encode()
     if asked.preview is not None:
         from camtool.pipeline import picture
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from camtool.cli.talk import one_line
+from camtool.plain import one_line
 
 SHOWN = 10
 """So many rows of a list are shown, unless asked for all."""

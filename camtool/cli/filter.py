@@ -19,6 +19,7 @@ from camtool.cli.output import STDOUT
 from camtool.cli.pictureflags import PictureFlags
 from camtool.cli.posting import posting_options
 from camtool.cli.sections import SectionedCommand
+from camtool.cli.talk import say
 
 if TYPE_CHECKING:
     from camtool.cli.posting import Posting
@@ -66,4 +67,4 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
 
 def _progress(percent: int) -> None:
     """Moves LinuxCNC's progress bar: a line of its own, at once."""
-    click.echo(f"FILTER_PROGRESS={percent}", err=True)
+    say(f"FILTER_PROGRESS={percent}", quiet=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -81,11 +80,12 @@ def check(
     """Check the job FILE, and say what each operation does; with --against, to which paths, on
     which side of them, and why."""
     from camtool.cli.output import STDOUT, check_places, write_all
-    from camtool.cli.talk import one_line, say_findings
+    from camtool.cli.talk import say_findings, show_text
     from camtool.jobs.described import described
+    from camtool.plain import one_line, to_json
 
-    inputs = [file, against, *machine.files()]
-    check_places(inputs, [report])
+    reads = [*JobFlags(file, (), {}).files(), against, *machine.files()]
+    check_places(reads, [report])
     said = JobFlags(file, (), {}).job(drawing)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(against, target, said) if against is not None else None
@@ -99,10 +99,10 @@ def check(
             }
             for each in findings
         ]
-        write_all({report: (json.dumps(facts, indent=2, ensure_ascii=False) + "\n").encode()})
+        write_all({report: to_json(facts).encode()})
     if not quiet and report != STDOUT:
         for line in _summary(facts):
-            click.echo(one_line(line))
+            show_text(one_line(line))
     say_findings(findings, quiet=quiet, verbose=verbose)
 
 

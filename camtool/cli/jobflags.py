@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from camtool.cli.sections import option
 from camtool.errors import OptionError
 from camtool.jobs.given import Given, Key, Table
 from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, TOOL_NAME, WHOLE
+from camtool.machine.loader import parsed_table
 
 if TYPE_CHECKING:
     from camtool.planning.job import Job
@@ -65,7 +65,7 @@ class JobFlags:
         if self.file is None or "tool_table" in self.given:
             return self.given.get("tool_table")
         try:
-            name = tomllib.loads(Path(self.file).read_text(encoding="utf-8")).get("tool_table")
+            name = parsed_table(Path(self.file).read_text(encoding="utf-8")).get("tool_table")
         except (OSError, ValueError):
             return None
         return str(Path(self.file).parent / name) if isinstance(name, str) else None

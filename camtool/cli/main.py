@@ -1,17 +1,22 @@
 """The command `camtool`: the group, and the one place where errors become exit codes.
 
-0 fine · 1 the job has findings of severity error · 2 wrong use or bad input · 3 a fault of ours.
+0 fine · 1 the job has findings of severity error · 2 wrong use or bad input · 3 a fault of ours ·
+130 interrupted · 141 the reader of stdout is gone.
 """
 
 from __future__ import annotations
 
+import _thread
 import atexit
+import errno
 import gc
+import io
 import os
 import signal
 import sys
 import traceback
-from typing import NoReturn
+from contextlib import suppress
+from typing import NoReturn, TextIO
 
 import click
 
@@ -28,14 +33,19 @@ from camtool.cli.post import post
 from camtool.cli.preview import preview
 from camtool.cli.shells import take_over
 from camtool.cli.stale import stale
-from camtool.cli.talk import say_error
+from camtool.cli.talk import say, say_error
 from camtool.cli.targets import targets
 from camtool.cli.verify import verify
-from camtool.errors import CamtoolError
+from camtool.errors import CamtoolError, OutputError
 
 EXIT_BAD_INPUT = 2
 EXIT_FAULT = 3
 EXIT_INTERRUPTED = 128 + signal.SIGINT
+EXIT_PIPE = 128 + 13
+"""What a shell makes of SIGPIPE, of which other tools die; not all systems know the signal."""
+
+_FULL = (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG)
+"""Why a stream, which has no file's name in its errors, takes nothing."""
 
 GARBAGE_AFTER = 50_000
 """So many more objects made than freed before Python looks for rings of garbage among them; its
@@ -74,40 +84,105 @@ cli.add_command(completion)
 
 def main() -> NoReturn:
     """Run the command line; never returns. One line on stderr for every error."""
+    _keep_streams()
     _seldom_collected()
-    debug = "--debug" in sys.argv[1:]
+    sys.unraisablehook = _once_more
     if VARIABLE in os.environ:
         values_told(cli)
         take_over()
+    code = _code(debug="--debug" in sys.argv[1:])
+    # All is done: an interruption now would only print a traceback of Python's own end.
+    with suppress(ValueError):  # not in the main thread
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _let_go(sys.stdout)
+    _let_go(sys.stderr)
+    sys.exit(code)
+
+
+def _code(*, debug: bool) -> int:
+    """What the command line gives: its exit code."""
     try:
-        code = cli.main(prog_name="camtool", standalone_mode=False)
-        sys.exit(code if isinstance(code, int) else 0)
-    except click.exceptions.Exit as stop:
-        sys.exit(stop.exit_code)
+        return _run()
     except click.ClickException as error:
-        error.show()
-        sys.exit(EXIT_BAD_INPUT)
+        said = io.StringIO()
+        error.show(said)
+        for line in said.getvalue().splitlines():
+            say(line, quiet=False)
+        return EXIT_BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
-        click.echo("camtool: interrupted; nothing was written", err=True)
-        sys.exit(EXIT_INTERRUPTED)
+        say("camtool: interrupted; what is written is whole", quiet=False)
+        return EXIT_INTERRUPTED
     except CamtoolError as error:
-        if debug:
-            traceback.print_exc()
+        _trace(debug)
         say_error(error)
-        sys.exit(error.exit_code)
-    except BrokenPipeError:
-        # The reader of our stdout went away; say nothing when Python flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+        return error.exit_code
+    except BrokenPipeError:  # the reader of our stdout has seen enough: as other tools, no word
+        return EXIT_PIPE
     except Exception as error:
-        if debug:
-            traceback.print_exc()
-        click.echo(
+        _trace(debug)
+        say(
             f"camtool: fault in camtool itself ({type(error).__name__}: {error}); "
             "please report it with the output of the same command with --debug",
-            err=True,
+            quiet=False,
         )
-        sys.exit(EXIT_FAULT)
+        return EXIT_FAULT
+
+
+def _run() -> int:
+    """The command, and all that it says on stdout taken."""
+    try:
+        try:
+            code = cli.main(prog_name="camtool", standalone_mode=False)
+        except click.exceptions.Exit as stop:
+            code = stop.exit_code
+        except SystemExit:
+            if VARIABLE in os.environ:  # the shell has its answer
+                raise
+            return EXIT_PIPE  # what click makes of EPIPE
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        if error.filename is None and error.errno in _FULL:
+            raise OutputError(f"cannot be written ({error.strerror})", file="<stdout>") from error
+        raise
+    return code if isinstance(code, int) else 0
+
+
+def _trace(debug: bool) -> None:
+    if debug:
+        for line in traceback.format_exc().splitlines():
+            say(line, quiet=False)
+
+
+def _keep_streams() -> None:
+    """Take the numbers of streams that were closed, so that no file that is opened gets one and is
+    written to by whoever means the stream; Python itself says None for such a stream. Let what the
+    terminal's encoding lacks be shown as an escape."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the least number that is free: this one
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _let_go(stream: TextIO | None) -> None:
+    """What a stream does not take is lost: Python shall not try again at its end."""
+    if stream is None:
+        return
+    try:
+        stream.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _once_more(lost: sys.UnraisableHookArgs) -> None:
+    """Ctrl-C that comes where Python can raise nothing (in the end of an object) comes again."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        _thread.interrupt_main()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _seldom_collected() -> None:

@@ -155,6 +155,8 @@ def _is_stream(name: str) -> bool:
 
 def _write_stream(name: str, data: bytes) -> None:
     """The data written and taken; BrokenPipeError where the reader of stdout is gone."""
+    if name == STDOUT and sys.stdout is None:
+        raise OutputError("is closed", file="<stdout>", mend="give a file name")
     try:
         if name == STDOUT:
             sys.stdout.flush()

@@ -147,9 +147,9 @@ def _from(page_name: str, picture_name: str) -> str:
 
 
 def _page(subject: Subject, pictures: tuple[tuple[str, str], ...]) -> Page:
+    from camtool.plain import one_line
     from camtool.verify.page import Page
     from camtool.verify.report import reported
-    from camtool.verify.wording import one_line
 
     findings = reported(subject.findings)
     return Page(one_line(subject.title), subject.report, findings, _setup(subject), pictures)

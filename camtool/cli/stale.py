@@ -13,7 +13,7 @@ import click
 from camtool.cli.options import talk_options
 from camtool.cli.posting import JOB_ENDING, posting_options
 from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import one_line, say
+from camtool.cli.talk import say
 from camtool.errors import CamtoolError, InputError
 from camtool.findings import Severity
 
@@ -58,7 +58,7 @@ def stale(
     worst = 0
     for name, drawings in found.items():
         if not missing and not _has_program(name):
-            say(f"camtool: {one_line(str(name))}: has no program", quiet=not verbose)
+            say(f"camtool: {name}: has no program", quiet=not verbose)
             continue
         faults: list[Fault] = []
         for drawing in drawings:
@@ -68,7 +68,7 @@ def stale(
             if fault is None:  # of several drawings of one name the program is of one
                 break
         else:
-            say(one_line(f"camtool: error: {faults[0].words}"), quiet=False)
+            say(f"camtool: error: {faults[0].words}", quiet=False)
             worst = max(worst, faults[0].code)
     return worst
 

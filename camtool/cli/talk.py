@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import click
+
+from camtool.plain import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,17 +25,32 @@ COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 
 def say(text: str, *, quiet: bool) -> None:
-    """One message, unless quiet."""
+    """One message, unless quiet: one line that can be seen, whatever names it holds."""
     if not quiet:
-        click.echo(tinted(text), err=True)
+        _tell(tinted(one_line(text)))
 
 
-def in_colour(stream: TextIO) -> bool:
+def show_text(text: str, *, err: bool = False) -> None:
+    """Lines for people on stdout, styled or not, whose names `one_line` has gone through."""
+    if err:
+        _tell(text)
+    else:
+        click.echo(text)
+
+
+def _tell(text: str) -> None:
+    """Text on stderr; where that is full nobody can be told so."""
+    with suppress(OSError):
+        click.echo(text, err=True)
+
+
+def in_colour(stream: TextIO | None) -> bool:
     """Whether a stream is a terminal of somebody who has said neither NO_COLOR (no-color.org)
-    nor CLICOLOR=0 (bixense.com/clicolors)."""
+    nor CLICOLOR=0 (bixense.com/clicolors); one that was closed is None."""
     said = os.environ.get
     return (
-        stream.isatty()
+        stream is not None
+        and stream.isatty()
         and not said("NO_COLOR")
         and said("CLICOLOR") != "0"
         and said("TERM") != "dumb"
@@ -41,10 +59,10 @@ def in_colour(stream: TextIO) -> bool:
 
 def say_error(error: CamtoolError) -> None:
     """One line for what went wrong; how to mend it stands out on a terminal."""
-    text, mend = str(error), " ".join(error.mend.split())
+    text, mend = one_line(f"camtool: error: {error}"), one_line(" ".join(error.mend.split()))
     if mend and text.endswith(mend) and in_colour(sys.stderr):
         text = text.removesuffix(mend) + click.style(mend, bold=True)
-    say(f"camtool: error: {text}", quiet=False)
+    _tell(tinted(text))
 
 
 def tinted(text: str) -> str:
@@ -66,12 +84,7 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
     least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
     for finding in findings:
         if finding.severity >= least:
-            click.echo(tinted(f"camtool: {one_line(str(finding))}"), err=True)
-
-
-def one_line(text: str) -> str:
-    """Text as one line of printable characters, whatever a drawing's layer names hold."""
-    return "".join(char if char.isprintable() else " " for char in text)
+            say(f"camtool: {finding}", quiet=False)
 
 
 def say_first_run(*, quiet: bool, judging: bool = False) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Iterator
@@ -12,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.options import talk_options
-from camtool.cli.talk import in_colour, say
+from camtool.cli.output import STDOUT, check_new, check_places, write_all
+from camtool.cli.talk import in_colour, say, show_text
+from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -81,7 +82,6 @@ def show(
 @talk_options
 def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool) -> None:
     """Write a machine file for NAME that extends TARGET, with every value as a comment."""
-    from camtool.cli.output import STDOUT, check_new, check_places, write_all
     from camtool.machine.registry import list_target
     from camtool.machine.template import machine_template
 
@@ -110,7 +110,7 @@ def _list(as_json: bool) -> None:
         row = {"name": name, "title": target.title, "extension": target.extension}
         rows.append({**row, "needs": list(listed.needs)})
     if as_json:
-        click.echo(json.dumps({"targets": rows}, indent=2, ensure_ascii=False))
+        write_all({STDOUT: to_json({"targets": rows}).encode()})
         return
     if in_colour(sys.stdout):
         _table(rows)
@@ -118,7 +118,9 @@ def _list(as_json: bool) -> None:
     width = max((len(row["name"]) for row in rows), default=0)
     for row in rows:
         needs = f" (needs --machine FILE: {', '.join(row['needs'])})" if row["needs"] else ""
-        click.echo(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}{needs}")
+        show_text(
+            one_line(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}{needs}")
+        )
 
 
 def _table(rows: list[dict[str, Any]]) -> None:
@@ -132,7 +134,7 @@ def _table(rows: list[dict[str, Any]]) -> None:
         table.add_column(heading)
     for row in rows:
         # Titles and keys come from files: they are text, no markup.
-        name, rest = Text(row["name"], style="bold"), (row["extension"], row["title"])
+        name, rest = Text(row["name"], style="bold"), (row["extension"], one_line(row["title"]))
         table.add_row(name, *map(Text, (*rest, ", ".join(row["needs"]))))
     Console().print(table)
 
@@ -147,20 +149,20 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     loaded = load_target(name, machine_file=Path(machine) if machine else None, settings=settings)
     values: dict[str, Any] = msgspec.to_builtins(loaded.machine)
     if as_json:
-        click.echo(json.dumps(values, indent=2, ensure_ascii=False))
+        write_all({STDOUT: to_json(values).encode()})
         return
     for key, value in _flat("", values):
-        click.echo(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+        show_text(f"{key} = {to_json(value, indent=0)}".rstrip("\n"))
     for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
         if cells is not None:
-            click.echo("\n" + "\n".join(_play_table(name, cells, loaded.machine)), err=True)
-    click.echo(
+            show_text("\n" + "\n".join(_play_table(name, cells, loaded.machine)), err=True)
+    show_text(
         f"\nhighest feed {_speed(loaded.machine.max_feed_mm_min)}, "
         f"rapids {_speed(loaded.machine.rapid_mm_min)}; "
         "every number's source is in the target's own file:",
         err=True,
     )
-    click.echo(f"{loaded.file}", err=True)
+    say(f"{loaded.file}", quiet=False)
 
 
 def _play_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.talk import COLOURS, in_colour
+from camtool.cli.talk import COLOURS, in_colour, show_text
 
 if TYPE_CHECKING:
     from camtool.findings import Finding
@@ -47,20 +47,20 @@ def show_facts(plain: str, name_width: int, marks: Marks, *, err: bool = False) 
     """Lines of a name and a value; the names are `name_width` wide."""
     if in_colour(sys.stderr if err else sys.stdout):
         columns = shutil.get_terminal_size().columns
-        lines = plain.splitlines()
+        lines = plain.split("\n")
         plain = "\n".join(_line(line, name_width, marks, columns) for line in lines)
-    click.echo(plain, err=err)
+    show_text(plain, err=err)
 
 
 def show_compared(plain: str, rows: Sequence[ContrastRow]) -> None:
     """The table of `--compare`: the way with the least error in green, endless ones in red."""
     if in_colour(sys.stdout):
-        head, *lines = plain.splitlines()
+        head, *lines = plain.split("\n")
         ends = [row.total_max_um for row in rows if not row.endless]
         least = min((error for error in ends if error is not None), default=None)
         shown = [_way(line, row, least) for line, row in zip(lines, rows, strict=True)]
         plain = "\n".join([click.style(head, bold=True), *shown])
-    click.echo(plain)
+    show_text(plain)
 
 
 def report_marks(findings: Iterable[Finding]) -> dict[str, str]:

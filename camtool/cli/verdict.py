@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from camtool.cli.output import STDOUT, write_all
 from camtool.cli.programs import read_bytes, shown
 from camtool.cli.report import Subject, flags_given, report_files
-from camtool.cli.talk import say, say_findings
+from camtool.cli.talk import say, say_findings, show_text
 from camtool.cli.terminal import REPORT_NAMES, report_marks, show_compared, show_facts
 
 if TYPE_CHECKING:
@@ -122,7 +120,7 @@ def judged(file: str, case: Case, wishes: Wishes) -> int:
     if STDOUT not in (wishes.report, wishes.page) and not wishes.quiet:
         show_facts(report.to_text(findings=False), REPORT_NAMES, report_marks(findings))
         if case.judging.worst:
-            click.echo(report.worst_text())
+            show_text(report.worst_text())
     say_findings(findings, quiet=wishes.quiet, verbose=wishes.verbose)
     if worst(findings) < Severity.ERROR:
         return 0

@@ -68,7 +68,10 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
 def _standard_input() -> bytes:
     if sys.stdin is None:
         raise DrawingError("there is no standard input", file=STDIN, mend="name a file")
-    return _bounded(sys.stdin.buffer, STDIN)
+    try:
+        return _bounded(sys.stdin.buffer, STDIN)
+    except OSError as error:
+        raise DrawingError(f"cannot be read ({error.strerror})", file=STDIN) from error
 
 
 def file_bytes(path: Path) -> bytes:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -25,6 +25,9 @@ from camtool.errors import MachineError
 from camtool.machine.controllers import Controller, SlideStart
 from camtool.machine.model import Machine, Target
 from camtool.patterns import guess
+
+DEEPEST = 50
+"""Tables and lists within each other; those of machines and jobs are five deep at most."""
 
 NEEDS = "needs"
 """Key at the top of a target's file: the keys that only the user's machine file can give."""
@@ -39,15 +42,39 @@ _T = TypeVar("_T")
 def read_table(path: Path) -> Table:
     """A TOML file as nested dicts; MachineError with line and column when it is none."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
+        data = path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
+        reason = getattr(error, "strerror", None) or error
         raise MachineError(
-            f"cannot be read ({error.strerror})", file=str(path), mend="check the path"
+            f"cannot be read ({reason})", file=str(path), mend="check the path"
         ) from error
+    try:
+        return parsed_table(data.decode())
     except UnicodeDecodeError as error:
         raise MachineError("is not UTF-8 text", file=str(path)) from error
     except ValueError as error:  # TOMLDecodeError, or a whole number of too many digits
         raise MachineError(f"is no TOML: {error}", file=str(path)) from error
+
+
+def parsed_table(text: str) -> Table:
+    """TOML text as nested dicts; TOMLDecodeError for what is none or nested deeper than DEEPEST,
+    ValueError for a whole number of too many digits."""
+    try:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise tomllib.TOMLDecodeError("it is nested too deeply") from None
+    level: list[Any] = [table]
+    for _ in range(DEEPEST):
+        level = [each for value in level for each in _within(value)]
+        if not level:
+            return table
+    raise tomllib.TOMLDecodeError(f"it is nested more than {DEEPEST} deep")
+
+
+def _within(value: Any) -> Iterable[Any]:
+    if isinstance(value, dict):
+        return value.values()
+    return value if isinstance(value, list) else ()
 
 
 def build_machine(
@@ -264,12 +291,16 @@ def _setting(text: str) -> Table:
     """`axes.x.backlash_mm=0.2` as nested tables; a value that is no TOML value is a string."""
     key, equals, value = text.partition("=")
     keys = key.strip().split(".")
-    if not equals or not all(re.fullmatch(r"[A-Za-z0-9_-]+", part) for part in keys):
+    if (
+        not equals
+        or len(keys) > DEEPEST
+        or not all(re.fullmatch(r"[A-Za-z0-9_-]+", part) for part in keys)
+    ):
         raise MachineError(
             f"{text!r} is no setting", where="--set", mend="write --set axes.x.backlash_mm=0.2"
         )
     try:
-        parsed: Any = tomllib.loads(f"v = {value.strip()}")["v"]
+        parsed: Any = parsed_table(f"v = {value.strip()}")["v"]
     except tomllib.TOMLDecodeError:
         parsed = value.strip()
     except ValueError as error:  # a whole number of too many digits

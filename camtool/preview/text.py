@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import accumulate
 
 from camtool.geometry.strokes import BASELINE, BOX, CAP_UNITS, Glyph, glyph
 from camtool.preview.colours import INK
@@ -41,9 +42,10 @@ def shortened(text: str, cap: float, limit: float) -> str:
     text = one_line(text)
     if width(text, cap) <= limit:
         return text
-    while text and width(text + "…", cap) > limit:
-        text = text[:-1]
-    return text.rstrip() + "…"
+    # Names of many thousand letters come too: each letter is looked at once.
+    advances = accumulate((_drawn(letter).advance for letter in text), initial=_drawn("…").advance)
+    kept = sum(advance * cap / CAP_UNITS <= limit for advance in advances)
+    return text[: max(kept - 1, 0)].rstrip() + "…"
 
 
 def wrapped(text: str, cap: float, limit: float) -> list[str]:

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from camtool.machine.model import Machine
+from camtool.plain import to_json as json_text
 from camtool.simulation.motion import Chunk, Floats
 from camtool.verify.cuts import Bools
 from camtool.verify.report import Report
@@ -87,7 +88,7 @@ def table(rows: Sequence[ContrastRow]) -> str:
 
 def to_json(rows: Sequence[ContrastRow]) -> str:
     """The rows as indented JSON with a newline at its end."""
-    return msgspec.json.format(msgspec.json.encode(list(rows)), indent=2).decode() + "\n"
+    return json_text(list(rows))
 
 
 def worst_place(variants: Sequence[Variant]) -> tuple[float, float]:

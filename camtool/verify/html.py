@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
 
+from camtool.plain import one_line
 from camtool.verify.page import setup_rows, shortened
 from camtool.verify.sheets import sheets
-from camtool.verify.wording import facts, one_line
+from camtool.verify.wording import facts
 
 if TYPE_CHECKING:
     from camtool.verify.page import Page

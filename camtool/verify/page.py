@@ -83,6 +83,7 @@ def to_json(page: Page) -> str:
     Where nothing could be judged, `findings` are all that follows."""
     import msgspec
 
+    from camtool.plain import to_json as json_text
     from camtool.verify.records import FindingReport
 
     body: dict[str, Any] = {"title": page.title, "verdict": page.verdict}
@@ -90,4 +91,4 @@ def to_json(page: Page) -> str:
     if page.report is not None:
         body |= msgspec.to_builtins(page.report)
     body["findings"] = msgspec.to_builtins(page.findings, builtin_types=(FindingReport,))
-    return msgspec.json.format(msgspec.json.encode(body), indent=2).decode() + "\n"
+    return json_text(body)

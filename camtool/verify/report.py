@@ -13,6 +13,7 @@ from collections.abc import Iterable
 import msgspec
 
 from camtool.findings import Finding
+from camtool.plain import to_json
 from camtool.verify import records as record
 from camtool.verify.records import Before, FindingReport, Planned
 
@@ -56,7 +57,7 @@ class Report(msgspec.Struct, frozen=True):
 
     def to_json(self) -> str:
         """Indented JSON with keys in the order of the record, and a newline at the end."""
-        return msgspec.json.format(msgspec.json.encode(self), indent=2).decode() + "\n"
+        return to_json(self)
 
     def to_text(self, *, findings: bool = True) -> str:
         """A summary of a few lines for a terminal; `findings=False` leaves these out."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from camtool.plain import one_line
+
 if TYPE_CHECKING:
     from camtool.verify.records import AskedReport, PlannedOperation, ShapeReport
     from camtool.verify.report import Report
@@ -29,7 +31,7 @@ def clock(seconds: float) -> str:
 
 def text(report: Report, *, findings: bool) -> str:
     """The summary that `camtool post` and `camtool verify` print, without a final newline."""
-    lines = [f"{name:<10} {value}" for name, value in facts(report)]
+    lines = [one_line(f"{name:<10} {value}") for name, value in facts(report)]
     if findings:
         lines += [_finding_line(report, index) for index in range(len(report.findings))]
     return "\n".join(lines)
@@ -184,7 +186,7 @@ def _error_sources(report: Report) -> str:
 def _finding_line(report: Report, index: int) -> str:
     item = report.findings[index]
     place = f" [{item.where}]" if item.where else ""
-    return " ".join(f"{item.severity} {item.code}{place}: {item.message}".split())
+    return one_line(f"{item.severity} {item.code}{place}: {item.message}")
 
 
 def _cutting_reversals(report: Report) -> int:
@@ -204,8 +206,3 @@ def mm(value: float) -> str:
 def percent(value: float | None) -> str:
     """Per cent with its sign, a dash for what is not known."""
     return "–" if value is None else f"{value:+.2f} %".replace("-", "−")
-
-
-def one_line(words: str) -> str:
-    """One line of printable characters, whatever a drawing's names hold."""
-    return "".join(sign if sign.isprintable() else " " for sign in " ".join(words.split()))

@@ -1,6 +1,7 @@
 """Running the command line as a user does: arguments in, exit code and output out."""
 
 import io
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -37,8 +38,13 @@ def camtool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
             patch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin), encoding="utf-8"))
             patch.setattr(sys, "stdout", io.TextIOWrapper(out, encoding="utf-8"))
             patch.setattr(sys, "stderr", io.TextIOWrapper(err, encoding="utf-8"))
-            with pytest.raises(SystemExit) as stopped:
-                main()
+            patch.setattr(sys, "unraisablehook", sys.unraisablehook)
+            handler = signal.getsignal(signal.SIGINT)
+            try:
+                with pytest.raises(SystemExit) as stopped:
+                    main()
+            finally:
+                signal.signal(signal.SIGINT, handler)
             sys.stdout.flush()
             sys.stderr.flush()
             code = stopped.value.code

@@ -211,7 +211,7 @@ def test_sly_names_are_words_in_markdown() -> None:
 
 
 def test_a_row_stays_one_row() -> None:
-    assert plain("a|b\nc") == "a\\|b c"
+    assert plain("a|b\nc") == "a\\|b\\\\nc"
     rows = [line for line in markdown(sly_page()).splitlines() if line.startswith("| machine | ")]
     (row,) = rows
     assert len(re.findall(r"(?<!\\)\|", row)) == 3

@@ -150,7 +150,7 @@ def test_markdown_takes_names_from_drawings_as_words() -> None:
     assert len(report.findings) == 1
     lines = report.to_markdown().splitlines()
     (line,) = [line for line in lines if "UNITLESS" in line]
-    assert line == "- warning `UNITLESS` (\\[x\\](y)): a\\|b \\<script\\> \\`c\\` \\# d"
+    assert line == "- warning `UNITLESS` (\\[x\\](y)): a\\|b \\<script\\> \\`c\\`\\\\n\\# d"
     assert "\n" not in msgspec.structs.replace(report, source="a\nb").to_text().splitlines()[0]
 
 
