@@ -27,7 +27,7 @@ def files_below(folder: Path, apart: Path | None = None) -> Iterator[Path]:
     for entry in _entries(folder):
         if entry.name.startswith("."):
             continue
-        if entry.is_dir():
+        if _is_dir(entry):
             if not entry.is_symlink():
                 folders.append(entry)
         elif _is_file(entry):
@@ -44,7 +44,7 @@ def files_matching(base: Path, parts: Sequence[str], apart: Path | None = None) 
         yield from files_matching(base, rest or ("*",), apart)
         for entry in _entries(base):
             hidden = entry.name.startswith(".") or entry.is_symlink()
-            if entry.is_dir() and not (hidden or (apart is not None and _same(entry, apart))):
+            if _is_dir(entry) and not (hidden or (apart is not None and _same(entry, apart))):
                 yield from files_matching(Path(entry.path), parts, apart)
     elif not glob.has_magic(head):
         place = base / head
@@ -58,9 +58,9 @@ def files_matching(base: Path, parts: Sequence[str], apart: Path | None = None) 
                 continue
             if entry.name.startswith(".") and not head.startswith("."):
                 continue
-            if rest and entry.is_dir():
+            if rest and _is_dir(entry):
                 yield from files_matching(Path(entry.path), rest, apart)
-            elif not rest and not entry.is_dir() and _is_file(entry):
+            elif not rest and not _is_dir(entry) and _is_file(entry):
                 yield Path(entry.path)
 
 
@@ -76,9 +76,19 @@ def _entries(folder: Path) -> list[os.DirEntry[str]]:
         ) from error
 
 
+def _is_dir(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # a link that nobody can follow
+        return False
+
+
 def _is_file(entry: os.DirEntry[str]) -> bool:
     """A file, or a link to nothing (an error by its name later); no pipe and no device."""
-    return entry.is_file() or (entry.is_symlink() and not Path(entry.path).exists())
+    try:
+        return entry.is_file() or (entry.is_symlink() and not Path(entry.path).exists())
+    except OSError:
+        return True
 
 
 def _same(entry: os.DirEntry[str], folder: Path) -> bool:

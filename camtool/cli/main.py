@@ -36,7 +36,7 @@ from camtool.cli.stale import stale
 from camtool.cli.talk import say, say_error
 from camtool.cli.targets import targets
 from camtool.cli.verify import verify
-from camtool.errors import CamtoolError, OutputError
+from camtool.errors import CamtoolError, InputError, OutputError
 
 EXIT_BAD_INPUT = 2
 EXIT_FAULT = 3
@@ -144,7 +144,11 @@ def _run() -> int:
     except OSError as error:
         if error.filename is None and error.errno in _FULL:
             raise OutputError(f"cannot be written ({error.strerror})", file="<stdout>") from error
-        raise
+        if error.filename is None or isinstance(error, CamtoolError):
+            raise
+        # A name that the system does not take, wherever it was asked: too long, a loop of links.
+        name = os.fsdecode(error.filename)
+        raise InputError(f"cannot be used ({error.strerror})", file=name) from error
     return code if isinstance(code, int) else 0
 
 

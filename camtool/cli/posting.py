@@ -113,6 +113,8 @@ class Posting:
 
         Its own job takes the place of `--job`; flags are laid over either.
         """
+        if not Path(source).name:  # the folder ., which is an error later
+            return self
         own = Path(source).with_suffix(JOB_ENDING)
         if not own.is_file():
             return self
