@@ -70,6 +70,11 @@ def read_measurements(path: Path) -> Measurements:
             file=file,
             mend="`camtool coupon lines --measurements FILE` writes a file to fill in",
         )
+    coupons = [(name, coupon) for name, coupon in coupons if coupon.measured]
+    if not coupons:
+        raise InputError(
+            "nothing was measured", file=file, mend="fill in what was; 0.0 stands for what was not"
+        )
     _check_regions(head.regions, coupons, file)
     return Measurements(
         file,
@@ -114,7 +119,7 @@ def _check_regions(regions: RegionsOf, coupons: list[tuple[str, Coupon]], file: 
         there = {coupon.region for _, coupon in coupons if axis in coupon.axes}
         for name in sorted(cells.every - there):
             raise InputError(
-                f"no coupon of {axis} lies in the region {name!r}",
+                f"no coupon of {axis} was measured in the region {name!r}",
                 file=file,
                 where=f"table [regions.{axis}], key names",
                 mend="name the regions as the coupons do",

@@ -14,6 +14,8 @@ Pair = tuple[Length, Length]
 Flat = Literal["x", "y"]
 Any3 = Literal["x", "y", "z"]
 
+_ZERO_IS_A_RESULT = ("shorter_by_mm", "gap_x_mm", "gap_y_mm")
+
 MOST_TIMES = 2.0
 """A length that comes out more than so many times as long as its nominal one, or shorter than
 this part of it, is no measurement of it but a slip: a wrong unit, a lost digit."""
@@ -53,6 +55,8 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     lies in."""
 
     kind: ClassVar[str]
+    readings: ClassVar[tuple[str, ...]]
+    """The keys of what is measured on it."""
 
     source: str = ""
     region: str = ""
@@ -63,6 +67,17 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def axes(self) -> str:
         """The axes whose play it may tell."""
         return "xy"
+
+    @property
+    def measured(self) -> bool:
+        """Whether anything was: 0.0 is a reading that is still to be filled in, but where it is
+        a result like any other (`shorter_by_mm`, gaps)."""
+        for key in self.readings:
+            value = getattr(self, key)
+            readings = value if isinstance(value, tuple) else (value,)
+            if any(readings) or (value is not None and key in _ZERO_IS_A_RESULT):
+                return True
+        return False
 
     def lengths(self) -> Iterator[tuple[str, float, float]]:
         """(key, measured, nominal) of each length that must be near a nominal one, mm."""
@@ -78,6 +93,7 @@ class Lines(Coupon, frozen=True, kw_only=True):
     in +, `second_mm` the other one, or `shorter_by_mm` how much it falls short of the first."""
 
     kind = "lines"
+    readings = ("first_mm", "second_mm", "shorter_by_mm")
 
     axis: Flat
     nominal_mm: Length
@@ -99,7 +115,6 @@ class Lines(Coupon, frozen=True, kw_only=True):
         for key, value in (("second_mm", self.second_mm), ("shorter_by_mm", self.shorter_by_mm)):
             if value is not None and abs(value) > MOST_TIMES * self.nominal_mm:
                 yield key, f"is {value:g} on a line of {self.nominal_mm:g} mm", "write it in mm"
-        yield from _all_zero(self, ("first_mm", "second_mm", "shorter_by_mm"))
 
 
 class Square(Coupon, frozen=True, kw_only=True):
@@ -107,6 +122,7 @@ class Square(Coupon, frozen=True, kw_only=True):
     the lower left to the upper right corner, and from the upper left to the lower right one."""
 
     kind = "squares"
+    readings = ("dx_mm", "dy_mm", "diagonals_mm")
 
     nominal_mm: Pair
     dx_mm: Reading | None = None
@@ -122,15 +138,13 @@ class Square(Coupon, frozen=True, kw_only=True):
         for diagonal in filter(None, self.diagonals_mm or ()):
             yield "diagonals_mm", diagonal, (width**2 + height**2) ** 0.5
 
-    def faults(self) -> Iterator[tuple[str, str, str]]:
-        yield from _all_zero(self, ("dx_mm", "dy_mm", "diagonals_mm"))
-
 
 class Circle(Coupon, frozen=True, kw_only=True):
     """A whole circle, cut `direction`. `diameters_mm` are those at `angles_deg` from the X axis
     towards the Y axis, or evenly spread over half a turn from the X axis on."""
 
     kind = "circles"
+    readings = ("diameters_mm",)
 
     nominal_mm: Length
     direction: Literal["cw", "ccw"]
@@ -154,7 +168,6 @@ class Circle(Coupon, frozen=True, kw_only=True):
                 f"has {len(self.angles_deg)} angles for {len(self.diameters_mm)} diameters",
                 "give each diameter its angle, or leave it out for evenly spread ones",
             )
-        yield from _all_zero(self, ("diameters_mm",))
 
 
 class Steps(Coupon, frozen=True, kw_only=True):
@@ -163,6 +176,7 @@ class Steps(Coupon, frozen=True, kw_only=True):
     that lies `rows_apart_mm` to the + side of the first."""
 
     kind = "steps"
+    readings = ("forward_mm", "backward_mm")
 
     axis: Any3
     nominal_mm: tuple[Length, ...]
@@ -190,7 +204,6 @@ class Steps(Coupon, frozen=True, kw_only=True):
             for value in values or ():
                 if abs(value) > MOST_TIMES * max(self.nominal_mm):
                     yield key, f"{value:g} is far beyond the ruler", "write it in mm"
-        yield from _all_zero(self, ("forward_mm", "backward_mm"))
 
 
 class Closure(Coupon, frozen=True, kw_only=True):
@@ -198,6 +211,7 @@ class Closure(Coupon, frozen=True, kw_only=True):
     from its start, mm, positive towards +. `nominal_mm` is its size, against slips."""
 
     kind = "closures"
+    readings = ("gap_x_mm", "gap_y_mm")
 
     nominal_mm: Pair
     gap_x_mm: Place | None = None
@@ -208,22 +222,7 @@ class Closure(Coupon, frozen=True, kw_only=True):
         for (key, gap), size in zip(gaps, self.nominal_mm, strict=True):
             if gap is not None and abs(gap) > size:
                 yield key, f"is {gap:g} on a contour of {size:g} mm", "write it in mm"
-        if self.gap_x_mm is None and self.gap_y_mm is None:
-            yield "gap_x_mm", "nothing was measured", "fill in what was measured"
 
 
 KINDS: tuple[type[Coupon], ...] = (Lines, Square, Circle, Steps, Closure)
 """The tables of a file, in order."""
-
-
-def _all_zero(coupon: Coupon, keys: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
-    """A coupon on which nothing was measured: 0.0 is a reading that is still to be filled in,
-    but for `shorter_by_mm`, where it is a result like any other."""
-    for key in keys:
-        value = getattr(coupon, key)
-        if value is None:
-            continue
-        readings = value if isinstance(value, tuple) else (value,)
-        if any(readings) or key == "shorter_by_mm":
-            return
-    yield keys[0], "nothing was measured", "fill in what was measured, or leave the table out"

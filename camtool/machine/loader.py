@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -168,13 +168,18 @@ def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -
             message = "key is missing"
         elif message.startswith(_OUT_OF_RANGE):
             message = _outside(kind, table, keys[1:] if at else keys) or message
+        within = keys[1:] if at else keys
+        if unknown:
+            mend = _mend(kind, table, within[:-1], within[-1])
+        else:
+            mend = "" if missing else _choice(kind, table, within)
         *tables, key = keys or ["?"]
         where = (f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}"
         raise MachineError(
-            message,
+            message.replace("Invalid enum value", "Invalid value"),
             file=file,
             where=where,
-            mend=_mend(kind, table, tables, key) if unknown else "",
+            mend=mend,
         ) from None
 
 
@@ -188,11 +193,7 @@ _OUT_OF_RANGE = (
 def _outside(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
     """What is wrong with the number at `keys` ("axes", "x", "travel_mm"; "play_mm[0][1]"); ""
     where its range has not both ends."""
-    about: Any = msgspec.inspect.type_info(kind)
-    value: Any = table
-    for name in re.findall(r"[^.\[\]]+", ".".join(keys)):
-        key = int(name) if isinstance(value, list) else name
-        about, value = _part(about, value, key), value[key]
+    *_, (about, value) = _down(kind, table, keys)
     about = _fitting(about, value)
     if about.ge is None or about.le is None:
         return ""
@@ -203,14 +204,46 @@ def _outside(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
     return f"{said} is not between {' and '.join(ends)}"
 
 
+def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
+    """The words that may stand at `keys`, and the one that was meant; "" where any may."""
+    *above, (about, value) = _down(kind, table, keys)
+    words = [
+        word
+        for one in getattr(about, "types", (about,))
+        if isinstance(one, msgspec.inspect.LiteralType)
+        for word in one.values
+    ]
+    if above:  # the key that says which of several models a table is of
+        key = re.findall(r"[^.\[\]]+", ".".join(keys))[-1]
+        words += [
+            one.tag
+            for one in getattr(above[-1][0], "types", (above[-1][0],))
+            if isinstance(one, msgspec.inspect.StructType) and one.tag_field == key
+        ]
+    near = guess(value, map(str, words)) if isinstance(value, str) else ""
+    return f"{near}use one of {', '.join(map(str, words))}" if words else ""
+
+
+def _down(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator[tuple[Any, Any]]:
+    """(what is known, value) of a table, and of what lies within it on the way along `keys`."""
+    about: Any = msgspec.inspect.type_info(kind)
+    value: Any = table
+    yield about, value
+    for name in re.findall(r"[^.\[\]]+", ".".join(keys)):
+        key = int(name) if isinstance(value, list) else name
+        about, value = _part(about, value, key), value[key]
+        yield about, value
+
+
 def _part(about: Any, value: Any, key: int | str) -> Any:
     """What is known of the part `key` of a table or a list of which `about` is known."""
     about = _fitting(about, value)
     if isinstance(about, msgspec.inspect.StructType):
-        return next(field.type for field in about.fields if field.encode_name == key)
+        found = (field.type for field in about.fields if field.encode_name == key)
+        return next(found, None)  # none is the key that names the model
     if isinstance(about, msgspec.inspect.TupleType):
         return about.item_types[int(key)]
-    return about.item_type
+    return getattr(about, "item_type", None)  # nothing is known of a table of no known model
 
 
 def _fitting(about: Any, value: Any) -> Any:

@@ -27,8 +27,8 @@ CELLS = "[regions.x]\nx_mm = [0.0, 5.0, 10.0]\ny_mm = [0.0, 7.0]\n"
         ("[[line]]", "key line", "unknown key"),
         ("uncertainty_mm = -1.0\n" + LINES, "key uncertainty_mm", "not between"),
         ("uncertainty_mm = nan\n" + LINES, "key uncertainty_mm", "not finite"),
-        (LINES, "[[lines]] 1, key first_mm", "nothing was measured"),
-        (LINES + "first_mm = 0.0\nsecond_mm = 0.0\n", "[[lines]] 1, key first_mm", "nothing"),
+        (LINES, None, "nothing was measured"),
+        (LINES + "first_mm = 0.0\nsecond_mm = 0.0\n" + SQUARE, None, "nothing was measured"),
         (LINES + "first_mm = 2509.0\n", "[[lines]] 1, key first_mm", "µm"),
         (LINES + "first_mm = 0.0985\n", "[[lines]] 1, key first_mm", "inches"),
         (LINES + "first_mm = 0.25\n", "[[lines]] 1, key first_mm", "cm"),
@@ -69,7 +69,17 @@ CELLS = "[regions.x]\nx_mm = [0.0, 5.0, 10.0]\ny_mm = [0.0, 7.0]\n"
             "[[closures]] 1, key gap_y_mm",
             "write it in mm",
         ),
-        ("[[closures]]\nnominal_mm = [10.0, 5.0]\n", "key gap_x_mm", "nothing was measured"),
+        ("[[closures]]\nnominal_mm = [10.0, 5.0]\n", None, "nothing was measured"),
+        (
+            CELLS
+            + 'names = [["A", "B"]]\n'
+            + LINES
+            + 'first_mm = 2.5\nregion = "A"\n'
+            + LINES
+            + 'first_mm = 0.0\nregion = "B"\n',
+            "table [regions.x], key names",
+            "no coupon of x was measured in the region 'B'",
+        ),
         (
             CELLS + 'names = [["A"]]\n' + LINES + "first_mm = 2.5\n",
             "table [regions.x], key names",
@@ -117,3 +127,22 @@ def test_exchanged_lines_are_a_play_that_no_machine_has(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         read_measurements(tmp_path / "none.toml")
+
+
+def test_tables_of_zeros_are_coupons_that_were_not_measured(tmp_path: Path) -> None:
+    measured = LINES + "first_mm = 2.502\nsecond_mm = 2.41\n"
+    zeros = (
+        LINES + "first_mm = 0.0\nsecond_mm = 0.0\n",
+        SQUARE + "dx_mm = 0.0\ndy_mm = 0.0\ndiagonals_mm = [0.0, 0.0]\n",
+        CIRCLE + "diameters_mm = [0.0, 0.0]\n",
+        STEPS + "forward_mm = [0.0, 0.0]\nbackward_mm = [0.0, 0.0]\n",
+        "[[closures]]\nnominal_mm = [10.0, 5.0]\n",
+    )
+    machine = load_target("pic-mmh").machine
+    found = []
+    for text in (measured, measured + "".join(zeros)):
+        (tmp_path / "m.toml").write_text(text)
+        found.append(calibrate(read_measurements(tmp_path / "m.toml"), machine).estimates)
+    assert found[0] == found[1]
+    (tmp_path / "m.toml").write_text(LINES + "shorter_by_mm = 0.0\n")
+    assert len(read_measurements(tmp_path / "m.toml").coupons) == 1, "no play is a result"

@@ -12,6 +12,7 @@ from camtool.errors import MachineError
 from camtool.machine.controllers import PathController, PicMmhController
 from camtool.machine.loader import build_machine, missing_keys, read_table, target_of
 from camtool.machine.model import Machine, controller_of
+from camtool.machine.registry import load_target
 
 FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
 
@@ -218,3 +219,21 @@ def test_another_controller_model_leaves_the_options_of_the_first_behind(tmp_pat
         build_machine(table, "pic_mmh.toml", user)
     assert built("controller.arcs=dda").controller.start_direction == "+"  # nothing is lost
     assert controller_of(built("controller.model=pic-mmh"), PicMmhController).arcs == "dsm"
+
+
+@pytest.mark.parametrize(
+    ("target", "setting", "words"),
+    [
+        ("pic-mmh", "dialect.form=thesis", "use one of annex, example"),
+        ("pic-mmh", "dialect.form=3", "use one of annex, example"),
+        ("pic-mmh", "dialect.frm=annex", "did you mean form? known keys: "),
+        ("pic-mmh", "controller.model=grb", "did you mean grbl? use one of pic-mmh, path, "),
+        ("grbl", "controller.start_play=lost", "use one of "),
+    ],
+)
+def test_a_word_that_is_refused_names_those_that_are_known(
+    target: str, setting: str, words: str
+) -> None:
+    with pytest.raises(MachineError) as refused:
+        load_target(target, settings=[setting])
+    assert words in str(refused.value)
