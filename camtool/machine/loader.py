@@ -29,6 +29,9 @@ from camtool.patterns import guess
 DEEPEST = 50
 """Tables and lists within each other; those of machines and jobs are five deep at most."""
 
+_PARTS = re.compile(r"[=,{}\[\]\n]")
+"""Between these a TOML text holds one key or one value."""
+
 NEEDS = "needs"
 """Key at the top of a target's file: the keys that only the user's machine file can give."""
 
@@ -59,6 +62,9 @@ def read_table(path: Path) -> Table:
 def parsed_table(text: str) -> Table:
     """TOML text as nested dicts; TOMLDecodeError for what is none or nested deeper than DEEPEST,
     ValueError for a whole number of too many digits."""
+    # Of a key of n parts tomllib keeps all n beginnings: n²/2 parts.
+    if any(part.count(".") > DEEPEST for part in _PARTS.split(text)):
+        raise tomllib.TOMLDecodeError(f"a key has more than {DEEPEST} parts")
     try:
         table = tomllib.loads(text)
     except RecursionError:
