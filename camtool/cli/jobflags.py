@@ -14,7 +14,6 @@ from camtool.cli.sections import option
 from camtool.errors import OptionError
 from camtool.jobs.given import Given, Key, Table
 from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, TOOL_NAME, WHOLE
-from camtool.machine.loader import parsed_table
 
 if TYPE_CHECKING:
     from camtool.planning.job import Job
@@ -64,6 +63,8 @@ class JobFlags:
         where the job file cannot be read: `job` says why."""
         if self.file is None or "tool_table" in self.given:
             return self.given.get("tool_table")
+        from camtool.machine.loader import parsed_table
+
         try:
             name = parsed_table(Path(self.file).read_text(encoding="utf-8")).get("tool_table")
         except (OSError, ValueError):

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import _thread
 import atexit
 import errno
 import gc
@@ -14,6 +13,7 @@ import io
 import os
 import signal
 import sys
+import threading
 import traceback
 from contextlib import suppress
 from typing import NoReturn, TextIO
@@ -43,6 +43,9 @@ EXIT_FAULT = 3
 EXIT_INTERRUPTED = 128 + signal.SIGINT
 EXIT_PIPE = 128 + 13
 """What a shell makes of SIGPIPE, of which other tools die; not all systems know the signal."""
+
+AGAIN_S = 0.01
+"""An interruption that was lost comes again after so long."""
 
 _FULL = (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG)
 """Why a stream, which has no file's name in its errors, takes nothing."""
@@ -184,7 +187,8 @@ def _let_go(stream: TextIO | None) -> None:
 def _once_more(lost: sys.UnraisableHookArgs) -> None:
     """Ctrl-C that comes where Python can raise nothing (in the end of an object) comes again."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
-        _thread.interrupt_main()
+        # Not in here: it would be lost as well.
+        threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
     else:
         sys.__unraisablehook__(lost)
 
