@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
-    from camtool.planning.plan import Plan, Step
+    from camtool.planning.plan import Step
     from camtool.simulation.options import Effects
     from camtool.toolpath.bent import Bent
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
     from camtool.verify.asked import Asked
+    from camtool.verify.cuts import Bools
     from camtool.verify.gates import Gates
     from camtool.verify.records import Before, PlannedOperation
     from camtool.verify.verify import Verification, VerifyOptions
@@ -44,12 +45,14 @@ class Judging:
 @dataclass(frozen=True, eq=False)
 class Goal:
     """What a program is held against: the wanted toolpath, the drawing in its frame, what was
-    sent where that was bent, and what else the job asks for; None where there is none."""
+    sent where that was bent, what else the job asks for, and what it was written from; None where
+    there is none."""
 
     wanted: Toolpath | None = None
     drawing: Drawing | None = None
     sent: Bent | None = None
     asked: Asked | None = None
+    said: Toolpath | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +97,8 @@ def post_drawing(
     if worst(findings) >= Severity.ERROR:
         return Posted(wanted, None, None, None, findings)
     sent = _bent(wanted, target.machine) if compensate else None
-    program = target.post.write(wanted if sent is None else sent.toolpath, target.machine)
+    written = wanted if sent is None else sent.toolpath
+    program = target.post.write(written, target.machine)
     decoded = target.post.read(program.data, target.machine)
     # What the writer said of its blocks, the reader need not say again in other words.
     said = {finding.code for finding in program.findings}
@@ -116,7 +120,7 @@ def post_drawing(
         program.data,
         decoded,
         target,
-        Goal(goal, plan.placed, sent),
+        Goal(goal, plan.placed, sent, said=written),
         VerifyOptions(
             source=drawing.file,
             tool_diameter_mm=tool_mm(job),
@@ -159,9 +163,12 @@ def verify_program(
     if drawing is not None:
         from camtool.planning.plan import planned
 
-        plan = planned(drawing, job or Job(), target.machine, undivided=True)
-        sent = _bent(plan.toolpath, target.machine) if judging.compensated else None
-        asked = _asked(drawing, job or Job(), target, plan, sent)
+        wanted, machine = job or Job(), target.machine
+        plan = planned(drawing, wanted, machine)
+        sent = _bent(plan.toolpath, machine) if judging.compensated else None
+        asked = _asked(wanted, target, plan.toolpath, sent)
+        if sent is None and _plain(wanted) != wanted:
+            plan = planned(drawing, wanted, machine, undivided=True)
         goal = Goal(plan.toolpath, plan.placed, sent, asked)
     options = VerifyOptions(
         interpolator=judging.interpolator,
@@ -210,7 +217,7 @@ def convert_program(
     if not check:
         return Posted(wanted, program, again, None, findings)
     options = VerifyOptions(source=file)
-    judged = _judged(program.data, again, target, Goal(wanted), options)
+    judged = _judged(program.data, again, target, Goal(wanted, said=wanted), options)
     findings = _merged(findings, judged.findings)
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
@@ -312,51 +319,55 @@ def _judged(
         options=sized,
         sent=goal.sent,
         asked=goal.asked,
+        said=goal.said,
     )
 
 
-def _asked(
-    drawing: Drawing, job: Job, target: LoadedTarget, plain: Plan, sent: Bent | None
-) -> Asked | None:
+def _asked(job: Job, target: LoadedTarget, planned: Toolpath, sent: Bent | None) -> Asked | None:
     """What the job asks for, in moves as the dialect would say them; None where it asks for what
-    cannot be made, which is said already. `plain` is the plan with whole contours, `sent` that
-    bent against the mechanics."""
-    from camtool.planning.link import feeds_of, safe_z_of
-    from camtool.planning.plan import planned
+    cannot be made, which is said already. `sent` is `planned` bent against the mechanics."""
+    from camtool.planning.link import safe_z_of
     from camtool.verify.asked import Asked
 
-    machine = target.machine
-    if _plain(job) != job:
-        plan = planned(drawing, job, machine)
-        bent = None if sent is None else _bent(plan.toolpath, machine)
-    else:
-        plan, bent = plain, sent
-    if worst(plan.toolpath.findings) >= Severity.ERROR:
+    if worst(planned.findings) >= Severity.ERROR:
         return None
-    wanted = plan.toolpath if bent is None else bent.toolpath
+    machine = target.machine
+    wanted = planned if sent is None else sent.toolpath
     program = target.post.write(wanted, machine)
     unit = getattr(target.post, "unit_mm", None)
     units = [
         max(axis.coded_step_mm, axis.resolution_mm or 0.0) if unit is None else unit(machine)
         for axis in machine.axes
     ]
-    feeds: list[float] = []
-    for operation in job.operations:
-        both = feeds_of(operation, machine)
-        if operation.feed_mm_min is not None:
-            feeds += [both.cut_mm_min, both.plunge_mm_min]
-        elif operation.plunge_feed_mm_min is not None:
-            feeds.append(both.plunge_mm_min)
+    written, blocks = target.post.read(program.data, machine), len(program.row_of_block)
     return Asked(
-        written=target.post.read(program.data, machine),
+        written=written,
         wanted=wanted,
         unit_mm=max(units[:2]),
         unit_z_mm=units[2],
-        feeds_mm_min=tuple(feeds),
+        feed_said=_feed_said(job, machine, wanted, program)[written.block.clip(max=blocks)],
         feed_unit_mm_min=machine.feed.unit_mm_min,
         safe_z_mm=safe_z_of(job, machine),
         safe_z_said=job.safe_z_mm is not None,
     )
+
+
+def _feed_said(job: Job, machine: Machine, wanted: Toolpath, program: Program) -> Bools:
+    """(B + 1,) the blocks of a program whose feed the job names, or derives from what it names;
+    the last is False, for rows of no block."""
+    import numpy as np
+
+    from camtool.planning.link import feeds_of
+
+    said: list[float] = []
+    for operation in job.operations:
+        feeds = feeds_of(operation, machine)
+        if operation.feed_mm_min is not None:
+            said += [feeds.cut_mm_min, feeds.plunge_mm_min]
+        elif operation.plunge_feed_mm_min is not None:
+            said.append(feeds.plunge_mm_min)
+    row = np.append(program.row_of_block, -1)
+    return np.asarray(np.isin(wanted.feed[row], said) & (row >= 0))
 
 
 def _merged(

@@ -64,7 +64,7 @@ def rapids_through_stock(
     toolpath: Toolpath, reach: Reach, tolerance_mm: float = CLEARED_MM
 ) -> list[Through]:
     """The rapids that run through material which no earlier cut has cleared, in order."""
-    wanted = _low_rapids(toolpath)
+    wanted = low_rapids(toolpath)
     if not wanted:
         return []
     swarf = _Swarf(toolpath, reach, tolerance_mm)
@@ -78,7 +78,7 @@ def rapids_through_stock(
     return found
 
 
-def _low_rapids(toolpath: Toolpath) -> list[int]:
+def low_rapids(toolpath: Toolpath) -> list[int]:
     """Rapids below the stock top that move in XY, or straight down to where no feed has been."""
     start, end = toolpath.starts, toolpath.end
     if len(toolpath) == 0:

@@ -13,7 +13,6 @@ from camtool.toolpath.moves import Toolpath
 from camtool.verify.compare import Target
 from camtool.verify.cuts import Bools, CutMoves, cut_moves
 from camtool.verify.holes import Holes, holes_of
-from camtool.verify.loops import NO_LOOP, loops
 
 LIMIT_UNITS = 1.5
 """Moves may be so many units of the dialect apart: ends are rounded by up to 0.71 of them, and
@@ -26,15 +25,16 @@ class Asked:
 
     `written`: the moves of the program that camtool would write, as its dialect decodes them;
     `wanted`: what that was written from. `unit_mm`, `unit_z_mm`: the finest difference of places
-    that the dialect can say. `feeds_mm_min`: those that the job names; a feed is the same within
-    `feed_unit_mm_min`. `safe_z_mm`: the height of rapids, `safe_z_said` where the job names it.
+    that the dialect can say. `feed_said` (M,): the written rows whose feed the job names; a feed
+    is the same within half of `feed_unit_mm_min`. `safe_z_mm`: the height of rapids,
+    `safe_z_said` where the job names it.
     """
 
     written: Toolpath
     wanted: Toolpath
     unit_mm: float
     unit_z_mm: float
-    feeds_mm_min: tuple[float, ...]
+    feed_said: Bools
     feed_unit_mm_min: float
     safe_z_mm: float
     safe_z_said: bool
@@ -43,11 +43,6 @@ class Asked:
     def limits_mm(self) -> tuple[float, float]:
         """How far apart moves may be in XY, and in height."""
         return LIMIT_UNITS * self.unit_mm, LIMIT_UNITS * self.unit_z_mm
-
-    def says_feed(self, feed_mm_min: float) -> bool:
-        """Whether the job names this feed, which the dialect may have rounded."""
-        unit = self.feed_unit_mm_min
-        return any(abs(feed_mm_min - said) <= unit for said in self.feeds_mm_min)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +75,6 @@ class Side:
         still = (start[:, :2] == end[:, :2]).all(axis=1) & ~self.toolpath.is_arc
         deep = (end[:, 2] < start[:, 2]) & (end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
         return np.asarray(self.toolpath.is_feed & still & deep)
-
-    def round_trips(self, gap_mm: float) -> Bools:
-        """(C,) contours that come back to where they were round some area: the others (open
-        paths, to and fro) may be cut from either end."""
-        return np.asarray(loops(self.cuts, gap_mm)[:, 0] != NO_LOOP)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from camtool.verify.cuts import Bools, is_flat
 from camtool.verify.places import at_point, block_name
 
 FEED_SHARE = 0.5
-"""A feed is another one when it is off by more than this part of what the dialect can say."""
+"""A feed is another one when it is off by more than this part of the dialect's unit of feeds."""
 
 DWELL_S = 0.0005
 """A dwell that is shorter by less is as long."""
@@ -104,7 +104,7 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
     is_, wanted = both.decoded.feed[both.pairs[:, 0]], both.written.feed[both.pairs[:, 1]]
     off = np.abs(is_ - wanted) > FEED_SHARE * asked.feed_unit_mm_min
     rows, of = both.unlike(~off)
-    said = np.array([asked.says_feed(feed) for feed in both.written.feed[of].tolist()], dtype=bool)
+    said = asked.feed_said[of]
     for severity, which in ((Severity.ERROR, said), (Severity.WARNING, ~said)):
         if which.any():
             row, feed = int(rows[which][0]), float(both.written.feed[of][which][0])

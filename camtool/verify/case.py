@@ -68,7 +68,8 @@ class VerifyOptions:
 class Case:
     """What is to be judged. `sent`: what the program should say, where it is not `wanted` itself
     but bent against the mechanics. `asked`: what the job asks for besides, and how the dialect
-    would say it."""
+    would say it. `said`: what the program was written from, where that is known: its contours
+    must run the same way round."""
 
     decoded: Toolpath
     machine: Machine
@@ -77,6 +78,7 @@ class Case:
     options: VerifyOptions
     sent: Bent | None = None
     asked: Asked | None = None
+    said: Toolpath | None = None
 
     @property
     def simulation(self) -> Options:

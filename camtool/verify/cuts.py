@@ -115,13 +115,6 @@ def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool) -> Bools:
     return np.asarray(moves & (lowest < STOCK_TOP_MM - POSITION_EPS_MM))
 
 
-def rapids_in_stock(toolpath: Toolpath) -> Ints:
-    """Rows of rapids that move in XY below the stock top: they cut, and at full speed."""
-    lowest = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
-    rapid = (toolpath.kind == Kind.RAPID) & (moved_lengths(toolpath) > POSITION_EPS_MM)
-    return np.flatnonzero(rapid & (lowest < STOCK_TOP_MM - POSITION_EPS_MM))
-
-
 def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
     """The cutting moves of a toolpath as segments; `flat_cuts` as the module says."""
     cutting = cutting_rows(toolpath, flat_cuts=flat_cuts)

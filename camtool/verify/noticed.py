@@ -12,12 +12,12 @@ from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
 from camtool.planning.places import own_numbers
 from camtool.simulation.models import findings_of
-from camtool.toolpath.cleared import CLEARED_MM, Reach, Through, rapids_through_stock
+from camtool.toolpath.cleared import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
 from camtool.verify.by_row import missed_ends
 from camtool.verify.case import Case
-from camtool.verify.cuts import CutMoves, rapids_in_stock
+from camtool.verify.cuts import CutMoves
 from camtool.verify.holes import holes_of
 from camtool.verify.motion import Tally
 from camtool.verify.places import and_more, at_point, block_name
@@ -124,8 +124,8 @@ def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
 
 
 def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
-    """Rapids through what the tool has not cleared; of a tool that nobody knows all rapids below
-    the stock top that move in XY."""
+    """Rapids through what the tool has not cleared; of a tool that nobody knows all that go along
+    below the stock top, or straight down to where no feed has been."""
     diameter = case.options.tool_diameter_mm
     if diameter is not None:
         radius = np.full(len(decoded), 0.5 * diameter)
@@ -134,7 +134,7 @@ def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
     low = np.minimum(decoded.starts[:, 2], decoded.end[:, 2])
     return [
         Through(row, float(low[row]), (float(decoded.end[row, 0]), float(decoded.end[row, 1])))
-        for row in rapids_in_stock(decoded).tolist()
+        for row in low_rapids(decoded)
     ]
 
 

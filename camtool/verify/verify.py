@@ -33,6 +33,7 @@ from camtool.verify.circles import full_circles
 from camtool.verify.compare import Target
 from camtool.verify.coverage import Coverage, Drilled, cover
 from camtool.verify.cuts import CutMoves, cut_moves, is_flat
+from camtool.verify.direction import cut_other_way
 from camtool.verify.figures import Figure
 from camtool.verify.holes import contours_drilled, hole_findings, holes_of
 from camtool.verify.match import Goal, carried_match, own_match
@@ -80,14 +81,15 @@ def verify(
     options: VerifyOptions | None = None,
     sent: Bent | None = None,
     asked: Asked | None = None,
+    said: Toolpath | None = None,
 ) -> Verification:
     """Simulate `decoded` on `machine` and judge it; against `wanted` when there is one.
 
     `drawing` gives the fitting error and its findings; `sent` is what the program was written from
-    where `wanted` was bent; `asked` is what else its job asks for. Toolpaths are in the work
-    frame.
+    where `wanted` was bent; `asked` is what else its job asks for, `said` what the program was
+    written from. Toolpaths are in the work frame.
     """
-    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent, asked)
+    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent, asked, said)
     check_options(machine, case.simulation)
     steps = steps_on_the_way(decoded, machine, case.simulation)
     return judge(case, steps or simulate(decoded, machine, case.simulation))
@@ -121,7 +123,8 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
     extents = toolpath_extents(case.decoded)
     noticed = motion_findings(decoded.cuts, case, tally, extents, rows)
-    findings = _all_findings(case, coverage, held_against, noticed)
+    turned = _turned(case, decoded, flat_cuts=flat_cuts)
+    findings = _all_findings(case, coverage, held_against, (*turned, *noticed))
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, held_against)
     trace = slides.trace()
     report = result.report(extents, findings, trace if shaped else None)
@@ -146,6 +149,14 @@ def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Co
     if case.sent is not None:
         match = carried_match(match, case.sent.row, goal)
     return replace(coverage, match=match, findings=(*coverage.findings, *holes))
+
+
+def _turned(case: Case, decoded: Target, *, flat_cuts: bool) -> tuple[Finding, ...]:
+    if case.said is None:
+        return ()
+    said = Target(cut_moves(case.said, flat_cuts=flat_cuts))
+    limits = case.coverage_mm, case.depth_mm
+    return tuple(cut_other_way(decoded, said, limits, case.options.sample_mm))
 
 
 def _held_against(case: Case, *, flat_cuts: bool) -> Held | None:

@@ -33,7 +33,7 @@ def sample_part(*, shift: float = 0.0) -> ToolpathBuilder:
 def judged(
     decoded: Toolpath, wanted: Toolpath | None = None, bend=lambda points: points, **options
 ) -> Verification:
-    case = Case(decoded, MACHINE, wanted, None, VerifyOptions(**options))
+    case = Case(decoded, MACHINE, wanted, None, VerifyOptions(**options), said=wanted)
     return judge(case, follow(decoded, bend=bend))
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.cleared import Reach, Through, rapids_through_stock
+from camtool.toolpath.cleared import Reach, Through, low_rapids, rapids_through_stock
 from camtool.toolpath.moves import Toolpath
 from tests.oracles.cleared import most_uncut
 from tests.waiting import no_chewing
@@ -149,6 +149,13 @@ def test_beside_the_stock_is_air() -> None:
     path = ToolpathBuilder().rapid(z=-1.0).rapid(5.0, 0.0).finish()
     assert [one.row for one in through(path, solid=(0.0, 0.6, 9.0, 9.0))] == []
     assert [one.row for one in through(path, solid=(0.0, 0.4, 9.0, 9.0))] == [0, 1]
+
+
+def test_rapids_below_the_stock_top_whatever_the_tool() -> None:
+    """They go along, or straight down to where no feed has been; up they may go."""
+    path = ToolpathBuilder().rapid(z=0.2).rapid(1, 1).line(z=-1, feed=1).rapid(2, 1)
+    path.rapid(z=0.2).rapid(3, 1).rapid(z=-1.0).line(z=-2, feed=1).rapid(z=0.2).rapid(z=-1.9)
+    assert low_rapids(path.finish()) == [3, 6]
 
 
 def test_nothing_is_nothing() -> None:

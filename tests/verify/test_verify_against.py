@@ -11,7 +11,7 @@ from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.machine.registry import LoadedTarget, load_target
 from camtool.pipeline import post_drawing, verify_program
-from camtool.planning.job import Job, job_of
+from camtool.planning.job import Job, Operation, Tool, job_of
 from camtool.verify.verify import Verification
 from tests.drawings import drawing_of
 
@@ -143,6 +143,24 @@ def test_corners_are_rounded_no_farther_than_asked() -> None:
     assert errors(held(damaged, exact)) == [Code.SETTING_DIFFERS]
 
 
+def test_the_tool_and_the_wait_at_the_bottom_of_a_hole() -> None:
+    """LinuxCNC: T1 M6 before what T2 is asked for; G4 shorter than asked, or left out."""
+    target = load_target("linuxcnc")
+    drill = Tool(diameter_mm=1.0, kind="drill", tip_angle_rad=2.0, number=2)
+    bore = Operation(kind="drill", tool=drill, depth_mm=1.0, dwell_s=0.5, max_hole_mm=20.0)
+    ring = Operation(tool=Tool(diameter_mm=1.0, number=1), depth_mm=1.0)
+    job = Job((ring, bore), safe_z_mm=5.0)
+    text = program(target, job)
+    assert errors(held(text, target, job)) == []
+    assert "T2 M6\n" in text
+    assert "G4 P0.5\n" in text
+    for wrong in (text.replace("T2 M6", "T3 M6"), text.replace("T2 M6\n", "")):
+        assert Code.SETTING_DIFFERS in errors(held(wrong, target, job))
+    for wrong in (text.replace("G4 P0.5", "G4 P0.4", 1), text.replace("G4 P0.5\n", "", 1)):
+        assert errors(held(wrong, target, job)) == [Code.SETTING_DIFFERS]
+    assert errors(held(text.replace("G4 P0.5", "G4 P0.7"), target, job)) == []
+
+
 @both
 def test_what_nobody_asked_for_is_told(target: LoadedTarget) -> None:
     plain = job_of(depth_mm=1.0, tool_diameter_mm=1.0)
@@ -189,6 +207,17 @@ def test_a_shift_of_a_few_units_is_found(target: LoadedTarget) -> None:
     assert errors(far) == [Code.EXTRA_CUT]
     deeper = held(text.replace("Z-1.000", "Z-1.003", 1), target)
     assert set(errors(deeper)) == {Code.CONTOUR_MISSING, Code.EXTRA_CUT}
+
+
+@both
+@pytest.mark.parametrize("tool", [0.0, 1.0])
+def test_a_plunge_as_a_rapid_runs_through_the_stock(target: LoadedTarget, tool: float) -> None:
+    job = job_of(tool_diameter_mm=tool, depth_mm=1.0)
+    text = program(target, job)
+    down = re.findall(r"^G1 Z-1.000 F\d+$", text, re.MULTILINE)
+    assert Code.RAPID_IN_STOCK not in errors(held(text, target, job))
+    damaged = text.replace(down[0], "G0 Z-1.000", 1).replace("\nG3 X", "\nG3 F200 X", 1)
+    assert Code.RAPID_IN_STOCK in errors(held(damaged, target, job))
 
 
 @both

@@ -12,7 +12,6 @@ from camtool.verify.cuts import (
     cut_moves,
     cutting_rows,
     is_flat,
-    rapids_in_stock,
     sample_cuts,
 )
 from tests.oracles.dense_moves import circle, cut, dense_distance, points_of, square
@@ -51,11 +50,6 @@ def test_nothing_behind_the_end_of_the_program_cuts() -> None:
     b = cut(ToolpathBuilder(), 1, 1).line(2, 1, feed=1)
     b.event(Kind.END).line(3, 1, feed=1)
     assert rows(b) == [3]
-
-
-def test_rapids_through_the_stock_are_found() -> None:
-    b = cut(ToolpathBuilder(), 1, 1).rapid(2, 1).rapid(z=0.2).rapid(3, 1)
-    assert rapids_in_stock(b.finish()).tolist() == [3]
 
 
 def test_contours_end_at_air_moves_and_homing_but_not_at_plunges_and_events() -> None:

@@ -55,6 +55,28 @@ def test_a_short_missing_line_is_found() -> None:
     assert missing.measured == pytest.approx(0.012, rel=0.02)
 
 
+@pytest.mark.parametrize("radius", [0.1, 0.02])
+def test_a_circle_the_other_way_round(radius: float) -> None:
+    """Wherever it starts, in one piece or in halves."""
+    wanted = circle(square(ToolpathBuilder(), 1, 1, 1), 3, 3, radius).finish()
+    same = square(ToolpathBuilder(), 1, 1, 1)
+    cut(same, 3, 3 + radius).arc(3, 3 - radius, centre=(3, 3), ccw=True, feed=1)
+    same.arc(3, 3 + radius, centre=(3, 3), ccw=True, feed=1)
+    assert Code.CUT_OTHER_WAY not in codes(judged(same.finish(), wanted))
+    other = square(ToolpathBuilder(), 1, 1, 1)
+    cut(other, 3, 3 + radius).arc(3, 3 + radius, centre=(3, 3), ccw=False, feed=1)
+    found = judged(other.finish(), wanted)
+    (turned,) = [f for f in found.findings if f.code == Code.CUT_OTHER_WAY]
+    assert turned.severity == Severity.ERROR
+    assert not {Code.CONTOUR_MISSING, Code.EXTRA_CUT} & set(codes(found))
+
+
+def test_an_open_line_may_run_either_way() -> None:
+    wanted = cut(ToolpathBuilder(), 1, 1).line(2, 1, feed=1).line(2, 2, feed=1).finish()
+    back = cut(ToolpathBuilder(), 2, 2).line(2, 1, feed=1).line(1, 1, feed=1).finish()
+    assert Code.CUT_OTHER_WAY not in codes(judged(back, wanted))
+
+
 def test_the_wrong_depth_is_a_missing_and_an_extra_cut() -> None:
     wanted = sample_part().finish()
     z = np.where(wanted.end[:, 2] < 0, -0.05, wanted.end[:, 2])
