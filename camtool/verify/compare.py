@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ import numpy as np
 from camtool.geometry.measure import segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
 from camtool.verify.cuts import CutMoves
-from camtool.verify.pieces import boxes_of_pieces, gap_mm
+from camtool.verify.pieces import Layers, gap_mm, levels_of
 from camtool.verify.runs import group_boxes, ranges
 
 PAIRS_AT_ONCE = 1 << 17
@@ -147,12 +148,14 @@ class Target:
         self.contour = cuts.contour[cuts.segments.path]
         self.table = SegmentTable(cuts.segments)
         self.boxes = segment_boxes(cuts.segments)
-        self._tree: Any = None
-        self._whose = np.empty(0, dtype=np.int64)
         low, high = cuts.z.T
         length = segment_lengths(cuts.segments)
-        self.gap_mm = gap_mm(cuts.segments, self.boxes)
+        self.gap_mm = gap_mm(cuts.segments, self.boxes, levels_of(cuts.z))
         self._slope = (high - low) / np.where(length > 0.0, length, 1.0)
+
+    @cached_property
+    def _layers(self) -> Layers:
+        return Layers(self.cuts.segments, self.cuts.z, self._slope, self.gap_mm)
 
     def nearest(self, points: Floats, groups: Groups) -> Found:
         """The nearest move of each point (J, 2), and how far it is, exact."""
@@ -193,13 +196,15 @@ class Target:
         parts: list[tuple[Ints, Ints, Floats]] = [(none, none, np.empty(0))]
         for begin in range(0, len(points) if len(self.boxes) else 0, PAIRS_AT_ONCE):
             some = points[begin : begin + PAIRS_AT_ONCE]
-            point, move = self._pairs(np.concatenate([some, some], axis=1), limit_mm)
+            there = np.repeat(height[begin : begin + PAIRS_AT_ONCE, None], 2, axis=1)
+            wide = np.concatenate([some - limit_mm, some + limit_mm], axis=1)
+            point, move = self._layers.pairs(wide, there, depth_mm)
             distance = self.table.distances(some[point], move)
             near = np.flatnonzero(distance <= limit_mm)
             point, move, distance = point[near], move[near], distance[near]
             z = height[begin + point]
-            there = ~self._off_height(some[point], z, move, depth_mm)
-            parts.append((begin + point[there], move[there], distance[there]))
+            fits = ~self._off_height(some[point], z, move, depth_mm)
+            parts.append((begin + point[fits], move[fits], distance[fits]))
         every, moves, distances = zip(*parts, strict=True)
         return np.concatenate(every), np.concatenate(moves), np.concatenate(distances)
 
@@ -214,25 +219,13 @@ class Target:
     ) -> tuple[Ints, Ints]:
         """Pairs (index into `todo`, move) with a piece whose box comes within the margin, in
         order."""
-        group, move = self._pairs(boxes[todo], margin[todo, None])
+        wide = boxes[todo] + margin[todo, None] * np.array([-1.0, -1.0, 1.0, 1.0])
+        group, move = self._layers.pairs(wide, groups.z[todo])
         wanted, z = groups.contour[todo][group], groups.z[todo][group]
         here = self.cuts.z[move]
         fits = (wanted == ANY_CONTOUR) | (wanted == self.contour[move])
         fits &= (z[:, 0] <= here[:, 1]) & (here[:, 0] <= z[:, 1])
         return group[fits], move[fits]
-
-    def _pairs(self, boxes: Floats, margin_mm: Any) -> tuple[Ints, Ints]:
-        """Pairs (box, move) with a piece whose box comes within the margin, in order."""
-        import shapely
-
-        if self._tree is None:
-            pieces, self._whose = boxes_of_pieces(self.cuts.segments, self.gap_mm)
-            self._tree = shapely.STRtree(shapely.box(*pieces.T))
-        wide = boxes + margin_mm * np.array([-1.0, -1.0, 1.0, 1.0])
-        box, piece = self._tree.query(shapely.box(*wide.T))
-        pairs = np.sort(box * len(self.boxes) + self._whose[piece])
-        pairs = pairs[np.diff(pairs, prepend=-1) > 0]
-        return np.divmod(pairs, len(self.boxes))
 
     def _off_height(self, points: Floats, height: Floats, move: Ints, window_mm: float) -> Any:
         """(J,) where the moves are at another height than the points nearest to them."""

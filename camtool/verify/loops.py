@@ -88,13 +88,33 @@ class _Way:
 
 
 def _returns(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
-    """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it."""
-    import shapely
+    """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it.
 
-    points = shapely.points(places)
-    later, earlier = shapely.STRtree(points).query(points, predicate="dwithin", distance=gap_mm)
-    before = earlier < later
-    later, earlier = later[before], earlier[before]
-    order = np.lexsort((earlier, later))
-    last = order[np.flatnonzero(np.diff(later[order], append=len(places)))]
-    yield from zip(earlier[last].tolist(), later[last].tolist(), strict=True)
+    Places lie in square cells as wide as the gap. The latest place before another one in each of
+    the nine cells about it is looked at, and what lies before that only where it is too far away:
+    a thousand passes over one place are not compared each with each.
+    """
+    count = len(places)
+    cell = np.floor(places / gap_mm).astype(np.int64)
+    cell -= cell.min(axis=0) - 1
+    wide = int(cell[:, 1].max()) + 2
+    known, rank = np.unique(cell[:, 0] * wide + cell[:, 1], return_inverse=True)
+    # Sorted by cells, and within a cell by number.
+    sorted_ = np.sort(rank.reshape(-1) * count + np.arange(count))
+    latest = np.full(count, -1, dtype=np.int64)
+    for beside in (-wide, 0, wide):
+        for above in (-1, 0, 1):
+            wanted = known[rank.reshape(-1)] + beside + above
+            there = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
+            rows = np.flatnonzero(known[there] == wanted)
+            at = np.searchsorted(sorted_, there[rows] * count + rows) - 1
+            while len(rows):
+                near_cell, before = np.divmod(sorted_[at], count)
+                inside = (at >= 0) & (near_cell == there[rows]) & (before > latest[rows])
+                rows, at, before = rows[inside], at[inside], before[inside]
+                off = places[before] - places[rows]
+                near = np.hypot(off[:, 0], off[:, 1]) <= gap_mm
+                latest[rows[near]] = before[near]
+                rows, at = rows[~near], at[~near] - 1
+    later = np.flatnonzero(latest >= 0)
+    yield from zip(latest[later].tolist(), later.tolist(), strict=True)
