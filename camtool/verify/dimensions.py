@@ -102,10 +102,12 @@ def sizes(
     centre = _extents(wanted.contour[segments.path], boxes[:, :2], boxes[:, 2:], wanted)
     slide = _extents(match.contour[mine], low[mine], high[mine], wanted)
     known = wanted.toolpath.drawn is not None
-    nominal, predicted = _edges(wanted, closed, centre, slide) if known else (centre, slide)
+    nominal, predicted, rough = _edges(wanted, closed, centre, slide)
     seen = np.isfinite(slide[:, 0, 0]) & np.isfinite(centre[:, 0, 0])
     # What the program does not cut at all is still a part of its nominal size.
-    yield from _pair("part", _whole(nominal), _whole(predicted[seen]), known)
+    yield from _pair(
+        "part", _whole(nominal), _whole(predicted[_finest(nominal, rough, seen)]), known
+    )
     final = _final(segments, boxes, wanted, gap_mm)
     for index in np.flatnonzero(closed & final & seen):
         sizes_mm = np.diff(nominal[index])[:, 0], np.diff(predicted[index])[:, 0]
@@ -114,19 +116,31 @@ def sizes(
 
 def _edges(
     wanted: CutMoves, closed: Bools, centre: Floats, slide: Floats
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats, Floats]:
     """Nominal and predicted boxes (C, 2, 2) of the edges that contours cut, from the boxes of the
-    wanted moves and of the slides; those boxes themselves where a contour cuts no edge."""
+    wanted moves and of the slides, those boxes themselves where a contour cuts no edge; and how
+    far (C,) each is planned to stay from its nominal one, mm."""
     drawn, rows = wanted.toolpath.drawn, wanted.rows
-    of = np.full(len(centre), -1, dtype=np.int64)
+    nominal, predicted, rough = centre.copy(), slide.copy(), np.zeros(len(centre))
     if drawn is not None:
-        np.maximum.at(of, wanted.contour[rows], drawn.edge[rows])
-    has = closed & (of >= 0)
-    nominal, predicted = centre.copy(), slide.copy()
-    if drawn is not None:
-        nominal[has] = drawn.nominal[of[has]]
-        predicted[has] = drawn.planned[of[has]] + (slide - centre)[has]
-    return nominal, predicted
+        edge = np.full(len(centre), -1, dtype=np.int64)
+        np.maximum.at(edge, wanted.contour[rows], drawn.edge[rows])
+        has = np.flatnonzero(closed & (edge >= 0))
+        of = edge[has]
+        nominal[has] = drawn.nominal[of]
+        predicted[has] = drawn.planned[of] + slide[has] - centre[has]
+        rough[has] = np.abs(drawn.planned[of] - drawn.nominal[of]).max(axis=(1, 2))
+    return nominal, predicted, rough
+
+
+def _finest(nominal: Floats, rough: Floats, seen: Bools) -> Ints:
+    """Of the contours (C,) that are cut, those that decide a size: of several on one line, roughed
+    and finished, the ones that come nearest to it."""
+    rows = np.flatnonzero(seen)
+    _, line = np.unique(nominal[rows].reshape(len(rows), 4), axis=0, return_inverse=True)
+    least = np.full(len(rows), np.inf)
+    np.minimum.at(least, line.reshape(-1), rough[rows])
+    return rows[rough[rows] <= least[line.reshape(-1)]]
 
 
 def _whole(boxes: Floats) -> Floats:

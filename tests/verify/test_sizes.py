@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from camtool.geometry.polylines import Polyline
 from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing
-from camtool.planning.job import job_of
+from camtool.planning.job import Job, Operation, Tool, job_of
 from camtool.verify.records import Dimension
 from tests.drawings import drawing_of
 
@@ -73,6 +74,17 @@ def test_allowance_pockets_and_the_slides() -> None:
     moved = sizes(plate, "axes.x.real_step_mm=0.0005005", "axes.x.coded_step_mm=0.0005",
                   side="outside", tool_diameter_mm=TOOL)  # fmt: skip
     assert moved["part X"].predicted_mm == pytest.approx(WIDE + 1e-3 * (WIDE + TOOL), abs=3e-3)
+
+
+def test_what_is_roughed_and_finished_is_as_large_as_it_is_finished() -> None:
+    cutter = Tool(diameter_mm=TOOL)
+    rough = Operation(side="outside", tool=cutter, allowance_mm=0.3)
+    job = Job(operations=(rough, replace(rough, allowance_mm=0.0)))
+    made = post_drawing(drawing_of([box(0, 0, WIDE, HIGH)]), job, load_target("linuxcnc"))
+    assert made.verification is not None, made.findings
+    size = made.verification.report.dimensions[0]
+    assert size.nominal_mm == WIDE
+    assert size.predicted_mm == pytest.approx(WIDE, abs=0.02)
 
 
 def test_parts_that_one_contour_runs_round_are_as_the_tool_leaves_them() -> None:
