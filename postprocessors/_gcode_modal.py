@@ -29,6 +29,8 @@ FEED_GUARD: Final = 1e-9
 
 MOTION_GROUP: Final = "motion"
 
+NO_FEED: Final = "a feed move, and no feed yet"
+
 TURNS_TOLERANCE: Final = 1e-3
 """Turns: a P beside a whole number by no more is that number (rs274 takes 2.001)."""
 
@@ -152,6 +154,8 @@ class ModalReader:
             self._set_path_mode(modes["path"], numbers)
         if modes.get("tool length") == G.TOOL_LENGTH:  # H tells of which tool
             numbers.pop("H", None)
+        if "feed mode" in modes and self._rules.forgets_feed:
+            self._feed = 0.0
         if "work frame" in modes:
             self._set_frame(block, modes["work frame"])
 
@@ -227,12 +231,14 @@ class ModalReader:
             if axes:
                 block.fail("coordinates, and no motion word in force", mend="write G0 or G1")
         elif not axes and not self._is_circle(motion, numbers, said=said):
+            if said and self._rules.forgets_feed and motion > G.RAPID and self._feed == 0.0:
+                block.fail(NO_FEED, mend="say F first")
             if motion > G.LINE and said:
                 block.fail("an arc without X or Y", mend="say where it ends")
         elif motion == G.RAPID:
             self.path.rapid(*to)
         elif self._feed == 0.0:
-            block.fail("a feed move, and no feed yet", mend="say F first")
+            block.fail(NO_FEED, mend="say F first")
         elif motion == G.LINE:
             self.path.line(*to, feed=self._feed)
         elif self._rules.ends_in_plane and not flat:

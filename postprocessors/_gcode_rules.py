@@ -64,6 +64,7 @@ class Rules:
     `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
     `circle_without_end`: an arc that says only its centre is a full circle. `path_modes`: the
     group "path" tells how corners are met. `turns`: P tells how many turns an arc begins.
+    `forgets_feed`: G94 does, and G1 to G3 want a feed even where nothing moves.
     `ends_in_plane`: an arc must say X or Y. `feed_first`: a feed beside a change of units is in
     the units before. `m_codes`: the M codes it takes and the group of each.
     `tools`: "change" (M6), "pause" (M0 beside a T word), or "none"; T words go up to `most_tool`.
@@ -80,6 +81,7 @@ class Rules:
     turns: bool = False
     ends_in_plane: bool = False
     feed_first: bool = False
+    forgets_feed: bool = False
     m_codes: Mapping[int, str] = field(default_factory=lambda: M_CODES)
     tools: str = "none"
     most_tool: int = 99_999

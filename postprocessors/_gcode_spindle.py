@@ -34,7 +34,7 @@ class MachineWords:
 
     def read(self, block: Block, codes: list[int], numbers: dict[str, float]) -> None:
         """Tool, then spindle, in front of the block's motion; takes S and T out."""
-        groups = [M_CODES[code] for code in codes if M_CODES[code] != "coolant"]
+        groups = [M_CODES[code] for code in codes]
         if len(set(groups)) != len(groups):
             block.fail_at("M", "two M words of one group")
         speed = numbers.pop("S", None)

@@ -142,5 +142,6 @@ def rules_of(dialect: Dialect) -> Rules:
         path_modes=True,
         turns=True,
         feed_first=True,
+        forgets_feed=True,
         tools="change",
     )

@@ -213,6 +213,7 @@ BAD = [
     ("G4 P1 X1\n", 1, 7, "uses the X word"),
     ("S-5\n", 1, 1, "a speed below 0"),
     ("M3 M4 S1\n", 1, 4, "two M words of one group"),
+    ("M8 M9\n", 1, 4, "two M words of one group"),
     ("G0 X1\nG17 G55\n", 2, 5, "another work frame"),
     ("G55\nG0 X1\nX0\nG54\n", 4, 1, "another work frame"),
     ("G92 X0\n", 1, 1, "moves part zero"),
@@ -469,6 +470,13 @@ def test_a_spindle_may_start_before_its_speed_is_said(name: str) -> None:
         text = target.post.write(carried_over(path), target.machine).data.decode()
         assert ("M3\n" in text) == (other != "valcnc")
         assert "nan" not in text
+
+
+def test_g94_forgets_the_feed_on_linuxcnc() -> None:
+    text = "G21 F100\nG94 G1 X1\nM2\n"
+    assert read(text, "grbl").feed[0] == 100.0
+    with pytest.raises(ProgramError, match="no feed yet"):
+        read(text, "linuxcnc")
 
 
 def test_a_feed_beside_a_change_of_units_is_in_the_controller_s_own_order() -> None:

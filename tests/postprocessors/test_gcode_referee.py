@@ -94,6 +94,8 @@ ONLY_LINUXCNC = [
     "M3\nG21 G0 X1\nS500\nM2",
     "G21 F10 G1 X1\nG20 F20 X2\nX3\nM2",
     "%\nG0 X1\n%\nX5 nothing\n",
+    "F60 G94\nG1 X1\nM2",
+    "F60\nG94 F50\nG1 X1\nM2",
     "N1.5 G8 G0 X1\nM2\nG0 X7 never\n",
     "G21 F100 G2 Z-1 I5\nM2",
 ]
@@ -198,6 +200,11 @@ def test_the_slack_of_a_radius_is_theirs(short: float, tmp_path: Path) -> None:
         "F9 G2 X1 I1 P0\nM2",
         "F9 G2 X1 I1 P1.5\nM2",
         "G61 P1\nM2",
+        "F60\nG94\nG1 X1\nM2",
+        "F60 G1 X1\nG94 G90\nX2\nM2",
+        "G1\nF5 X1\nM2",
+        "M8 M9\nM2",
+        "M7 M8\nM2",
     ],
 )
 def test_what_they_refuse_we_refuse(text: str, tmp_path: Path) -> None:

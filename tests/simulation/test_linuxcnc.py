@@ -294,7 +294,7 @@ def test_merged_lines_leave_the_path_within_the_tolerance() -> None:
 def test_chunks_change_nothing() -> None:
     case = next(case for case in MEASURED if case.name == "arcs")
     machine = in_mode("blend", 0.05, "axes.x.backlash_mm=0.05")
-    path = read(case.program, machine)
+    path = read(f"{case.program}M2\n", machine)
     whole = run(path, machine)
     for one, other in zip(whole, run(path, machine, chunk_steps=13), strict=True):
         assert (one.commanded == other.commanded).all()
