@@ -139,7 +139,8 @@ def leads() -> Iterator[Figure]:
 
 def dog_legs() -> Iterator[Figure]:
     """The rule is the thesis's (L416-426, L4683-4705), the figures follow from it."""
-    target = loaded("tolerance_mm=9")  # else lines are cut into shorter records
+    # Else lines are cut into shorter records.
+    target = loaded("tolerance_mm=9", "long_runs=true")
     for dx, dy in ((100, 50), (100, 41), (300, 100)):
         path = ToolpathBuilder().line(z=-STEP_8751_MM, feed=9.0)
         path.line(dx * STEP_8751_MM, dy * STEP_8751_MM, feed=9.0)
