@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -18,9 +19,11 @@ if TYPE_CHECKING:
     from camtool.planning.plan import Step
     from camtool.simulation.options import Effects
     from camtool.toolpath.bent import Bent
+    from camtool.toolpath.kept import Kept
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Program
     from camtool.verify.asked import Asked
+    from camtool.verify.case import Cone
     from camtool.verify.cuts import Bools
     from camtool.verify.gates import Gates
     from camtool.verify.records import Before, PlannedOperation
@@ -106,6 +109,7 @@ def post_drawing(
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return Posted(wanted, program, decoded, None, findings)
+    from camtool.planning.kept import kept_of
     from camtool.verify.case import TRACE_POINTS
     from camtool.verify.records import Planned
     from camtool.verify.report import certain
@@ -113,17 +117,19 @@ def post_drawing(
 
     plain = _plainly(drawing, job, target, compensate=compensate)
     # Runs that never turn back are judged by the whole contours that they are parts of.
-    goal = wanted
+    whole = plan
     if _plain(job) != job and sent is None:
-        goal = planned(drawing, job, target.machine, undivided=True).toolpath
+        whole = planned(drawing, job, target.machine, undivided=True)
     verification = _judged(
         program.data,
         decoded,
         target,
-        Goal(goal, plan.placed, sent, said=written),
+        Goal(whole.toolpath, plan.placed, sent, said=written),
         VerifyOptions(
             source=drawing.file,
             tool_diameter_mm=tool_mm(job),
+            cone=cone_of(job),
+            kept=kept_of(whole.steps),
             trace_points=trace_points or TRACE_POINTS,
         ),
     )
@@ -160,7 +166,9 @@ def verify_program(
     judging = judging or Judging()
     decoded = read_program(data, target, source)
     goal = Goal()
+    kept: tuple[Kept, ...] = ()
     if drawing is not None:
+        from camtool.planning.kept import kept_of
         from camtool.planning.plan import planned
 
         wanted, machine = job or Job(), target.machine
@@ -169,12 +177,14 @@ def verify_program(
         asked = _asked(wanted, target, plan.toolpath, sent)
         if sent is None and _plain(wanted) != wanted:
             plan = planned(drawing, wanted, machine, undivided=True)
-        goal = Goal(plan.toolpath, plan.placed, sent, asked)
+        goal, kept = Goal(plan.toolpath, plan.placed, sent, asked), kept_of(plan.steps)
     options = VerifyOptions(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
         source=source,
         tool_diameter_mm=tool_mm(job or Job()),
+        cone=cone_of(job or Job()),
+        kept=kept,
         worst=WORST_LISTED if judging.worst is None else judging.worst,
         trace_points=judging.trace_points or TRACE_POINTS,
     )
@@ -298,6 +308,18 @@ def tool_mm(job: Job) -> float | None:
     """The diameter of the one tool that all operations cut with, mm; None for several or none."""
     diameters = {operation.tool.diameter_mm for operation in job.operations}
     return (diameters.pop() or None) if len(diameters) == 1 else None
+
+
+def cone_of(job: Job) -> Cone | None:
+    """The shape of the V bit that all operations cut with; None for other tools, and several."""
+    from camtool.verify.case import Cone
+
+    tools = [operation.tool for operation in job.operations]
+    shapes = {(tool.kind, tool.tip_angle_rad, tool.tip_diameter_mm) for tool in tools}
+    if len(shapes) != 1:
+        return None
+    kind, angle, tip = shapes.pop()
+    return Cone(0.5 * tip, math.tan(0.5 * angle)) if kind == "v" and angle is not None else None
 
 
 def _judged(

@@ -9,6 +9,7 @@ from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
 from camtool.simulation.options import ALL, Effects, Options
 from camtool.toolpath.bent import Bent
+from camtool.toolpath.kept import Kept
 from camtool.toolpath.moves import Toolpath
 from camtool.verify.asked import Asked
 
@@ -38,6 +39,14 @@ WORST_LISTED = 10
 
 
 @dataclass(frozen=True)
+class Cone:
+    """The shape of a V bit: the radius of its flat tip, mm, and the tangent of half its angle."""
+
+    tip_mm: float
+    slope: float
+
+
+@dataclass(frozen=True)
 class VerifyOptions:
     """How to judge, and what the report says of the program.
 
@@ -47,12 +56,16 @@ class VerifyOptions:
     toolpath where it was read. `coverage_mm` None: `COVERAGE_MM`, `COVERAGE_STEPS` or
     `COVERAGE_RESOLUTIONS`, and `stray_mm`, by which the dialect may leave the wanted path on
     purpose. `tool_diameter_mm`: rapids below the stock top may run where the tool
-    has cleared the way before; None, when nobody knows it: nowhere.
+    has cleared the way before; None, when nobody knows it: nowhere. `cone`: the tool is a V bit,
+    that is so wide at its top only. `kept`: what is cut by whom, and what must stay; () where
+    nobody knows.
     """
 
     interpolator: Interpolator | None = None
     effects: Effects = ALL
     tool_diameter_mm: float | None = None
+    cone: Cone | None = None
+    kept: tuple[Kept, ...] = ()
     source: str = ""
     size_bytes: int | None = None
     line_bytes: int | None = None

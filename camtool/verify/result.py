@@ -30,6 +30,8 @@ from camtool.verify.figures import Figure
 from camtool.verify.motion import Tally
 from camtool.verify.report import Report, certain, number, reported
 from camtool.verify.rows import RowFigures
+from camtool.verify.shape import Wanted as WantedShape
+from camtool.verify.shape import machined_shape
 from camtool.verify.slides import SlidePass, largest
 from camtool.verify.trace import Trace
 
@@ -48,10 +50,14 @@ class Result:
     held: Held | None = None
 
     def report(
-        self, extents: Floats, findings: tuple[Finding, ...], trace: Trace | None
+        self,
+        extents: Floats,
+        findings: tuple[Finding, ...],
+        trace: Trace,
+        shape: WantedShape | None = None,
     ) -> Report:
-        """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides
-        where a shape is to be made of it."""
+        """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides, and the
+        `shape` that they should make, where one is looked at."""
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
@@ -83,7 +89,7 @@ class Result:
             contour_errors=self._contours(),
             bidirectional=self._both_ways(),
             unreached=self._unreached(),
-            shape=self._shape(trace),
+            shape=self._shape(trace, shape),
             worst=self._worst(),
             assumptions=assumptions(case),
             asked=self._asked(),
@@ -242,13 +248,10 @@ class Result:
             limit_um=certain(asked.limits_mm[0] * UM_PER_MM),
         )
 
-    def _shape(self, trace: Trace | None) -> record.ShapeReport | None:
-        diameter = self.case.options.tool_diameter_mm
-        if not diameter or trace is None:
+    def _shape(self, trace: Trace, wanted: WantedShape | None) -> record.ShapeReport | None:
+        if wanted is None:
             return None
-        from camtool.verify.shape import machined_shape  # loads shapely
-
-        shape = machined_shape(trace, self.wanted, diameter)
+        shape = machined_shape(trace, self.case.decoded, wanted)
         if shape is None:
             return None
         return record.ShapeReport(

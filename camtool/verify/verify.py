@@ -43,7 +43,7 @@ from camtool.verify.records import Before, Planned
 from camtool.verify.report import Report
 from camtool.verify.result import Result
 from camtool.verify.rows import RowFigures
-from camtool.verify.shape import points_wanted
+from camtool.verify.shape import cutter_of, overcut_findings, points_wanted, wanted_shape
 from camtool.verify.slides import SeenCircle, SlidePass
 from camtool.verify.trace import Trace, trace_size
 
@@ -109,7 +109,8 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
     coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
     held_against = _held_against(case, flat_cuts=flat_cuts)
-    shaped = points_wanted(decoded.cuts, case.options.tool_diameter_mm or 0.0)
+    cutter = cutter_of(case.options, decoded.cuts)
+    shaped = points_wanted(decoded.cuts, cutter)
     points = max(case.options.trace_points, shaped or 0)
     size = trace_size(case.decoded, case.spacing_mm, points)
     slides = SlidePass(decoded, goal, coverage.match, size)
@@ -123,11 +124,16 @@ def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
     tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
     extents = toolpath_extents(case.decoded)
     noticed = motion_findings(decoded.cuts, case, tally, extents, rows)
+    shape = None
+    if shaped and cutter is not None:
+        shape = wanted_shape(wanted.cuts, cutter, case.options.kept)
+    said = () if case.wanted is None else case.wanted.findings
+    over = overcut_findings(shape, {finding.code for finding in said})
     turned = _turned(case, decoded, flat_cuts=flat_cuts)
-    findings = _all_findings(case, coverage, held_against, (*turned, *noticed))
+    findings = _all_findings(case, coverage, held_against, (*turned, *noticed, *over))
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, held_against)
     trace = slides.trace()
-    report = result.report(extents, findings, trace if shaped else None)
+    report = result.report(extents, findings, trace, shape)
     return Verification(report, trace, findings, rows, wanted.cuts, slides.seen())
 
 

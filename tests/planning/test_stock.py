@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from camtool.errors import OptionError
-from camtool.findings import Finding, Severity
+from camtool.findings import Code, Finding, Severity
 from camtool.machine.registry import LoadedTarget, load_target
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool
@@ -22,6 +22,7 @@ from tests.drawings import drawing_of
 from tests.oracles.contours import closed
 from tests.oracles.stock import Cutter, Path, moves_of
 from tests.oracles.stock_jobs import (
+    GOUGE_MM,
     Asked,
     circle,
     complaints,
@@ -102,6 +103,28 @@ def test_their_programs_are_accepted_by_their_own_verifier(seed: int) -> None:
     posted = post_drawing(drawing, Job((operation_of(asked),)), linuxcnc())
     errors = [each for each in posted.findings if each.severity is Severity.ERROR]
     assert errors == [], described(asked)
+    assert posted.verification is not None
+    shape = posted.verification.report.shape
+    gouges = any(each.code is Code.GOUGE for each in posted.findings)
+    if shape is not None and not gouges:
+        assert shape.overcut_um <= 1000.0 * GOUGE_MM
+
+
+def test_the_report_sees_a_gouge_that_is_a_warning() -> None:
+    """Two parts nearer than the tool: the oracle's figure is the report's."""
+    gap, diameter = 2.0, 3.0
+    paths = (rectangle(20.0, 20.0), moved(rectangle(20.0, 20.0), 20.0 + gap, 0.0))
+    asked = profile(paths, diameter, 1.0)
+    posted = post_drawing(
+        drawing_of([closed(*path) for path in paths]), Job((operation_of(asked),)), linuxcnc()
+    )
+    assert {Code.GOUGE} == {f.code for f in posted.findings if f.severity > Severity.INFO} - {
+        Code.CUT_DOUBTFUL
+    }
+    assert posted.verification is not None
+    shape = posted.verification.report.shape
+    assert shape is not None
+    assert shape.overcut_um == pytest.approx(1000.0 * (diameter - gap), abs=5.0)
 
 
 # ----- past failures -------------------------------------------------------------------------
