@@ -85,23 +85,18 @@ def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found
         _shape(chosen, of, setting, found)
 
 
-def _shapes(chosen: Chosen, closed: list[int]) -> Iterator[list[int]]:
-    """The closed paths in groups that are the boundary of a region each.
+def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
+    """The closed paths as the boundaries of one region, or of two.
 
-    One of them is a hole in the part around it, or a part in the hole around it. Where what lies
-    between two of them was not chosen, both are rims of parts, say, and they are not of one shape.
+    Those whose side is as they nest among themselves, and those that have the other one because
+    of contours that were not chosen: windows whose plate is not, a part in a window that is not.
     """
-    nest = nesting(chosen.lines.select(closed))
-    shapes: dict[tuple[int, bool], list[int]] = {}
-    key: dict[int, tuple[int, bool]] = {-1: (-1, False)}
-    for place in np.argsort(nest.depth, kind="stable").tolist():
-        parent, rim = int(nest.parent[place]), bool(chosen.rim[closed[place]])
-        if parent >= 0 and rim != chosen.rim[closed[parent]]:
-            key[place] = key[parent]
-        else:
-            key[place] = (parent, rim)
-        shapes.setdefault(key[place], []).append(closed[place])
-    return (sorted(of) for of in shapes.values())
+    if not closed:
+        return []
+    alone = nesting(chosen.lines.select(closed)).depth % 2 == 0
+    turned = alone != chosen.rim[closed]
+    rows = np.array(closed)
+    return [each.tolist() for each in (rows[~turned], rows[turned]) if len(each)]
 
 
 def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> None:

@@ -16,14 +16,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_extents, point_at
 from camtool.geometry.nest import nesting
-from camtool.geometry.polylines import Bools, Ints, Polylines, Segments
+from camtool.geometry.polylines import Bools, Ints, Polyline, Polylines, Segments
 from camtool.patterns import matches
 from camtool.planning.job import Job, Operation
 
@@ -55,16 +57,17 @@ class Seen:
 class Sides:
     """The M contours of a placed drawing, those that were not chosen after those that were, and
     their sides. `names`: layer and source of each. `takes` (K, M): what each of the `operations`
-    takes of them. `uncut` (M,): the closed ones that bound material though nobody cuts them, and
-    `frames` (M,) those that do not because of their layer.
-    `unsaid_mm`: the depth of operations that say none."""
+    takes of them. (M,) each: `worked`, what any of them cuts along or clears; `edges`, what is
+    drawn as an edge that is seen; `framed`, what is on the layer of a frame. `unsaid_mm`: the
+    depth of operations that say none."""
 
     lines: Polylines
     names: tuple[str, ...]
     operations: tuple[Operation, ...]
     takes: Bools
-    uncut: Bools
-    frames: Bools
+    worked: Bools
+    edges: Bools
+    framed: Bools
     unsaid_mm: float
     _known: dict[bytes, Seen] = field(default_factory=dict)
 
@@ -75,29 +78,41 @@ class Sides:
         takes = np.zeros((len(job.operations), len(lines) + len(around.paths)), dtype=np.bool_)
         if len(around.paths):
             lines = Polylines.of([*lines, *around.paths])
+        names = list(zip(placed.layers, placed.colours, strict=True))
         for number, operation in enumerate(job.operations):
-            names = zip(placed.layers, placed.colours, strict=True)
-            takes[number, : len(placed.paths)] = [operation.takes(*name) for name in names]
+            known = {name: operation.takes(*name) for name in set(names)}
+            takes[number, : len(names)] = [known[name] for name in names]
         layers = (*placed.layers, *around.layers)
         types = (*placed.line_types, *around.line_types)
         sources = (*placed.sources, *around.sources)
         sheet = {layer for layer in set(layers) if matches(job.frames, layer)}
-        seen = [kind.casefold() in CONTINUOUS for kind in types]
         # A drill takes circles alone, whatever else is on its layers.
         makers = [operation.kind != "drill" for operation in job.operations]
-        worked = np.asarray(takes[makers].any(axis=0))
-        idle = np.asarray(lines.closed & np.array(seen, dtype=np.bool_) & ~worked)
-        idle &= ~_again(lines, worked, idle)
-        framed = np.array([layer in sheet for layer in layers], dtype=np.bool_)
         return cls(
             lines=lines,
             names=tuple(f"{layer}/{it}" for layer, it in zip(layers, sources, strict=True)),
             operations=job.operations,
             takes=takes,
-            uncut=np.asarray(idle & ~framed),
-            frames=np.asarray(idle & framed),
+            worked=np.asarray(takes[makers].any(axis=0)),
+            edges=np.array([kind.casefold() in CONTINUOUS for kind in types], dtype=np.bool_),
+            framed=np.array([layer in sheet for layer in layers], dtype=np.bool_),
             unsaid_mm=unsaid_mm,
         )
+
+    @cached_property
+    def uncut(self) -> Bools:
+        """(M,) the closed contours that bound material though nobody cuts them."""
+        return np.asarray(self._idle & ~self.framed)
+
+    @cached_property
+    def frames(self) -> Bools:
+        """(M,) those that would, were they not on the layer of a frame."""
+        return np.asarray(self._idle & self.framed)
+
+    @cached_property
+    def _idle(self) -> Bools:
+        idle = np.asarray(self.lines.closed & self.edges & ~self.worked)
+        return np.asarray(idle & ~_again(self.lines, self.worked, idle))
 
     def seen_by(self, operation: Operation) -> Seen:
         """The sides for a profile of this operation."""
@@ -164,20 +179,27 @@ def runs_beside(operation: Operation) -> bool:
     return operation.tool.radius_mm + operation.allowance_mm > 0.0
 
 
-def _again(lines: Polylines, cut: Bools, uncut: Bools) -> Bools:
-    """(M,) those of the contours that nobody cuts that run along one that is cut."""
+def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
+    """(M,) those of the closed contours that nobody cuts (`idle`) that run along one that is cut,
+    or along one before them."""
     found = np.zeros(len(lines), dtype=np.bool_)
-    rows = np.flatnonzero(cut & lines.closed)
-    if not uncut.any() or len(rows) == 0:
+    others = np.flatnonzero((cut & lines.closed) | idle)
+    mine = np.flatnonzero(idle)
+    if len(mine) == 0:
         return found
     boxes = path_extents(lines)
-    for k in np.flatnonzero(uncut).tolist():
-        alike = rows[np.abs(boxes[rows] - boxes[k]).max(axis=(1, 2)) <= SAME_CONTOUR_MM]
-        mine = Segments.of(lines[k])
-        middles = point_at(mine, np.arange(len(mine)), np.full(len(mine), 0.5))
-        points = np.concatenate([mine.start, middles])
-        found[k] = any(
-            (nearest(points, Segments.of(lines[row])).distance <= SAME_CONTOUR_MM).all()
-            for row in alike.tolist()
-        )
+    corners = np.concatenate([boxes[:, :, 0], boxes[:, :, 0]], axis=1)  # as boxes of no size
+    for one, other in box_pairs(corners[mine], corners[others], reach_mm=SAME_CONTOUR_MM):
+        k, row = mine[one], others[other]
+        alike = np.abs(boxes[k] - boxes[row]).max(axis=(1, 2)) <= SAME_CONTOUR_MM
+        alike &= cut[row] | (row < k)
+        for each, along in zip(k[alike].tolist(), row[alike].tolist(), strict=True):
+            found[each] = found[each] or _runs_along(lines[each], lines[along])
     return found
+
+
+def _runs_along(path: Polyline, other: Polyline) -> bool:
+    segments = Segments.of(path)
+    middles = point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
+    points = np.concatenate([segments.start, middles])
+    return bool((nearest(points, Segments.of(other)).distance <= SAME_CONTOUR_MM).all())

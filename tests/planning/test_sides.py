@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.drawing import Drawing, FitError, Unchosen, Units
+from camtool.geometry.drawing import Drawing, Unchosen, Units
 from camtool.geometry.measure import extents, sample
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.importers.assemble import Piece, assemble
@@ -49,7 +49,6 @@ def _read(
         pieces,
         file="test.dxf",
         units=Units("mm", 1.0, "in a test"),
-        fit=FitError(),
         used={},
         skipped=[],
         findings=[],
@@ -206,6 +205,12 @@ def test_what_is_drawn_again_elsewhere_holds_nothing(machine: Machine) -> None:
     )
 
 
+def test_what_nobody_cuts_counts_once_however_often_it_is_drawn(machine: Machine) -> None:
+    again = PLATE[0] + np.array([0.002, 0.001, 0.0])
+    drawing = _read((*PLATE, again), ("RIM", "CUT", "CUT", "OLD"), layers=("CUT",))
+    assert _rims(drawing, job_of(tool_diameter_mm=D), machine) == pytest.approx([2 - D, 2 - D])
+
+
 def test_engraving_holds_nothing_and_a_pocket_holds_what_is_no_deeper(machine: Machine) -> None:
     shapes = (_box(-5, -5, 5, 5), _circle(0, 0, 3), _circle(0, 0, 1))
     drawing = _read(shapes, ("RIM", "RING", "BORE"))
@@ -327,7 +332,6 @@ def test_what_is_not_chosen_joins_nothing_that_is() -> None:
             pieces,
             file="test.dxf",
             units=Units("mm", 1.0, "in a test"),
-            fit=FitError(),
             used={},
             skipped=[],
             findings=[],
