@@ -21,6 +21,7 @@ from typing import NoReturn, TextIO
 import click
 
 from camtool import __version__
+from camtool.cli.alive import life_signs
 from camtool.cli.batch import batch
 from camtool.cli.calibrate import calibrate
 from camtool.cli.check import check
@@ -105,7 +106,8 @@ def main() -> NoReturn:
 def _code(*, debug: bool) -> int:
     """What the command line gives: its exit code."""
     try:
-        return _run()
+        with life_signs(sys.stderr, sys.argv[1:]):
+            return _run()
     except click.ClickException as error:
         said = io.StringIO()
         error.show(said)
