@@ -86,9 +86,9 @@ def complaints(asked: Asked, moves: list[Move], findings: Collection[str]) -> li
         found += _lines(asked, seen, walls)
     else:
         found += _gouges(asked, seen, walls, said)
-        found += _left(asked, seen, walls)
+        found += _left(asked, seen, walls, said)
     if asked.tabs is not None:
-        found += _tabs(asked, seen, sum(code == "TAB_LEFT_OUT" for code in findings))
+        found += _tabs(asked, seen, "TAB_LEFT_OUT" in said)
     return found
 
 
@@ -186,7 +186,7 @@ def _at_corner(asked: Asked, walls: Walls, points: Floats) -> npt.NDArray[np.boo
     return np.asarray((apart >= asked.away - GOUGE_MM) & (apart <= 1.5 * asked.away))
 
 
-def _left(asked: Asked, seen: Seen, walls: Walls) -> Iterator[str]:
+def _left(asked: Asked, seen: Seen, walls: Walls, said: set[str]) -> Iterator[str]:
     """What the tool could have cut along the walls, or on the floor of a pocket, and did not."""
     bottom = seen.points[seen.points[:, 2] <= 1e-3 - asked.depth][:, :2]
     place, left, ring = walls.samples(0.25)
@@ -214,6 +214,8 @@ def _left(asked: Asked, seen: Seen, walls: Walls) -> Iterator[str]:
             steep = asked.settings.get("entry")
             if steep is not None:
                 most += count * len(asked.paths) * 2.0 * height / math.tan(steep.angle_rad)
+            # Those of a neighbour, or of the other side, stand here too.
+            most *= 2.0 if "TAB_SHARED" in said else 1.0
             total = 0.25 * float(missed.sum())
             if total > most:
                 yield f"left: {total:.2f} mm of the wall where tabs account for {most:.2f}"
@@ -291,20 +293,26 @@ def _holes(asked: Asked, seen: Seen) -> Iterator[str]:
             yield f"left: the hole at ({middle[0]:.2f}, {middle[1]:.2f})"
 
 
-def _tabs(asked: Asked, seen: Seen, left_out: int) -> Iterator[str]:
-    """As many bridges as asked for, as wide and as high, in the end."""
+def _tabs(asked: Asked, seen: Seen, some_left_out: bool) -> Iterator[str]:
+    """As many bridges as asked for, as wide and as high, in the end; where some were left out, and
+    that is said, all for which the tool goes up so far."""
     assert asked.tabs is not None
     count, width, height = asked.tabs
     top = height - asked.depth
-    contours, bridges = 0, 0
+    wanted, bridges = 0, 0
     for stay in _stays(seen.moves):
         if min(move.b[2] for move in stay) > 1e-3 - asked.depth:
             continue
-        contours += 1
-        bridges += sum(_is_whole(asked, seen, piece) for piece in _raised(stay, top))
-    wanted = contours * count - left_out
+        pieces = list(_raised(stay, top))
+        bridges += sum(_is_whole(asked, seen, piece) for piece in pieces)
+        long = sum(_length(piece) > width + 2.0 * asked.cutter.radius - 0.1 for piece in pieces)
+        wanted += min(count, long) if some_left_out else count
     if bridges < wanted:
         yield f"tabs: {bridges} bridges of {width} mm instead of {wanted}"
+
+
+def _length(piece: Floats) -> float:
+    return float(np.hypot(*np.diff(piece[:, :2], axis=0).T).sum())
 
 
 def _stays(moves: list[Move]) -> Iterator[list[Move]]:
