@@ -142,6 +142,8 @@ def _plunges(
 ) -> Iterator[Finding]:
     """EXTRA_CUT for feeds straight down to where nothing was asked to be cut; holes, which are
     compared as such, are left out."""
+    import shapely
+
     toolpath = mine.toolpath
     rows = np.flatnonzero(mine.plunges & ~alike.in_written)
     rows = rows[~_on(toolpath.end[rows, :2], mine.holes.at)]
@@ -149,12 +151,11 @@ def _plunges(
     for other in others:
         ends = toolpath.end[rows]
         fine[other.target.within(ends[:, :2], ends[:, 2], limits)[0]] = True
-        deep = np.flatnonzero(other.plunges)
-        for place, end in enumerate(ends):
-            apart = np.hypot(*(other.toolpath.end[deep, :2] - end[:2]).T) <= limits[0]
-            fine[place] |= bool(
-                (apart & (other.toolpath.end[deep, 2] <= end[2] + limits[1])).any()
-            )
+        deep = other.toolpath.end[other.plunges]
+        tree = shapely.STRtree(shapely.points(deep[:, :2]))
+        places = shapely.points(ends[:, :2])
+        one, plunge = tree.query(places, predicate="dwithin", distance=limits[0])
+        fine[one[deep[plunge, 2] <= ends[one, 2] + limits[1]]] = True
     bad = rows[~fine]
     for number, row in enumerate(bad.tolist()):
         more = and_more(number, len(bad), "plunges")
@@ -196,8 +197,8 @@ def _again(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Fi
     moves = np.column_stack([point, other.cuts.segments.path[move]])
     lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
     bad = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
-    for number_, place in enumerate(bad.tolist()):
-        row, more = int(rows[place]), and_more(number_, len(bad), "moves")
+    for rank, place in enumerate(bad.tolist()):
+        row, more = int(rows[place]), and_more(rank, len(bad), "moves")
         times, limit = int(counts[more_often][place]), max(int(lie[place]), 1)
         yield Finding(
             Code.EXTRA_CUT,
