@@ -33,7 +33,8 @@ def verify(
     `program`: its bytes, or the file they are in. With `against`, the slides' path is compared
     with that drawing, planned with `job`, and the program with what that job asks for: places,
     direction, feeds, spindle, tool, clearance, end. `report` holds errors in µm, sizes in mm,
-    times in s. Raises ProgramError with block and column, and OptionError. Source: docs/verifying.md.
+    times in s. Raises ProgramError with block and column, and OptionError. Source:
+    docs/verifying.md.
     """
     from camtool.pipeline import verify_program
 
