@@ -6,8 +6,10 @@ add, never renumber. Hundreds: 1xx drawing, 2xx planning, 3xx program, 4xx motio
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Protocol, TypeVar
 
 from camtool.plain import one_line
 
@@ -120,6 +122,40 @@ class Finding:
     def __str__(self) -> str:
         place = f" [{self.where}]" if self.where else ""
         return one_line(f"{self.severity.name.lower()} {self.code.name}{place}: {self.message}")
+
+
+MOST_ALIKE = 3
+"""So many findings of one code and severity are told one by one where people read them."""
+
+
+class Noticed(Protocol):
+    """What a finding is, here or in a report."""
+
+    @property
+    def code(self) -> Code | str:
+        """What was noticed."""
+
+    @property
+    def severity(self) -> Severity | str:
+        """How grave it is."""
+
+
+_N = TypeVar("_N", bound=Noticed)
+
+
+def summed(findings: Iterable[_N]) -> list[tuple[_N, int]]:
+    """The first findings of each code and severity, in their order; the last of them with the
+    number of those that are left out behind it, the others with 0."""
+    alike: dict[tuple[object, object], list[_N]] = {}
+    order = list(findings)
+    for each in order:
+        alike.setdefault((each.code, each.severity), []).append(each)
+    shown = []
+    for group in alike.values():
+        shown += [(each, 0) for each in group[:MOST_ALIKE]]
+        shown[-1] = (shown[-1][0], max(len(group) - MOST_ALIKE, 0))
+    places = {id(each): place for place, each in enumerate(order)}
+    return sorted(shown, key=lambda row: places[id(row[0])])
 
 
 def worst(findings: tuple[Finding, ...] | list[Finding]) -> Severity:

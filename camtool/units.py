@@ -37,6 +37,7 @@ S_PER_UNIT: dict[str, float] = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
 """Units of times that a user may write, as s."""
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^\d\s,]*)\s*")
 _QUANTITY = re.compile(rf"\s*({_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*([^\d\s].*?)?\s*")
 
 
@@ -49,6 +50,12 @@ def parse_length(text: str, *, name: str = "length") -> float:
     (3.175, 0.2, 3.0)
     """
     value, unit = _split(text, name)
+    if not unit and "/" in text:
+        # Fractions are inches, bare numbers millimetres: nobody can know which is meant.
+        bare = text.strip()
+        raise OptionError(
+            f"{name} {text!r} has no unit", mend=f"write {bare}in, or {bare}mm if that is meant"
+        )
     factor = MM_PER_UNIT.get(unit.lower() or "mm")
     if factor is None:
         known = ", ".join(u for u in MM_PER_UNIT if u.isascii() and u != '"')
@@ -98,6 +105,11 @@ def parse_time(text: str, *, name: str = "time") -> float:
 
 
 def _split(text: str, name: str) -> tuple[float, str]:
+    comma = _COMMA.fullmatch(text)
+    if comma is not None:
+        raise OptionError(
+            f"{name} {text!r} has a comma", mend=f"write {comma[1]}.{comma[2]} with a point"
+        )
     match = _QUANTITY.fullmatch(text)
     if match is None:
         raise OptionError(f"{name} {text!r} is no number", mend='write it like "0.2mm"')

@@ -93,3 +93,17 @@ def test_bad_angles(text: str) -> None:
 def test_bad_times(text: str) -> None:
     with pytest.raises(OptionError):
         parse_time(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1/8", "'1/8' has no unit; write 1/8in, or 1/8mm"),
+        ("3,175", "has a comma; write 3.175 with a point"),
+        ("3,175 mm", "has a comma; write 3.175 mm with a point"),
+    ],
+)
+def test_what_could_be_meant_in_two_ways_is_refused(text: str, words: str) -> None:
+    with pytest.raises(OptionError) as refused:
+        parse_length(text)
+    assert words in str(refused.value)

@@ -8,6 +8,7 @@ with a part is no exception but a finding in the result.
 
 from __future__ import annotations
 
+from camtool.api.jobs import job_of
 from camtool.api.judging import calibrate, compare, verify
 from camtool.api.machines import load_target, targets
 from camtool.api.making import convert, plan, post
@@ -16,7 +17,7 @@ from camtool.api.reading import Reading, read_drawing, read_job
 from camtool.errors import CamtoolError
 from camtool.machine.registry import ListedTarget, LoadedTarget
 from camtool.pipeline import Judging
-from camtool.planning.job import Job, Operation, Placement, Stock, Tool, job_of
+from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.results import (
     Calibration,
     Comparison,

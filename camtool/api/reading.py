@@ -13,6 +13,7 @@ from camtool.machine.registry import LoadedTarget
 from camtool.planning.job import Job
 from camtool.results import Drawing, extended
 from camtool.toolpath.program import Program
+from camtool.units import parse_length
 
 BYTES = "<bytes>"
 """What messages call a program that was given as bytes."""
@@ -43,6 +44,12 @@ class Reading(TypedDict, total=False):
 
 
 _SELECTION = ("layers", "exclude_layers", "colours", "line_types")
+_LENGTHS = ("tolerance_mm", "gap_mm", "section_z_mm")
+
+
+def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
+    """Several patterns, or one as it is."""
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 def read_drawing(
@@ -65,7 +72,10 @@ def read_drawing(
         defaults = as_target(target).machine.defaults
         settings = {"tolerance_mm": defaults.fit_tolerance_mm, "gap_mm": defaults.gap_mm}
     settings.update(reading)
-    chosen = {key: tuple(settings.pop(key, ())) for key in _SELECTION}
+    for key in _LENGTHS:
+        if isinstance(settings.get(key), str):
+            settings[key] = parse_length(settings[key], name=key)
+    chosen = {key: _patterns(settings.pop(key, ())) for key in _SELECTION}
     chosen["colours"] = tuple(colour_named(colour) for colour in chosen["colours"])
     options = ReadOptions(**settings, select=Selection(**chosen))
     return extended(Drawing, read(Path(file), options=options))
@@ -88,7 +98,7 @@ def read_job(
     from camtool.jobs.build import job_of_file
     from camtool.jobs.layers import refuse_unmatched
 
-    job = job_of_file(Path(file), tuple(operations))
+    job = job_of_file(Path(file), _patterns(operations))
     if isinstance(drawing, DrawingRecord):
         refuse_unmatched(drawing, job)
     elif drawing is not None:

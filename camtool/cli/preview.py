@@ -15,7 +15,7 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
-from camtool.cli.output import check_places, write_all
+from camtool.cli.output import STDOUT, check_places, write_all
 from camtool.cli.pictureflags import (
     DRAWING,
     RESULT,
@@ -29,7 +29,7 @@ from camtool.cli.sections import SectionedCommand
 from camtool.cli.talk import say, say_findings, say_first_run
 from camtool.cli.types import is_viewer
 from camtool.cli.types import picture as picture_name
-from camtool.errors import CamtoolError
+from camtool.errors import CamtoolError, DrawingError
 
 if TYPE_CHECKING:
     from camtool.findings import Finding
@@ -37,6 +37,10 @@ if TYPE_CHECKING:
     from camtool.preview.scene import Scene
 
     Findings = tuple[Finding, ...]
+
+
+NO_DRAWING = ("is a machine program", "is no drawing")
+"""How an importer begins to say that a file is something else than a drawing."""
 
 
 @click.command(cls=SectionedCommand, short_help="Picture of a drawing, toolpath or program.")
@@ -74,7 +78,8 @@ def preview(
 ) -> int:
     """Draw FILE: a drawing; with --target its toolpath; or a program of that target.
 
-    A file with the target's own extension (such as .pic) is taken for a program.
+    With --target, a file with the target's own extension (such as .pic), or whose content is no
+    drawing, is taken for its program.
     """
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
@@ -120,9 +125,24 @@ class Seen:
         if self.machine.name() is None:
             return self._of_drawing(source)
         target = self.machine.load()
-        if Path(source).suffix.lower() == target.machine.target.extension:
+        if Path(source).suffix.lower() == target.machine.target.extension or self._is_no_drawing(
+            source
+        ):
             return self._of_program(source, target), ()
         return self._of_job(source, target)
+
+    def _is_no_drawing(self, source: str) -> bool:
+        """Whether a file's content says that it is none: then it is a program of the target."""
+        from camtool.importers.read import file_bytes, find_format
+
+        if source == STDOUT or self.drawing.given.get("format") is not None:
+            return False
+        data = file_bytes(Path(source))
+        try:
+            find_format(data, Path(source).suffix, source)
+        except DrawingError as error:
+            return error.message.startswith(NO_DRAWING)
+        return False
 
     def _of_drawing(self, source: str) -> tuple[Scene, Findings]:
         from camtool.pipeline import picture

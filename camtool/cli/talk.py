@@ -78,13 +78,17 @@ def tinted(text: str) -> str:
 
 
 def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
-    """Errors always, warnings unless quiet, remarks when verbose; one line each."""
-    from camtool.findings import Severity
+    """Errors always, warnings unless quiet, remarks when verbose; one line each, and one for all
+    that are like those before, unless verbose."""
+    from camtool.findings import Severity, summed
 
     least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
-    for finding in findings:
-        if finding.severity >= least:
-            say(f"camtool: {finding}", quiet=False)
+    told = [finding for finding in findings if finding.severity >= least]
+    for finding, more in [(each, 0) for each in told] if verbose else summed(told):
+        say(f"camtool: {finding}", quiet=False)
+        if more:
+            name = f"{finding.severity.name.lower()} {finding.code.name}"
+            say(f"camtool: {name}: and {more} more (-v shows all)", quiet=False)
 
 
 def say_first_run(*, quiet: bool, judging: bool = False) -> None:

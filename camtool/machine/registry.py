@@ -16,11 +16,14 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from camtool.errors import MachineError, UnknownTargetError
+from camtool.errors import CamtoolError, MachineError, PostError, UnknownTargetError
 from camtool.machine.loader import build_machine, missing_keys, read_table, target_of
 from camtool.machine.model import Machine, Target
 
 GROUP = "camtool.postprocessors"
+
+OURS = "camtool_postprocessors."
+"""Modules that are camtool's own: what goes wrong in them is a fault of camtool itself."""
 
 
 @dataclass(frozen=True)
@@ -96,4 +99,34 @@ def _load(point: EntryPoint) -> tuple[Any, Path]:
             where=f"plug-in {point.value}",
             mend="reinstall or remove the package that brings it",
         ) from error
-    return post, file
+    return post if point.module.startswith(OURS) else Guarded(post, point.value), file
+
+
+class Guarded:
+    """A third party's post-processor: what it raises and should not is told as its own fault."""
+
+    def __init__(self, post: Any, value: str) -> None:
+        self._post = post
+        self._value = value
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Guarded, (self._post, self._value)
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._post, name)
+        if not callable(found):
+            return found
+
+        def called(*arguments: Any, **named: Any) -> Any:
+            try:
+                return found(*arguments, **named)
+            except CamtoolError:
+                raise
+            except Exception as error:
+                raise PostError(
+                    f"fails to {name} ({type(error).__name__}: {error})",
+                    where=f"plug-in {self._value}",
+                    mend="tell whoever made it, with the output of the same command with --debug",
+                ) from error
+
+        return called

@@ -223,12 +223,14 @@ def convert_program(
         return Posted(wanted, None, None, None, wanted.findings)
     program = target.post.write(wanted, target.machine)
     again = target.post.read(program.data, target.machine)
-    findings = _merged(wanted.findings, program.findings, again.findings)
+    said = {finding.code for finding in program.findings}
+    repeated = {finding for finding in again.findings if finding.code in said}
+    findings = _merged(wanted.findings, program.findings, again.findings, without=repeated)
     if not check:
         return Posted(wanted, program, again, None, findings)
     options = VerifyOptions(source=file)
     judged = _judged(program.data, again, target, Goal(wanted, said=wanted), options)
-    findings = _merged(findings, judged.findings)
+    findings = _merged(findings, judged.findings, without=repeated)
     return Posted(wanted, program, again, judged.with_findings(findings), findings)
 
 

@@ -72,15 +72,18 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
 
 def _missed_ends(held: Toolpath, case: Case, tally: Tally, rows: RowFigures) -> Iterator[Finding]:
     """Moves that end beside their programmed ends, but for arcs that never end; a remark when
-    all are within what the part is compared by, as where corners are blended."""
+    all are within what the part is compared by, and what the program itself lets corners be
+    rounded by (G64 P, Q)."""
     axes = case.machine.axes
     steps_mm = axes.x.coded_step_mm, axes.y.coded_step_mm
     missed = missed_ends(rows, held, steps_mm, without=tuple(tally.gave_up))
     if missed.count == 0:
         return
+    asked = (mode.tolerance_mm + mode.merging_mm for mode in held.modes if mode.tolerance_mm)
+    meant_mm = case.coverage_mm + max(asked, default=0.0)
     yield Finding(
         Code.END_NOT_REACHED,
-        Severity.WARNING if missed.most_mm > case.coverage_mm else Severity.INFO,
+        Severity.WARNING if missed.most_mm > meant_mm else Severity.INFO,
         f"the controller leaves {missed.count} moves beside their ends, "
         f"up to {missed.most_mm * UM_PER_MM:.2f} µm",
         where=f"{block_name(held, missed.row)}, end {at_point(held.end[missed.row])}",

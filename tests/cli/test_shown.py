@@ -184,3 +184,21 @@ def test_json_hides_nothing() -> None:
     # What is left has no effect: private and unassigned signs, and blanks of other widths.
     assert not [sign for sign in shown if ord(sign) < 0x20 or "\x7f" <= sign <= "\x9f"]
     assert not {"\u202e", "\u2066", "\u200f", "\u2028", "\ufeff", "\udcff"} & set(shown)
+
+
+def test_findings_that_repeat_are_summed_up(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "gaps.dxf").write_bytes(dxf(tuple(f"L{n}" for n in range(20))))
+    done = camtool("check", "gaps.dxf")
+    told = [line for line in done.stderr.decode().splitlines() if "GAP_OPEN" in line]
+    assert len(told) == 4
+    assert told[-1] == "camtool: warning GAP_OPEN: and 17 more (-v shows all)"
+    done = camtool("check", "gaps.dxf", "-v")
+    assert done.stderr.decode().count("warning GAP_OPEN [") == 20
+
+
+def test_a_program_is_shown_by_the_target_that_is_named(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.x").write_text("G21\nG90\nG1 X5 F100\nM2\n")
+    done = camtool("preview", "a.x", "-t", "grbl", "-o", "a.svg")
+    assert done.returncode == 0, done.stderr.decode()
+    done = camtool("preview", "a.x", "-o", "b.svg")
+    assert done.returncode == 2

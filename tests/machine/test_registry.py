@@ -1,12 +1,13 @@
 """Targets are found by entry point; a broken one harms nothing else."""
 
+import pickle
 from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 from click.testing import CliRunner
 
 from camtool.cli.targets import targets
-from camtool.errors import MachineError, UnknownTargetError
+from camtool.errors import MachineError, PostError, UnknownTargetError
 from camtool.machine import registry
 from camtool.machine.registry import list_target, load_target, target_names
 
@@ -64,3 +65,21 @@ def test_a_listed_target_is_checked() -> None:
     assert list_target("pic-mmh").needs == ()
     with pytest.raises(UnknownTargetError):
         list_target("pic")
+
+
+def test_what_a_plug_in_raises_is_its_own_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Post:
+        name = "mine"
+
+        def write(self, toolpath: object, machine: object) -> None:
+            raise TypeError("no such thing")
+
+    post = registry.Guarded(Post(), "their_module:POST")
+    with pytest.raises(PostError) as refused:
+        post.write(None, None)
+    said = str(refused.value)
+    assert "plug-in their_module:POST: fails to write (TypeError: no such thing)" in said
+    assert post.name == "mine"
+    assert not hasattr(post, "listing")
+    again = pickle.loads(pickle.dumps(registry.Guarded(len, "builtins:len")))
+    assert again.__self__ is not None
