@@ -16,9 +16,9 @@ def job_of(**settings: Any) -> Job:
     Tool with `tool_` before them (`tool_diameter_mm=0.2`).
 
     A text or a list is read as a job file reads it: `depth_mm="1/8in"`, `tabs="4:3mm:1mm"`,
-    `layers="CUT"` (one layer; commas part several); so are the numbers of `tabs`, `lead_in` and the like. Other
-    numbers are mm, rad, s and mm/min. TypeError for a name that none of them has, OptionError
-    that names the field for a value that it cannot have.
+    `layers="CUT"` (one layer; commas part several); so are the numbers of `tabs`, `lead_in` and
+    the like. Other numbers are mm, rad, s and mm/min. TypeError for a name that none of them has,
+    OptionError that names the field for a value that it cannot have.
     """
     return made(**{name: _read(name, value) for name, value in settings.items()})
 
