@@ -89,9 +89,13 @@ def truth_um(made: Posted, file: Path, scale: float, target: str) -> Floats:
     return 1000.0 * distances(slides, [scale * curve for curve in drawn(file)])
 
 
-def check(file: Path, target: str, scale: float, **asked: float) -> Posted:
-    """The report's total is never below the truth, and not above it by more than the fit."""
-    made = posted(file, target, job_of(scale=scale, **asked))
+def check(file: Path, target: str, scale: float, fits: float = 1.0) -> Posted:
+    """The report's total is never below the truth, and not above it by more than so many fits.
+
+    With d from a slide to its move and f from that to the curve, the truth t is d − f at least, so
+    that the total d + f is t + 2f at most; over many places the largest of both comes nearer.
+    """
+    made = posted(file, target, job_of(scale=scale))
     assert made.verification is not None, made.findings
     error = made.verification.report.error_um
     truth = truth_um(made, file, scale, target)
@@ -100,7 +104,7 @@ def check(file: Path, target: str, scale: float, **asked: float) -> Posted:
     assert error.total.rms is not None
     assert error.total.p95 is not None
     assert truth.max() <= error.total.max + ORACLE_UM
-    assert error.total.max <= truth.max() + error.fit.max + ORACLE_UM
+    assert error.total.max <= truth.max() + fits * error.fit.max + ORACLE_UM
     assert math.sqrt(float((truth**2).mean())) <= error.total.rms + ORACLE_UM
     assert float(np.quantile(truth, 0.95)) <= error.total.p95 * 1.005 + ORACLE_UM
     tolerance = load_target(target).machine.defaults.fit_tolerance_mm
@@ -111,10 +115,10 @@ def check(file: Path, target: str, scale: float, **asked: float) -> Posted:
 WRITERS: dict[str, Callable[[Path, int], None]] = {".dxf": spline_dxf, ".svg": bezier_svg}
 
 
-def check_random(kind: str, target: str, scale: float, seed: int, folder: Path) -> None:
+def random_file(kind: str, seed: int, folder: Path) -> Path:
     file = folder / f"random{kind}"
     WRITERS[kind](file, seed)
-    check(file, target, scale)
+    return file
 
 
 @pytest.mark.parametrize(
@@ -131,7 +135,7 @@ def check_random(kind: str, target: str, scale: float, seed: int, folder: Path) 
 def test_the_total_is_the_distance_from_the_true_curves(
     kind: str, target: str, scale: float, tmp_path: Path
 ) -> None:
-    check_random(kind, target, scale, 1, tmp_path)
+    check(random_file(kind, 1, tmp_path), target, scale)
 
 
 @pytest.mark.slow
@@ -144,7 +148,7 @@ def test_more_random_curves(
 ) -> None:
     if target == "pic-mmh" and scale > 1.0:
         pytest.skip("its blocks have no digits for 600 mm")
-    check_random(kind, target, scale, seed, tmp_path)
+    check(random_file(kind, seed, tmp_path), target, scale, fits=2.0)
 
 
 @pytest.mark.parametrize("scale", SCALES)
