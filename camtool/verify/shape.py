@@ -152,18 +152,21 @@ def wanted_shape(cuts: CutMoves, cutter: Cutter, kept: Sequence[Kept] = ()) -> W
         lines = _chords(cuts.segments, cuts.ends_z, cutter.tolerance_mm)
         region = _swept(lines, cutter)
         return None if region is None else Wanted(cutter, region, 0.0, (0.0, 0.0))
-    swept, left = [], []
+    left, taken = [], []
     for each in kept:
-        lines = _chords(*_moves(each), cutter.tolerance_mm)
+        lines = _chords(*_moves(each, cutter), cutter.tolerance_mm)
         region = _swept(lines, cutter)
-        if region is not None:
-            swept.append(region)
-            left.append(shapely.difference(region, _solid(each, region, cutter.tolerance_mm)))
-    if not swept:
+        if region is None:
+            continue
+        solid = _solid(each, region, cutter.tolerance_mm)
+        into = shapely.intersection(region, solid)
+        left.append(region if into.is_empty else shapely.difference(region, solid))
+        taken.append(into)
+    if not left:
         return None
-    asked = shapely.union_all(left)
-    rest = shapely.difference(shapely.union_all(swept), asked)
-    _, depth, at = _beyond(rest, asked, cutter.tolerance_mm)
+    asked = left[0] if len(left) == 1 else shapely.union_all(left)
+    # What one may not take, another may.
+    _, depth, at = _beyond(shapely.union_all(taken), asked, cutter.tolerance_mm)
     return Wanted(cutter, asked, depth, at)
 
 
@@ -294,13 +297,17 @@ def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
     return _Lines(np.concatenate(points), np.concatenate(heights), np.concatenate(line))
 
 
-def _moves(kept: Kept) -> tuple[Segments, Floats]:
-    """The moves of runs that cut, and the heights (K, 2) of their ends."""
+def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
+    """The moves of runs that cut, and the heights (K, 2) of their ends; each once, where the tool
+    is as wide at every height."""
     rows = [np.hstack([run[:-1], run[1:]]) for run in kept.runs]
     moves = np.concatenate([np.empty((0, 8)), *rows])
     lowest = np.minimum(moves[:, 2], moves[:, 6])
     far = np.hypot(moves[:, 4] - moves[:, 0], moves[:, 5] - moves[:, 1]) > POSITION_EPS_MM
     moves = moves[far & (lowest < STOCK_TOP_MM)]
+    if cutter.cone is None:
+        _, first = np.unique(moves[:, [0, 1, 3, 4, 5]], axis=0, return_index=True)
+        moves = moves[np.sort(first)]
     return Segments.between(moves[:, :2], moves[:, 4:6], moves[:, 3]), moves[:, [2, 6]]
 
 
