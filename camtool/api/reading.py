@@ -27,7 +27,7 @@ class Reading(TypedDict, total=False):
     tolerance_mm: float
     gap_mm: float
     scale: float
-    dpi: float
+    dpi: float | None
     format: str | None
     chain_gaps: bool
     across_layers: bool

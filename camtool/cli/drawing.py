@@ -105,7 +105,12 @@ def _read_flags() -> list[Callable[..., Any]]:
     return [
         option(_READ, "--format", type=click.Choice(FORMATS), help="Do not guess it."),
         option(_READ, "--units", metavar="UNIT", help="Unit of the drawing: mm, in, um, px ..."),
-        option(_READ, "--dpi", type=float, help="Pixels per inch of an SVG.  [96]"),
+        option(
+            _READ,
+            "--dpi",
+            type=float,
+            help="Pixels per inch of an SVG.  [96, or what its program took]",
+        ),
         option(
             _READ, "--tolerance", "tolerance_mm", callback=length, metavar="LENGTH", help=tolerance
         ),

@@ -49,7 +49,8 @@ class ReadOptions:
     `units.MM_PER_UNIT`). `tolerance_mm`: how far fitted arcs may lie from a curve; `gap_mm`: open
     ends nearer than this are joined: both on the part, which is `scale` times as large as what
     is drawn. With `chain_gaps` false only equal ends are joined; `across_layers` joins ends of
-    different layers too. `dpi`: pixels per inch of SVG's px. `format`: one of FORMATS, over what
+    different layers too. `dpi`: pixels per inch of SVG's px (None: what the program that
+    wrote the file took, else DPI). `format`: one of FORMATS, over what
     the content looks like. `select`: which entities.
 
     `text`: one of TEXTS. `recognise_arcs`: chords on one circle become arcs again. `layout`: a
@@ -62,7 +63,7 @@ class ReadOptions:
     tolerance_mm: float = TOLERANCE_MM
     gap_mm: float = GAP_MM
     scale: float = 1.0
-    dpi: float = DPI
+    dpi: float | None = None
     format: str | None = None
     chain_gaps: bool = True
     across_layers: bool = False
@@ -90,11 +91,16 @@ class ReadOptions:
         if self.section_z_mm is not None and not math.isfinite(self.section_z_mm):
             raise OptionError(f"section_z_mm is {self.section_z_mm}, it must be a height")
         for name in ("tolerance_mm", "dpi", "scale"):
-            value = getattr(self, name)
+            value = self.px_an_inch if name == "dpi" else getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise OptionError(f"{name} is {value}, it must be above 0")
         if not (math.isfinite(self.gap_mm) and self.gap_mm >= 0.0):
             raise OptionError(f"gap_mm is {self.gap_mm}, it must be 0 or more")
+
+    @property
+    def px_an_inch(self) -> float:
+        """As asked, or as CSS has it."""
+        return DPI if self.dpi is None else self.dpi
 
     def as_drawn(self) -> ReadOptions:
         """The same with lengths of the part as they are in the drawing; `scale` says so still.
@@ -112,7 +118,7 @@ class ReadOptions:
     def mm_per(self, unit: str) -> float:
         """One `unit` in mm; a px is as large as `dpi` makes it."""
         name = unit.lower()
-        return _MM_PER_INCH / self.dpi if name == "px" else MM_PER_UNIT[name]
+        return _MM_PER_INCH / self.px_an_inch if name == "px" else MM_PER_UNIT[name]
 
 
 DEFAULTS = ReadOptions()

@@ -189,7 +189,11 @@ def test_programs_with_other_pixels_are_told(head: str, page: str, dpi: str | No
         if finding.code == Code.UNIT_GUESSED
     ]
     assert len(told) == (dpi is not None)
-    assert not told or f"give --dpi {dpi}" in told[0].message
+    assert not told or f"took {dpi} px an inch, and it was read so" in told[0].message
+    read_so = read_in((head + svg(LINE, page)).encode())
+    asked = read((head + svg(LINE, page)).encode(), "a.svg", ReadOptions(dpi=float(dpi or 96)))
+    assert read_so.paths.vertices.tolist() == asked.paths.vertices.tolist()
+    assert read_so.units == asked.units
     asked = read((head + svg(LINE, page)).encode(), "a.svg", ReadOptions(dpi=90.0))
     assert not [finding for finding in asked.findings if finding.code == Code.UNIT_GUESSED]
 

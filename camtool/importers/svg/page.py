@@ -54,20 +54,26 @@ Writer = tuple[str, float]
 
 
 def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> Page:
-    """The page of the root element; DrawingError when its size or viewBox makes no sense."""
+    """The page of the root element; DrawingError when its size or viewBox makes no sense.
+
+    Where nobody says `dpi` a px is what the program took it for that wrote the file.
+    """
+    if writer is not None and options.units is None and options.dpi is None:
+        options = replace(options, dpi=writer[1])
+    else:
+        writer = None
     width, height = (_side(root, name, options) for name in ("width", "height"))
     box = parse_view_box(root.get("viewBox"))
     if options.units is not None:
         return _asked(width, height, box, options)
     page = _said(root, (width, height), box, options)
-    in_px = box is None or page.units.name == "px"
-    if writer is None or not in_px or options.dpi != DPI:
+    if writer is None or not (box is None or page.units.name == "px"):
         return page
     hint = Finding(
         Code.UNIT_GUESSED,
         Severity.WARNING,
-        f"{writer[0]} wrote the file, which took {writer[1]:g} px an inch, and it was read with "
-        f"{DPI:g}; if it comes out too small, give --dpi {writer[1]:g}",
+        f"{writer[0]} wrote the file, which took {writer[1]:g} px an inch, and it was read so; "
+        f"if it comes out too large, give --dpi {DPI:g}",
     )
     return replace(page, findings=(*page.findings, hint))
 
@@ -115,7 +121,7 @@ def _asked(width: _Side, height: _Side, box: Box | None, options: ReadOptions) -
 def _sizeless(box: Box | None, options: ReadOptions) -> Page:
     """Nothing says how large the page is: user units are taken as px."""
     px = options.mm_per("px")
-    units = Units("px", px, f"no size in the file, taken as {options.dpi:g} px an inch")
+    units = Units("px", px, f"no size in the file, taken as {options.px_an_inch:g} px an inch")
     finding = _unitless("the svg has no width and height", options)
     if box is None:
         return Page(_flip(0.0) @ scaling(px, px), None, units, (finding,))
@@ -153,6 +159,6 @@ def _unitless(why: str, options: ReadOptions) -> Finding:
     return Finding(
         Code.UNITLESS,
         Severity.WARNING,
-        f"{why}: read as px, {options.dpi:g} an inch; if that is wrong, name the unit of a user "
-        "unit with --units, or give --dpi",
+        f"{why}: read as px, {options.px_an_inch:g} an inch; if that is wrong, name the unit of a "
+        "user unit with --units, or give --dpi",
     )
