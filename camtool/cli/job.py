@@ -123,7 +123,8 @@ def _summary(facts: dict[str, Any]) -> Iterator[str]:
             )
             yield from _sides(operation["contours"])
     if "stock_mm" in facts:
-        yield f"stock      {' by '.join(f'{size:g}' for size in facts['stock_mm']['size'])} mm"
+        known = [f"{size:g}" for size in facts["stock_mm"]["size"] if size is not None]
+        yield f"stock      {' by '.join(known)} mm{' thick' if len(known) == 1 else ''}"
 
 
 def _sides(groups: list[dict[str, Any]]) -> Iterator[str]:

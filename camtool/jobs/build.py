@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"\d{1,6}")
 """An operation by its number."""
 
 _TABLE_KEYS = ("tool_table", "tool_table_units")
-_ANY_STOCK = {"corner_mm": (0.0, 0.0), "size_mm": (1.0, 1.0), "thickness_mm": 1.0}
+_ANY_STOCK = {"thickness_mm": 1.0}
 
 
 def build_job(file: Said, flags: Said, chosen: tuple[str, ...] = ()) -> Job:
@@ -177,8 +177,6 @@ def _placement(file: Said, flags: Said) -> Placement:
 def _stock(table: Table | None) -> Stock | None:
     if table is None:
         return None
-    needed = [name for name, key in STOCK.items() if key.field in _ANY_STOCK]
-    for name in needed:
-        if name not in table.given:
-            raise table.refused(f"key {name} is missing", f"give {', '.join(needed)}")
+    if "thickness" not in table.given:
+        raise table.refused("key thickness is missing", "give thickness, and corner and size")
     return record_of(Stock, STOCK, table, _ANY_STOCK)

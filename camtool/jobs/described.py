@@ -40,8 +40,8 @@ def described(
     if job.stock is not None:
         stock = job.stock
         facts["stock_mm"] = {
-            "corner": list(stock.corner_mm),
-            "size": [*stock.size_mm, stock.thickness_mm],
+            "corner": None if stock.corner_mm is None else list(stock.corner_mm),
+            "size": [*(stock.size_mm or (None, None)), stock.thickness_mm],
         }
     findings: list[Finding] = []
     if drawing is None:

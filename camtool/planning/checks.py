@@ -16,7 +16,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
 from camtool.machine.model import Machine
-from camtool.planning.job import Job, Stock, Tool
+from camtool.planning.job import Job, Tool
 from camtool.planning.link import lowered_feeds
 from camtool.planning.places import operation_name, own_numbers
 from camtool.toolpath.cleared import STOCK_TOP_MM, Reach, rapids_through_stock
@@ -30,6 +30,8 @@ MOST_LISTED = 10
 """So many rapids are listed; the last one says how many more there are."""
 
 AXES = "XYZ"
+Box = tuple[float, float, float, float]
+"""Left, lower, right and upper edge, mm."""
 
 
 def checked(toolpath: Toolpath, job: Job, machine: Machine) -> tuple[Finding, ...]:
@@ -119,8 +121,10 @@ def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
             limit=stock.thickness_mm + stock.through_mm,
             unit="mm",
         )
+    if stock.box_mm is None:
+        return
     _, sweeps = _radii(toolpath, job)
-    beside = _beside(toolpath, stock, sweeps)
+    beside = _beside(toolpath, stock.box_mm, sweeps)
     stay = np.cumsum((toolpath.kind == Kind.RAPID) & (toolpath.end[:, 2] >= STOCK_TOP_MM))
     within = np.unique(stay[cuts & ~beside])
     outside = cuts & ~np.isin(stay, within)
@@ -143,17 +147,16 @@ def _cuts(toolpath: Toolpath) -> Bools:
     return np.asarray(toolpath.is_feed & (low < STOCK_TOP_MM - POSITION_EPS_MM))
 
 
-def _beside(toolpath: Toolpath, stock: Stock, radius: Floats) -> Bools:
-    """(N,) true where the tool, of `radius` (N,) mm, stays beside the stock: by the boxes of the
-    moves, of arcs by those of their circles."""
+def _beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
+    """(N,) true where the tool, of `radius` (N,) mm, stays beside the stock's box: by the boxes
+    of the moves, of arcs by those of their circles."""
     begin, end = toolpath.starts[:, :2], toolpath.end[:, :2]
     low, high = np.minimum(begin, end), np.maximum(begin, end)
     arm = np.hypot(*(begin - toolpath.centre).T)[:, None]
     arc = toolpath.is_arc[:, None]
     low = np.where(arc, toolpath.centre - arm, low) - radius[:, None]
     high = np.where(arc, toolpath.centre + arm, high) + radius[:, None]
-    corner = np.array(stock.corner_mm)
-    far = (high <= corner) | (low >= corner + np.array(stock.size_mm))
+    far = (high <= np.array(box[:2])) | (low >= np.array(box[2:]))
     return np.asarray(far.any(axis=1))
 
 
@@ -201,7 +204,8 @@ def _cleared_mm(tool: Tool) -> float:
 def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     """Rapids below the stock top outside what is cleared."""
     cuts, sweeps = _radii(toolpath, job)
-    found = rapids_through_stock(toolpath, Reach(cuts, sweeps, _solid(job.stock)))
+    solid = None if job.stock is None else job.stock.box_mm
+    found = rapids_through_stock(toolpath, Reach(cuts, sweeps, solid))
     more = len(found) - MOST_LISTED
     for number, one in enumerate(found[:MOST_LISTED], 1):
         depth = STOCK_TOP_MM - one.z_mm
@@ -216,13 +220,6 @@ def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
             limit=STOCK_TOP_MM,
             unit="mm",
         )
-
-
-def _solid(stock: Stock | None) -> tuple[float, float, float, float] | None:
-    if stock is None:
-        return None
-    (x, y), (width, height) = stock.corner_mm, stock.size_mm
-    return x, y, x + width, y + height
 
 
 def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:

@@ -265,20 +265,35 @@ class Placement:
 
 @dataclass(frozen=True)
 class Stock:
-    """A block whose top is Z0: its lower-left corner and size in the work frame, mm. Cuts may go
-    `spoilboard_mm` below it, into what it lies on (None: up to THROUGH_MM, and no more than
-    THROUGH_SHARE of its thickness)."""
+    """A block whose top is Z0: its thickness, and its lower-left corner and size in the work
+    frame, mm (both None: as large as the job needs). Cuts may go `spoilboard_mm` below it, into
+    what it lies on (None: up to THROUGH_MM, and no more than THROUGH_SHARE of its thickness)."""
 
-    corner_mm: tuple[float, float]
-    size_mm: tuple[float, float]
     thickness_mm: float
+    corner_mm: tuple[float, float] | None = None
+    size_mm: tuple[float, float] | None = None
     spoilboard_mm: float | None = None
 
     def __post_init__(self) -> None:
-        all_above_zero("stock size", self.size_mm, "mm")
         above_zero("stock thickness", self.thickness_mm, "mm")
+        if self.size_mm is not None:
+            all_above_zero("stock size", self.size_mm, "mm")
+        if (self.corner_mm is None) != (self.size_mm is None):
+            raise OptionError(
+                "a stock has a corner and a size, or neither",
+                where="[stock]",
+                mend="give both corner and size, or thickness alone",
+            )
         if self.spoilboard_mm is not None:
             at_least_zero("spoilboard", self.spoilboard_mm, "mm")
+
+    @property
+    def box_mm(self) -> tuple[float, float, float, float] | None:
+        """Its left, lower, right and upper edge; None where nobody said them."""
+        if self.corner_mm is None or self.size_mm is None:
+            return None
+        (x, y), (width, height) = self.corner_mm, self.size_mm
+        return x, y, x + width, y + height
 
     @property
     def through_mm(self) -> float:

@@ -160,7 +160,7 @@ EXPECTED = Job(
         copies=(3, 2),
         pitch_mm=(12.0, 9.0),
     ),
-    stock=Stock((-1.0, -2.0), (10.0, 50.0), 2.0),
+    stock=Stock(2.0, (-1.0, -2.0), (10.0, 50.0)),
     safe_z_mm=0.5,
     minimise="reversals",
     approach=True,
@@ -180,7 +180,7 @@ def job(
 
 def test_every_key_has_its_place(tmp_path: Path) -> None:
     # "10x5cm": the unit behind both is that of both.
-    expected_stock = Stock((-1.0, -2.0), (100.0, 50.0), 2.0)
+    expected_stock = Stock(2.0, (-1.0, -2.0), (100.0, 50.0))
     made = job(tmp_path, WHOLE_FILE)
     for got, expected in zip(made.operations, EXPECTED.operations, strict=True):
         assert got == expected

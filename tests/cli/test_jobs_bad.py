@@ -113,6 +113,7 @@ FILES = [
     ("[place]\ncopies = [0, 1]", ["table [place], key copies", "not above 0"]),
     ("[stock]\ncorner = [0, 0]\nsize = [9, -9]\nthickness = 1", ["table [stock], key size"]),
     ("[stock]\ncorner = [0, 0]\nsize = [9, 9]", ["table [stock]", "key thickness is missing"]),
+    ("[stock]\ncorner = [0, 0]\nthickness = 1", ["table [stock]", "both corner and size"]),
     # contradictions
     ("depth = 1\nlast_pass = 2", ["key last_pass", "deeper than the whole cut of 1 mm"]),
     ("tabs = {count = 2, spacing = 3}", ["key tabs", "a count or a spacing"]),

@@ -12,7 +12,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 from tests.oracles.path_machine import path_machine
 
-STOCK = Stock((0.0, 0.0), (10.0, 10.0), 2.0)
+STOCK = Stock(2.0, (0.0, 0.0), (10.0, 10.0))
 
 
 def found(
@@ -72,6 +72,14 @@ def test_only_what_helps_is_advised(
     assert "--machine" in finding.message
 
 
+def test_a_stock_of_which_only_the_thickness_is_known_is_as_large_as_the_job_needs() -> None:
+    job = job_of(stock=Stock(2.0), tool_diameter_mm=1.0)
+    assert codes(down(500, 500, -2).line(600, 1, feed=10), job) == []
+    (finding,) = found(down(1, 1, -2).line(2, 1, -3.5, feed=10), job)
+    assert finding.code == Code.OUT_OF_STOCK
+    assert finding.limit == pytest.approx(3.0)
+
+
 @pytest.mark.parametrize(
     ("thickness", "board", "through", "allowed"),
     [
@@ -88,7 +96,7 @@ def test_only_what_helps_is_advised(
 def test_cuts_may_go_through_the_stock_as_far_as_the_spoilboard_lets_them(
     thickness: float, board: float | None, through: float, allowed: float | None
 ) -> None:
-    job = job_of(stock=Stock(STOCK.corner_mm, STOCK.size_mm, thickness, board))
+    job = job_of(stock=Stock(thickness, STOCK.corner_mm, STOCK.size_mm, board))
     assert codes(down(1, 1, -thickness).line(2, 1, feed=10), job) == []
     path = down(1, 1, -thickness).line(2, 1, -thickness - through, feed=10)
     (finding,) = found(path, job)

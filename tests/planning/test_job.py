@@ -78,6 +78,8 @@ BAD = [
     (Placement, {"copies": (0, 1), "pitch_mm": (1.0, 1.0)}),
     (Stock, {"corner_mm": (0.0, 0.0), "size_mm": (1.0, 0.0), "thickness_mm": 1.0}),
     (Stock, {"corner_mm": (0.0, 0.0), "size_mm": (1.0, 1.0), "thickness_mm": 0.0}),
+    (Stock, {"corner_mm": (0.0, 0.0), "thickness_mm": 1.0}),
+    (Stock, {"size_mm": (1.0, 1.0), "thickness_mm": 1.0}),
     *[(Job, {"safe_z_mm": value}) for value in ABOVE_ZERO],
     (Job, {"minimise": "time"}),
     (Job, {"operations": ()}),

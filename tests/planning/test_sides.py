@@ -355,5 +355,5 @@ def test_copies_take_what_was_not_chosen_with_them(machine: Machine) -> None:
 
 def test_a_stock_is_no_contour() -> None:
     drawing = _read(PLATE, ("CUT",) * 3)
-    job = Job(operations=_profiles("CUT"), stock=Stock((-5.0, -5.0), (20.0, 20.0), 3.0))
+    job = Job(operations=_profiles("CUT"), stock=Stock(3.0, (-5.0, -5.0), (20.0, 20.0)))
     assert _sides(drawing, job) == {"CUT/PATH 0": True, "CUT/PATH 1": False, "CUT/PATH 2": False}
