@@ -8,7 +8,8 @@ The edge of a closed contour is the drawn line. Its size, and that of what the t
 
     tool             nominal     planned
     on the line      drawn       box of the tool's centre
-    within it        drawn       that box and a tool's radius all round
+    within it        drawn       that box and a tool's radius all round; of a V bit its radius at
+                                 the surface, which depth makes
     round it         drawn       drawn, and the allowance all round
 
 where a line is cut by one contour alone; of contours that share a line, or that run round several
@@ -32,6 +33,7 @@ from camtool.toolpath.moves import Toolpath
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
+    from camtool.planning.carving.vcarve import Cone
     from camtool.planning.plan import Step
 
 PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
@@ -124,7 +126,7 @@ def _edges(step: Step, placed: Drawing) -> Iterator[tuple[Item, tuple[Floats, Fl
 def _cuts_edge(item: Item) -> bool:
     """Whether the item follows a closed line whose size it decides."""
     if isinstance(item, Fixed):
-        return item.setting.operation.kind == "pocket"
+        return item.setting.operation.kind in ("pocket", "vcarve")
     return item.path.closed
 
 
@@ -138,8 +140,12 @@ def _boxes(item: Item, placed: Drawing) -> tuple[Floats, Floats]:
         if item.material_left is None:
             return drawn, centre
     else:
-        points = np.concatenate([run.vertices[:, :2] for run in item.runs])
-        centre = np.column_stack([points.min(axis=0), points.max(axis=0)])
+        points = np.concatenate([run.vertices[:, :3] for run in item.runs])
+        if operation.kind == "vcarve":
+            from camtool.planning.carving.vcarve import Cone
+
+            return drawn, _carved(points, Cone.of(operation))
+        centre = np.column_stack([points.min(axis=0), points.max(axis=0)])[:2]
     wider = np.array([-1.0, 1.0])
     more = np.diff(centre - drawn)[:, 0] - 2.0 * (radius + allowance)
     if isinstance(item, Fixed) or more.max() < -SAME_SIZE_MM:
@@ -153,3 +159,13 @@ def _boxes(item: Item, placed: Drawing) -> tuple[Floats, Floats]:
     if more.max() <= SAME_SIZE_MM + spare:
         return drawn, drawn + allowance * wider
     return centre - (radius + allowance) * wider, centre - radius * wider
+
+
+def _carved(points: Floats, cone: Cone) -> Floats:
+    """(2, 2) mm: the box of what a V bit cuts at the surface, its tip at these points (N, 3). The
+    edge bounds an envelope of discs whose radius is even along each move, so that the widest
+    place of a move is at one of its ends."""
+    reach = np.array([cone.radius_at(-min(z, 0.0)) for z in points[:, 2].tolist()])[:, None]
+    return np.column_stack(
+        [(points[:, :2] - reach).min(axis=0), (points[:, :2] + reach).max(axis=0)]
+    )

@@ -76,6 +76,19 @@ def test_allowance_pockets_and_the_slides() -> None:
     assert moved["part X"].predicted_mm == pytest.approx(WIDE + 1e-3 * (WIDE + TOOL), abs=3e-3)
 
 
+@pytest.mark.parametrize(("depth", "least"), [(2.0, WIDE), (5.0, WIDE)])
+def test_what_is_carved_is_as_large_as_the_bit_is_wide_at_the_surface(
+    depth: float, least: float
+) -> None:
+    bit = Tool(diameter_mm=6.0, kind="v", tip_angle_rad=0.5 * math.pi)
+    carve = Job(operations=(Operation(kind="vcarve", tool=bit, depth_mm=depth),))
+    made = post_drawing(drawing_of([box(0, 0, WIDE, HIGH)]), carve, load_target("linuxcnc"))
+    assert made.verification is not None, made.findings
+    size = made.verification.report.dimensions[0]
+    assert (size.nominal_mm, size.of) == (WIDE, "edge")
+    assert size.predicted_mm == pytest.approx(least, abs=0.03)
+
+
 def test_what_is_roughed_and_finished_is_as_large_as_it_is_finished() -> None:
     cutter = Tool(diameter_mm=TOOL)
     rough = Operation(side="outside", tool=cutter, allowance_mm=0.3)
