@@ -222,8 +222,8 @@ def test_what_a_window_and_a_rim_must_leave() -> None:
     rim, window = closed(*rectangle(60.0, 40.0)), closed(*moved(rectangle(30.0, 20.0), 15.0, 10.0))
     job = job_of(tool_diameter_mm=3.0, side="auto", depth_mm=1.0)
     plan = planned(drawing_of([rim, window]), job, load_target("linuxcnc").machine)
-    beside_rim, beside_window = kept_of(plan.steps)
-    assert (len(beside_rim.runs), len(beside_window.runs)) == (1, 1)
+    beside_rim, beside_window, free = kept_of(plan.steps)
+    assert (len(beside_rim.runs), len(beside_window.runs), len(free.runs)) == (1, 1, 0)
     assert not beside_rim.beyond
     assert beside_window.beyond
     for each in (beside_rim, beside_window):
@@ -235,3 +235,16 @@ def test_what_a_window_and_a_rim_must_leave() -> None:
     wrong = Kept(beside_window.runs, beside_window.lines, ~beside_window.stays, False)
     found = wanted_shape(cut_moves(plan.toolpath, flat_cuts=False), Cutter(3.0), (wrong,))
     assert found is None or found.beyond_mm > 1.0
+
+
+@pytest.mark.parametrize("side", ["auto", "outside", "inside"])
+def test_open_lines_and_named_sides_are_cut_where_they_are_asked_for(side: str) -> None:
+    rim, window = closed(*rectangle(60.0, 40.0)), closed(*moved(rectangle(30.0, 20.0), 15.0, 10.0))
+    line = Polyline(np.array([[-5.0, 5.0, 0.0], [65.0, 5.0, 0.0]]), closed=False)
+    job = job_of(tool_diameter_mm=3.0, side=side, depth_mm=1.0)
+    plan = planned(drawing_of([rim, window, line]), job, load_target("linuxcnc").machine)
+    kept = kept_of(plan.steps)
+    assert sum(len(each.runs) for each in kept) == 3
+    found = wanted_shape(cut_moves(plan.toolpath, flat_cuts=False), Cutter(3.0), kept)
+    assert found is not None
+    assert found.beyond_mm == 0.0
