@@ -30,7 +30,7 @@ OF_ALL = ("--size", "--crop", "--dark")
 """What every still picture has."""
 
 HINTS = {
-    "swept": "; --tool-diameter says how wide the tool is",
+    "swept": "; --tool-diameter says how wide the tool is (a V bit is as wide as it is deep)",
     "travel": "; the path does not lie within the table's travel",
     "drawing": "; there is no drawing in it",
 }

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.kernels.approach import approach_scan, expected_quadrants
-from camtool.kernels.compiled import bare, kernel
+from camtool.kernels.compiled import bare, inner, kernel
 from camtool.kernels.heading import heading
 from camtool.kernels.leg_steps import (
     ARC,
@@ -89,7 +89,7 @@ def _passes(path: Ints, leg: Ints, tracker: Ints, expected: int) -> int:
     return found
 
 
-@bare
+@inner
 def _stop(leg: Ints, how: tuple[int, bool, int], room: Room, out: Ints) -> None:
     """Fill `out` (4,) for one arc that does not start at its centre."""
     method, rounded, reading = how

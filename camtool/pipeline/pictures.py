@@ -38,7 +38,7 @@ def picture(
     `job` tells where it places the drawing in the work frame; `listing` gives the program's lines
     to the viewer.
     """
-    from camtool.pipeline.judge import tool_mm
+    from camtool.pipeline.judge import cone_of, tool_mm
     from camtool.preview.scene import Scene, scene_of_drawing
 
     if drawing is not None and toolpath is None:
@@ -48,6 +48,8 @@ def picture(
 
         drawing = place(drawing, job)
     trace = verification.trace if verification is not None else None
+    # A V bit is as wide as it is deep: one width for all of its path would be false.
+    even = job is not None and cone_of(job) is None
     return Scene(
         title=title,
         drawing=drawing,
@@ -59,7 +61,7 @@ def picture(
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
         worst=worst_places(verification),
-        tool_mm=None if job is None else tool_mm(job),
+        tool_mm=tool_mm(job) if job is not None and even else None,
         rounds=() if verification is None else rounds_of(verification),
         run=_run(toolpath, verification, machine, listing),
     )

@@ -72,12 +72,10 @@ def run_of(
         run = by_feed(toolpath, machine.rapid_mm_min)
     else:
         report, rows = verification.report, verification.rows
-        shape = report.shape
         run = Run(
             seconds=rows.ledger.duration_s,
             error_mm=rows.total,
             trace_row=verification.trace.row,
-            tool_mm=None if shape is None else shape.tool_diameter_mm,
             tables=tuple(_tables(report)),
             worst=_worst_places(report),
         )

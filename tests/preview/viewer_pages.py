@@ -41,9 +41,8 @@ def busy(scene: Scene) -> Scene:
         blocks=tuple(f"N{row} G01 X{row}" for row in range(count)),
         tables=(Table("Worst moves", ("block", "error"), (Line(("3", "20"), 2),)),),
         worst=(Worst((2.5, 2.5)),),
-        tool_mm=0.5,
     )
-    return with_run(replace(scene, toolpath=numbered), run)
+    return with_run(replace(scene, toolpath=numbered, tool_mm=0.5), run)
 
 
 def traced(scene: Scene) -> Scene:

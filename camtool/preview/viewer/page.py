@@ -97,7 +97,7 @@ def _head(scene: Scene, run: Run | None, traced: Traced) -> dict[str, object]:
         "texts": [] if toolpath is None else list(toolpath.texts),
         "blocks": None if blocks is None else "\n".join(map(_one_line, blocks)),
         "hex": run is not None and run.binary,
-        "tool_mm": scene.tool_mm if run is None or run.tool_mm is None else run.tool_mm,
+        "tool_mm": scene.tool_mm,
         "top_um": _top_um(scene, run),
         "map": {"light": bin_colours(), "dark": bin_colours(dark=True)},
         "tables": [] if run is None else [_table(table) for table in run.tables],

@@ -43,8 +43,7 @@ class Run:
     `trace_row` (T,) the row of each point of the scene's trace.
 
     `blocks` are the program's lines, one per block, or None without a program; `binary` tells
-    that they are bytes in hex. `tool_mm` is the diameter of the tool, None when not known.
-    ValueError when the columns do not fit.
+    that they are bytes in hex. ValueError when the columns do not fit.
     """
 
     seconds: Floats
@@ -52,7 +51,6 @@ class Run:
     trace_row: Ints
     blocks: tuple[str, ...] | None = None
     binary: bool = False
-    tool_mm: float | None = None
     tables: tuple[Table, ...] = ()
     worst: tuple[Worst, ...] = ()
 
