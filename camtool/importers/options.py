@@ -15,6 +15,9 @@ FORMATS = ("dxf", "svg", "points", "solid")
 TEXTS = ("skip", "outline", "stroke")
 """What becomes of text: left out, the outlines of its font, or the lines of an engraving font."""
 
+TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engraving"
+"""What is said of text that is left out."""
+
 TOLERANCE_MM = 0.0005
 """Largest distance between a curve and the arcs that stand for it (docs/numerics.md)."""
 

@@ -44,6 +44,19 @@ def skip_findings(skipped: Sequence[Skipped], dropped: Sequence[Skipped]) -> lis
     ]
 
 
+def font_findings(lacking: Counter[str]) -> list[Finding]:
+    """FONT_SUBSTITUTED for what texts wanted and could not have, and how many texts did."""
+    return [
+        Finding(
+            Code.FONT_SUBSTITUTED,
+            Severity.WARNING,
+            f"{count} texts: {what}",
+            measured=float(count),
+        )
+        for what, count in lacking.items()
+    ]
+
+
 def size_findings(drawing: Drawing) -> list[Finding]:
     """IMPLAUSIBLE_SIZE when the longer side fits a wrong unit better than a part."""
     units, box = drawing.units, drawing_extents(drawing)

@@ -86,6 +86,19 @@ def test_python_loads_what_its_calls_need() -> None:
     assert "ezdxf" not in heavy_of("camtool.read_drawing('samples/letter.svg')")
 
 
+@pytest.mark.parametrize(("mode", "fonts"), [("skip", set()), ("stroke", {"HersheyFonts"})])
+def test_text_of_an_svg_loads_the_fonts_that_it_needs(
+    mode: str, fonts: set[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "text.svg"
+    file.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm">'
+        '<text y="9">A</text><path d="M0 0h9"/></svg>'
+    )
+    loaded = heavy_of(f"camtool.read_drawing({str(file)!r}, text={mode!r})")
+    assert loaded & {"ezdxf", "HersheyFonts", "defusedxml"} == {"defusedxml"} | fonts
+
+
 def test_no_kernel_is_compiled_for_targets() -> None:
     assert not warm("targets") & {"numba", "ezdxf", "shapely"}
 

@@ -664,7 +664,7 @@ def test_what_cannot_be_cut_is_counted() -> None:
 
 
 def test_nothing_to_draw_is_an_error_that_says_what_there_was() -> None:
-    with pytest.raises(DrawingError, match=r"only 2 text \(.*convert it to paths\)"):
+    with pytest.raises(DrawingError, match=r"only 2 text \(.*--text outline.*\)"):
         drawn("<text/><text/>")
 
 

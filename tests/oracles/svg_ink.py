@@ -45,8 +45,8 @@ class Picture:
         return left, top, right, bottom
 
 
-def ink(svg: str, zoom: int) -> Picture:
-    """What resvg draws of the page at `zoom` times its size."""
+def ink(svg: str, zoom: int, fonts: tuple[str, ...] = ()) -> Picture:
+    """What resvg draws of the page at `zoom` times its size, its text in these font files."""
     data = bytes(
         resvg_py.svg_to_bytes(
             svg_string=svg,
@@ -54,6 +54,8 @@ def ink(svg: str, zoom: int) -> Picture:
             zoom=zoom,
             skip_system_fonts=True,
             shape_rendering="crisp_edges",
+            text_rendering="optimize_speed",
+            font_files=list(fonts),
         )
     )
     return Picture(decode(data)[:, :, 3] > 0, zoom)

@@ -46,7 +46,6 @@ DIMENSIONS = frozenset(
 COMPOUNDS = frozenset(("MLINE", "ACAD_PROXY_ENTITY"))
 """Kinds that are read by the parts they are drawn with."""
 
-TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engraving"
 DIMENSION_SKIPPED = "is an annotation: read its lines with --dimensions"
 
 _SOLID = "is a 3D shape: export it as STEP"

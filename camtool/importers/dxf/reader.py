@@ -19,6 +19,7 @@ from camtool.importers.dxf.load import load, quiet, without_collector
 from camtool.importers.dxf.units import units_of
 from camtool.importers.dxf.walk import Walk
 from camtool.importers.options import ReadOptions
+from camtool.importers.told import font_findings
 
 REPAIRS_NAMED = 3
 """So many repairs are told in full."""
@@ -44,7 +45,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
             *_repaired(loaded.repairs),
             *findings,
             *_not_applied(walk.lacking),
-            *_substituted(walk.fonts),
+            *font_findings(walk.fonts),
         ],
         options=options,
     )
@@ -88,17 +89,4 @@ def _not_applied(lacking: Counter[tuple[str, str]]) -> list[Finding]:
             measured=float(count),
         )
         for (kind, what), count in lacking.items()
-    ]
-
-
-def _substituted(fonts: Counter[str]) -> list[Finding]:
-    """Fonts that stand for others."""
-    return [
-        Finding(
-            Code.FONT_SUBSTITUTED,
-            Severity.WARNING,
-            f"{count} texts: {what}",
-            measured=float(count),
-        )
-        for what, count in fonts.items()
     ]

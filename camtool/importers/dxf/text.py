@@ -20,12 +20,18 @@ from camtool.geometry.polylines import Floats
 from camtool.importers.dxf.frames import Unusable, require
 from camtool.importers.dxf.load import printable
 from camtool.importers.text.fonts import Wanted, font_for
-from camtool.importers.text.layout import NUMBERED, Ink, Look, Rule, finite, numbered, slant
+from camtool.importers.text.layout import (
+    MAX_CHARACTERS,
+    NUMBERED,
+    Ink,
+    Look,
+    Rule,
+    finite,
+    lacking,
+    numbered,
+    slant,
+)
 from camtool.importers.text.mtext import write_mtext
-
-MAX_CHARACTERS = 20_000
-"""Of one text entity, codes included; CAD programs write 250 into TEXT and about 2000 into MTEXT
-by hand."""
 
 _CARET = re.compile(r"\^([ @-_])")
 _CODE = re.compile(NUMBERED.pattern + "|%%([cdpkou%])", re.ASCII | re.IGNORECASE)
@@ -60,17 +66,7 @@ class TextShape:
     @property
     def lacks(self) -> str:
         """What was wanted and could not be had, "" when nothing."""
-        said = []
-        if self.substituted:
-            said.append(f"font {self.substituted} is not here: drawn with {self.font}")
-        if self.missing:
-            signs = " ".join(_visible(sign) for sign in dict.fromkeys(self.missing))
-            said.append(f"{self.font} has no {signs}: left blank")
-        return "; ".join(said)
-
-
-def _visible(sign: str) -> str:
-    return sign if sign.isprintable() and not sign.isspace() else f"U+{ord(sign):04X}"
+        return lacking(self.font, self.substituted, self.missing)
 
 
 def text_strokes(entity: Any, mode: str) -> TextShape:

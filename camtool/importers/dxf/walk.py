@@ -23,7 +23,6 @@ from camtool.importers.dxf.kinds import (
     DIMENSIONS,
     OTHER,
     READERS,
-    TEXT_SKIPPED,
     TEXTS,
     WHY_UNUSED,
     parts_of,
@@ -31,7 +30,7 @@ from camtool.importers.dxf.kinds import (
 )
 from camtool.importers.dxf.load import printable
 from camtool.importers.dxf.looks import Look, Looks
-from camtool.importers.options import ReadOptions
+from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.piece import Piece
 
 MAX_NESTING = 50

@@ -9,6 +9,7 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Skipped
 from camtool.importers.svg.tree import Node
+from camtool.importers.told import font_findings
 
 
 @dataclass
@@ -18,6 +19,7 @@ class Notes:
     used: Counter[str] = field(default_factory=Counter)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     changed: Counter[tuple[str, str]] = field(default_factory=Counter)
+    fonts: Counter[str] = field(default_factory=Counter)
     _faults: Counter[tuple[str, str]] = field(default_factory=Counter)
     _first: dict[tuple[str, str], str] = field(default_factory=dict)
 
@@ -37,9 +39,10 @@ class Notes:
         return faults + [Skipped(kind, n, why) for (kind, why), n in self.left_out.items()]
 
     def findings(self) -> list[Finding]:
-        """NOT_APPLIED for each thing that changes the look and was not done."""
-        return [
+        """NOT_APPLIED for each thing that changes the look and was not done; what fonts lack."""
+        applied = [
             Finding(Code.NOT_APPLIED, Severity.WARNING, f"{count} {what} {why}",
                     measured=float(count))
             for (what, why), count in self.changed.items()
         ]  # fmt: skip
+        return applied + font_findings(self.fonts)

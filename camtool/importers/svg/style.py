@@ -28,8 +28,25 @@ LIMITS = {
     "marker-mid": "is not drawn",
     "marker-end": "is not drawn",
     "marker": "is not drawn",
+    "shape-inside": "is not applied: lines break where tspans begin them",
+    "inline-size": "is not applied: lines break where tspans begin them",
 }
 """Properties that would hide or add something, and what is said of them."""
+
+PLAIN_TEXT: dict[str, tuple[str, ...]] = {
+    "letter-spacing": ("normal", "0"),
+    "word-spacing": ("normal", "0"),
+    "writing-mode": ("horizontal-tb", "lr", "lr-tb"),
+    "direction": ("ltr",),
+    "baseline-shift": ("baseline", "0"),
+    "dominant-baseline": ("auto", "alphabetic", "use-script", "no-change", "reset-size"),
+    "alignment-baseline": ("auto", "baseline", "alphabetic"),
+    "font-variant": ("normal", "none"),
+    "font-stretch": ("normal", "100%"),
+    "font-size-adjust": ("none",),
+    "text-transform": ("none",),
+}
+"""Properties of text that are not applied, with the values that ask for nothing."""
 
 _NOT_INHERITED = ("display", "transform", "transform-origin", "transform-box", "overflow",
                   "limits")  # fmt: skip
@@ -39,6 +56,9 @@ _FONT_WORDS = {
     "xx-small": 9.0, "x-small": 10.0, "small": 13.0, "medium": FONT_PX, "large": 18.0,
     "x-large": 24.0, "xx-large": 32.0,
 }  # fmt: skip
+_FONT_STEPS = {"smaller": 1.0 / 1.2, "larger": 1.2}
+_FONT_PARTS = 5  # a size and four words before it
+_ZERO = re.compile(r"[+-]?0+(\.0*)?[a-z%]*", re.ASCII)
 _FURTHEST_FONT_PX = 1e6
 _UNSEEN = ("none", "transparent")
 
@@ -47,7 +67,8 @@ _UNSEEN = ("none", "transparent")
 class Style:
     """The properties of one element, after inheritance; `transform` and its like only where a
     style says them, for attributes of that name are read by the walk. `limits`: the properties of
-    LIMITS that the element itself has."""
+    LIMITS that the element itself has. `odd`: those of PLAIN_TEXT, and "font-size", that ask for
+    what is not done. `decoration`: lines along text, of the element and of those around it."""
 
     stroke: str = "none"
     fill: str = "black"
@@ -55,6 +76,13 @@ class Style:
     visibility: str = "visible"
     dash: str = "none"
     font_px: float = FONT_PX
+    family: str = ""
+    slope: str = "normal"
+    weight: str = "normal"
+    anchor: str = "start"
+    blanks: str = ""
+    decoration: frozenset[str] = frozenset()
+    odd: frozenset[str] = frozenset()
     display: str = "inline"
     transform: str = ""
     transform_origin: str = ""
@@ -82,14 +110,21 @@ class Style:
 
 _FIELDS = {
     "font-size": "font_px",
+    "font-family": "family",
+    "font-style": "slope",
+    "font-weight": "weight",
+    "text-anchor": "anchor",
+    "white-space": "blanks",
     "stroke-dasharray": "dash",
     "transform-origin": "transform_origin",
     "transform-box": "transform_box",
 }
 _NAMES = ("stroke", "fill", "color", "visibility", "stroke-dasharray", "font-size",
+          "font-family", "font-style", "font-weight", "text-anchor", "white-space",
+          "text-decoration", "text-decoration-line", *PLAIN_TEXT,
           "display", "transform", "transform-origin", "transform-box", "overflow",
           *LIMITS)  # fmt: skip
-_PROPERTIES = frozenset(_NAMES)
+_PROPERTIES = frozenset((*_NAMES, "font"))
 _ATTRIBUTES = tuple(name for name in _NAMES if name not in _SHEET_ONLY)
 _INITIAL = {field.name: field.default for field in fields(Style)}
 _BLANK = {_FIELDS.get(name, name): _INITIAL[_FIELDS.get(name, name)] for name in _NOT_INHERITED}
@@ -121,7 +156,11 @@ class Sheet:
             sheets.append(declared(own, _PROPERTIES))
         for declarations in sheets:
             for name, (value, important) in declarations.items():
-                (strong if important else values)[name] = value
+                chosen = strong if important else values
+                if name == "font":
+                    chosen.update(_longhands(value))
+                else:
+                    chosen[name] = value
         values.update(strong)
         key = above, tuple(values.items())
         style = self._known.get(key)
@@ -139,27 +178,72 @@ def _under(above: Style, values: dict[str, str]) -> Style:
             if value not in ("none", "inherit", "initial", "unset", ""):
                 own["limits"] = (*own["limits"], name)
             continue
+        if name in PLAIN_TEXT or name.startswith("text-decoration"):
+            _text_property(name, value, above, own)
+            continue
         target = _FIELDS.get(name, name)
         if value == "inherit" or (value == "unset" and name not in _NOT_INHERITED):
             own[target] = getattr(above, target)
         elif value in ("initial", "unset"):
             own[target] = _INITIAL[target]
         elif name == "font-size":
-            own[target] = _font_px(value, above.font_px)
+            px = _font_px(value, above.font_px)
+            own[target] = above.font_px if px is None else px
+            own["odd"] = own.get("odd", above.odd) - {name} | ({name} if px is None else set())
+        elif name == "font-family":
+            own[target] = written.strip()
         elif value:
             own[target] = value
     merged = {field.name: getattr(above, field.name) for field in fields(Style)} | own
     return Style(**merged)
 
 
-def _font_px(text: str, above: float) -> float:
-    """A font size in px; what is none leaves the one above."""
+def _text_property(name: str, value: str, above: Style, own: dict[str, Any]) -> None:
+    """One of PLAIN_TEXT, or lines along text: the latter add to those of the elements around."""
+    if value in ("inherit", "unset", ""):
+        return
+    if name in PLAIN_TEXT:
+        plain = value == "initial" or value in PLAIN_TEXT[name]
+        plain = plain or ("0" in PLAIN_TEXT[name] and _ZERO.fullmatch(value) is not None)
+        own["odd"] = own.get("odd", above.odd) - {name} | (set() if plain else {name})
+    else:
+        own["decoration"] = above.decoration | {*value.split()}
+
+
+def _longhands(text: str) -> dict[str, str]:
+    """What `font: [style, variant, weight or stretch] size[/line-height] family` says; a font of
+    the system, or what is no font, makes the size unreadable."""
+    said = {"font-style": "normal", "font-weight": "normal", "font-variant": "normal",
+            "font-stretch": "normal", "font-size": "?", "font-family": ""}  # fmt: skip
+    if text.lower() in ("inherit", "initial", "unset"):
+        return dict.fromkeys(said, text)
+    words = text.split()
+    for place, word in enumerate(words[:_FONT_PARTS]):
+        size = word.lower().partition("/")[0]
+        if not size.isdigit() and _font_px(size, FONT_PX) is not None:
+            said["font-size"], said["font-family"] = size, " ".join(words[place + 1 :])
+            break
+        if size in ("italic", "oblique"):
+            said["font-style"] = size
+        elif size in ("bold", "bolder", "lighter") or size.isdigit():
+            said["font-weight"] = size
+        elif size == "small-caps":
+            said["font-variant"] = size
+        elif size != "normal":
+            said["font-stretch"] = size
+    return said
+
+
+def _font_px(text: str, above: float) -> float | None:
+    """A font size in px, None when it is none."""
     if text in _FONT_WORDS:
         return _FONT_WORDS[text]
+    if text in _FONT_STEPS:
+        return above * _FONT_STEPS[text]
     match = _FONT_SIZE.fullmatch(text)
     if match is None:
-        return above
+        return None
     value, unit = float(match[1]), match[2] or "px"
     relative = {"em": above, "ex": above / 2.0, "%": above / 100.0, "rem": FONT_PX}
     size = value * relative.get(unit, MM_PER_UNIT.get(unit, 0.0) / MM_PER_UNIT["px"])
-    return size if 0.0 <= size <= _FURTHEST_FONT_PX else above
+    return size if 0.0 <= size <= _FURTHEST_FONT_PX else None

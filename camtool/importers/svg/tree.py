@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 SVG = "http://www.w3.org/2000/svg"
 XLINK = "http://www.w3.org/1999/xlink"
+XML = "http://www.w3.org/XML/1998/namespace"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
 
 MAX_DEPTH = 150
@@ -41,7 +42,9 @@ _WRONG_PREFIX = "unbound prefix"
 @dataclass(eq=False, slots=True)
 class Node:
     """One SVG element: `tag` without namespace; foreign elements have the tag "". Attributes
-    of SVG itself by name, those of XLink and Inkscape as "xlink:href", "inkscape:label"."""
+    of SVG itself by name, those of others as "xlink:href", "xml:space", "inkscape:label".
+    `text` is what a sheet holds, or the letters in front of the first child of an element within
+    a text; `tail` the letters behind such an element."""
 
     tag: str
     attributes: dict[str, str]
@@ -49,6 +52,7 @@ class Node:
     parent: Node | None = None
     children: list[Node] = field(default_factory=list)
     text: str = ""
+    tail: str = ""
 
     @property
     def label(self) -> str:
@@ -145,6 +149,8 @@ class _Builder(ContentHandler):
         self.root_name = ""
         self._open: list[Node] = []
         self._sheet: list[str] = []
+        self._letters: list[str] = []
+        self._texts = 0
         self._count = 0
 
     def start(self, name: str, attributes: dict[str, str], line: int) -> None:
@@ -159,6 +165,8 @@ class _Builder(ContentHandler):
                 where=f"line {line}",
                 mend="ungroup the drawing" if deep else "save it in parts",
             )
+        if self._letters:
+            self._put_letters()
         space, tag = _parted(name)
         above = self._open[-1] if self._open else None
         node = Node(tag if space in (SVG, "") else "", _attributes(attributes), line, above)
@@ -167,13 +175,27 @@ class _Builder(ContentHandler):
         elif self.root is None:
             self.root, self.root_name = node, tag
         self._open.append(node)
+        self._texts += node.tag == "text"
 
     def end(self) -> None:
         """The innermost element ends."""
+        if self._letters:
+            self._put_letters()
         node = self._open.pop()
+        self._texts -= node.tag == "text"
         if node.tag == "style":
             node.text = "".join(self._sheet)
             self._sheet = []
+
+    def _put_letters(self) -> None:
+        """What was read since the last tag, to the element that it stands in or behind."""
+        node = self._open[-1]
+        letters = "".join(self._letters)
+        self._letters = []
+        if node.children:
+            node.children[-1].tail = letters
+        else:
+            node.text = letters
 
     def skippedEntity(self, name: str) -> None:
         """An entity of the outside: with it, attributes could have lost words without a sign."""
@@ -183,6 +205,8 @@ class _Builder(ContentHandler):
     def characters(self, content: str) -> None:
         if self._open[-1].tag == "style":
             self._sheet.append(content)
+        elif self._texts:
+            self._letters.append(content)
 
 
 def _parted(name: str) -> tuple[str, str]:
@@ -191,11 +215,11 @@ def _parted(name: str) -> tuple[str, str]:
     return ("", name) if len(words) == 1 else (words[0], words[1])
 
 
-_PREFIXES = {SVG: "", XLINK: "xlink:", INKSCAPE: "inkscape:"}
+_PREFIXES = {SVG: "", XLINK: "xlink:", XML: "xml:", INKSCAPE: "inkscape:"}
 
 
 def _attributes(attributes: dict[str, str]) -> dict[str, str]:
-    """SVG's own by name, those of XLink and Inkscape with a prefix, no others."""
+    """SVG's own by name, those of XML, XLink and Inkscape with a prefix, no others."""
     named: dict[str, str] = {}
     for name, value in attributes.items():
         if " " in name:

@@ -1,8 +1,9 @@
 """The walk over an SVG document.
 
 Every element is visited with what its ancestors say (`Scope`): the map to mm, the style, the
-layer, the size that percentages are of. Shapes become pieces; what cannot be cut (texts, images,
-hidden things) is counted. Layers are Inkscape's, else the groups right under the root, else "0".
+layer, the size that percentages are of. Shapes become pieces, and texts when they are wanted; what
+cannot be cut (images, hidden things) is counted. Layers are Inkscape's, else the groups right
+under the root, else "0".
 
 Nothing is clipped: clip paths, masks and the frames of inner svg and symbol elements are counted
 where they would hide something, and everything is drawn whole.
@@ -13,11 +14,12 @@ SVG 2, 5.5 (use of an svg element).
 from __future__ import annotations
 
 from camtool.errors import DrawingError
-from camtool.importers.options import ReadOptions
+from camtool.importers.dxf.frames import Unusable
+from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.piece import Piece
 from camtool.importers.svg.affine import translation
 from camtool.importers.svg.frame import frame_of
-from camtool.importers.svg.map import CurveFitter
+from camtool.importers.svg.map import CurveFitter, Fitted
 from camtool.importers.svg.notes import Notes
 from camtool.importers.svg.page import Page
 from camtool.importers.svg.scope import Scope, is_for_us, layer_in, own_transform
@@ -33,10 +35,13 @@ could ask for billions."""
 MAX_USE_DEPTH = 20
 """A `use` of a `use` of ...: deeper is a fault in the file."""
 
+MAX_LETTERS = 50_000
+"""So many letters are drawn, each of some dozens of arcs."""
+
 _CORNERS_A_UNIT = 100
 _GROUPS = ("g", "a", "svg", "switch", "use")
 _NOT_CUT = {
-    "text": "text has no outline here: convert it to paths",
+    "flowRoot": "is flowed text: convert it to text or to paths",
     "image": "is a picture of pixels",
     "foreignObject": "is not SVG",
     "video": "is no geometry",
@@ -50,7 +55,7 @@ _SILENT = (
 )  # fmt: skip
 """Elements that draw nothing where they stand: they count where they are used."""
 
-_COUNTED = (*SHAPES, "text", "image", "use")
+_COUNTED = (*SHAPES, "text", "flowRoot", "image", "use")
 
 
 class Walk:
@@ -65,6 +70,7 @@ class Walk:
         self._page = page
         self._sheet = Sheet(root)
         self._by_use = 0
+        self._letters = 0
         self._shapes: dict[Node, tuple[list[Subpath], str]] = {}
         self._ids: dict[str, Node] = {}
         for node in root.walk():
@@ -103,7 +109,9 @@ class Walk:
         tag = node.tag
         if tag in _NOT_CUT:
             self.notes.left_out[tag, _NOT_CUT[tag]] += 1
-        elif tag in SHAPES or tag in _GROUPS:
+        elif tag == "text" and self.options.text == "skip":
+            self.notes.left_out[tag, TEXT_SKIPPED] += 1
+        elif tag in SHAPES or tag in _GROUPS or tag == "text":
             inner = self._entered(node, scope)
             if inner is not None:
                 self._drawn(node, inner)
@@ -114,6 +122,8 @@ class Walk:
         """A shape, or what is in a group."""
         if node.tag in SHAPES:
             self._shape(node, scope)
+        elif node.tag == "text":
+            self._text(node, scope)
         elif node.tag == "use":
             self._use(node, scope)
         elif node.tag == "svg":
@@ -173,7 +183,7 @@ class Walk:
         if scope.uses:
             self._spend(_cost(found), node)
         try:
-            rows = [(*self.fitter.vertices(one, scope.to_mm), one.closed) for one in found]
+            fitted = [self.fitter.vertices(one, scope.to_mm) for one in found]
         except DrawingError as error:
             self.notes.fault(node.tag, "cannot be drawn", node, error)
             return
@@ -184,12 +194,73 @@ class Walk:
             if not fault:
                 self.notes.left_out[node.tag, "draws nothing"] += 1
             return
-        source = node.label + (f" by use {scope.uses[-1]}" if scope.uses else "")
-        for vertices, off, closed in rows:
-            self.pieces.append(
-                Piece(vertices, closed, scope.layer, style.colour, source, style.line_type, off)
-            )
+        self._take(found, fitted, node, scope)
         self.notes.used[node.tag] += 1
+
+    def _take(self, found: list[Subpath], fitted: list[Fitted], node: Node, scope: Scope) -> None:
+        """Subpaths of an element, in mm, as pieces."""
+        style = scope.style
+        source = node.label + (f" by use {scope.uses[-1]}" if scope.uses else "")
+        for subpath, (vertices, off) in zip(found, fitted, strict=True):
+            self.pieces.append(
+                Piece(
+                    vertices,
+                    subpath.closed,
+                    scope.layer,
+                    style.colour,
+                    source,
+                    style.line_type,
+                    off,
+                )
+            )
+
+    def _text(self, node: Node, scope: Scope) -> None:
+        """The letters of a text as pieces, all or none."""
+        from camtool.importers.svg.text import text_of  # fonts: only where there is text
+
+        def lengths_of(style: Style) -> Lengths:
+            return self._lengths(scope, style)
+
+        try:
+            text = text_of(node, scope.style, self._sheet.style, lengths_of, self.options.text)
+        except Unusable as reason:
+            self.notes.left_out["text", str(reason)] += 1
+            return
+        except DrawingError as error:
+            self.notes.fault("text", "cannot be read", node, error)
+            return
+        self._letters += text.letters
+        if self._letters > MAX_LETTERS:
+            raise DrawingError(
+                f"texts have more than {MAX_LETTERS} letters",
+                where=node.label,
+                mend="leave text out (--text skip), or delete what is not cut",
+            )
+        if scope.uses:
+            self._spend(sum(_cost(run.subpaths) for run in text.runs), node)
+        try:
+            fitted = [
+                [self.fitter.vertices(one, scope.to_mm) for one in run.subpaths]
+                for run in text.runs
+            ]
+        except DrawingError as error:
+            self.notes.fault("text", "cannot be drawn", node, error)
+            return
+        drawn = False
+        for run, rows in zip(text.runs, fitted, strict=True):
+            self._take(run.subpaths, rows, node, scope._replace(style=run.style))
+            drawn |= bool(rows)
+        for why in text.unseen:
+            self.notes.left_out["part of a text" if drawn else "text", why] += 1
+        for weight in text.plainer:
+            what = f"font-weight {weight} of text"
+            self.notes.changed[what, "is not applied: 600 and more is bold"] += 1
+        for lacks in text.lacks:
+            self.notes.fonts[lacks] += 1
+        if drawn:
+            self.notes.used["text"] += 1
+        elif not text.unseen:
+            self.notes.left_out["text", "draws nothing"] += 1
 
     def _subpaths(self, node: Node, scope: Scope) -> tuple[list[Subpath], str]:
         """The shape in user units; paths that are used again are not parsed again."""

@@ -1,1 +1,1 @@
-"""Letters of DXF drawings as curves: fonts, layout, and the codes of MTEXT."""
+"""Letters of drawings as curves: fonts, layout, and the codes of MTEXT."""

@@ -22,6 +22,9 @@ SUBSTITUTES = ("Liberation Sans", "Arimo", "Arial", "Helvetica", "DejaVu Sans", 
 """Families that stand in for a font that is not installed, the first that is: most drawings name
 Arial, whose widths the first four share."""
 
+STROKE_EM = 2048.0 / 1466.0
+"""Size of the stroke font in heights of its capitals, that of Arial: such a font has none."""
+
 _OUTLINES = (".ttf", ".otf", ".ttc")
 _SHAPES = (".shx", ".shp", ".lff")
 _SHAPE_FONTS = frozenset(
@@ -78,13 +81,18 @@ class Letter:
 
 @dataclass(frozen=True, eq=False)
 class Font:
-    """`letter` gives None for what the font lacks: a blank as wide as `blank` stands there."""
+    """`letter` gives None for what the font lacks: a blank as wide as `blank` stands there.
+
+    `em`, the size that a font is asked for by, is in heights of a capital, like all of it; the
+    baseline is the foot of an "x", which lies `foot` above the one that the font counts from."""
 
     name: str
     outlines: bool
     letter: Callable[[str], Letter | None]
     descent: float
     blank: float
+    em: float
+    foot: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -136,7 +144,7 @@ def stroke_font() -> Font:
     """Hershey's Roman simplex; it needs no font file."""
     depth = max(y for stroke in _strokes("p") for _, y in stroke) - strokes.BASELINE
     blank = strokes.BOX.advance / strokes.CAP_UNITS
-    return Font(strokes.NAME, False, _stroke_letter, depth / strokes.CAP_UNITS, blank)
+    return Font(strokes.NAME, False, _stroke_letter, depth / strokes.CAP_UNITS, blank, STROKE_EM)
 
 
 def _strokes(character: str) -> strokes.Strokes:
@@ -224,6 +232,7 @@ def _outline_font(path: str) -> Font | None:
         glyphs = TTFontRenderer(TTFont(BytesIO(Path(path).read_bytes()), fontNumber=0))
         size = glyphs.font_measurements
         blank = float(glyphs.undefined_generic_glyph.width)
+        em = float(glyphs.font["head"].unitsPerEm)
     except (OSError, TTLibError, UnsupportedFont, LookupError, ValueError, AttributeError):
         return None
     capital = float(size.cap_height)
@@ -231,7 +240,10 @@ def _outline_font(path: str) -> Font | None:
         return None
     letter = lru_cache(maxsize=_LETTERS_KEPT)(partial(_outline, glyphs, capital))
     name = f"{glyphs.font_name} ({PurePath(path).name})"
-    return Font(name, True, letter, float(size.descender_height) / capital, blank / capital)
+    descent, foot = float(size.descender_height), float(size.baseline)
+    return Font(
+        name, True, letter, descent / capital, blank / capital, em / capital, foot / capital
+    )
 
 
 def _outline(glyphs: Any, capital: float, character: str) -> Letter | None:

@@ -23,6 +23,13 @@ RULE_DROP = 0.2
 NUMBERED = re.compile(r"%%(03[2-9]|0[4-9]\d|1\d\d|2[0-4]\d|25[0-5])", re.ASCII)
 """A character by its number, 32 to 255."""
 
+MAX_CHARACTERS = 20_000
+"""Of one text, codes included; CAD programs write 250 into TEXT and about 2000 into MTEXT by
+hand."""
+
+MAX_SIGNS_NAMED = 20
+"""So many of the characters that a font lacks are named."""
+
 MAX_NUMBER = 1e60
 """Sizes and places beyond it are refused: products of a few of them would not be finite."""
 
@@ -36,6 +43,24 @@ def finite(*values: float) -> tuple[float, ...]:
     if not all(abs(number) <= MAX_NUMBER for number in numbers):
         raise Unusable("has numbers that are not finite or beyond all bounds")
     return numbers
+
+
+def lacking(font: str, substituted: str, missing: str) -> str:
+    """What was wanted and could not be had, "" when nothing: `font` draws in place of the font
+    `substituted` ("" when it is the wanted one) and has none of the characters `missing`."""
+    said = []
+    if substituted:
+        said.append(f"font {substituted} is not here: drawn with {font}")
+    if missing:
+        signs = [_visible(sign) for sign in dict.fromkeys(missing)]
+        more = len(signs) - MAX_SIGNS_NAMED
+        tail = f" and {more} more" if more > 0 else ""
+        said.append(f"{font} has no {' '.join(signs[:MAX_SIGNS_NAMED])}{tail}: left blank")
+    return "; ".join(said)
+
+
+def _visible(sign: str) -> str:
+    return sign if sign.isprintable() and not sign.isspace() else f"U+{ord(sign):04X}"
 
 
 def slant(oblique_deg: float) -> float:

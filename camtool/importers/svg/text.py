@@ -1,0 +1,348 @@
+"""`<text>` and its `tspan`s as the contours of their letters, in user units.
+
+    element ──_Flow──▶ letters, each with its style, and places by letter ──chunks──▶ subpaths
+
+Blanks collapse over the whole text, line ends being blanks, unless `xml:space` or `white-space`
+keeps them. A letter that x or y gives a place begins a chunk; text-anchor lies at the chunk's
+first letter. Letters come from `importers.text`, as those of a DXF do: without kerning. What would
+move or shape letters and is not done here refuses the whole text, with the reason.
+Source: Scalable Vector Graphics 2, chapter 11 (11.5: the layout).
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
+
+import numpy as np
+
+from camtool.geometry.polylines import Floats
+from camtool.importers.dxf.frames import Unusable
+from camtool.importers.svg.scope import is_for_us
+from camtool.importers.svg.segments import Bezier, Lines, Segment, Subpath
+from camtool.importers.svg.shapes import Lengths
+from camtool.importers.svg.style import Style
+from camtool.importers.svg.tree import Node
+from camtool.importers.text.fonts import Font, Wanted, font_for
+from camtool.importers.text.layout import MAX_CHARACTERS, Ink, Look, Rule, lacking
+
+MAX_FAMILIES = 8
+"""So many families of a list are looked for."""
+
+DEFAULT_FAMILY = "sans-serif"
+"""The family of a text that names none, as Inkscape takes it; renderers differ."""
+
+_MAX_NAME = 64  # letters of a family's name
+_BOLD_FROM = 600
+_WEIGHTS = {"normal": 400, "lighter": 400, "bold": 700, "bolder": 700}
+_PLACES = (("x", "x"), ("y", "y"), ("dx", "x"), ("dy", "y"))
+_LETTERLESS = ("title", "desc", "metadata", "style", "script", "animate", "set",
+               "animateTransform", "animateMotion", "animateColor", "")  # fmt: skip
+_ANCHORS = ("start", "middle", "end")
+_RULES = {"underline": Rule.UNDER, "overline": Rule.OVER, "line-through": Rule.THROUGH}
+_BLANKS = " \t\r\n"
+_KEPT = ("pre", "pre-wrap", "break-spaces")
+_LEFTWARDS = ("R", "AL", "RLE", "RLO", "RLI")
+_BLANK = re.compile(r"[ \t\r\n]+")
+_BETWEEN = re.compile(r"[\s,]+")
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Letters of one style and what they draw."""
+
+    subpaths: list[Subpath]
+    style: Style
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """The runs of a text and the count of its letters; `unseen`: why some of them are not drawn;
+    `lacks`: what was wanted of fonts and could not be had; `plainer`: weights that fonts are not
+    asked for."""
+
+    runs: list[Run]
+    letters: int
+    unseen: list[str]
+    lacks: list[str]
+    plainer: list[str]
+
+
+def text_of(
+    node: Node,
+    style: Style,
+    style_of: Callable[[Node, Style], Style],
+    lengths_of: Callable[[Style], Lengths],
+    mode: str,
+) -> Text:
+    """A `text` of this style; `style_of` gives the style of an element within it, under that of
+    its parent; mode is "outline" or "stroke".
+
+    Raises Unusable with the reason when it cannot be drawn as it is shown, DrawingError for a
+    place that is none.
+    """
+    flow = _Flow(style_of, lengths_of)
+    flow.visit(node, style, _keeps_blanks(node))
+    flow.end()
+    writer = _Writer(mode)
+    runs = [run for chunk in _chunks(flow, writer) for run in _anchored(chunk, writer, flow)]
+    lacks = [
+        text
+        for (font, other), missing in writer.missing.items()
+        if (text := lacking(font, other, "".join(sorted(missing))))
+    ]
+    return Text(runs, len(flow.letters), list(flow.unseen), lacks, list(writer.plainer))
+
+
+def _keeps_blanks(node: Node | None) -> bool:
+    """xml:space of the element or of the nearest one around it."""
+    while node is not None:
+        said = node.get("xml:space")
+        if said:
+            return said == "preserve"
+        node = node.parent
+    return False
+
+
+@dataclass(eq=False)
+class _Flow:
+    """Letters in order, blanks collapsed, each with its style; `at` has the places that elements
+    give to letters by their number."""
+
+    style_of: Callable[[Node, Style], Style]
+    lengths_of: Callable[[Style], Lengths]
+    letters: list[str] = field(default_factory=list)
+    styles: list[Style] = field(default_factory=list)
+    at: dict[int, dict[str, float]] = field(default_factory=dict)
+    unseen: dict[str, None] = field(default_factory=dict)
+    _after_blank: bool = True
+    _by_letter: bool = False
+    _recounted: bool = False
+
+    def visit(self, node: Node, style: Style, keep: bool) -> None:
+        """What stands in the element, then its places: those of inner elements come first."""
+        for name in ("rotate", "textLength"):
+            if node.get(name):
+                raise Unusable(f"has {name}, which is not read: convert it to paths")
+        first = len(self.letters)
+        self._add(node.text, style, keep)
+        for child in node.children:
+            if child.tag in ("tspan", "a"):
+                inner = self.style_of(child, style)
+                if inner.display == "none":
+                    self.unseen["is hidden (display: none)"] = None
+                elif not is_for_us(child):
+                    self.unseen["is for another language or program"] = None
+                else:
+                    said = child.get("xml:space")
+                    self.visit(child, inner, said == "preserve" if said else keep)
+            elif child.tag not in _LETTERLESS:
+                raise Unusable(f"has a {child.tag[:40]} in it, which is not read")
+            self._add(child.tail, style, keep)
+        self._place(node, style, first)
+
+    def end(self) -> None:
+        """A last blank collapses too; Unusable when there are no letters, or of a kind whose
+        places are not known."""
+        if self._after_blank and self.letters:
+            self.letters.pop()
+            self.at.pop(len(self.letters), None)
+        if not self.letters:
+            raise Unusable("is empty")
+        if len(self.letters) > MAX_CHARACTERS:
+            raise Unusable(f"has more than {MAX_CHARACTERS} characters")
+        if self._by_letter and self._recounted:
+            raise Unusable("has a place for each letter, and letters that are put together")
+
+    def _add(self, raw: str, style: Style, keep: bool) -> None:
+        """Letters of one style, blanks kept or not."""
+        if not raw:
+            return
+        if style.blanks:
+            keep = style.blanks in _KEPT
+            if "\n" in raw and (keep or style.blanks == "pre-line"):
+                if not raw.strip(_BLANKS):
+                    return
+                raise Unusable(f"has lines broken by white-space: {style.blanks[:20]}")
+        text = raw if keep else _BLANK.sub(" ", raw)
+        if len(self.letters) + len(text) > MAX_CHARACTERS + 2:  # blanks at its ends may go
+            raise Unusable(f"has more than {MAX_CHARACTERS} characters")
+        whole = unicodedata.normalize("NFC", text)
+        self._recounted |= len(whole) != len(text) or any(letter > "\uffff" for letter in whole)
+        for letter in whole:
+            blank = letter in _BLANKS
+            if not blank:
+                _check(letter)
+            elif not keep and self._after_blank:
+                continue
+            self.letters.append(" " if blank else letter)
+            self.styles.append(style)
+            self._after_blank = blank and not keep
+
+    def _place(self, node: Node, style: Style, first: int) -> None:
+        lengths = self.lengths_of(style)
+        for name, axis in _PLACES:
+            said = node.get(name)
+            if not said:
+                continue
+            listed = _BETWEEN.split(said)
+            self._by_letter |= len(listed) > 1
+            for place, word in enumerate(listed[: max(len(self.letters) - first, 1)], first):
+                value = lengths.length(word, axis, name)
+                if place < len(self.letters):
+                    self.at.setdefault(place, {}).setdefault(name, value)
+
+
+def _check(letter: str) -> None:
+    """Unusable for a letter whose place depends on those around it."""
+    if unicodedata.bidirectional(letter) in _LEFTWARDS:
+        raise Unusable("is written from right to left")
+    if unicodedata.category(letter) in ("Mn", "Mc", "Me"):
+        raise Unusable(f"has letters that are put together (U+{ord(letter):04X})")
+
+
+@dataclass(frozen=True, eq=False)
+class _Words:
+    """Letters of one look from x on, the baseline at y (down)."""
+
+    letters: str
+    style: Style
+    look: Look
+    fonts: tuple[str, str]
+    x: float
+    y: float
+    end: float
+
+
+@dataclass(eq=False)
+class _Writer:
+    """Fonts by mode; what they lacked, by font and by the font wanted."""
+
+    mode: str
+    missing: dict[tuple[str, str], set[str]] = field(default_factory=dict)
+    plainer: dict[str, None] = field(default_factory=dict)
+
+    def look(self, style: Style) -> tuple[Look, tuple[str, str]]:
+        """How letters of this style look, and the names of their font and of the wanted one."""
+        if style.odd:
+            raise Unusable(f"its {min(style.odd)} cannot be applied: convert it to paths")
+        if style.anchor not in _ANCHORS:
+            raise Unusable("has a text-anchor that is none")
+        if not style.font_px > 0.0:
+            raise Unusable("has no size")
+        font, other = self._font(style)
+        rules = Rule.NONE
+        for word in style.decoration:
+            rules |= _RULES.get(word, Rule.NONE)
+        self.missing.setdefault((font.name, other), set())
+        return Look(font, style.font_px / font.em, rules=rules), (font.name, other)
+
+    def _font(self, style: Style) -> tuple[Font, str]:
+        """The first installed family of the list; else what stands in for the first of all."""
+        weight = _WEIGHTS.get(style.weight, 0)
+        if not weight:
+            if not (style.weight.isdecimal() and 1 <= int(style.weight[:5]) <= 1000):
+                raise Unusable("has a font-weight that is none")
+            weight = int(style.weight)
+        if weight not in _WEIGHTS.values() and self.mode != "stroke":
+            self.plainer[str(weight)] = None
+        italic = style.slope.startswith(("italic", "oblique"))
+        named = style.family.split(",", MAX_FAMILIES)[:MAX_FAMILIES]
+        families = [family for name in named if (family := _family(name))] or [DEFAULT_FAMILY]
+        bold = weight >= _BOLD_FROM
+        wanted = [Wanted(family=family, bold=bold, italic=italic) for family in families]
+        for one in wanted:
+            font, other = font_for(one, self.mode)
+            if not other:
+                return font, "" if one is wanted[0] or self.mode == "stroke" else str(wanted[0])
+        return font_for(wanted[0], self.mode)
+
+
+def _family(name: str) -> str:
+    """The name without quotes, fit to be printed."""
+    words = " ".join(name.strip().strip("\"'").split())[:_MAX_NAME]
+    return "".join(sign if sign.isprintable() else "?" for sign in words)
+
+
+def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
+    """The words between letters that have places of their own."""
+    starts = sorted(
+        {0, *flow.at}
+        | {k for k in range(1, len(flow.letters)) if flow.styles[k] != flow.styles[k - 1]}
+    )
+    x = y = 0.0
+    chunk: list[_Words] = []
+    looks: dict[Style, tuple[Look, tuple[str, str]]] = {}
+    for first, last in pairwise([*starts, len(flow.letters)]):
+        at = flow.at.get(first, {})
+        if chunk and ("x" in at or "y" in at):
+            yield chunk
+            chunk = []
+        x = at.get("x", x) + at.get("dx", 0.0)
+        y = at.get("y", y) + at.get("dy", 0.0)
+        style = flow.styles[first]
+        if style not in looks:
+            looks[style] = writer.look(style)
+        look, fonts = looks[style]
+        letters = "".join(flow.letters[first:last])
+        end = x + look.width(letters)
+        chunk.append(_Words(letters, style, look, fonts, x, y, end))
+        x = end
+    yield chunk
+
+
+def _anchored(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[Run]:
+    """The words of a chunk drawn, their span [a, b] moved so that its start, middle or end lies
+    at the chunk's first letter."""
+    begin = min(words.x for words in chunk)
+    end = max(words.end for words in chunk)
+    share = {"start": 0.0, "middle": 0.5, "end": 1.0}[chunk[0].style.anchor]
+    shift = chunk[0].x - (begin + share * (end - begin))
+    for words in chunk:
+        style, look = words.style, words.look
+        if style.visibility in ("hidden", "collapse"):
+            flow.unseen["is hidden (visibility)"] = None
+        elif not style.is_painted:
+            flow.unseen["has neither stroke nor fill"] = None
+        else:
+            ink = Ink()
+            x, baseline = words.x + shift, look.font.foot * look.height - words.y
+            ink.write(words.letters, look, (x, baseline))
+            ink.rule(look, (x, words.end + shift), baseline)
+            writer.missing[words.fonts].update(ink.missing)
+            yield Run(_subpaths(ink), style)
+
+
+def _subpaths(ink: Ink) -> list[Subpath]:
+    """What was drawn, Y down."""
+    if not ink.points:
+        return []
+    points = np.concatenate(ink.points) * (1.0, -1.0)
+    found, at = [], 0
+    for counts, closed in ink.contours:
+        ends = list(accumulate(counts, initial=at))
+        parts = [points[start:stop] for start, stop in pairwise(ends)]
+        at = ends[-1]
+        if parts:
+            found.append(Subpath(parts[0][0], _segments(parts), closed))
+    return found
+
+
+def _segments(parts: list[Floats]) -> tuple[Segment, ...]:
+    """Parts end to end, straight ones in a row together."""
+    segments: list[Segment] = []
+    corners: list[Floats] = []
+    for part in parts:
+        if len(part) == 2:
+            corners.append(part[1])
+            continue
+        if corners:
+            segments.append(Lines(np.array(corners)))
+            corners = []
+        segments.append(Bezier(part[1:]))
+    if corners:
+        segments.append(Lines(np.array(corners)))
+    return tuple(segments)
