@@ -18,6 +18,7 @@ import click
 from camtool.cli.jobflags import _flag
 from camtool.cli.main import cli, main
 from camtool.jobs.keys import OPERATION, TOOL_KEYS
+from tests.waiting import HANG_S
 
 BAD = ("nan", "inf", "-inf", "-1", "0", "1e308", "1e-308", "", "9" * 5000, "\x1b[31m")
 """What every flag is given: no number, too large, too small, too long, no text for a terminal."""
@@ -25,8 +26,8 @@ BAD = ("nan", "inf", "-inf", "-1", "0", "1e308", "1e-308", "", "9" * 5000, "\x1b
 WIDE = (*BAD, "1e9", "1e6", "1e4", "1e-4", "1e-6", "1e-9", "9" * 9, "1x", "1e9x1e9", "1:1e-9:1e9")
 """And what is a number, but makes too much or too little of everything."""
 
-HANG_S = 120.0
-"""A run that takes longer hangs: the slowest takes some seconds where nothing else runs."""
+CHEWED_S = 120
+"""A run that takes more seconds of a processor has unbounded work: the slowest takes some."""
 
 MOST_BYTES = 6 << 30
 """Address space of a run: libraries map some 2 GB."""
@@ -220,6 +221,7 @@ def _become(words: Sequence[str], folder: Path, said: Path) -> None:
         sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
         os.chdir(folder)
         resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
+        resource.setrlimit(resource.RLIMIT_CPU, (CHEWED_S, CHEWED_S))
         sys.argv = ["camtool", *words]
         main()
     except SystemExit as stop:

@@ -4,6 +4,7 @@ The small run is the default one; the wide one tries every flag of every command
 the range of every number of every machine.
 """
 
+import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +17,7 @@ from tests.cli import sweeping
 from tests.cli.sweeping import BAD, DRAWING, WIDE, Ran, flags_of, ran, set_up
 from tests.machine.numbers import DIALECTS, FILES, machine_numbers
 from tests.machine.test_ranges import setting_of
+from tests.waiting import HANG_S
 
 FLAGS = list(flags_of())
 SMALL = ("1e308", "9" * 5000)
@@ -89,6 +91,10 @@ def test_a_fault_and_a_hang_would_be_seen(folder: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(sweeping, "main", lambda: time.sleep(600.0))
     monkeypatch.setattr(sweeping, "HANG_S", 0.5)
     assert ran([], folder).code is None
+    monkeypatch.setattr(sweeping, "CHEWED_S", 1)
+    monkeypatch.setattr(sweeping, "main", lambda: sum(iter(int, 1)))
+    monkeypatch.setattr(sweeping, "HANG_S", HANG_S)
+    assert ran([], folder).code in (-signal.SIGXCPU, -signal.SIGKILL)
     monkeypatch.setattr(sweeping, "main", lambda: exit(3))
     assert not ran([], folder).fine
     monkeypatch.setattr(sweeping, "main", lambda: print("\x1b[31m"))
