@@ -201,6 +201,7 @@ def test_an_anchor_holds_for_all_of_a_chunk_and_for_that_alone() -> None:
     [
         ('<text x="5" y="20" dx="3" dy="-1">A</text>', [("A", 8, 19)]),
         ('<text y="2em">A</text>', [("A", 0, 20)]),
+        ('<text y="9">A<tspan dx="3">I</tspan></text>', [("A", 0, 9), ("I", 3 + width("A"), 9)]),
         ('<text x="50%" y="10%">A</text>', [("A", 100, 10)]),
         ('<text x="5 30 60" y="20">ABC</text>', [("A", 5, 20), ("B", 30, 20), ("C", 60, 20)]),
         ('<text x="5" y="20 30">AI</text>', [("A", 5, 20), ("I", 5 + width("A"), 30)]),
@@ -259,6 +260,8 @@ def test_use_draws_a_text_again() -> None:
         '<text x="60" y="50" font-size="20" text-anchor="middle">Oo<tspan dy="8">Q</tspan></text>',
         '<text x="110" y="40" text-anchor="end" font-size="2em">\n  pB  d\n</text>',
         '<text x="20 50 70" y="30 40" font-size="25px">abc</text>',
+        '<text x="20 60 100" y="30" text-anchor="middle">WOW</text>',
+        '<text x="99" y="30" text-anchor="end" xml:space="preserve"> One  </text>',
         '<text x="60" y="30" text-anchor="middle">O e <tspan x="60" dy="1em">Nine</tspan></text>',
     ],
 )  # fmt: skip
@@ -337,6 +340,9 @@ def test_lines_along_a_text() -> None:
         ("<text>x\u0332</text>", "put together"),
         ('<text x="1 2">e\u0301a</text>', "put together"),
         ('<text style="white-space: pre">A\nB</text>', "white-space"),
+        ('<text text-anchor="end">A<tspan dx="1">B</tspan></text>', "a dx within"),
+        ('<text text-anchor="middle">A<tspan y="9">B</tspan></text>', "a y without an x"),
+        ('<text>A<tspan dx="-50">B</tspan></text>', "a dx within"),
         ('<text x="nan">A</text>', "x 'nan' is no length"),
         ('<text y="1 2 ?">ABC</text>', "y '?' is no length"),
         ('<text x="1e30">A</text>', "out of all bounds"),

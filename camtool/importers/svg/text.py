@@ -268,7 +268,11 @@ def _family(name: str) -> str:
 
 
 def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
-    """The words between letters that have places of their own."""
+    """The words between letters that have places of their own.
+
+    Unusable where a line goes on from letters that text-anchor moves: the standard counts from
+    where they were before that, renderers from where they are.
+    """
     starts = sorted(
         {0, *flow.at}
         | {k for k in range(1, len(flow.letters)) if flow.styles[k] != flow.styles[k - 1]}
@@ -279,6 +283,8 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
     for first, last in pairwise([*starts, len(flow.letters)]):
         at = flow.at.get(first, {})
         if chunk and ("x" in at or "y" in at):
+            if "x" not in at and chunk[0].style.anchor != "start":
+                raise Unusable("has a y without an x behind letters that text-anchor moves")
             yield chunk
             chunk = []
         x = at.get("x", x) + at.get("dx", 0.0)
@@ -296,9 +302,13 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
 
 def _anchored(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[Run]:
     """The words of a chunk drawn, their span [a, b] moved so that its start, middle or end lies
-    at the chunk's first letter."""
+    at the chunk's first letter. Unusable where a dx within it changes that span: the standard
+    takes it into account, not all renderers do."""
     begin = min(words.x for words in chunk)
     end = max(words.end for words in chunk)
+    gaps = any(words.x != before.end for before, words in pairwise(chunk))
+    if gaps and (chunk[0].style.anchor != "start" or begin < chunk[0].x):
+        raise Unusable("has a dx within letters that text-anchor moves")
     share = {"start": 0.0, "middle": 0.5, "end": 1.0}[chunk[0].style.anchor]
     shift = chunk[0].x - (begin + share * (end - begin))
     for words in chunk:
