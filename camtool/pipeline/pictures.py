@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline.judge import Posted
     from camtool.planning.job import Job
-    from camtool.preview.draw import Scene
     from camtool.preview.rounds import Round
+    from camtool.preview.scene import Scene
     from camtool.preview.viewer.run import Run
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing

@@ -18,13 +18,11 @@ from camtool.preview.content import Content, content_of
 from camtool.preview.options import AS_USUAL, SVG_WIDTH_PX, Options, check_width
 from camtool.preview.page import Page, mat, page_of, sheet
 from camtool.preview.polar import draw_polar
-from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
+from camtool.preview.scene import Scene
 from camtool.preview.svg import Look, element, number
 from camtool.preview.text import Style
 from camtool.preview.trace import trace_layer
 from camtool.preview.view import View, page_width
-
-__all__ = ["Scene", "draw", "png", "scene_of_drawing", "scene_of_toolpath"]
 
 PNG_DPI = 96
 """resvg's own default of 0 makes lengths in mm vanish."""

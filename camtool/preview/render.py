@@ -7,10 +7,9 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from camtool.errors import OutputError
-from camtool.preview.draw import Scene, draw, png
+from camtool.preview.draw import draw, png
 from camtool.preview.options import AS_USUAL, PNG_WIDTH_PX, SVG_WIDTH_PX, Options
-
-__all__ = ["PNG_WIDTH_PX", "render", "rendered"]
+from camtool.preview.scene import Scene
 
 
 def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from camtool.pipeline import Way
     from camtool.preview.overlay import Overlay
     from camtool.verify.contrast import Variant
-    from camtool.verify.verify import Verification
+    from camtool.verify.verify import Verification as VerificationRecord
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,7 +37,7 @@ class Comparison(Shown):
         return tuple(row_of(each.name, each.verification.report) for each in self.variants)
 
     @property
-    def verdicts(self) -> Mapping[str, Verification]:
+    def verdicts(self) -> Mapping[str, VerificationRecord]:
         """The verdict on each way, by its name."""
         return {each.name: each.verification for each in self.variants}
 

@@ -7,7 +7,7 @@ import pytest
 
 from camtool.geometry.drawing import Drawing, Gap, Units
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.preview.draw import Scene, scene_of_drawing, scene_of_toolpath
+from camtool.preview.scene import Scene, scene_of_drawing, scene_of_toolpath
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 

@@ -9,8 +9,9 @@ import pytest
 from camtool.errors import OptionError, OutputError
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.preview.beside import draw_beside, render_beside
-from camtool.preview.draw import Scene, png
+from camtool.preview.draw import png
 from camtool.preview.options import Options
+from camtool.preview.scene import Scene
 from tests.oracles import svg_page
 from tests.oracles.png import decode
 from tests.preview.conftest import SCENES, circle, drawing_of, line

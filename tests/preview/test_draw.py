@@ -16,9 +16,10 @@ from camtool.geometry.drawing import Branch, Gap, Healing, Mark, SelfCrossing
 from camtool.preview.axes import TICK_CAP
 from camtool.preview.colours import FEED, PAPER, PLUNGE, RAPID, bin_colours, on_dark
 from camtool.preview.content import content_of
-from camtool.preview.draw import ALONE_PEN, TRACE_PEN, Scene, draw, png
+from camtool.preview.draw import ALONE_PEN, TRACE_PEN, draw, png
 from camtool.preview.options import Options
 from camtool.preview.page import page_of
+from camtool.preview.scene import Scene
 from camtool.preview.svg import clean
 from tests.oracles import svg_page
 from tests.oracles.png import decode

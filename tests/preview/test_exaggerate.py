@@ -13,9 +13,10 @@ from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.preview.content import content_of
-from camtool.preview.draw import Scene, draw
+from camtool.preview.draw import draw
 from camtool.preview.exaggerate import exaggerated, nearest_points
 from camtool.preview.options import Options
+from camtool.preview.scene import Scene
 from tests.oracles import svg_page
 from tests.preview.conftest import SCENES, circle, line
 

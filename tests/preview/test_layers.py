@@ -10,12 +10,13 @@ import pytest
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Gap
 from camtool.preview.content import content_of
-from camtool.preview.draw import Scene, draw, scene_of_toolpath
+from camtool.preview.draw import draw
 from camtool.preview.layers import LAYERS, USUAL, chosen
 from camtool.preview.missing import missing_layers
 from camtool.preview.numbers import CLEAR, every, placed
 from camtool.preview.options import Options
 from camtool.preview.page import page_of
+from camtool.preview.scene import Scene, scene_of_toolpath
 from camtool.preview.turns import turns_of
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles import literal_turns, svg_page

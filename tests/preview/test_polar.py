@@ -8,9 +8,10 @@ import pytest
 from camtool.errors import OptionError
 from camtool.kernels.circle_bins import bin_directions, empty_bins, fill_bins
 from camtool.pipeline.pictures import rounds_of
-from camtool.preview.draw import Scene, draw, png
+from camtool.preview.draw import draw, png
 from camtool.preview.options import Options
 from camtool.preview.rounds import Round
+from camtool.preview.scene import Scene
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verify.verify import verify
 from tests.oracles import svg_page

@@ -10,11 +10,12 @@ import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.preview.beside import draw_beside
-from camtool.preview.draw import Scene, draw, png
+from camtool.preview.draw import draw, png
 from camtool.preview.layers import LAYERS
 from camtool.preview.options import Options
 from camtool.preview.overlay import Overlay, draw_overlay
 from camtool.preview.rounds import Round
+from camtool.preview.scene import Scene
 from tests.oracles.png import decode
 from tests.preview.conftest import SCENES, circle, followed, plate
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from camtool.preview.colours import BINS, bin_colours
-from camtool.preview.draw import Scene, draw
+from camtool.preview.draw import draw
+from camtool.preview.scene import Scene
 from camtool.preview.trace import UM_PER_MM, bins_of, strokes, trace_of
 from tests.oracles import svg_page
 from tests.preview.conftest import ring_trace

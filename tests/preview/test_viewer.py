@@ -14,10 +14,10 @@ import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.preview.colours import BINS
-from camtool.preview.draw import Scene
 from camtool.preview.exaggerate import exaggerated
 from camtool.preview.render import render
 from camtool.preview.rounds import Round
+from camtool.preview.scene import Scene
 from camtool.preview.trace import bins_of, trace_of
 from camtool.preview.viewer.circles import MOST_PLOTS
 from camtool.preview.viewer.columns import columns_of, packed

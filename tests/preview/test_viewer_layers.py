@@ -9,7 +9,7 @@ import pytest
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.machine.registry import load_target
 from camtool.pipeline import listing_of, picture, verify_program
-from camtool.preview.draw import Scene
+from camtool.preview.scene import Scene
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.i8751_machines import SAMPLE

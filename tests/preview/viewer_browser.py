@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from camtool.preview.draw import Scene
+from camtool.preview.scene import Scene
 from tests.preview.viewer_pages import text_of
 from tests.waiting import HANG_S
 

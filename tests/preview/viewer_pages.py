@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camtool.geometry.polylines import Segments
-from camtool.preview.draw import Scene
+from camtool.preview.scene import Scene
 from camtool.preview.viewer.page import viewer_page
 from camtool.preview.viewer.run import Line, Run, Table, Worst, by_feed
 from camtool.toolpath.moves import Toolpath
