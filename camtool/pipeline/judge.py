@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from camtool.machine.controllers import Interpolator
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
+    from camtool.planning.items import Step
     from camtool.planning.job import Job
-    from camtool.planning.plan import Step
     from camtool.simulation.options import Effects
     from camtool.toolpath.bent import Bent
     from camtool.toolpath.kept import Kept
@@ -350,7 +350,7 @@ def _judged(
 def _asked(job: Job, target: LoadedTarget, planned: Toolpath, sent: Bent | None) -> Asked | None:
     """What the job asks for, in moves as the dialect would say them; None where it asks for what
     cannot be made, which is said already. `sent` is `planned` bent against the mechanics."""
-    from camtool.planning.link import safe_z_of
+    from camtool.planning.settings import safe_z_of
     from camtool.verify.asked import Asked
 
     if worst(planned.findings) >= Severity.ERROR:
@@ -381,7 +381,7 @@ def _feed_said(job: Job, machine: Machine, wanted: Toolpath, program: Program) -
     the last is False, for rows of no block."""
     import numpy as np
 
-    from camtool.planning.link import feeds_of
+    from camtool.planning.settings import feeds_of
 
     said: list[float] = []
     for operation in job.operations:

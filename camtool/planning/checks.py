@@ -17,8 +17,8 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
-from camtool.planning.link import lowered_feeds
 from camtool.planning.places import operation_name, own_numbers
+from camtool.planning.settings import lowered_feeds
 from camtool.toolpath.cleared import STOCK_TOP_MM, Reach, rapids_through_stock
 from camtool.toolpath.extents import toolpath_extents
 from camtool.toolpath.moves import Kind, Toolpath

@@ -14,9 +14,8 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.planning.items import Setting
+from camtool.planning.items import Setting, Step
 from camtool.planning.places import operation_name
-from camtool.planning.plan import Step
 
 IN_PASSES = ("profile", "pocket", "engrave")
 """Kinds of operation that go down in passes, each of one depth."""

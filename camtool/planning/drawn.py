@@ -27,14 +27,13 @@ import numpy as np
 
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import Floats, Ints, Polylines, Segments
-from camtool.planning.items import Contour, Fixed, Item
+from camtool.planning.items import Contour, Fixed, Item, Step
 from camtool.toolpath.drawn import Drawn
 from camtool.toolpath.moves import Toolpath
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
     from camtool.planning.carving.vcarve import Cone
-    from camtool.planning.plan import Step
 
 PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
 """Where on a row it is asked which lines are nearest; its ends lie beside its neighbours' too."""

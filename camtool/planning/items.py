@@ -123,3 +123,36 @@ class Chosen:
     points: Floats
     point_names: tuple[str, ...]
     rim: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Bridge:
+    """What a tab leaves: `middle` (2,), `ahead` (2,) the direction of its contour there, half its
+    width, half the width of the slot that it spans, mm; its top; `fall` as of its tab; the name of
+    its contour."""
+
+    middle: Floats
+    ahead: Floats
+    half_width_mm: float
+    half_span_mm: float
+    top_mm: float
+    fall: float
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What became of one operation: its setting, what it took, its items as the operation made
+    them, the runs in order of cutting with the item that each is of, how far rapids go in XY: as
+    drawn, and as ordered, mm; and the bridges that its tabs leave."""
+
+    operation: Operation
+    setting: Setting
+    chosen: Chosen
+    work: Work
+    runs: tuple[Run, ...]
+    owners: tuple[Item, ...]
+    findings: tuple[Finding, ...]
+    rapid_drawn_mm: float
+    rapid_mm: float
+    bridges: tuple[Bridge, ...]

@@ -13,8 +13,8 @@ import numpy as np
 
 from camtool.geometry.nest import nesting
 from camtool.geometry.polylines import Bools, Floats, Ints, Polylines
+from camtool.planning.items import Step
 from camtool.planning.job import Operation
-from camtool.planning.plan import Step
 from camtool.planning.sides import runs_beside
 from camtool.toolpath.kept import Kept
 

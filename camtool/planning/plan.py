@@ -24,18 +24,17 @@ from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
 from camtool.planning.choose import choose
-from camtool.planning.contours.levels import carved_levels, levels
-from camtool.planning.items import Chosen, Contour, Item, Run, Setting, Work
+from camtool.planning.items import Bridge, Chosen, Contour, Item, Run, Setting, Step, Work
 from camtool.planning.job import Job, Operation
-from camtool.planning.link import Worked, depth_of, feeds_of, link, safe_z_of, settled
+from camtool.planning.link import Worked, link, settled
 from camtool.planning.place import SCALE_SHARE, collapsed, place
-from camtool.planning.places import key_of, operation_name
+from camtool.planning.places import key_of
 from camtool.planning.ranges import refuse_endless
+from camtool.planning.settings import safe_z_of, setting_of
 from camtool.planning.sides import Sides
 from camtool.toolpath.moves import Toolpath
 
 if TYPE_CHECKING:
-    from camtool.planning.contours.bridges import Bridge
     from camtool.planning.contours.leads import KeepOut
 
 Point = tuple[float, float]
@@ -43,24 +42,6 @@ HOME: Point = (0.0, 0.0)
 
 MOST_OVERLAPS = 20
 """Contours are cut no more times round than this beyond their starts: once is enough."""
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """What became of one operation: its setting, what it took, its items as the operation made
-    them, the runs in order of cutting with the item that each is of, how far rapids go in XY: as
-    drawn, and as ordered, mm; and the bridges that its tabs leave."""
-
-    operation: Operation
-    setting: Setting
-    chosen: Chosen
-    work: Work
-    runs: tuple[Run, ...]
-    owners: tuple[Item, ...]
-    findings: tuple[Finding, ...]
-    rapid_drawn_mm: float
-    rapid_mm: float
-    bridges: tuple[Bridge, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,19 +125,6 @@ def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:
             measured=placed.fit.max_mm,
             unit="mm",
         )
-
-
-def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
-    """The operation with the machine's numbers where it is silent; OptionError when too fast,
-    and for passes that cannot be."""
-    depth = depth_of(operation, machine)
-    try:
-        made = carved_levels if operation.kind == "vcarve" else levels
-        passes = made(depth, operation.step_down_mm, operation.last_pass_mm)
-    except OptionError as error:
-        error.where = f"{operation_name(operation)}, {error.where}"
-        raise
-    return Setting(operation, feeds_of(operation, machine), passes, safe_z_of(job, machine))
 
 
 def work_of(chosen: Chosen, setting: Setting) -> Work:

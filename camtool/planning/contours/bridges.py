@@ -30,7 +30,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Segmen
 from camtool.planning.contours.along import Along
 from camtool.planning.contours.ramps import Knots, feeds_along, lifted
 from camtool.planning.contours.tabs import Tab, raised
-from camtool.planning.items import Feeds, Run
+from camtool.planning.items import Bridge, Feeds, Run
 from camtool.planning.job import Operation, Tool
 from camtool.planning.places import at_place
 
@@ -39,32 +39,6 @@ BRIDGE_SLACK_MM = 1e-4
 
 QUARTER = math.tan(math.pi / 8.0)
 """The bulge of a quarter of a circle."""
-
-
-@dataclass(frozen=True, eq=False)
-class Bridge:
-    """What a tab leaves: `middle` (2,), `ahead` (2,) the direction of its contour there, half its
-    width, half the width of the slot that it spans, mm; its top; `fall` as of its tab; the name of
-    its contour."""
-
-    middle: Floats
-    ahead: Floats
-    half_width_mm: float
-    half_span_mm: float
-    top_mm: float
-    fall: float
-    name: str
-
-    def zone(self, reach_mm: float) -> Polyline:
-        """Where the middle of a tool of this radius would cut into it."""
-        aside = np.array([-self.ahead[1], self.ahead[0]])
-        w, s, r = self.half_width_mm, self.half_span_mm, reach_mm
-        corners = [
-            (w + r, -s, 0.0), (w + r, s, QUARTER), (w, s + r, 0.0), (-w, s + r, QUARTER),
-            (-w - r, s, 0.0), (-w - r, -s, QUARTER), (-w, -s - r, 0.0), (w, -s - r, QUARTER),
-        ]  # fmt: skip
-        rows = [[*(self.middle + t * self.ahead + n * aside), b] for t, n, b in corners]
-        return Polyline(np.array(rows), closed=True)
 
 
 def bridges_of(along: Along, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
@@ -171,7 +145,7 @@ def _drilled(run: Run, bridge: Bridge, tool: Tool, found: _Found) -> None:
     place, deep = run.vertices[:1, :2], float(run.vertices[:, 2].min())
     reach = tool.radius_mm - BRIDGE_SLACK_MM
     through = deep < bridge.top_mm and reach > 0.0
-    if through and inside(place, Segments.of(bridge.zone(reach)))[0]:
+    if through and inside(place, Segments.of(_zone(bridge, reach)))[0]:
         found.drilled[id(bridge)] = (bridge, run.name)
 
 
@@ -184,7 +158,7 @@ def _over(along: Along, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab
     reach = _radius_at(tool, bridge.top_mm - float(low.min())) - BRIDGE_SLACK_MM
     if reach <= 0.0:
         return
-    zone = Segments.of(bridge.zone(reach))
+    zone = Segments.of(_zone(bridge, reach))
     boxes, around = segment_boxes(along.segments), segment_boxes(zone)
     lowest, highest = around[:, :2].min(axis=0), around[:, 2:].max(axis=0)
     rows = np.flatnonzero(((boxes[:, :2] <= highest) & (boxes[:, 2:] >= lowest)).all(axis=1))
@@ -208,6 +182,18 @@ def _over(along: Along, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab
     for first, last, deep in spans:
         if deep:
             yield Tab(first, last, bridge.top_mm, bridge.fall)
+
+
+def _zone(bridge: Bridge, reach_mm: float) -> Polyline:
+    """Where the middle of a tool of this radius would cut into a bridge."""
+    aside = np.array([-bridge.ahead[1], bridge.ahead[0]])
+    w, s, r = bridge.half_width_mm, bridge.half_span_mm, reach_mm
+    corners = [
+        (w + r, -s, 0.0), (w + r, s, QUARTER), (w, s + r, 0.0), (-w, s + r, QUARTER),
+        (-w - r, s, 0.0), (-w - r, -s, QUARTER), (-w, -s - r, 0.0), (w, -s - r, QUARTER),
+    ]  # fmt: skip
+    rows = [[*(bridge.middle + t * bridge.ahead + n * aside), b] for t, n, b in corners]
+    return Polyline(np.array(rows), closed=True)
 
 
 def _radius_at(tool: Tool, above_tip_mm: float) -> float:

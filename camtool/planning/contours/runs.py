@@ -18,7 +18,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats, Polyline
 from camtool.planning.contours.along import Along
-from camtool.planning.contours.bridges import Bridge, bridges_of
+from camtool.planning.contours.bridges import bridges_of
 from camtool.planning.contours.leads import KeepOut, Leads, leads_of
 from camtool.planning.contours.ramps import (
     MOST_LAPS,
@@ -32,7 +32,7 @@ from camtool.planning.contours.ramps import (
     to_and_fro,
 )
 from camtool.planning.contours.tabs import Tab, raised, tabs_of
-from camtool.planning.items import Contour, Run
+from camtool.planning.items import Bridge, Contour, Run
 from camtool.planning.places import at_place
 
 Heights = tuple[float | None, list[Tab]]
