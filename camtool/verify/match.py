@@ -9,6 +9,7 @@ much) is taken row by row: a row belongs where all of its inner samples are near
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,10 +93,11 @@ def nearest_at_height(
     """The nearest move of the target for each sample at its own height; where none is near there,
     the nearest at any height, and true (S,) if that one is near.
 
-    `choice` (S,): the contour to compare with, the same all along a segment; None: any.
-    `limits_mm`: how far "near" is in XY, and in height.
+    `choice` (S,): the contour to compare with, the same all along a segment, and what is not near
+    on it is not found at all; None: any. `limits_mm`: how far "near" is in XY, and in height.
     """
     limit_mm, depth_mm = limits_mm
+    near_mm = max(limit_mm, LEAST_MM)
     found, wrong_depth = _nothing(len(samples.points)), np.zeros(len(samples.points), np.bool_)
     if len(samples.points) == 0:
         return found, wrong_depth
@@ -109,15 +111,18 @@ def nearest_at_height(
         count = len(first)
         contour = np.full(count, ANY_CONTOUR) if choice is None else choice[first]
         groups = Groups(
-            offsets, np.full(count, limit_mm), contour, np.tile([-np.inf, np.inf], (count, 1))
+            offsets,
+            np.full(count, limit_mm),
+            contour,
+            np.tile([-np.inf, np.inf], (count, 1)),
+            # All moves between here and a far one of the chosen contour would be looked at.
+            most_mm=math.inf if choice is None else near_mm,
         )
         if levels:
             low = np.minimum.reduceat(z, offsets[:-1]) - depth_mm
             high = np.maximum.reduceat(z, offsets[:-1]) + depth_mm
             heights = np.column_stack([low, high])
-            groups = replace(
-                groups, z=heights, height=z, window_mm=depth_mm, most_mm=max(limit_mm, LEAST_MM)
-            )
+            groups = replace(groups, z=heights, height=z, window_mm=depth_mm, most_mm=near_mm)
         near = target.nearest(samples.points[rest], groups)
         found.distance[rest], found.segment[rest] = near.distance, near.segment
         if not levels:

@@ -11,7 +11,8 @@ from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Segments
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verify.compare import ANY_CONTOUR, Groups, SegmentTable, Target
-from camtool.verify.cuts import cut_moves
+from camtool.verify.cuts import cut_moves, sample_cuts
+from camtool.verify.match import nearest_at_height
 from camtool.verify.runs import run_offsets
 from tests.oracles.dense_moves import cut, dense_distance
 
@@ -150,6 +151,20 @@ def test_the_search_can_be_kept_to_a_contour_and_to_a_height() -> None:
     deep = Groups(groups.offsets, groups.margin, groups.contour, np.tile([-0.05, -0.03], (6, 1)))
     exact = everything(target, points, target.cuts.z[:, 0] < -0.03)
     assert np.allclose(target.nearest(points, deep).distance, exact, rtol=0, atol=1e-12)
+
+
+def test_on_a_chosen_contour_only_what_is_near_is_found() -> None:
+    target, limit = drawn(1), 0.3
+    samples = sample_cuts(target.cuts, 0.2)
+    choice = (target.contour[samples.segment] + 1) % target.cuts.contour_count
+    found, wrong_depth = nearest_at_height(samples, choice, target, (limit, 0.01))
+    for contour in range(target.cuts.contour_count):
+        here = choice == contour
+        exact = everything(target, samples.points[here], target.contour == contour)
+        assert (np.isfinite(found.distance[here]) == (exact <= limit)).all()
+    assert (found.segment[np.isinf(found.distance)] == -1).all()
+    assert wrong_depth.any()
+    assert not wrong_depth[np.isinf(found.distance)].any()
 
 
 def test_where_nothing_may_be_compared_the_distance_is_infinite() -> None:
