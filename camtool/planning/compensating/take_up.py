@@ -127,8 +127,8 @@ class _TakenUp:
 
     def _enter(self, point: Point) -> None:
         """From here on the play is that of the region around a point."""
-        for drive, residual in zip(self._drives, self._regions.residuals(point), strict=True):
-            drive.residual = residual
+        for drive, found in zip(self._drives, self._regions.residuals(point), strict=True):
+            drive.residual = found
 
     def _place(self) -> Point:
         x, y, z = (drive.at for drive in self._drives)
