@@ -45,12 +45,7 @@ LEAST_FOOT = 1e-3
 0.068 of it, that of a corner of 156 degrees is just so large."""
 
 PROBES = (0.0, 0.3, 0.5, 0.7, 1.0)
-"""Where a stretch between two vertices is measured; its ends say nothing on whether it runs
-together with something, only on how far it leads."""
-
-
-AT_A_TIME = 32
-"""How many neighbouring points are looked up at a time: few, because they lie near each other."""
+"""Where a stretch between two vertices is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,28 +100,27 @@ def _without(region: Polylines, reached: Polylines, least_mm2: float) -> Polylin
     """
     if len(reached) == 0:
         return region
-    inner = _apart(reached, region, region.vertices[:, :2], least_mm2)
-    # Where the one parts from the other, so does the other from the one.
-    ends = np.array([[path.start, path.end] for path in inner]).reshape(-1, 2)
-    stretches = [*_apart(region, reached, ends, least_mm2), *map(reverse, inner)]
+    inner = _apart(reached, region, least_mm2)
+    stretches = [*_apart(region, reached, least_mm2), *map(reverse, inner)]
     whole = [path for path in stretches if path.closed]
     return Polylines.of([*whole, *_closed([path for path in stretches if not path.closed])])
 
 
-def _apart(lines: Polylines, other: Polylines, marks: Floats, least_mm2: float) -> list[Polyline]:
+def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
     """The stretches of closed paths that do not run together with others: closed where whole.
 
-    They begin and end at vertices, and at those of the `marks` (P, 2) that are on a path. One
-    that leads h away, and is l long, goes round no more than 2 l h: if that is less than
-    `least_mm2` it is left out, and so are the many at the blunt corners of a fine polygon.
+    They begin and end at vertices, their own and those of the others that are on a path: where
+    the one parts from the other, so does the other from the one. One that leads h away, and is l
+    long, goes round no more than 2 l h: if that is less than `least_mm2` it is left out, and so
+    are the many at the blunt corners of a fine polygon.
     """
     segments = Segments.of(lines)
-    row, low, high = _split(segments, marks)
+    row, low, high = _split(segments, other.vertices[:, :2])
     parts = np.array(PROBES)
     probes = (low[:, None] + (high - low)[:, None] * parts).ravel()
     points = point_at(segments, np.repeat(row, len(parts)), probes)
     away = _distances(points, Segments.of(other)).reshape(-1, len(parts))
-    wanted = np.asarray((away[:, 1:-1] > TOGETHER_MM).any(axis=1))
+    wanted = np.asarray((away > TOGETHER_MM).any(axis=1))
     lengths = segment_lengths(segments)[row] * (high - low)
     first = np.searchsorted(segments.path[row], np.arange(len(lines) + 1))
     found: list[Polyline] = []
@@ -171,13 +165,14 @@ class _Parts:
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
-    points = points[_distances(points, segments) <= TOGETHER_MM]
-    points = _elsewhere(points, segments.start)
-    row = (
-        nearest(points, segments, chunk=AT_A_TIME).segment
-        if len(points)
-        else np.empty(0, dtype=np.int64)
-    )
+    from camtool.kernels.offset_near import curves_within, nearest_distances
+
+    curves, points = Curves.of(segments), np.ascontiguousarray(points)
+    away = nearest_distances(points, curves.rows, curves.tree)
+    on = (away <= TOGETHER_MM) & ~_at_any(points, segments.start)
+    points, away = points[on], away[on]
+    pairs = curves_within(points, away + POSITION_EPS_MM, curves.rows, curves.tree)
+    row = pairs[np.unique(pairs[:, 0], return_index=True)[1], 1]
     frames = Frames.of(segments)[row]
     along = frames.along(points)
     within = (along > TOGETHER_MM) & (along < frames.length - TOGETHER_MM)
@@ -199,10 +194,10 @@ def _distances(points: Floats, segments: Segments) -> Floats:
     return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)
 
 
-def _elsewhere(points: Floats, others: Floats) -> Floats:
-    """The points (P, 2) that are at none of the others (N, 2)."""
+def _at_any(points: Floats, others: Floats) -> Bools:
+    """(P,) which of the points (P, 2) are at one of the others (N, 2)."""
     node, _ = merge_points(np.concatenate([points, others]), TOGETHER_MM)
-    return points[~np.isin(node[: len(points)], node[len(points) :])]
+    return np.isin(node[: len(points)], node[len(points) :])
 
 
 def _closed(stretches: list[Polyline]) -> list[Polyline]:

@@ -95,6 +95,22 @@ def test_blunt_corners_are_left_out_unless_asked_for() -> None:
     assert len(unreached(region_of(blunt), 1.0, least_foot=0.0)) >= 60
 
 
+def test_a_disc_that_comes_away_beside_a_corner() -> None:
+    # Failed once: the disc parts from the wall 5.5 µm before a corner, and the needle was lost.
+    needle = closed(
+        (5.82421875, 0.0, 0.033203125),
+        (2.71520298, 2.93729004),
+        *[(2.0 * math.cos(a), 2.0 * math.sin(a)) for a in np.arange(2, 9) * 0.2 * math.pi],
+        (0.830584035, -1.84315702),
+        (16.7561731, -9.72734737),
+    )
+    region = region_of([needle])
+    pieces = unreached(region, 2.0)
+    exact = float(signed_areas(region).sum() - signed_areas(opened(region, 2.0)).sum())
+    assert sum(piece.area_mm2 for piece in pieces) == pytest.approx(exact, abs=1e-6)
+    assert pieces[0].at_mm == pytest.approx((16.7561731, -9.72734737))
+
+
 def test_nothing_is_out_of_reach_of_a_point() -> None:
     assert unreached(region_of([SQUARE]), 0.0) == []
 
