@@ -1,1 +1,1 @@
-"""Dialects: each is one module (write and read) and one TOML file (its machine)."""
+"""Targets: each machine is one folder, with its dialect and its machine file."""

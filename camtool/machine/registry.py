@@ -2,8 +2,9 @@
 
 A third party adds a target as camtool's own are added: an entry point of the group
 `camtool.postprocessors`, named like the target, that points at an object with `name`, `check`,
-`write`, `read` (see `camtool.toolpath.program.PostProcessor`) in a module that has a .toml file
-of its own name beside it. Nothing is imported but the target that is asked for.
+`write`, `read` (see `camtool.toolpath.program.PostProcessor`). Its machine file is `machine.toml`
+beside the `__init__.py` of a package, or beside a module the .toml file of the module's own name.
+Nothing is imported but the target that is asked for.
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ def _load(point: EntryPoint) -> tuple[Any, Path]:
     try:
         post = point.load()
         module = sys.modules[point.module]
-        file = Path(str(module.__file__)).with_suffix(".toml")
+        file = _machine_file(Path(str(module.__file__)))
     except Exception as error:  # whatever a third party's module raises belongs to it
         raise MachineError(
             f"target {point.name!r} cannot be loaded ({type(error).__name__}: {error})",
@@ -100,6 +101,13 @@ def _load(point: EntryPoint) -> tuple[Any, Path]:
             mend="reinstall or remove the package that brings it",
         ) from error
     return post if point.module.startswith(OURS) else Guarded(post, point.value), file
+
+
+def _machine_file(module: Path) -> Path:
+    """The machine file that belongs to the module of a target."""
+    if module.name == "__init__.py":
+        return module.with_name("machine.toml")
+    return module.with_suffix(".toml")
 
 
 class Guarded:

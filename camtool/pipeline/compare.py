@@ -99,7 +99,7 @@ def _window(wanted: Toolpath, variants: Sequence[Variant]) -> Floats:
     """[[xmin, xmax], [ymin, ymax]] mm: what the picture shows."""
     import numpy as np
 
-    from camtool.toolpath.extents import toolpath_extents
+    from camtool.toolpath.moves import toolpath_extents
     from camtool.verify.contrast import worst_place
 
     step = max(

@@ -18,10 +18,9 @@ if TYPE_CHECKING:
     from camtool.planning.items import Step
     from camtool.planning.job import Job
     from camtool.simulation.options import Effects
-    from camtool.toolpath.bent import Bent
-    from camtool.toolpath.kept import Kept
-    from camtool.toolpath.moves import Toolpath
+    from camtool.toolpath.moves import Bent, Toolpath
     from camtool.toolpath.program import Program
+    from camtool.toolpath.wanted import Kept
     from camtool.verify.asked import Asked
     from camtool.verify.case import Cone
     from camtool.verify.cuts import Bools
@@ -209,7 +208,7 @@ def convert_program(
     its highest feed; `feed_mm_min` takes the place of all feeds. ProgramError names file, block
     and column.
     """
-    from camtool.toolpath.carried import at_feed, carried_over, within_feeds
+    from camtool.toolpath.lower import at_feed, carried_over, within_feeds
     from camtool.verify.verify import VerifyOptions
 
     decoded = read_program(data, source, file)

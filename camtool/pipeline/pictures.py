@@ -153,7 +153,7 @@ def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, 
     only then is there a place where the frame can honestly be drawn."""
     if toolpath is None or machine is None:
         return None
-    from camtool.toolpath.extents import toolpath_extents
+    from camtool.toolpath.moves import toolpath_extents
 
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
     (left, right), (low, high), _ = toolpath_extents(toolpath).tolist()

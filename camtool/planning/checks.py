@@ -2,7 +2,7 @@
 
 Everything that is cut lies below the stock top, z < 0. The stock, where the job knows one, ends at
 its sides and at its thickness; beside it is air, so leads and overrun may go there, and so may
-rapids. What earlier cuts have cleared is that of `camtool.toolpath.cleared`.
+rapids. What earlier cuts have cleared is that of `camtool.toolpath.rapids`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,8 @@ from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
 from camtool.planning.places import operation_name, own_numbers
 from camtool.planning.settings import lowered_feeds
-from camtool.toolpath.cleared import STOCK_TOP_MM, Reach, rapids_through_stock
-from camtool.toolpath.extents import toolpath_extents
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
+from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, rapids_through_stock
 
 FEED_TOLERANCE = 1e-6
 """A feed may exceed its limit by this part of it: by rounding alone."""

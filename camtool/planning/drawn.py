@@ -28,8 +28,8 @@ import numpy as np
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import Floats, Ints, Polylines, Segments
 from camtool.planning.items import Contour, Fixed, Item, Step
-from camtool.toolpath.drawn import Drawn
 from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.wanted import Drawn
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing

@@ -16,7 +16,7 @@ from camtool.geometry.polylines import Bools, Floats, Ints, Polylines
 from camtool.planning.items import Step
 from camtool.planning.job import Operation
 from camtool.planning.sides import runs_beside
-from camtool.toolpath.kept import Kept
+from camtool.toolpath.wanted import Kept
 
 
 def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:

@@ -21,8 +21,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.motion import Bools, Floats, Ints
 from camtool.simulation.path_samples import move_lengths
 from camtool.simulation.speed_plan import allowed_along, axis_limits
-from camtool.toolpath.arms import Arms
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Arms, Kind, Toolpath
 
 NORMAL_RATIO = np.sqrt(0.75)
 """How much of the acceleration a turn may take (BLEND_ACC_RATIO_NORMAL)."""

@@ -14,8 +14,7 @@ import numpy as np
 
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Floats, Ints
-from camtool.toolpath.arms import Arms
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Arms, Toolpath
 
 MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or wider when a program would have more of them than this."""

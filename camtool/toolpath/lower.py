@@ -9,7 +9,7 @@
 Each function gives a new Toolpath and, for each of its rows, the row that it came from. All new
 points lie on the true arc, and the last one is the old end itself. Feed, provenance, block and
 value of a row go on in all the rows that it becomes; events stay as they are. Arcs whose ends lie
-at two radii are spirals, as in `camtool.toolpath.arms`.
+at two radii are spirals, as in `camtool.toolpath.moves`.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.errors import OptionError, PostError
+from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
-from camtool.toolpath.arms import Arms
-from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
+from camtool.toolpath.moves import Arms, Floats, Ints, Kind, Toolpath
 
 Bools = npt.NDArray[np.bool_]
 
@@ -194,3 +194,49 @@ def _repeated(counts: Ints) -> tuple[Ints, Ints]:
 def _built(toolpath: Toolpath, row: Ints, kind: Ints, end: Floats, centre: Floats) -> Lowered:
     """Rows of new kinds, ends and centres with all else of the rows that they came from."""
     return Lowered(toolpath.picked(row, kind=kind, end=end, centre=centre), row)
+
+
+# A toolpath decoded from one machine's program, as what another machine shall do.
+
+
+def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:
+    """The same moves, all cuts at one feed."""
+    return replace(toolpath, feed=np.where(toolpath.is_feed, feed_mm_min, toolpath.feed))
+
+
+def within_feeds(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The same moves with every cut at no more than the machine's highest feed; FEED_ABOVE_LIMIT
+    tells of it where one was faster."""
+    limit = machine.max_feed_mm_min
+    with np.errstate(invalid="ignore"):
+        fast = toolpath.is_feed & (toolpath.feed > limit)
+    if not fast.any():
+        return toolpath
+    most = float(toolpath.feed[fast].max())
+    found = Finding(
+        Code.FEED_ABOVE_LIMIT,
+        Severity.WARNING,
+        f"{int(fast.sum())} cuts of up to {most:g} mm/min are written at {limit:g}, the highest "
+        f"feed of {machine.target.name}",
+        measured=most,
+        limit=limit,
+        unit="mm_min",
+    )
+    return replace(
+        toolpath,
+        feed=np.where(fast, limit, toolpath.feed),
+        findings=(*toolpath.findings, found),
+    )
+
+
+def carried_over(decoded: Toolpath) -> Toolpath:
+    """The moves and events of a program, free of what belongs to its own machine alone.
+
+    Part zero set at the very beginning is left out: there every program begins. Homing becomes a
+    rapid to where machine zero lay. Rows lose their block: the new program has blocks of its own.
+    """
+    first = 1 if len(decoded) and decoded.kind[0] == Kind.SET_ZERO else 0
+    homes = (decoded.kind == Kind.HOME_XY) | (decoded.kind == Kind.HOME_Z)
+    kind = np.where(homes, int(Kind.RAPID), decoded.kind)[first:]
+    rows = np.arange(first, len(decoded))
+    return decoded.picked(rows, kind=kind, block=np.full(len(rows), -1))

@@ -17,8 +17,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.toolpath.drawn import Drawn
+from camtool.toolpath.wanted import Drawn
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -223,3 +224,102 @@ def _triple(row: Floats) -> tuple[float, float, float]:
 
 def _or_none(number: np.float64) -> float | None:
     return None if np.isnan(number) else float(number)
+
+
+# A toolpath that was bent beforehand, so that a machine's slides come out on another one.
+
+
+@dataclass(frozen=True, eq=False)
+class Bent:
+    """`toolpath` is what the controller is told; `row` (N,) of each of its rows the row of the
+    wanted toolpath that it is there for."""
+
+    toolpath: Toolpath
+    row: Ints
+
+
+# Arcs of a toolpath seen from their centres, and the points on them.
+#
+# An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the spiral
+# between them; radius and, in a helix, Z change in proportion to the angle, so that both ends are
+# met.
+
+Bools = npt.NDArray[np.bool_]
+
+
+class Arms:
+    """The chosen arcs seen from their centres: radius at start and end mm, angle at the start and
+    signed sweep rad, each (J,), for the rows `row` (J,)."""
+
+    def __init__(self, toolpath: Toolpath, chosen: Bools) -> None:
+        """PostError for an arc without a centre."""
+        self.row = np.flatnonzero(chosen)
+        self.centre = toolpath.centre[self.row]
+        bad = ~np.isfinite(self.centre).all(axis=1)
+        if bad.any():
+            raise PostError("an arc without a centre", where=f"move {self.row[bad.argmax()]}")
+        self.begin, self.end = toolpath.starts[self.row], toolpath.end[self.row]
+        out, back = self.begin[:, :2] - self.centre, self.end[:, :2] - self.centre
+        self.radius = np.hypot(out[:, 0], out[:, 1])
+        self.end_radius = np.hypot(back[:, 0], back[:, 1])
+        self.angle = np.arctan2(out[:, 1], out[:, 0])
+        self.sweep = toolpath.sweeps()[self.row]
+
+    def points(self, which: Ints, share: Floats) -> Floats:
+        """(K, 3) mm: the points of the arcs `which` (K,) at `share` (K,) of their sweep."""
+        angle = self.angle[which] + share * self.sweep[which]
+        radius = self.radius[which] + share * (self.end_radius - self.radius)[which]
+        rise = (self.end[:, 2] - self.begin[:, 2])[which]
+        return np.column_stack(
+            [
+                self.centre[which, 0] + radius * np.cos(angle),
+                self.centre[which, 1] + radius * np.sin(angle),
+                self.begin[which, 2] + share * rise,
+            ]
+        )
+
+
+# How far a toolpath reaches, exact with its arcs.
+
+
+def toolpath_extents(toolpath: Toolpath, *, cuts: bool = False) -> Floats:
+    """(3, 2) mm: lowest and highest X, Y and Z that any move reaches, the start included; with
+    `cuts` those that moves at a feed reach.
+
+    An arc reaches centre ± radius where its sweep passes the direction of an axis.
+    """
+    points = np.concatenate([toolpath.start[None, :], toolpath.end])
+    if cuts and toolpath.is_feed.any():
+        rows = toolpath.is_feed
+        points = np.concatenate([toolpath.starts[rows], toolpath.end[rows]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    tops = _arc_extremes(toolpath)
+    if len(tops):
+        low[:2] = np.minimum(low[:2], tops.min(axis=0))
+        high[:2] = np.maximum(high[:2], tops.max(axis=0))
+    return np.column_stack([low, high])
+
+
+def _arc_extremes(toolpath: Toolpath) -> Floats:
+    """(J, 2) the points of arcs that lie straight right, above, left or below of the centre."""
+    arcs = np.flatnonzero(toolpath.is_arc)
+    centre, begin = toolpath.centre[arcs], toolpath.starts[arcs, :2]
+    arm = begin - centre
+    radius = np.hypot(arm[:, 0], arm[:, 1])
+    sign = np.where(toolpath.kind[arcs] == Kind.ARC_CW, -1.0, 1.0)
+    sweep = np.abs(toolpath.sweeps()[arcs])
+    compass = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    from_start = np.arctan2(compass[:, 1], compass[:, 0]) - np.arctan2(arm[:, 1:], arm[:, :1])
+    turn = np.mod(sign[:, None] * from_start, 2.0 * np.pi)
+    arc, which = np.nonzero(turn <= sweep[:, None])
+    return np.asarray(centre[arc] + radius[arc, None] * compass[which])
+
+
+# Tool changes of a toolpath, for machines that have none or only some.
+
+
+def mounted_before(toolpath: Toolpath) -> npt.NDArray[np.bool_]:
+    """(N,) true for tool changes before the first move at a feed: where a machine cannot be told
+    of tools, the operator mounts this one before the program starts."""
+    fed = np.cumsum(toolpath.is_feed) > 0
+    return np.asarray((toolpath.kind == Kind.TOOL_CHANGE) & ~fed)

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from camtool.geometry.polylines import POSITION_EPS_MM, Ints
-from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verify.compare import Target
 from camtool.verify.cuts import Bools, CutMoves, cut_moves
 from camtool.verify.holes import Holes, holes_of

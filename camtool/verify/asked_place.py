@@ -16,7 +16,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
-from camtool.toolpath.cleared import STOCK_TOP_MM
+from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verify.asked import Alike, Asked, Side
 from camtool.verify.compare import Target
 from camtool.verify.cuts import Bools

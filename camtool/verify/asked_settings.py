@@ -9,8 +9,8 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats, Ints
-from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verify.asked import Alike, Asked, Side
 from camtool.verify.cuts import Bools, is_flat
 from camtool.verify.places import at_point, block_name

@@ -8,9 +8,8 @@ from camtool.geometry.drawing import Drawing
 from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
 from camtool.simulation.options import ALL, Effects, Options
-from camtool.toolpath.bent import Bent
-from camtool.toolpath.kept import Kept
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Bent, Toolpath
+from camtool.toolpath.wanted import Kept
 from camtool.verify.asked import Asked
 
 COVERAGE_MM = 0.005

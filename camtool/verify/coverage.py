@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
-from camtool.toolpath.cleared import STOCK_TOP_MM
+from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verify.compare import Found, Target
 from camtool.verify.cuts import Bools, CutMoves, Samples, sample_cuts
 from camtool.verify.figures import Figure

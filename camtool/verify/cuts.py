@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
-from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
 
 Bools = npt.NDArray[np.bool_]
 

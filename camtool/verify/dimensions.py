@@ -3,7 +3,7 @@
 Of a contour that is cut in several passes the deepest, last one counts, without leads and ramps:
 its loop (`camtool.verify.loops`). The part is all loops and open contours together. Sizes are
 those of the cut edges, nominally as they are drawn, where the plan says which edges those are
-(`camtool.toolpath.drawn`); the slides move an edge as they move the box of the tool's centre:
+(`camtool.toolpath.wanted`); the slides move an edge as they move the box of the tool's centre:
 
     predicted edge = planned edge + (box of the slides − box of the wanted moves)
 

@@ -14,8 +14,8 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
-from camtool.toolpath.cleared import STOCK_TOP_MM
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verify.cuts import Bools, CutMoves, cutting_rows, moved_lengths
 from camtool.verify.places import and_more, at_point, block_name
 

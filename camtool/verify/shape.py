@@ -25,9 +25,9 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
-from camtool.toolpath.cleared import STOCK_TOP_MM
-from camtool.toolpath.kept import Kept
 from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.wanted import Kept
 from camtool.verify.case import Cone, VerifyOptions
 from camtool.verify.cuts import CutMoves, moved_lengths
 from camtool.verify.trace import Trace

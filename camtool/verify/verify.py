@@ -23,9 +23,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.models import StepsOnTheWay, model_of, steps_on_the_way
 from camtool.simulation.motion import Chunk
 from camtool.simulation.simulate import check_options, simulate
-from camtool.toolpath.bent import Bent
-from camtool.toolpath.extents import toolpath_extents
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Bent, Toolpath, toolpath_extents
 from camtool.verify.against import Held, hold
 from camtool.verify.asked import Asked
 from camtool.verify.case import Case, VerifyOptions

@@ -24,6 +24,6 @@ def test_every_code_is_explained_and_no_other() -> None:
 
 def test_every_code_is_used_somewhere() -> None:
     root = Path(__file__).parents[2]
-    files = [*root.glob("camtool/**/*.py"), *root.glob("postprocessors/*.py")]
+    files = [*root.glob("camtool/**/*.py"), *root.glob("postprocessors/**/*.py")]
     text = "".join(path.read_text(encoding="utf-8") for path in files)
     assert [code.name for code in Code if f"Code.{code.name}" not in text] == []

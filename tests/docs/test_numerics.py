@@ -34,7 +34,10 @@ class Constant:
 
 def constants() -> Iterator[Constant]:
     """All constants, file by file, in the order of the code."""
-    for path in [*sorted(ROOT.glob("camtool/**/*.py")), *sorted(ROOT.glob("postprocessors/*.py"))]:
+    for path in [
+        *sorted(ROOT.glob("camtool/**/*.py")),
+        *sorted(ROOT.glob("postprocessors/**/*.py")),
+    ]:
         parts = path.relative_to(ROOT).with_suffix("").parts
         if parts[1] in NOT_DECIDING:
             continue

@@ -55,7 +55,7 @@ def test_names_of_the_overview_exist() -> None:
 
 def test_functions_of_the_overview_exist() -> None:
     """Those that are called by their module's name alone: `link.link`."""
-    sources = [*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/*.py")]
+    sources = [*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")]
     names = set(re.findall(r"`(_?[a-z_]+)\.([A-Za-z_]+)`", OVERVIEW)) - {
         ("camtool", "postprocessors")
     }

@@ -1,6 +1,7 @@
 """The house's direction: rooms import only from below, and heavy packages only where used."""
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
@@ -56,8 +57,14 @@ HEAVY = {
 }
 
 
+MACHINES = [path.parent for path in sorted(ROOT.glob("postprocessors/*/machine.toml"))]
+"""The folder of each target."""
+
+
 def files() -> list[Path]:
-    return sorted([*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/*.py")])
+    found = sorted([*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")])
+    assert len(found) > 100
+    return found
 
 
 def room_of(name: str) -> str | None:
@@ -81,8 +88,9 @@ def imported(tree: ast.AST, *, neighbours: bool = False) -> list[tuple[int, str]
             found += [(node.lineno, alias.name) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             # One package, two names: postprocessors/ here, camtool_postprocessors installed.
-            # So its modules import each other as neighbours, and nobody else does.
-            assert node.level == 0 or (neighbours and node.level == 1), f"line {node.lineno}"
+            # So its modules import each other as neighbours, and nobody else does: "." is their
+            # own folder, ".." the room.
+            assert node.level == 0 or (neighbours and node.level <= 2), f"line {node.lineno}"
             module = ("camtool_postprocessors." if node.level else "") + (node.module or "")
             if module == "camtool":
                 found += [(node.lineno, f"camtool.{alias.name}") for alias in node.names]
@@ -120,14 +128,26 @@ def test_the_rule_can_be_broken(source: str, room: str) -> None:
     assert broken_rules(source, room)
 
 
-def test_a_dialect_never_imports_another() -> None:
-    dialects = [path.stem for path in ROOT.glob("postprocessors/*.toml")]
-    dialects = [name.replace("-", "_") for name in dialects]
-    for path in ROOT.glob("postprocessors/*.py"):
-        own = [name for name in dialects if name in path.stem]
-        for line, module in imported(ast.parse(path.read_text(encoding="utf-8")), neighbours=True):
-            others = [name for name in dialects if name not in own and name in module]
-            assert not others, f"{path.name} line {line} imports {module}"
+def reached_rooms(source: str) -> set[str]:
+    """The folders of postprocessors/ that a module in one of them imports from, but its own."""
+    nodes = ast.walk(ast.parse(source))
+    far = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.level > 1]
+    return {str(node.module).split(".")[0] for node in far}
+
+
+@pytest.mark.parametrize("folder", MACHINES, ids=lambda path: path.name)
+def test_a_target_never_imports_another(folder: Path) -> None:
+    modules = list(folder.glob("**/*.py"))
+    assert folder / "__init__.py" in modules
+    for path in modules:
+        assert reached_rooms(path.read_text(encoding="utf-8")) <= {"gcode"}, path.name
+
+
+def test_every_target_is_looked_at() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    points = settings["project"]["entry-points"]["camtool.postprocessors"]
+    assert {f"camtool_postprocessors.{path.name}:POST" for path in MACHINES} == {*points.values()}
+    assert reached_rooms("from ..grbl.read import read_grbl\nfrom .dialect import x") == {"grbl"}
 
 
 @pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
@@ -142,9 +162,10 @@ def test_heavy_packages_are_imported_where_they_are_used(path: Path) -> None:
 
 def test_every_package_is_shipped() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    listed = set(settings["tool"]["setuptools"]["packages"]) - {"camtool_postprocessors"}
-    there = {path.parent.relative_to(ROOT) for path in ROOT.glob("camtool/**/__init__.py")}
-    assert listed == {".".join(path.parts) for path in there}
+    listed = set(settings["tool"]["setuptools"]["packages"])
+    ours = [*ROOT.glob("camtool/**/__init__.py"), *ROOT.glob("postprocessors/**/__init__.py")]
+    there = {".".join(path.parent.relative_to(ROOT).parts) for path in ours}
+    assert listed == {re.sub("^postprocessors", "camtool_postprocessors", name) for name in there}
 
 
 def loaded_by(*arguments: str) -> set[str]:

@@ -15,7 +15,9 @@ POSSESSIVE = re.compile(r"\)(?:[*?+]|\{[\d,]+\})\+")
 
 
 def files() -> list[Path]:
-    return sorted([*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/*.py")])
+    found = sorted([*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")])
+    assert len(found) > 100
+    return found
 
 
 @pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))

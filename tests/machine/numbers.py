@@ -4,15 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from camtool_postprocessors import (
-    _flashcut_options,
-    _grbl_options,
-    _i8751_options,
-    _linuxcnc_options,
-    _matlab_router_options,
-    _pic_mmh_options,
-    _valcnc_options,
-)
+from camtool_postprocessors.flashcut import dialect as flashcut
+from camtool_postprocessors.grbl import dialect as grbl
+from camtool_postprocessors.i8751 import dialect as i8751
+from camtool_postprocessors.linuxcnc import dialect as linuxcnc
+from camtool_postprocessors.matlab_router import dialect as matlab_router
+from camtool_postprocessors.pic_mmh import dialect as pic_mmh
+from camtool_postprocessors.valcnc import dialect as valcnc
 from msgspec import inspect as known
 
 from camtool.calibration.measurements import _Head
@@ -21,13 +19,13 @@ from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
 
 DIALECTS: dict[str, type] = {
-    "flashcut": _flashcut_options.Dialect,
-    "grbl": _grbl_options.Dialect,
-    "i8751": _i8751_options.Dialect,
-    "linuxcnc": _linuxcnc_options.Dialect,
-    "matlab-router": _matlab_router_options._Table,
-    "pic-mmh": _pic_mmh_options.Dialect,
-    "valcnc": _valcnc_options.Dialect,
+    "flashcut": flashcut.Dialect,
+    "grbl": grbl.Dialect,
+    "i8751": i8751.Dialect,
+    "linuxcnc": linuxcnc.Dialect,
+    "matlab-router": matlab_router._Table,
+    "pic-mmh": pic_mmh.Dialect,
+    "valcnc": valcnc.Dialect,
 }
 
 FILES = {"i8751": Path(__file__).parents[2] / "samples" / "i8751-sample.toml"}

@@ -14,7 +14,7 @@ from camtool.machine.loader import build_machine, missing_keys, read_table, targ
 from camtool.machine.model import Machine, controller_of
 from camtool.machine.registry import load_target
 
-FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
+FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
 
 
 def base() -> dict[str, Any]:

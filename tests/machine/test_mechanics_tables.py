@@ -8,7 +8,7 @@ from camtool.errors import MachineError
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
 
-FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
+FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
 
 
 def built(*settings: str) -> Machine:

@@ -18,7 +18,7 @@ from camtool.simulation.motion import Chunk, Floats, one_row
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 
-MACHINE_FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
+MACHINE_FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
 
 DOWN_MM = -0.02
 SAFE_MM = 0.2

@@ -7,16 +7,17 @@ import pytest
 
 ROOT = Path(__file__).parents[2] / "postprocessors"
 # Options of the [dialect] table are what both must agree on.
-SHARED = {"_gcode_options"}
+SHARED = {"gcode.dialect"}
 
 
 def neighbours(module: str) -> set[str]:
-    """The modules beside it that a module imports."""
-    tree = ast.parse((ROOT / f"{module}.py").read_text(encoding="utf-8"))
+    """The modules of this room that a module imports."""
+    folder, _, name = module.partition(".")
+    tree = ast.parse((ROOT / folder / f"{name}.py").read_text(encoding="utf-8"))
     return {
-        str(node.module)
+        f"{folder}.{node.module}" if node.level == 1 else str(node.module)
         for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.level == 1
+        if isinstance(node, ast.ImportFrom) and node.level
     }
 
 
@@ -32,11 +33,12 @@ def reached(module: str) -> set[str]:
 
 @pytest.mark.parametrize("name", ["grbl", "linuxcnc"])
 def test_what_both_need_are_options_only(name: str) -> None:
-    both = reached(f"_{name}_write") & reached(f"_{name}_read")
-    assert both == SHARED | {f"_{name}_options"}
+    both = reached(f"{name}.write") & reached(f"{name}.read")
+    assert both == SHARED | {f"{name}.dialect"}
 
 
 @pytest.mark.parametrize(("name", "other"), [("grbl", "linuxcnc"), ("linuxcnc", "grbl")])
 def test_no_dialect_needs_another(name: str, other: str) -> None:
-    assert not any(f"_{other}_" in module for module in reached(name))
-    assert {f"_{name}_write", f"_{name}_read"} <= reached(name)
+    needed = reached(f"{name}.__init__")
+    assert not any(module.startswith(f"{other}.") for module in needed)
+    assert {f"{name}.write", f"{name}.read"} <= needed

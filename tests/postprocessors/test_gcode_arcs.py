@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors._gcode_arcs import arcs_hold, arcs_of
-from camtool_postprocessors._grbl_options import Dialect, dialect_of
+from camtool_postprocessors.gcode.arcs import arcs_hold, arcs_of
+from camtool_postprocessors.grbl.dialect import Dialect, dialect_of
 from hypothesis import given
 from hypothesis import strategies as st
 

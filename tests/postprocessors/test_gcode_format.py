@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from camtool_postprocessors._gcode_format import (
+from camtool_postprocessors.gcode.format import (
     NumberStyle,
     comment,
     first_too_long,

@@ -73,5 +73,5 @@ def test_the_page_has_every_option(name: str) -> None:
     import importlib
 
     page = (ROOT / "docs" / "dialects" / f"{name}.md").read_text(encoding="utf-8")
-    options = importlib.import_module(f"camtool_postprocessors._{name}_options").Dialect
+    options = importlib.import_module(f"camtool_postprocessors.{name}.dialect").Dialect
     assert [field for field in options.__struct_fields__ if f"| `{field}` |" not in page] == []

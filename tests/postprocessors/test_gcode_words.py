@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from camtool_postprocessors._gcode_words import Lexing, blocks_of
+from camtool_postprocessors.gcode.blocks import Lexing, blocks_of
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors._i8751_dogleg import FREE, Line, elbows, reaches
+from camtool_postprocessors.i8751.dogleg import FREE, Line, elbows, reaches
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -81,7 +81,7 @@ def test_the_worked_examples_of_the_page() -> None:
 
 
 def test_every_option_has_its_line_on_the_page() -> None:
-    from camtool_postprocessors._i8751_options import Dialect
+    from camtool_postprocessors.i8751.dialect import Dialect
 
     page = PAGE.read_text(encoding="utf-8")
     keys = Dialect.__struct_fields__

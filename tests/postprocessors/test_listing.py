@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from camtool_postprocessors._gcode_listing import listing as lines_of
-from camtool_postprocessors._gcode_words import Lexing, blocks_of
+from camtool_postprocessors.gcode.blocks import Lexing, blocks_of
+from camtool_postprocessors.gcode.blocks import listing as lines_of
 
 from camtool.machine.registry import LoadedTarget, load_target, target_names
 from camtool.toolpath.builder import ToolpathBuilder

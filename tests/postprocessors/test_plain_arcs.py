@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-from camtool_postprocessors._gcode_plain_arcs import (
-    ArcRules,
-    PlainRows,
-    _Wanted,
-    plain_rows,
-)
+from camtool_postprocessors.gcode.plain_arcs import ArcRules, PlainRows, _Wanted, plain_rows
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

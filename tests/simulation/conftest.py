@@ -8,7 +8,7 @@ import pytest
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
 
-TARGET = Path(__file__).parents[2] / "postprocessors" / "pic_mmh.toml"
+TARGET = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
 
 
 @pytest.fixture(scope="session")

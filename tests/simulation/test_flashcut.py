@@ -20,7 +20,7 @@ from tests.oracles.controllers import play
 from tests.oracles.flashcut_run import Pc, half_period, run_rows
 from tests.oracles.motion_rows import RowMotion, rows_of
 
-TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut.toml"
+TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
 STEP = 0.0019
 
 

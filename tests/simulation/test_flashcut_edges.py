@@ -18,7 +18,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of
 
-TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut.toml"
+TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
 STEP = 0.0019
 
 

@@ -16,8 +16,7 @@ from camtool.simulation.path import held
 from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.extents import toolpath_extents
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from tests.oracles.motion_rows import rows_of
 from tests.oracles.path_machine import (
     STEP,

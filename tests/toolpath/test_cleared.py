@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.cleared import Reach, Through, low_rapids, rapids_through_stock
 from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.rapids import Reach, Through, low_rapids, rapids_through_stock
 from tests.oracles.cleared import most_uncut
 from tests.waiting import no_chewing
 

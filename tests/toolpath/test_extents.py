@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.extents import toolpath_extents
-from camtool.toolpath.moves import Kind
+from camtool.toolpath.moves import Kind, toolpath_extents
 
 
 def test_nothing_reaches_only_its_start() -> None:

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.toolpath.arms import Arms
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Arms, Kind, Toolpath
 
 
 def test_left_out_coordinates_stay() -> None:

@@ -1,8 +1,7 @@
 """Which tool changes an operator can make before the program starts."""
 
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind
-from camtool.toolpath.tools import mounted_before
+from camtool.toolpath.moves import Kind, mounted_before
 
 
 def test_changes_before_the_first_feed_are_made_by_hand() -> None:

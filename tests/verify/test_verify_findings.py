@@ -10,8 +10,8 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.drawn import Drawn
 from camtool.toolpath.moves import Kind
+from camtool.toolpath.wanted import Drawn
 from camtool.verify.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import (
     circle,

@@ -13,8 +13,8 @@ from camtool.planning.job import job_of
 from camtool.planning.kept import kept_of
 from camtool.planning.plan import planned
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.kept import Kept
 from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.wanted import Kept
 from camtool.verify.case import Cone
 from camtool.verify.cuts import CutMoves, cut_moves
 from camtool.verify.shape import (

@@ -5,8 +5,7 @@ from __future__ import annotations
 from camtool.machine.model import Machine
 from camtool.planning.compensating.linear import motor_path
 from camtool.planning.compensating.take_up import taken_up
-from camtool.toolpath.bent import Bent
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Bent, Toolpath
 
 
 def compensated(toolpath: Toolpath, machine: Machine) -> Bent:

@@ -21,9 +21,8 @@ from camtool.geometry.curves import EllipseCurve
 from camtool.geometry.fit import fit_curve
 from camtool.machine.model import Machine
 from camtool.planning.compensating.stretch import Point
-from camtool.toolpath.bent import Bent
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Floats, Kind, Move, Toolpath
+from camtool.toolpath.moves import Bent, Floats, Kind, Move, Toolpath
 
 
 def motor_matrix(machine: Machine) -> Floats:

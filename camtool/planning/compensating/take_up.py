@@ -34,9 +34,8 @@ from camtool.machine.model import Axis, Machine
 from camtool.planning.compensating.regions import Regions
 from camtool.planning.compensating.stretch import Point, Stretch, stretches
 from camtool.planning.reversing.residual import Residual
-from camtool.toolpath.bent import Bent
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind, Move, Toolpath
+from camtool.toolpath.moves import Bent, Kind, Move, Toolpath
 
 OVERSHOOT = 0.5
 """The share of what the controller compensates too much that an axis overshoots at a reversal."""

@@ -1,0 +1,303 @@
+"""Reading flashcut, one block a line, by the four templates of the thesis (L980-1016).
+
+The real program hands each line to the routine of its code; what it does with a line that fits no
+template is not said, so here such a line is an error with block, line and column.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.kernels.lattice import to_steps
+from camtool.machine.controllers import FlashcutController
+from camtool.machine.controllers.flashcut_timers import (
+    feeds_of,
+    half_periods_ms,
+    shortest_ms,
+    steps_too_many,
+)
+from camtool.machine.model import Machine
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+
+from ..gcode.blocks import Block, Lexing, blocks_of
+from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+
+LEXING: Final = Lexing(letters="GMXYZIJF")
+
+FEED_GUARD: Final = 1e-9
+"""Part of a feed: a feed above its limit by less is at the limit."""
+
+TEMPLATES: Final = {
+    "G00": ("XY", "Z"),
+    "G01": ("XY", "XYF", "Z"),
+    "G02": ("XYIJ",),
+    "G03": ("XYIJ",),
+    "M00": ("",),
+    "M02": ("",),
+    "M03": ("",),
+    "M04": ("",),
+    "M05": ("",),
+    "M30": ("",),
+}
+MOTIONS: Final = frozenset({"G00", "G01", "G02", "G03"})
+MORE_FEEDS: Final = {"G01": ("ZF",), "G02": ("XYIJF",), "G03": ("XYIJF",)}
+"""Further templates where feeds may stand everywhere."""
+
+SPINDLE: Final = {
+    "M03": Kind.SPINDLE_CW,
+    "M04": Kind.SPINDLE_CCW,
+    "M05": Kind.SPINDLE_OFF,
+}
+NOT_INCHES: Final = frozenset({"G20", "G21", "G30", "G31"})
+"""Arcs in the list that the thesis cites (L393-432), which it does not implement."""
+
+
+def read_program(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError naming block, line and column when it is none."""
+    reader = _Reader(machine)
+    for block in blocks_of(data, LEXING):
+        reader.block(block)
+    if not reader.blocks:
+        raise ProgramError("the program is empty", mend="a program has blocks such as M30")
+    path = reader.path.finish(reader.findings())
+    return replace(path, findings=(*path.findings, *timer_findings(path, machine)))
+
+
+@dataclass
+class _Excess:
+    """How many blocks have a feed above the limit, the highest, and the first of them."""
+
+    count: int = 0
+    most: float = 0.0
+    where: str = ""
+
+
+class _Reader:
+    """Blocks in, rows out; knows the feed that holds and whether the program has ended."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.path = ToolpathBuilder()
+        self.blocks = 0
+        self._dialect: Dialect = dialect_of(machine)
+        self._max_feed = machine.max_feed_mm_min
+        self._sign = 1.0 if self._dialect.z_up == "+" else -1.0
+        self._templates = {code: set(forms) for code, forms in TEMPLATES.items()}
+        if self._dialect.feed_words == "everywhere":
+            for code, forms in MORE_FEEDS.items():
+                self._templates[code] |= set(forms)
+        self._feed = math.nan
+        self._ended = ""
+        self._fast = _Excess()
+
+    def block(self, block: Block) -> None:
+        """One block."""
+        self.blocks += 1
+        if self._ended:
+            block.fail(f"a block after {self._ended}, the end of the program", mend="remove it")
+        words = block.words
+        code = words[0][0] + words[0][1]
+        form = "".join([letter for letter, _ in words[1:]])
+        if form not in self._templates.get(code, ()):
+            self._refuse(block, code, form)
+        text = block.text.strip(" ")
+        if text.count(" ") != len(words) - 1 or "  " in text or "\t" in text:
+            _refuse_spacing(block)
+        self.path.block = block.index
+        if code in MOTIONS:
+            self._motion(block, code, form, [float(number) for _, number in words[1:]])
+        elif code in SPINDLE:
+            self.path.event(SPINDLE[code])
+        elif code == "M00":
+            self.path.message(STOP_TEXT)
+        else:
+            self.path.event(Kind.END)
+            self._ended = code
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What goes beyond the machine's limits."""
+        if not self._fast.count:
+            return ()
+        return (
+            Finding(
+                Code.FEED_ABOVE_LIMIT,
+                Severity.WARNING,
+                f"{self._fast.count} blocks have a feed above what the machine's shortest half "
+                f"period gives, up to {self._fast.most:g} mm/min where {self._max_feed:.4g} is "
+                "the limit: that half period holds them, and so does the simulation",
+                where=self._fast.where,
+                measured=self._fast.most,
+                limit=self._max_feed,
+                unit="mm_min",
+            ),
+        )
+
+    def _motion(self, block: Block, code: str, form: str, numbers: list[float]) -> None:
+        """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""
+        if not max(map(abs, numbers)) <= MOST_MM:
+            at = next(at for at, number in enumerate(numbers, 1) if not abs(number) <= MOST_MM)
+            block.fail(f"a number beyond ±{MOST_MM:g}", word=at, mend="check the units")
+        if form[-1] == "F":
+            self._set_feed(block, numbers.pop(), len(form))
+        if code != "G00" and math.isnan(self._feed):
+            block.fail(f"{code} before any F", mend="say F in a G01 of X and Y first")
+        if code in ("G02", "G03"):
+            self._arc(block, code, numbers)
+            return
+        x, y, z = (
+            (None, None, self._sign * numbers[0] + 0.0)
+            if form[0] == "Z"
+            else (numbers[0], numbers[1], None)
+        )
+        if code == "G00":
+            self.path.rapid(x, y, z)
+        elif form != "XYF" or (x, y) != self.path.position[:2]:
+            # A G01 with F to where the tool is sets the feed, no more.
+            self.path.line(x, y, z, feed=self._feed)
+
+    def _set_feed(self, block: Block, feed: float, word: int) -> None:
+        if feed <= 0.0:
+            block.fail("a feed must be above 0", word=word, mend="write F3.0")
+        if feed > self._max_feed * (1.0 + FEED_GUARD):
+            self._fast.where = self._fast.where or f"block {block.index + 1}"
+            self._fast.count += 1
+            self._fast.most = max(self._fast.most, feed)
+        self._feed = feed
+
+    def _arc(self, block: Block, code: str, numbers: list[float]) -> None:
+        x, y, i, j = numbers
+        at_x, at_y, _ = self.path.position
+        centre = at_x + i, at_y + j
+        radius, other = math.hypot(i, j), math.hypot(x - centre[0], y - centre[1])
+        if radius == 0.0:
+            block.fail("an arc about its own start", word=3, mend="give I and J from the start")
+        spread, most = abs(radius - other), self._dialect.arc_spread_mm
+        if spread > most:
+            block.fail(
+                f"the arc's start is {radius:.6g} mm from its centre, its end {other:.6g} mm",
+                word=3,
+                mend=f"they may differ by {most:g} mm",
+            )
+        if (x, y) == (at_x, at_y) and self._dialect.full_circles == "halves":
+            block.fail(
+                "an arc that ends where it starts: whether it is a circle or nothing is not known",
+                word=1,
+                mend="write two halves, or say --set dialect.full_circles=whole",
+            )
+        self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=self._feed)
+
+    def _refuse(self, block: Block, code: str, form: str) -> None:
+        """Why a block fits no template."""
+        forms = self._templates.get(code)
+        if code in NOT_INCHES:
+            block.fail(
+                f"{code} is an arc in this controller's list, neither inches nor a return, and is "
+                "not done",
+                mend="remove it; lengths are mm",
+            )
+        if forms is None:
+            known = " ".join(TEMPLATES)
+            block.fail(f"{code} is not known", mend=f"known, with two digits: {known}")
+        wanted = " or ".join(" ".join([code, *one]) for one in sorted(forms))
+        for at, letter in enumerate(form):
+            if not any(one.startswith(form[: at + 1]) for one in forms):
+                block.fail(
+                    f"{letter} has no place here", word=at + 1, mend=f"write {wanted}, no more"
+                )
+        block.fail(f"{code} lacks a word", word=len(form), mend=f"write {wanted}")
+
+
+def _refuse_spacing(block: Block) -> None:
+    block.fail("one space, no more and no tab, goes between words", mend="as in G00 X1.0 Y1.0")
+
+
+# What the machine's timers make of a program's lines and feeds: found when it is read.
+
+HELD_GUARD: Final = 0.01
+"""Part of a feed: whole milliseconds bring it no nearer than this at the fastest."""
+
+WARNED_PART: Final = 0.5
+"""Of the feed that a program says: a cut that gets less is a warning, not a remark."""
+
+MOST_MS: Final = 1e9
+"""Half periods longer than this make no shorter axis too long."""
+
+
+def timer_findings(path: Toolpath, machine: Machine) -> tuple[Finding, ...]:
+    """What feeds become, and which moves of both axes get steps too many on their shorter one."""
+    controller = machine.controller
+    if not isinstance(controller, FlashcutController):
+        return ()
+    return (*_held(path, machine, controller), *_too_long(path, machine, controller))
+
+
+def _held(path: Toolpath, machine: Machine, controller: FlashcutController) -> Iterator[Finding]:
+    """FEED_HELD: cuts whose feed the shortest half period does not let them have."""
+    rows = np.flatnonzero(path.is_feed)
+    steps_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    way = (path.end - path.starts)[rows]
+    moves = np.column_stack([to_steps(way[:, k], float(steps_mm[k])) != 0 for k in range(3)])
+    alone = (moves.sum(axis=1) == 1) & ~path.is_arc[rows]
+    step_mm = np.where(moves[:, 2] & alone, steps_mm[2], steps_mm[:2].max())
+    asked = path.feed[rows]
+    fastest = feeds_of(shortest_ms(alone, controller), step_mm, controller)
+    late = np.flatnonzero(asked > fastest * (1.0 + HELD_GUARD))
+    if len(late):
+        worst = int(late[(asked[late] / fastest[late]).argmax()])
+        gets, where = float(fastest[worst]), "along one axis" if alone[worst] else "of both axes"
+        slow = gets < WARNED_PART * asked[worst]
+        yield Finding(
+            Code.FEED_HELD,
+            Severity.WARNING if slow else Severity.INFO,
+            f"{len(late)} cuts are slower than their F: F{asked[worst]:g} becomes {gets:.3g} "
+            f"mm/min {where}, by the shortest half period (controller.half_period_ms, "
+            "controller.single_axis_half_period_ms); a shorter one makes slanted lines less exact",
+            where=f"block {int(path.block[rows[worst]]) + 1}",
+            measured=gets,
+            limit=float(asked[worst]),
+            unit="mm_min",
+        )
+
+
+def _too_long(
+    path: Toolpath, machine: Machine, controller: FlashcutController
+) -> tuple[Finding, ...]:
+    rows = np.flatnonzero(path.is_motion & ~path.is_arc)
+    x_mm, y_mm = machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm
+    way = np.abs(path.end - path.starts)[rows]
+    steps = np.column_stack([to_steps(way[:, 0], x_mm), to_steps(way[:, 1], y_mm)])
+    feed = np.where(path.is_feed, path.feed, np.inf)[rows]
+    alone = (steps == 0).any(axis=1)
+    half_period = half_periods_ms(feed, max(x_mm, y_mm), alone, controller)
+    whole = np.minimum(half_period, MOST_MS).astype(np.int64)
+    extra = steps_too_many(steps.max(axis=1), steps.min(axis=1), whole, controller)
+    count = int((extra > 0).sum())
+    if not count:
+        return ()
+    worst = int(extra.argmax())
+    most_um = float(extra[worst]) * 1000.0 * (y_mm if steps[worst].argmin() else x_mm)
+    rapids = bool((path.kind[rows[extra > 0]] == Kind.RAPID).any())
+    stays = controller.goes_on_from == "programmed"
+    return (
+        Finding(
+            Code.EXECUTED_OTHERWISE,
+            Severity.WARNING,
+            f"{count} straight moves of both axes make their shorter one too long, by up to "
+            f"{extra[worst]} steps ({most_um:.1f} µm), because each axis has a timer of its own"
+            + ("; it stays in all that follows" if stays else "")
+            + ". What lowers it: longer half periods (controller.half_period_ms), lines in pieces "
+            "(dialect.slants=split)"
+            + (", rapids along one axis at a time (dialect.rapids=one-axis)" if rapids else ""),
+            where=f"block {int(path.block[rows[worst]]) + 1}",
+            measured=most_um,
+            limit=0.0,
+            unit="um",
+        ),
+    )

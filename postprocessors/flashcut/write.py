@@ -1,0 +1,262 @@
+"""Writing flashcut: a Toolpath to blocks that each say everything anew, but for the feed.
+
+    rows ──checked──▶ XY and Z apart ──units, arcs mended──▶ blocks, F where it changes
+
+The syntax has F in G01 of XY alone (L989-992). So a feed that changes before a Z move or an arc
+is said by a G01 to where the tool is: X and Y "aún así es necesario", L985.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.kernels.lattice import to_steps
+from camtool.machine.controllers import FlashcutController
+from camtool.machine.controllers.flashcut_timers import half_periods_ms
+from camtool.machine.model import Machine
+from camtool.toolpath.lower import MAX_PARTS, Lowered
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.program import Program
+
+from ..gcode.checks import check_plain, feed_units, left_out, place, split_z
+from ..gcode.dialect import feed_decimals
+from ..gcode.format import Ints as Ints_here
+from ..gcode.format import NumberStyle, say_units
+from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
+from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+
+WORD: Final[dict[int, str]] = {
+    Kind.RAPID: "G00",
+    Kind.LINE: "G01",
+    Kind.ARC_CW: "G02",
+    Kind.ARC_CCW: "G03",
+}
+EVENT: Final = {
+    Kind.SPINDLE_CW: "M03",
+    Kind.SPINDLE_CCW: "M04",
+    Kind.SPINDLE_OFF: "M05",
+    Kind.TOOL_CHANGE: "M00",
+}
+
+
+def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    dialect = dialect_of(machine)
+    check_plain(toolpath, machine)
+    feeds, feed_note = feed_units(toolpath, machine)
+    lowered, split_note = split_z(toolpath, machine)
+    if dialect.slants == "split":
+        lowered = split_slants(lowered.toolpath, machine).after(lowered)
+    rules = ArcRules(dialect.decimals, dialect.full_circles, MOST_MM)
+    rows = plain_rows(lowered.toolpath, rules)
+    of_row = lowered.row[rows.row]
+    _check_reach(toolpath, rows, of_row, dialect)
+    writer = _Writer(rows, dialect, machine)
+    writer.run(_event_words(toolpath), of_row, feeds[of_row])
+    ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
+    first = place(toolpath, int(lowered.row[rows.first])) if rows.first >= 0 else ""
+    notes = [
+        *([feed_note] if feed_note else []),
+        *([split_note] if split_note else []),
+        *arc_findings(rows, first),
+        *_event_notes(toolpath, dialect),
+    ]
+    blocks = [*writer.blocks, dialect.program_end]
+    return Program(
+        data="".join(f"{block}\n" for block in blocks).encode("ascii"),
+        extension=machine.target.extension,
+        target=machine.target.name,
+        row_of_block=np.array([*writer.rows, len(toolpath) - 1 if ended else -1], dtype=np.int64),
+        findings=tuple(notes),
+    )
+
+
+def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints_here, dialect: Dialect) -> None:
+    far = (np.abs(rows.end) > MOST_MM * 10**dialect.decimals).any(axis=1)
+    if far.any():
+        raise PostError(
+            f"a coordinate has more than four digits before the point (±{MOST_MM:g} mm)",
+            where=place(toolpath, int(of_row[far.argmax()])),
+            mend="check the units",
+        )
+
+
+def _texts(units: Ints_here, dialect: Dialect) -> list[str]:
+    """Column of units (M,) as texts: "1.0", "-0.25"; zero has no minus."""
+    texts = say_units(units, NumberStyle(dialect.decimals))
+    if dialect.trailing_zeros:
+        return texts
+    return [text if text[-1] != "0" else _short(text) for text in texts]
+
+
+def _short(text: str) -> str:
+    """Without its last zeros, but for the first decimal."""
+    short = text.rstrip("0")
+    return f"{short}0" if short[-1] == "." else short
+
+
+def _event_words(toolpath: Toolpath) -> dict[int, str]:
+    """The block of each event that has one, by row."""
+    words = {}
+    for row in np.flatnonzero(~toolpath.is_motion).tolist():
+        kind = Kind(int(toolpath.kind[row]))
+        if kind in EVENT:
+            words[row] = EVENT[kind]
+        elif kind == Kind.MESSAGE and toolpath.texts[int(toolpath.value[row])] == STOP_TEXT:
+            words[row] = "M00"
+    return words
+
+
+def _event_notes(toolpath: Toolpath, dialect: Dialect) -> list[Finding]:
+    """What the events lose."""
+    found = left_out(toolpath, [Kind.DWELL], "this controller has no dwell")
+    kinds = toolpath.kind
+    spindles = np.isin(kinds, [int(Kind.SPINDLE_CW), int(Kind.SPINDLE_CCW)])
+    speeds = int((spindles & ~np.isnan(toolpath.value)).sum())
+    tools = int((kinds == Kind.TOOL_CHANGE).sum())
+    if speeds or tools:
+        found.append(
+            Finding(
+                Code.VALUE_ROUNDED,
+                Severity.INFO,
+                f"{speeds} spindle speeds and {tools} tool numbers have no word: the spindle "
+                "turns with the feed, and M00 waits for the tool",
+            )
+        )
+    if not dialect.spindle_stops:
+        why = "M05 is written, but this machine's spindle turns with every move"
+        found += left_out(toolpath, [Kind.SPINDLE_OFF], why)
+    return found
+
+
+class _Writer:
+    """Blocks one by one; knows which feed the controller holds."""
+
+    def __init__(self, rows: PlainRows, dialect: Dialect, machine: Machine) -> None:
+        self.blocks: list[str] = []
+        self.rows: list[int] = []
+        self._table = rows
+        self._dialect = dialect
+        self._feed_decimals = max(1, feed_decimals(machine))
+        self._feed_scale = 10 ** feed_decimals(machine)
+        self._said_feeds: dict[int, str] = {}
+        self._feed = 0
+
+    def run(self, events: dict[int, str], of_row: Ints_here, feeds: Ints_here) -> None:
+        """All blocks; `of_row` (M,) names the toolpath's rows, `feeds` (M,) in units of F."""
+        table, dialect = self._table, self._dialect
+        sign = 1 if dialect.z_up == "+" else -1
+        xy = self._xy_texts(table.end)
+        z = _texts(table.end[:, 2] * sign, dialect)
+        arc = table.is_arc
+        i, j = (iter(_texts(table.offset[arc, axis], dialect)) for axis in (0, 1))
+        begin = table.starts
+        flat = (table.end[:, :2] != begin[:, :2]).any(axis=1)
+        columns = zip(
+            table.kind.tolist(),
+            table.moves.tolist(),
+            flat.tolist(),
+            of_row.tolist(),
+            feeds.tolist(),
+            strict=True,
+        )
+        cornered = (table.end[:, 2] >= 0) & (dialect.rapids == "one-axis")
+        at = self._xy_texts(table.start[None, :])[0]
+        for index, (kind, moves, in_xy, row, feed) in enumerate(columns):
+            if kind > Kind.ARC_CCW:
+                if row in events:
+                    self._send(events[row], row)
+            elif moves:
+                target = xy[index] if in_xy or kind >= Kind.ARC_CW else f"Z{z[index]}"
+                if kind >= Kind.ARC_CW:
+                    target += f" I{next(i)} J{next(j)}"
+                if kind == Kind.RAPID and in_xy and cornered[index]:
+                    self._corner(at, target, row)
+                self._move(WORD[kind], target, row, feed, at)
+            at = xy[index]
+
+    def _xy_texts(self, units: Ints_here) -> list[str]:
+        x, y = (_texts(units[:, axis], self._dialect) for axis in (0, 1))
+        return [f"X{one} Y{two}" for one, two in zip(x, y, strict=True)]
+
+    def _corner(self, at: str, target: str, row: int) -> None:
+        """The way along X of a rapid of both axes, before that along Y."""
+        corner = f"{target.partition(' ')[0]} {at.partition(' ')[2]}"
+        if corner not in (at, target):
+            self._send(f"{WORD[Kind.RAPID]} {corner}", row)
+
+    def _move(self, word: str, target: str, row: int, feed: int, at: str) -> None:
+        """One move, and a block in front that says the feed where its own cannot."""
+        tail = ""
+        if word != "G00" and feed != self._feed:
+            tail = f" {self._feed_word(feed)}"
+            self._feed = feed
+            here = word == "G01" and target[0] == "X"
+            if not here and self._dialect.feed_words == "syntax":
+                self._send(f"G01 {at}{tail}", row)
+                tail = ""
+        self._send(f"{word} {target}{tail}", row)
+
+    def _feed_word(self, units: int) -> str:
+        word = self._said_feeds.get(units)
+        if word is None:
+            word = f"F{units / self._feed_scale:.{self._feed_decimals}f}"
+            self._said_feeds[units] = word
+        return word
+
+    def _send(self, block: str, row: int) -> None:
+        self.blocks.append(block)
+        self.rows.append(row)
+
+
+# Long slanted lines as pieces that the machine's timers do exactly.
+#
+# The timers make the shorter axis too long where it has more steps than the half period has
+# milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes K = ⌈m / (P −
+# 1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its start, so that the
+# controller, which rounds the way of each piece by itself, has nothing to round.
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+
+def split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:
+    """Lines of X and Y in pieces; PostError when they would be too many. XY and Z are apart."""
+    controller = machine.controller
+    if not isinstance(controller, FlashcutController):
+        return Lowered(toolpath, np.arange(len(toolpath)))
+    q_mm = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
+    begin = toolpath.starts
+    way = toolpath.end[:, :2] - begin[:, :2]
+    steps = np.column_stack([to_steps(way[:, axis], float(q_mm[axis])) for axis in (0, 1)])
+    feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
+    alone = (steps == 0).any(axis=1)
+    half_period = half_periods_ms(feed, float(q_mm.max()), alone, controller)
+    exact = np.maximum(half_period - 1.0, 1.0)
+    slanted = toolpath.kind == Kind.LINE
+    pieces = np.where(slanted, np.ceil(np.abs(steps).min(axis=1) / exact), 1.0)
+    count = np.maximum(pieces, 1.0)
+    if count.sum() > MAX_PARTS:
+        raise PostError(
+            f"the program would have more than {MAX_PARTS} blocks",
+            where=place(toolpath, int(count.argmax())),
+            mend="say --set dialect.slants=whole",
+        )
+    return _cut(toolpath, count.astype(np.int64), steps, q_mm)
+
+
+def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
+    """Each row in `count` (N,) pieces; `steps` (N, 2) of its whole way."""
+    row = np.repeat(np.arange(len(count)), count)
+    part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    inner = np.flatnonzero(part + 1 < count[row])
+    of = row[inner]
+    share = ((part[inner] + 1) / count[of])[:, None]
+    end = toolpath.end[row]
+    end[inner, :2] = toolpath.starts[of, :2] + np.rint(share * steps[of]) * q_mm
+    return Lowered(toolpath.picked(row, end=end), row)

@@ -1,0 +1,285 @@
+"""Writing arcs of grbl and linuxcnc: every arc re-checked after its numbers were rounded.
+
+A *unit* is the last decimal that is said. Start, end and centre lie on whole units; what is sent
+is the end and the offset centre − start. For each arc, by its rounded numbers:
+
+    sagitta below half a unit           one line says it as well
+    the controller's rule holds         as it is
+    otherwise                           1. re-centred: a centre close by for which it holds
+                                        2. split into two arcs at its middle (each re-centred)
+                                        3. lines within a unit of the arc
+
+"The rule holds" also means that the rounded arc turns as the wanted one does: an arc of a few
+units may come out as nearly a full turn, and a short one of a large radius as a full circle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import GcodeDialect
+from .format import Floats, Ints, units_of
+
+Bools = npt.NDArray[np.bool_]
+
+FLAT_UNITS: Final = 0.5
+"""An arc with less sagitta (in units) is a line."""
+
+LINE_SAGITTA_UNITS: Final = 1.0
+"""Lines in place of an arc stray from it by no more (in units), their rounding not counted."""
+
+RECENTRE_UNITS: Final = 1.5
+"""A centre may move by this many units, or by the controller's tolerance if that is more."""
+
+_AROUND: Final = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)])
+
+RULE_MARGIN: Final = 0.9
+"""Arcs are kept within this part of the controller's tolerance: it may compute in 32 bits."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One row in place of an arc: its kind, end (x, y) and offset of the centre (i, j), units.
+    `share`: the part of a helix's rise that is made at its end."""
+
+    kind: Kind
+    end: tuple[int, int]
+    offset: tuple[int, int] = (0, 0)
+    share: float = 1.0
+
+
+@dataclass
+class ArcCounts:
+    """How many arcs were changed, and how."""
+
+    flat: int = 0
+    dropped: int = 0
+    recentred: int = 0
+    split: int = 0
+    lines: int = 0
+    first: int = -1
+    """Row of the first that was re-centred, split or written as lines."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arcs:
+    """All rows' ends (N, 3) and offsets (N, 2) in units, and `pieces` in place of some rows."""
+
+    end: Ints
+    offset: Ints
+    kind: Ints
+    pieces: dict[int, list[Piece]]
+    counts: ArcCounts = field(default_factory=ArcCounts)
+
+
+def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
+    """The toolpath's rows in units, arcs as this controller takes them."""
+    unit = 10.0**-dialect.decimals
+    end = units_of(toolpath.end, dialect.decimals)
+    start = np.concatenate([units_of(toolpath.start[None, :], dialect.decimals), end[:-1]])
+    offset = np.zeros((len(toolpath), 2), dtype=np.int64)
+    kind = np.array(toolpath.kind)
+    arcs = Arcs(end, offset, kind, {})
+    rows = np.flatnonzero(toolpath.is_arc)
+    if not len(rows):
+        return arcs
+    sweep = toolpath.sweeps()[rows]
+    arm = toolpath.starts[rows, :2] - toolpath.centre[rows]
+    radius = np.hypot(arm[:, 0], arm[:, 1])
+    half = np.minimum(np.abs(sweep), math.pi) / 2.0
+    # 1 − cos a = 2 sin²(a/2), which keeps its digits where a is small.
+    sagitta = radius * 2.0 * np.sin(half / 2.0) ** 2
+    flat = sagitta < FLAT_UNITS * unit
+    huge = ~flat & (radius > dialect.arc_most_radius_mm)
+    kind[rows[flat]] = Kind.LINE
+    arcs.counts.flat = int(flat.sum())
+    said = ~flat & ~huge
+    centre = np.zeros((len(rows), 2), dtype=np.int64)
+    centre[said] = units_of(toolpath.centre[rows[said]], dialect.decimals)
+    begin, stop = start[rows, :2], end[rows, :2]
+    offset[rows[said]] = (centre - begin)[said]
+    holds = arcs_hold(np.abs(sweep), (begin, stop, centre), kind[rows], dialect)
+    halves = dialect.full_circles == "halves"
+    full = (begin == stop).all(axis=1) & said & holds
+    special = huge | (said & ~holds) | (full & halves)
+    for at in np.flatnonzero(special).tolist():
+        _mended(arcs, toolpath, int(rows[at]), float(sweep[at]), dialect)
+    return arcs
+
+
+def arcs_hold(
+    sweep_rad: Floats, points: tuple[Ints, Ints, Ints], kind: Ints, dialect: GcodeDialect
+) -> Bools:
+    """Which arcs the controller takes, and takes for what they are.
+
+    `sweep_rad` (K,) > 0 as wanted; `points` start, end, centre (K, 2) in units.
+    """
+    unit = 10.0**-dialect.decimals
+    start, end, centre = points
+    out, back = (start - centre).astype(np.float64), (end - centre).astype(np.float64)
+    r1, r2 = np.hypot(*out.T) * unit, np.hypot(*back.T) * unit
+    gap = np.abs(r1 - r2) / RULE_MARGIN
+    wide = (gap > dialect.arc_difference_mm) & (
+        gap > dialect.arc_difference_part * np.minimum(r1, r2)
+    )
+    small = np.minimum(r1, r2) <= dialect.arc_least_radius_mm / RULE_MARGIN
+    turn = _turns(out, back, kind)
+    limit = dialect.arc_full_turn_rad / RULE_MARGIN
+    same = (start == end).all(axis=1)
+    vague = ~same & ((turn <= limit) | (turn >= 2.0 * math.pi - limit))
+    turned = np.abs(turn - sweep_rad) < math.pi
+    return np.asarray(
+        ~wide & (gap <= dialect.arc_most_difference_mm) & ~small & ~vague & turned & (r1 > 0.0)
+    )
+
+
+def _turns(out: Floats, back: Floats, kind: Ints) -> Floats:
+    """(K,) in (0, 2π]: how far an arc turns from the arm `out` to the arm `back`."""
+    cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
+    sign = np.where(kind == Kind.ARC_CW, -1.0, 1.0)
+    angle = np.mod(sign * np.arctan2(cross, (out * back).sum(axis=1)), 2.0 * math.pi)
+    return np.where(angle == 0.0, 2.0 * math.pi, angle)
+
+
+def _mended(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: GcodeDialect) -> None:
+    """Replace one arc by pieces: re-centred, split, or lines."""
+    begin = arcs.end[row - 1, :2] if row else units_of(toolpath.start[:2], dialect.decimals)
+    stop, kind = arcs.end[row, :2], Kind(int(toolpath.kind[row]))
+    counts = arcs.counts
+    wanted = _Wanted(toolpath.starts[row, :2], toolpath.centre[row], toolpath.end[row, :2], sweep)
+    if (begin == stop).all() and abs(sweep) < math.pi:
+        rises = toolpath.end[row, 2] != toolpath.starts[row, 2]
+        counts.dropped += not rises
+        arcs.pieces[row] = [Piece(Kind.LINE, _pair(stop))] if rises else []
+        return
+    whole = bool((wanted.start == wanted.end).all())
+    huge = math.dist(wanted.start, wanted.centre) > dialect.arc_most_radius_mm
+    one = None if huge or whole else _one(wanted, (begin, stop), kind, dialect)
+    two = None if huge or one else _two(wanted, (begin, stop), kind, dialect)
+    if whole and two:
+        arcs.pieces[row] = two
+        return
+    if counts.first < 0:
+        counts.first = row
+    if one:
+        counts.recentred += 1
+        arcs.pieces[row] = [one]
+    elif two:
+        counts.split += 1
+        arcs.pieces[row] = two
+    else:
+        counts.lines += 1
+        arcs.pieces[row] = _lines(wanted, begin, stop, dialect)
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """An arc in mm ((2,) each) with its signed sweep; radius and angle run evenly from start to
+    end, so that ends which are not quite equally far from the centre are both met."""
+
+    start: Floats
+    centre: Floats
+    end: Floats
+    sweep: float
+
+    def at(self, parts: Floats) -> Floats:
+        """(k, 2) points at these parts (0 to 1) of the sweep."""
+        out = self.start - self.centre
+        r1, r2 = math.hypot(*out), math.dist(self.end, self.centre)
+        radius = r1 + (r2 - r1) * parts
+        angle = math.atan2(out[1], out[0]) + self.sweep * parts
+        return np.asarray(
+            self.centre + radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        )
+
+
+def _one(
+    wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
+) -> Piece | None:
+    """The arc about the nearest centre that the controller takes; None when there is none close.
+
+    The centre from which both rounded ends are equally far and which is nearest to c is
+    c + ((m − c)·t) t, with m the middle of the chord and t its direction. It is hardly ever a
+    whole number of units, so those around it are tried, the nearest to c first.
+    """
+    begin, stop = ends
+    chord = (stop - begin).astype(np.float64)
+    length = math.hypot(*chord)
+    if length == 0.0:
+        return None
+    unit = 10.0**-dialect.decimals
+    centre, along = wanted.centre / unit, chord / length
+    moved = float(((begin + stop) / 2.0 - centre) @ along)
+    tried = np.rint(centre + moved * along).astype(np.int64) + _AROUND
+    away = np.hypot(*(tried - centre).T)
+    tried = tried[np.argsort(away, kind="stable")]
+    most = max(dialect.arc_difference_mm / unit, RECENTRE_UNITS)
+    tried = tried[np.sort(away, kind="stable") <= most]
+    same = np.ones((len(tried), 1), dtype=np.int64)
+    points = (begin * same, stop * same, tried)
+    sweeps = np.full(len(tried), abs(wanted.sweep))
+    holds = arcs_hold(sweeps, points, np.full(len(tried), int(kind)), dialect)
+    if not holds.any():
+        return None
+    return Piece(kind, _pair(stop), _pair(tried[int(np.argmax(holds))] - begin))
+
+
+def _two(
+    wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
+) -> list[Piece] | None:
+    """Two arcs that meet at the middle; None when the controller would refuse one of them."""
+    begin, stop = ends
+    mid_mm = wanted.at(np.array([0.5]))[0]
+    mid = units_of(mid_mm, dialect.decimals)
+    half = wanted.sweep / 2.0
+    first = _Wanted(wanted.start, wanted.centre, mid_mm, half)
+    second = _Wanted(mid_mm, wanted.centre, wanted.end, half)
+    pieces = [
+        _as_it_is(first, (begin, mid), kind, dialect) or _one(first, (begin, mid), kind, dialect),
+        _as_it_is(second, (mid, stop), kind, dialect) or _one(second, (mid, stop), kind, dialect),
+    ]
+    if pieces[0] is None or pieces[1] is None:
+        return None
+    return [replace(pieces[0], share=0.5), pieces[1]]
+
+
+def _as_it_is(
+    wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
+) -> Piece | None:
+    """The arc with its own centre, if the controller takes it."""
+    begin, stop = ends
+    centre = units_of(wanted.centre, dialect.decimals)
+    points = (begin[None, :], stop[None, :], centre[None, :])
+    sweep = np.array([abs(wanted.sweep)])
+    if not arcs_hold(sweep, points, np.array([kind]), dialect)[0]:
+        return None
+    return Piece(kind, _pair(stop), _pair(centre - begin))
+
+
+def _lines(wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> list[Piece]:
+    """The fewest equal chords within a unit of the arc: a chord over the angle a strays by
+    R (1 − cos(a/2)) = 2 R sin²(a/4)."""
+    radius = math.dist(wanted.start, wanted.centre)
+    unit = 10.0**-dialect.decimals
+    ratio = min(0.5, LINE_SAGITTA_UNITS * unit / (2.0 * radius)) if radius > 0.0 else 0.5
+    count = max(1, math.ceil(abs(wanted.sweep) / (4.0 * math.asin(math.sqrt(ratio)))))
+    shares = np.arange(1, count) / count
+    inner = units_of(wanted.at(shares), dialect.decimals)
+    pieces, at = [], begin
+    for point, share in zip(inner, shares.tolist(), strict=True):
+        if (point != at).any():
+            pieces.append(Piece(Kind.LINE, _pair(point), share=share))
+            at = point
+    # Says nothing when the last chord was too small, but for the rest of a helix's rise.
+    return [*pieces, Piece(Kind.LINE, _pair(stop))]
+
+
+def _pair(point: Ints) -> tuple[int, int]:
+    return int(point[0]), int(point[1])

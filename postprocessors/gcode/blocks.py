@@ -1,0 +1,273 @@
+"""Reading RS274-like text: bytes to blocks of (letter, number text), strict and quick. Shared by
+the dialects whose blocks are rows of words, one block a line.
+
+    for block in blocks_of(data, Lexing(letters="GMXYZIJF", lower_case=True)):
+        for letter, number in block.words: ...           # ("X", "-1.50"), letters always capital
+        block.fail("a Z beside X", word=2)               # ProgramError: block, line and column
+
+What a *block* is: a line with at least one word. `Block.index` counts them from 0 (so does
+`Toolpath.block`), `Block.line` counts lines of the file from 1; empty lines and comments are lines
+but no blocks. Lines end with LF, CR LF or CR, also mixed. N words in front are taken off
+where `Lexing.block_numbers` allows them. Columns are those of the file's own line, from 1, and
+are only worked out when something is wrong: that is why words carry none.
+
+`Block.comments` holds the texts of the line's comments, without their signs; a line of comments
+alone is given too when `Lexing.comment_lines` (with no words and an index of −1).
+
+Writers never use this module, readers never `_gcode_format`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, Literal, NoReturn
+
+from camtool.errors import ProgramError
+from camtool.toolpath.program import Listing
+
+SHOWN_CHARS: Final = 32
+"""An error message shows no more of a line than this."""
+
+LINE_CHARS: Final = 4096
+"""A longer line is refused where the dialect itself has no limit: no machine reads such."""
+
+# Possessive (++): a number is matched in one way only, so that no line costs more than its length.
+_NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?|\.\d++)"
+_COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
+_ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
+_CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+_LINE_END: Final = re.compile(r"\r\n|\n|\r")
+
+# What a sign means that begins no word: (message, mend).
+_SIGNS: Final = {
+    ",": ("a decimal comma", "write a decimal point"),
+    "#": ("a parameter", "only plain numbers can be read"),
+    "[": ("an expression", "only plain numbers can be read"),
+    "$": ("a command of the controller itself", "programs hold words only"),
+    "/": ("a block that a switch may leave out", "write it without / or remove it"),
+    "%": ("a %, which is no word and frames no program here", "remove it"),
+    "=": ("an assignment", "only plain numbers can be read"),
+}
+
+Blanks = Literal["anywhere", "between", "none"]
+
+
+@dataclass(frozen=True)
+class Lexing:
+    """What a dialect's text may hold.
+
+    `letters`: those that begin words. `lower_case`: small letters count as capitals. `blanks`:
+    spaces and tabs "anywhere" (even inside a number), "between" words (and around them), or
+    "none". `parentheses`, `semicolon`: comments of that sign. `block_numbers`: a leading N word.
+    `line_chars`: longest line; `counts_blanks` tells whether blanks and comments count for it (the
+    controller may drop them as they come in). `foreign_comments`: comments may hold signs beyond
+    ASCII (grbl takes such bytes for commands, even there).
+    """
+
+    letters: str
+    lower_case: bool = False
+    blanks: Blanks = "between"
+    parentheses: bool = False
+    semicolon: bool = False
+    block_numbers: bool = False
+    line_chars: int = LINE_CHARS
+    counts_blanks: bool = True
+    comment_lines: bool = False
+    foreign_comments: bool = False
+
+
+class Block:
+    """One block: `words` [(letter, number text)], where it stands, and its `comments`."""
+
+    __slots__ = ("_lexing", "comments", "index", "line", "text", "words")
+
+    def __init__(
+        self,
+        index: int,
+        line: int,
+        text: str,
+        words: list[tuple[str, str]],
+        comments: tuple[str, ...],
+        lexing: Lexing,
+    ) -> None:
+        self.index = index
+        self.line = line
+        self.text = text
+        """The file's own line."""
+        self.words = words
+        self.comments = comments
+        self._lexing = lexing
+
+    def column(self, word: int) -> int:
+        """Column, from 1, of a word's letter."""
+        plain = _blanked(self.text, self._lexing).upper()
+        starts = [found.start() + 1 for found in re.finditer("[A-Z]", plain)]
+        numbered = len(starts) - len(self.words)
+        return starts[word + numbered]
+
+    def fail(self, message: str, *, word: int | None = None, mend: str = "") -> NoReturn:
+        """ProgramError at this block and the column of `word` (its first one when None)."""
+        column = self.column(word or 0) if self.words else 1
+        raise ProgramError(message, where=_place(self.index, self.line, column), mend=mend)
+
+    def fail_at(
+        self, letter: str, message: str, *, number: str | None = None, mend: str = ""
+    ) -> NoReturn:
+        """ProgramError at the last word of that letter (and number text)."""
+        at = [
+            index
+            for index, (other, text) in enumerate(self.words)
+            if other == letter and number in (None, text)
+        ]
+        self.fail(message, word=at[-1] if at else None, mend=mend)
+
+
+def blocks_of(data: bytes, lexing: Lexing) -> Iterator[Block]:
+    """The blocks of a program one by one; ProgramError at the first that is none."""
+    line_of_words, word = _patterns(lexing)
+    index = 0
+    for number, raw in enumerate(_lines(data, lexing), 1):
+        text = raw
+        comments: tuple[str, ...] = ()
+        if "(" in text or ";" in text or ")" in text:
+            comments = _comments(raw, index, number, lexing)
+            text = _blanked(text, lexing)
+        if lexing.lower_case and text.isascii():
+            text = text.upper()
+        if lexing.blanks == "anywhere":
+            text = text.replace(" ", "").replace("\t", "")
+        if len(raw if lexing.counts_blanks else text) > lexing.line_chars:
+            message = f"the line has more than {lexing.line_chars} characters"
+            raise _error(message, index, number, lexing.line_chars + 1, "shorten it")
+        if not text.isascii() or line_of_words.fullmatch(text) is None:
+            raise _fault(raw, index, number, lexing)
+        words: list[tuple[str, str]] = word.findall(text)
+        if words and words[0][0] == "N" and lexing.block_numbers:
+            del words[0]
+        if words:
+            yield Block(index, number, raw, words, comments, lexing)
+            index += 1
+        elif comments and lexing.comment_lines:
+            yield Block(-1, number, raw, words, comments, lexing)
+
+
+def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
+    """(the whole line, one word) as compiled patterns."""
+    known = re.escape(lexing.letters)
+    blank = r"[ \t]*+" if lexing.blanks == "between" else ""
+    numbered = rf"(?>(?:N\d++(?:\.\d*+)?{blank})?)" if lexing.block_numbers else ""
+    line = rf"{blank}{numbered}(?>(?:[{known}]{_NUMBER}{blank})*)"
+    letters = known + ("N" if lexing.block_numbers else "")
+    return re.compile(line), re.compile(rf"([{letters}])({_NUMBER})")
+
+
+def _lines(data: bytes, lexing: Lexing) -> list[str]:
+    """The lines; ProgramError at the first byte that is no printable ASCII, tab or line end.
+
+    Where comments may hold other signs, each of their bytes stands as one: columns count bytes.
+    """
+    odd = (_CONTROL if lexing.foreign_comments else _ODD).search(data)
+    if odd:
+        before = _LINE_END.split(data[: odd.start()].decode("latin-1"))
+        raise ProgramError(
+            f"the byte 0x{data[odd.start()]:02x} belongs to no program",
+            where=f"line {len(before)}, column {len(before[-1]) + 1}",
+            mend="give a program of plain ASCII text",
+        )
+    lines = _LINE_END.split(data.decode("latin-1"))
+    return lines if lines[-1] else lines[:-1]
+
+
+def _place(index: int, line: int, column: int) -> str:
+    """Block and line from 1."""
+    return f"block {index + 1}, line {line}, column {column}"
+
+
+def _error(message: str, index: int, line: int, column: int, mend: str = "") -> ProgramError:
+    return ProgramError(message, where=_place(index, line, column), mend=mend)
+
+
+def _blanked(text: str, lexing: Lexing) -> str:
+    """The line with blanks in place of its comments: columns stay."""
+    if not (lexing.parentheses or lexing.semicolon):
+        return text
+    return _COMMENT.sub(lambda found: " " * len(found[0]), text)
+
+
+def _comments(raw: str, index: int, line: int, lexing: Lexing) -> tuple[str, ...]:
+    """The texts of a line's comments; ProgramError where the dialect has none, and for
+    parentheses that are nested or not closed."""
+    found = list(_COMMENT.finditer(raw))
+    for one in found:
+        if not (lexing.semicolon if one[1] is None else lexing.parentheses):
+            raise _error(
+                "this dialect has no comments", index, line, one.start() + 1, "remove them"
+            )
+    rest = _COMMENT.sub(lambda one: " " * len(one[0]), raw)
+    odd = re.search(r"[()]", rest)
+    if odd:
+        message = "a comment that is nested or not closed"
+        raise _error(message, index, line, odd.start() + 1, "one ( and one ) for each comment")
+    texts = (one[2] if one[1] is None else one[1] for one in found)
+    return tuple(text.encode("latin-1").decode("utf-8", errors="replace") for text in texts)
+
+
+def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
+    """Why a line is no row of words: the first place where it stops being one."""
+    text = _blanked(raw, lexing)
+    text = text.upper() if lexing.lower_case else text
+    if lexing.blanks == "anywhere":
+        kept = [at for at, sign in enumerate(text) if sign not in " \t"]
+    else:
+        kept = list(range(len(text)))
+    packed = "".join(text[at] for at in kept)
+    blank = r"[ \t]*+" if lexing.blanks == "between" else ""
+    numbered = rf"(?>(?:N\d++(?:\.\d*+)?{blank})?)" if lexing.block_numbers else ""
+    head = re.compile(rf"{blank}{numbered}(?>(?:[{re.escape(lexing.letters)}]{_NUMBER}{blank})*)")
+    match = head.match(packed)
+    at = match.end() if match else 0
+    message, mend, more = _explained(packed[at:], packed[:at], lexing)
+    return _error(message, index, line, kept[at + more] + 1, mend)
+
+
+def _explained(rest: str, before: str, lexing: Lexing) -> tuple[str, str, int]:
+    """(message, mend, characters to pass over) for text that begins with no word."""
+    sign, behind = rest[0], rest[1:].lstrip()
+    shown = repr(rest[:SHOWN_CHARS])
+    if sign in lexing.letters:
+        wrong = re.match(r"[+-]?", rest[1:])
+        past = 1 + (wrong.end() if wrong else 0)
+        past = past if past < len(rest) else 0
+        return f"no number after {sign}", "digits, with a point if need be, follow a letter", past
+    if sign in _SIGNS:
+        return _SIGNS[sign][0], _SIGNS[sign][1], 0
+    if sign in " \t":
+        return f"a blank within the block, before {behind[:SHOWN_CHARS]!r}", "remove it", 0
+    if sign.islower() and sign.upper() in lexing.letters:
+        return "this controller takes no small letters", "write capital letters", 0
+    if sign == "N" and before.strip() == "" and lexing.block_numbers:
+        return "a block number is digits only", "write N10", 0
+    if sign.isalpha():
+        return f"the letter {sign} is no word here", f"known letters: {lexing.letters}", 0
+    if sign.isdigit() or sign in ".+-":
+        return f"a number without its letter, {shown}", "each number has one letter before it", 0
+    return f"{sign!r} begins no word", "remove it", 0
+
+
+# Which lines of RS274-like text are blocks: those with a word besides their number.
+
+_NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
+_BLOCK_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
+
+
+def listing(data: bytes) -> Listing:
+    """The blocks of a program that its reader takes, each as its line stands in the file."""
+    lines = _LINE_END.split(data.decode("latin-1"))
+    return Listing(tuple(line.strip() for line in lines if _has_words(line)))
+
+
+def _has_words(line: str) -> bool:
+    words = _NO_WORDS.sub("", line)
+    return bool(_BLOCK_NUMBER.sub("", words, count=1) if words[:1] in "Nn" else words)

@@ -1,0 +1,180 @@
+"""What the writers of grbl and linuxcnc refuse before a line is made: PostError with the move."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.lower import Lowered, helices_to_steps, slope_step_mm
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import feed_decimals
+from .format import Ints
+
+Bools = npt.NDArray[np.bool_]
+
+MOST_MM: Final = 99_999.0
+"""Coordinates beyond this are refused: with three decimals, grbl's 8 digits end there."""
+
+ARC_RADIUS_SPREAD_MM: Final = 0.05
+"""The radii at the start and at the end of a wanted arc may differ by this much, no more."""
+
+FEED_TOLERANCE: Final = 1e-6
+"""A feed within this part of a limit is at it, within this much of a whole F word it is whole."""
+
+
+def place(toolpath: Toolpath, row: int) -> str:
+    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
+    source = toolpath.text(row)
+    return f"move {row} ({source})" if source else f"move {row}"
+
+
+def check(toolpath: Toolpath, machine: Machine) -> None:
+    """Refuse what cannot be said or done, whatever the order of the rows."""
+    if toolpath.start.any():
+        x, y, z = toolpath.start.tolist()
+        raise PostError(
+            f"the toolpath starts at ({x:g}, {y:g}, {z:g}) mm, a program starts at part zero",
+            mend="begin with a rapid from (0, 0, 0)",
+        )
+    far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MOST_MM
+    _refuse(far, toolpath, lambda row: f"a coordinate beyond {MOST_MM:g} mm", "check the units")
+    _check_arcs(toolpath)
+    _check_feeds(toolpath, machine)
+
+
+def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, Finding | None]:
+    """(N,) feeds as whole units of the F word, rounded down, 0 where none; and FEED_ROUNDED when
+    one had to be."""
+    scale = 10.0 ** feed_decimals(machine)
+    wanted = np.where(toolpath.is_feed, toolpath.feed, 0.0) * scale
+    nearest = np.rint(wanted)
+    exact = np.abs(wanted - nearest) <= FEED_TOLERANCE
+    units = np.where(exact, nearest, np.floor(wanted)).astype(np.int64)
+    _refuse(
+        toolpath.is_feed & (units <= 0),
+        toolpath,
+        lambda row: f"a feed of {toolpath.feed[row]:g} mm/min is 0 in an F word",
+        f"use {1.0 / scale:g} mm/min or more",
+    )
+    if exact.all():
+        return units, None
+    row = int(np.argmax(~exact))
+    return units, Finding(
+        Code.FEED_ROUNDED,
+        Severity.INFO,
+        f"{int((~exact).sum())} feeds were rounded down to a whole {1.0 / scale:g} mm/min",
+        where=place(toolpath, row),
+        measured=float(toolpath.feed[row]),
+        unit="mm_min",
+    )
+
+
+def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend: str = "") -> None:
+    """PostError for the first bad row, if there is one."""
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise PostError(message(row), where=place(toolpath, row), mend=mend)
+
+
+def _check_arcs(toolpath: Toolpath) -> None:
+    """Arcs have a centre, and one radius."""
+    is_arc, starts = toolpath.is_arc, toolpath.starts
+    with np.errstate(invalid="ignore", over="ignore"):
+        centred = np.abs(toolpath.centre).max(axis=1, initial=0.0) < np.inf
+        out = np.hypot(*(starts[:, :2] - toolpath.centre).T)
+        back = np.hypot(*(toolpath.end[:, :2] - toolpath.centre).T)
+        spread = np.abs(out - back)
+        _refuse(is_arc & ~centred, toolpath, lambda row: "an arc without a centre")
+        _refuse(
+            is_arc & (spread > ARC_RADIUS_SPREAD_MM),
+            toolpath,
+            lambda row: f"the radii at start and end of an arc differ by {spread[row]:.4f} mm",
+            f"they may differ by {ARC_RADIUS_SPREAD_MM:g} mm",
+        )
+
+
+def _check_feeds(toolpath: Toolpath, machine: Machine) -> None:
+    """Feeds are numbers above 0 and no higher than the machine's highest."""
+    feed, is_feed = toolpath.feed, toolpath.is_feed
+    with np.errstate(invalid="ignore"):
+        fine = (feed > 0.0) & np.isfinite(feed)
+        _refuse(
+            is_feed & ~fine,
+            toolpath,
+            lambda row: f"a {Kind(int(toolpath.kind[row])).name} without a feed above 0",
+        )
+        limit = machine.max_feed_mm_min
+        _refuse(
+            is_feed & (feed > limit * (1.0 + FEED_TOLERANCE)),
+            toolpath,
+            lambda row: f"a feed of {feed[row]:g} mm/min, {limit:g} is the machine's highest",
+            "lower the feed, or say --set limits.max_feed_mm_min=…",
+        )
+
+
+# What the writers of flashcut and valcnc refuse or split before a block is made.
+
+HOMES = (Kind.HOME_XY, Kind.HOME_Z)
+
+
+def check_plain(toolpath: Toolpath, machine: Machine) -> None:
+    """PostError for the first row that has no meaning here, named as the toolpath numbers it."""
+    check(toolpath, machine)
+    for row in np.flatnonzero(~toolpath.is_motion).tolist():
+        kind = Kind(int(toolpath.kind[row]))
+        if kind in HOMES:
+            raise PostError(
+                "this machine has no code to go to machine zero",
+                where=place(toolpath, row),
+                mend="leave homing out, do it by hand",
+            )
+        if kind == Kind.SET_ZERO and toolpath.end[row].any():
+            raise PostError(
+                "part zero can only be set at part zero",
+                where=place(toolpath, row),
+                mend="set it first, before any move",
+            )
+        if kind == Kind.END and row < len(toolpath) - 1:
+            raise PostError("moves follow the end of the program", where=place(toolpath, row + 1))
+
+
+def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, Finding | None]:
+    """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
+    step_mm = slope_step_mm(machine)
+    lowered = helices_to_steps(toolpath, step_mm)
+    twice = np.bincount(lowered.row, minlength=len(toolpath)) > 1
+    twice &= toolpath.is_feed
+    if not twice.any():
+        return lowered, None
+    return lowered, Finding(
+        Code.MOVE_SPLIT,
+        Severity.WARNING,
+        f"{int(twice.sum())} feed moves in XY and Z became steps of at most {step_mm:g} mm, flat "
+        "and then down, or up and then flat: nowhere deeper than the slope",
+        where=place(toolpath, int(twice.argmax())),
+        measured=step_mm,
+        unit="mm",
+    )
+
+
+def left_out(toolpath: Toolpath, kinds: Collection[Kind], why: str) -> list[Finding]:
+    """One EVENT_LEFT_OUT when there are rows of `kinds`: how many of what, and `why`."""
+    rows = np.flatnonzero(np.isin(toolpath.kind, [int(kind) for kind in kinds]))
+    if not len(rows):
+        return []
+    names = ", ".join(dict.fromkeys(Kind(kind).name for kind in toolpath.kind[rows].tolist()))
+    return [
+        Finding(
+            Code.EVENT_LEFT_OUT,
+            Severity.WARNING,
+            f"{len(rows)} events were left out ({names}): {why}",
+            where=place(toolpath, int(rows[0])),
+        )
+    ]

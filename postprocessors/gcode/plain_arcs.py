@@ -1,0 +1,234 @@
+"""Writing arcs of dialects that say nothing of a tolerance: both radii equal to within a unit.
+
+A *unit* is the last decimal that is said. Start, end and centre lie on whole units; what is sent
+is the end and the offset centre − start. For each arc, by its rounded numbers:
+
+    sagitta below half a unit        one line says it as well
+    a centre within RECENTRE_REACH units of the rounded one, from which start and end are equally
+    far to within a unit, and about which the arc turns as wanted
+                                     the one nearest to the wanted centre
+    otherwise                        lines within a unit of the arc
+
+Shared by flashcut and valcnc, whose theses give no rule for arcs whose radii differ.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.findings import Code, Finding, Severity
+from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .format import Floats, Ints, units_of
+
+Bools = npt.NDArray[np.bool_]
+
+SPREAD_UNITS: Final = 1.0
+"""The radii at start and end of a written arc differ by no more units."""
+
+FLAT_UNITS: Final = 0.5
+"""An arc with less sagitta (in units) is a line."""
+
+LEAST_RADIUS_UNITS: Final = 4.0
+"""Smaller arcs become lines: rounding alone would turn their ends by more than 20°."""
+
+LINE_SAGITTA_UNITS: Final = 1.0
+"""Lines in place of an arc stray from it by no more (in units), their rounding not counted."""
+
+RECENTRE_REACH: Final = 2
+"""Centres are tried up to this many units from the rounded one, in I and in J."""
+
+
+@dataclass(frozen=True)
+class ArcRules:
+    """What a dialect wants of arcs: `most_mm` that an offset may say; `chord_fits`: the chord must
+    not exceed twice the radius at the start (a controller that takes its arcsine)."""
+
+    decimals: int
+    full_circles: Literal["halves", "whole"]
+    most_mm: float
+    chord_fits: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class PlainRows:
+    """M rows in units: `kind` (M,), `end` (M, 3), `offset` (M, 2) of the centre from the start
+    (0 where no arc), `start` (3,), and `row` (M,), the given toolpath's row of each."""
+
+    kind: Ints
+    end: Ints
+    offset: Ints
+    start: Ints
+    row: Ints
+    flat: int
+    recentred: int
+    lines: int
+    first: int
+    """Given row of the first arc that was re-centred or written as lines; −1 when none was."""
+
+    @property
+    def starts(self) -> Ints:
+        """(M, 3) units: where each row begins."""
+        return np.concatenate([self.start[None, :], self.end])[:-1]
+
+    @property
+    def is_arc(self) -> Bools:
+        """(M,) true for ARC_CW and ARC_CCW."""
+        return np.asarray((self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW))
+
+    @property
+    def moves(self) -> Bools:
+        """(M,) true for motions that leave their start, and for all arcs."""
+        motion = self.kind <= Kind.ARC_CCW
+        return np.asarray(self.is_arc | (motion & (self.end != self.starts).any(axis=1)))
+
+
+def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
+    """The rows of a toolpath (in the program's own lengths) in units, arcs made consistent."""
+    lowered = _halved(toolpath, rules)
+    path = lowered.toolpath
+    rows = np.flatnonzero(path.is_arc)
+    begin, stop = units_of(path.starts, rules.decimals), units_of(path.end, rules.decimals)
+    wanted = _Wanted(path, rows, begin[rows, :2], stop[rows, :2], rules)
+    flat = wanted.sagitta < FLAT_UNITS
+    centre, found, moved = _centres(wanted)
+    bad, moved = ~flat & ~found, moved & ~flat & found
+    changed = lowered.row[rows[bad | moved]]
+    kind = path.kind.copy()
+    kind[rows[flat]] = Kind.LINE
+    # By row of `path`, so that they survive the rows that lines add.
+    offset = np.zeros((len(path), 2), dtype=np.int64)
+    kept = ~flat & found
+    offset[rows[kept]] = centre[kept] - begin[rows[kept], :2]
+    chosen = np.zeros(len(path), dtype=np.bool_)
+    chosen[rows[bad]] = True
+    unit = 10.0**-rules.decimals
+    chords = arcs_to_lines(replace(path, kind=kind), chosen, LINE_SAGITTA_UNITS * unit)
+    return PlainRows(
+        kind=chords.toolpath.kind,
+        end=units_of(chords.toolpath.end, rules.decimals),
+        offset=offset[chords.row],
+        start=units_of(toolpath.start, rules.decimals),
+        row=lowered.row[chords.row],
+        flat=int(flat.sum()),
+        recentred=int(moved.sum()),
+        lines=int(bad.sum()),
+        first=int(changed[0]) if len(changed) else -1,
+    )
+
+
+def arc_findings(rows: PlainRows, place: str) -> list[Finding]:
+    """ARC_MENDED, and MOVE_COLLAPSED for what is smaller than a unit, where there is any."""
+    found = []
+    if rows.recentred or rows.lines:
+        found.append(
+            Finding(
+                Code.ARC_MENDED,
+                Severity.INFO,
+                f"{rows.recentred} arcs got another centre, so that start and end lie on them as "
+                f"the program says their numbers; {rows.lines} too small or too large were "
+                "written as lines",
+                where=place,
+                measured=float(rows.recentred + rows.lines),
+                unit="moves",
+            )
+        )
+    dropped = int(((rows.kind <= Kind.ARC_CCW) & ~rows.moves).sum())
+    if dropped or rows.flat:
+        found.append(
+            Finding(
+                Code.MOVE_COLLAPSED,
+                Severity.INFO,
+                f"{dropped} moves of less than the last decimal were left out, {rows.flat} arcs "
+                "flatter than half of it were written as lines",
+                measured=float(dropped + rows.flat),
+                unit="moves",
+            )
+        )
+    return found
+
+
+def _halved(toolpath: Toolpath, rules: ArcRules) -> Lowered:
+    """Full and nearly full circles, whose rounded ends coincide, in halves; all else as it is."""
+    begin = units_of(toolpath.starts, rules.decimals)
+    stop = units_of(toolpath.end, rules.decimals)
+    full = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)
+    full &= np.abs(toolpath.sweeps()) > math.pi
+    if rules.full_circles == "whole" or not full.any():
+        return Lowered(toolpath, np.arange(len(toolpath)))
+    # Other arcs pass for lines meanwhile, so that these alone are cut.
+    alone = np.where(toolpath.is_arc & ~full, int(Kind.LINE), toolpath.kind)
+    halves = arcs_within(replace(toolpath, kind=alone), math.pi)
+    kind = toolpath.kind[halves.row]
+    return Lowered(replace(halves.toolpath, kind=kind), halves.row)
+
+
+class _Wanted:
+    """K arcs as wanted and as rounded: all lengths in units."""
+
+    def __init__(
+        self, path: Toolpath, rows: Ints, begin: Ints, stop: Ints, rules: ArcRules
+    ) -> None:
+        scale = 10.0**rules.decimals
+        arm = (path.starts[rows, :2] - path.centre[rows]) * scale
+        self.begin, self.stop, self.rules = begin, stop, rules
+        self.centre: Floats = path.centre[rows] * scale
+        self.radius = np.hypot(arm[:, 0], arm[:, 1])
+        self.sweep = np.abs(path.sweeps()[rows])
+        self.sign = np.where(path.kind[rows] == Kind.ARC_CW, -1.0, 1.0)
+        half = np.minimum(self.sweep, math.pi) / 2.0
+        # 1 − cos a = 2 sin²(a/2), which keeps its digits where a is small.
+        self.sagitta = self.radius * 2.0 * np.sin(half / 2.0) ** 2
+        self.most = rules.most_mm * scale
+
+    def fits(self, which: Ints, centre: Floats) -> Bools:
+        """Which of these arcs (L,) are what was wanted about these centres (L, 2)."""
+        begin, stop = self.begin[which], self.stop[which]
+        out, back = begin - centre, stop - centre
+        r1, r2 = np.hypot(*out.T), np.hypot(*back.T)
+        cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
+        turn = np.arctan2(cross, (out * back).sum(axis=1)) * self.sign[which]
+        turn = np.mod(turn, 2.0 * math.pi)
+        same = (begin == stop).all(axis=1)
+        turn = np.where(same | (turn == 0.0), 2.0 * math.pi, turn)
+        good = (np.abs(r1 - r2) <= SPREAD_UNITS) & (r1 >= LEAST_RADIUS_UNITS)
+        good &= (np.abs(turn - self.sweep[which]) < math.pi) & (
+            np.abs(out).max(axis=1) <= self.most
+        )
+        if self.rules.chord_fits:
+            good &= np.hypot(*(stop - begin).T) <= 2.0 * r1
+        return np.asarray(good)
+
+
+def _centres(wanted: _Wanted) -> tuple[Ints, Bools, Bools]:
+    """For each arc its centre (K, 2) in units, whether there is one, and whether it is another
+    than the rounded one."""
+    count = len(wanted.radius)
+    said = wanted.radius <= wanted.most
+    centre = np.zeros((count, 2), dtype=np.int64)
+    centre[said] = np.rint(wanted.centre[said]).astype(np.int64)
+    every = np.arange(count)
+    found = said.copy()
+    found[said] = wanted.fits(every[said], centre[said].astype(np.float64))
+    moved = np.zeros(count, dtype=np.bool_)
+    left = every[said & ~found & (wanted.radius >= LEAST_RADIUS_UNITS - SPREAD_UNITS)]
+    if not len(left):
+        return centre, found, moved
+    reach = np.arange(-RECENTRE_REACH, RECENTRE_REACH + 1)
+    steps = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
+    tried = centre[left][:, None, :] + steps[None, :, :]
+    far = np.hypot(*np.moveaxis(tried - wanted.centre[left][:, None, :], -1, 0))
+    flat = tried.reshape(-1, 2).astype(np.float64)
+    good = wanted.fits(np.repeat(left, len(steps)), flat).reshape(far.shape)
+    best = np.where(good, far, np.inf).argmin(axis=1)
+    any_good = good.any(axis=1)
+    centre[left[any_good]] = tried[np.flatnonzero(any_good), best[any_good]]
+    found[left[any_good]] = True
+    moved[left[any_good]] = True
+    return centre, found, moved

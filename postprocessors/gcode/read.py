@@ -1,0 +1,608 @@
+"""What a reader of G-code is told of its dialect, and the M words that all of them know."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Final
+
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
+
+from .blocks import Block
+
+
+class G(IntEnum):
+    """G words that a reader acts on, tenfold: G91.1 is 911. Arcs are above LINE."""
+
+    RAPID = 0
+    LINE = 10
+    ARC_CCW = 30
+    DWELL = 40
+    INCHES = 200
+    TOOL_LENGTH = 430
+    MACHINE_FRAME = 530
+    FIRST_FRAME = 540
+    EXACT_PATH = 610
+    BLEND = 640
+    NO_MOTION = 800
+    ABSOLUTE = 900
+    ABSOLUTE_CENTRES = 901
+
+
+class M(IntEnum):
+    """M words that a reader acts on, tenfold."""
+
+    PAUSE = 0
+    END = 20
+    SPINDLE_CW = 30
+    SPINDLE_CCW = 40
+    SPINDLE_OFF = 50
+    CHANGE = 60
+    END_AND_REWIND = 300
+
+
+M_CODES: Final = {
+    0: "stop",
+    10: "stop",
+    20: "stop",
+    300: "stop",
+    30: "spindle",
+    40: "spindle",
+    50: "spindle",
+    60: "tool",
+    70: "coolant",
+    80: "coolant",
+    90: "coolant",
+}
+"""M words, tenfold, and their groups."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """One dialect. Codes are tenfold: G91.1 is 911.
+
+    `groups`: the G codes it takes and the group of each; two of a group in a block are an error.
+    `refused`: codes ("G55", "M6") that the controller knows but that have no place in a program
+    here, and why. `first_motion`: the motion mode before any word says one (None: none).
+    `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
+    `circle_without_end`: an arc that says only its centre is a full circle. `path_modes`: the
+    group "path" tells how corners are met. `turns`: P tells how many turns an arc begins.
+    `forgets_feed`: G94 does, and G1 to G3 want a feed even where nothing moves.
+    `ends_in_plane`: an arc must say X or Y. `feed_first`: a feed beside a change of units is in
+    the units before. `m_codes`: the M codes it takes and the group of each.
+    `tools`: "change" (M6), "pause" (M0 beside a T word), or "none"; T words go up to `most_tool`.
+    """
+
+    groups: Mapping[int, str]
+    refused: Mapping[str, str]
+    first_motion: int | None
+    arc_fault: Callable[[float, float], str]
+    full_turn_rad: float
+    chord_slack_mm: float
+    circle_without_end: bool = False
+    path_modes: bool = False
+    turns: bool = False
+    ends_in_plane: bool = False
+    feed_first: bool = False
+    forgets_feed: bool = False
+    m_codes: Mapping[int, str] = field(default_factory=lambda: M_CODES)
+    tools: str = "none"
+    most_tool: int = 99_999
+
+
+# Reading grbl and linuxcnc: blocks of words to rows, with the modes that both know.
+#
+# A block is decoded as RS274 orders it: modes and numbers first, then feed, spindle, tool, dwell,
+# and its motion last. What a dialect has of its own it says in `Rules`: which G and M codes it
+# takes, which it takes and ignores, which cannot be simulated, and its rule for arcs. A word that
+# nothing uses is an error, and so are two words of one group: controllers refuse both.
+
+MM_PER_INCH: Final = 25.4
+"""What one unit of a coordinate is under G20."""
+
+FEED_GUARD: Final = 1e-9
+"""Part of a feed: a feed above its limit by less is at the limit."""
+
+MOTION_GROUP: Final = "motion"
+
+NO_FEED: Final = "a feed move, and no feed yet"
+
+TURNS_TOLERANCE: Final = 1e-3
+"""Turns: a P beside a whole number by no more is that number (rs274 takes 2.001)."""
+
+MOST_TURNS: Final = 10_000
+"""Turns of an arc, each of which is a move."""
+
+
+class ModalReader:
+    """Blocks in, rows out; knows the modes, where the tool stands and whether the end came."""
+
+    def __init__(self, machine: Machine, rules: Rules) -> None:
+        self.path = ToolpathBuilder()
+        self._rules = rules
+        self._motion = rules.first_motion
+        self._mm = 1.0
+        self._absolute = True
+        self._absolute_centres = False
+        self._feed = 0.0
+        self._frame: int = G.FIRST_FRAME
+        self._moved = False
+        self._codes: dict[tuple[str, str], int] = {}
+        self._notes = ReadNotes(machine.max_feed_mm_min)
+        self._machine = MachineWords(self.path, rules, self._notes)
+        self._zero = machine.controller.machine_zero_mm
+
+    def block(self, block: Block) -> None:
+        """Decode one block; ProgramError where the controller would refuse it."""
+        if self._machine.ended:
+            block.fail("a block after the end of the program", mend="remove it")
+        self.path.block = block.index
+        numbers: dict[str, float] = {}
+        modes: dict[str, int] = {}
+        m_codes: list[int] = []
+        for letter, text in block.words:
+            if letter == "G":
+                code = self._code("G", text, block)
+                group = self._rules.groups[code]
+                if group in modes:
+                    block.fail_at("G", f"two G words of one group ({group})", number=text)
+                modes[group] = code
+            elif letter == "M":
+                m_codes.append(self._code("M", text, block))
+            elif letter in numbers:
+                block.fail_at(letter, f"two {letter} words in one block")
+            else:
+                numbers[letter] = float(text)
+        self._carry_out(block, modes, m_codes, numbers)
+        if numbers:
+            letter = next(iter(numbers))
+            block.fail_at(letter, f"nothing in the block uses the {letter} word")
+        if m_codes:
+            self._machine.stop(block, m_codes)
+
+    def _carry_out(
+        self, block: Block, modes: dict[str, int], m_codes: list[int], numbers: dict[str, float]
+    ) -> None:
+        """All but the end of the program, in RS274's order; takes out the numbers it uses."""
+        feed = numbers.pop("F", None)
+        before = self._mm
+        if modes:
+            self._set_modes(block, modes, numbers)
+        if feed is not None:
+            self._set_feed(block, feed * (before if self._rules.feed_first else self._mm))
+        if m_codes or "S" in numbers or "T" in numbers:
+            self._machine.read(block, m_codes, numbers)
+        once = modes.get("one block")
+        if once == G.DWELL:
+            self._dwell(block, numbers)
+        elif once == G.MACHINE_FRAME:
+            self._home(block, numbers)
+        elif numbers or MOTION_GROUP in modes:
+            self._move(block, numbers, said=MOTION_GROUP in modes)
+
+    def finish(self) -> Toolpath:
+        """The rows, with what was noticed."""
+        return self.path.finish(self._notes.findings())
+
+    @property
+    def ended(self) -> bool:
+        """Whether the program's end came."""
+        return self._machine.ended
+
+    def unread(self, lines: list[int]) -> None:
+        """Lines (from 1) behind the end, which no controller reads."""
+        if lines:
+            self._notes.behind_end = len(lines), lines[0]
+
+    def message(self, text: str) -> None:
+        """A comment that the operator is shown."""
+        self.path.message(text)
+
+    # Words
+
+    def _code(self, letter: str, text: str, block: Block) -> int:
+        """A G or M word's code, tenfold; ProgramError for codes that cannot be."""
+        known = self._codes.get((letter, text))
+        if known is not None:
+            return known
+        value = float(text)
+        code = round(value * 10.0) if value < 1000.0 else -1
+        exact = code / 10.0 == value
+        name = f"{letter}{value:g}"
+        if exact and name in self._rules.refused:
+            block.fail_at(letter, f"{name} {self._rules.refused[name]}", number=text)
+        fits = code in (self._rules.groups if letter == "G" else self._rules.m_codes)
+        if not (exact and fits):
+            block.fail_at(letter, f"the controller does not know {letter}{text}", number=text)
+        self._codes[letter, text] = code
+        return code
+
+    def _set_modes(self, block: Block, modes: dict[str, int], numbers: dict[str, float]) -> None:
+        """Motion, units, distance and arc modes."""
+        self._motion = modes.get(MOTION_GROUP, self._motion)
+        if "units" in modes:
+            self._mm = MM_PER_INCH if modes["units"] == G.INCHES else 1.0
+        if "distance" in modes:
+            self._absolute = modes["distance"] == G.ABSOLUTE
+        if "arc distance" in modes:
+            self._absolute_centres = modes["arc distance"] == G.ABSOLUTE_CENTRES
+        if "path" in modes:
+            self._set_path_mode(modes["path"], numbers)
+        if modes.get("tool length") == G.TOOL_LENGTH:  # H tells of which tool
+            numbers.pop("H", None)
+        if "feed mode" in modes and self._rules.forgets_feed:
+            self._feed = 0.0
+        if "work frame" in modes:
+            self._set_frame(block, modes["work frame"])
+
+    def _set_path_mode(self, code: int, numbers: dict[str, float]) -> None:
+        """G61, G61.1, and G64 with P, its tolerance, and Q, that of merging lines (P where it is
+        not said): how the moves from this block on meet their corners. Below 0 they count as not
+        said."""
+        if not self._rules.path_modes:
+            return
+        if code != G.BLEND:
+            self.path.mode = PathMode("exact-path" if code == G.EXACT_PATH else "exact-stop")
+            return
+        corner = max(numbers.pop("P", 0.0) * self._mm, 0.0)
+        merging = numbers.pop("Q", -1.0) * self._mm
+        self.path.mode = PathMode("blend", corner, corner if merging < 0.0 else merging)
+
+    def _set_frame(self, block: Block, frame: int) -> None:
+        """G54 to G59: whichever comes before the first move has its zero at part zero."""
+        if self._moved and frame != self._frame:
+            message = "another work frame, whose place only the controller knows"
+            block.fail_at(
+                "G", message, number=f"{frame // 10}", mend="write a program for each frame"
+            )
+        self._frame = frame
+
+    def _set_feed(self, block: Block, feed: float) -> None:
+        if feed <= 0.0:
+            block.fail_at("F", "a feed that is not above 0")
+        if feed > self._notes.max_feed_mm_min * (1.0 + FEED_GUARD):
+            self._notes.fast.append((block.index, feed))
+        self._feed = feed
+
+    def _dwell(self, block: Block, numbers: dict[str, float]) -> None:
+        """G4 P: seconds."""
+        if "P" not in numbers:
+            block.fail_at("G", "a dwell without P", mend="write G4 P1.5 for 1.5 s")
+        seconds = numbers.pop("P")
+        if seconds < 0.0:
+            block.fail_at("P", "a dwell below 0 s")
+        self.path.event(Kind.DWELL, seconds)
+
+    def _home(self, block: Block, numbers: dict[str, float]) -> None:
+        """G53 G0 X0 Y0 and G53 G0 Z0: to machine zero."""
+        said = {axis: numbers.pop(axis) for axis in "XYZ" if axis in numbers}
+        kinds = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}
+        kind = kinds.get(tuple(said))
+        if self._motion != G.RAPID or kind is None or any(said.values()):
+            block.fail(
+                "of machine coordinates only homing can be simulated",
+                mend="write G53 G0 X0 Y0 or G53 G0 Z0",
+            )
+        x, y, z = self.path.position
+        zx, zy, zz = self._zero
+        to = (zx, zy, z) if kind == Kind.HOME_XY else (x, y, zz)
+        self.path.moved_to(*to).event(kind)
+
+    # Motion
+
+    def _move(self, block: Block, numbers: dict[str, float], *, said: bool) -> None:
+        """Rapid, line or arc to the block's coordinates; `said`: by a motion word of its own."""
+        x, y, z = self.path.position
+        to = [x, y, z]
+        axes = False
+        flat = "X" in numbers or "Y" in numbers
+        for at, axis in enumerate("XYZ"):
+            if axis in numbers:
+                axes = True
+                value = numbers.pop(axis) * self._mm
+                to[at] = value if self._absolute else to[at] + value
+        self._moved = self._moved or axes
+        motion = self._motion
+        if motion is None or motion == G.NO_MOTION:
+            if axes:
+                block.fail("coordinates, and no motion word in force", mend="write G0 or G1")
+        elif not axes and not self._is_circle(motion, numbers, said=said):
+            if said and self._rules.forgets_feed and motion > G.RAPID and self._feed == 0.0:
+                block.fail(NO_FEED, mend="say F first")
+            if motion > G.LINE and said:
+                block.fail("an arc without X or Y", mend="say where it ends")
+        elif motion == G.RAPID:
+            self.path.rapid(*to)
+        elif self._feed == 0.0:
+            block.fail(NO_FEED, mend="say F first")
+        elif motion == G.LINE:
+            self.path.line(*to, feed=self._feed)
+        elif self._rules.ends_in_plane and not flat:
+            block.fail("an arc without X or Y: grbl's error 32", mend="say where it ends in XY")
+        else:
+            self._arc(block, motion == G.ARC_CCW, to, numbers)
+
+    def _is_circle(self, motion: int, numbers: dict[str, float], *, said: bool) -> bool:
+        """Whether a block without X, Y and Z is a full circle about its I and J."""
+        has_centre = "I" in numbers or "J" in numbers
+        return self._rules.circle_without_end and motion > G.LINE and said and has_centre
+
+    def _arc(self, block: Block, ccw: bool, to: list[float], numbers: dict[str, float]) -> None:
+        """G2 and G3, by centre or by radius, flat or helical."""
+        x, y, _ = self.path.position
+        turns = self._turns(block, numbers.pop("P", 1.0)) if self._rules.turns else 1
+        if "R" in numbers and ("I" in numbers or "J" in numbers):
+            block.fail_at("R", "an arc by its radius and by its centre at once")
+        if "R" in numbers:
+            radius = numbers.pop("R") * self._mm
+            fault = centre_of_radius(
+                (x, y), (to[0], to[1]), radius, ccw, self._rules.chord_slack_mm
+            )
+            if isinstance(fault, str):
+                block.fail_at("R", fault)
+            centre = fault
+        else:
+            centre = self._centre(block, (x, y), numbers)
+            r1, r2 = math.dist(centre, (x, y)), math.dist(centre, to[:2])
+            if fault := self._rules.arc_fault(r1, r2):
+                letter = "I" if any(word == "I" for word, _ in block.words) else "J"
+                block.fail_at(letter, fault)
+        circle = Circle((x, y), (to[0], to[1]), centre, ccw)
+        follow(self.path, circle, to[2], Way(self._feed, self._rules.full_turn_rad, turns))
+
+    def _turns(self, block: Block, value: float) -> int:
+        """How many turns P begins: 2 is one whole turn and then the arc."""
+        turns = round(min(value, MOST_TURNS + 1.0))
+        if turns > MOST_TURNS:
+            block.fail_at("P", f"an arc of more than {MOST_TURNS} turns")
+        if abs(value - turns) > TURNS_TOLERANCE or turns < 1:
+            block.fail_at("P", "the turns of an arc are a whole number from 1")
+        return turns
+
+    def _centre(
+        self, block: Block, start: tuple[float, float], numbers: dict[str, float]
+    ) -> tuple[float, float]:
+        """The centre that I and J say."""
+        if "I" not in numbers and "J" not in numbers:
+            block.fail("an arc without I, J or R", mend="say where its centre is")
+        if not self._absolute_centres:
+            i, j = numbers.pop("I", 0.0) * self._mm, numbers.pop("J", 0.0) * self._mm
+            return start[0] + i, start[1] + j
+        if "I" not in numbers or "J" not in numbers:
+            block.fail("with G90.1 an arc needs both I and J")
+        return numbers.pop("I") * self._mm, numbers.pop("J") * self._mm
+
+
+# Reading what is no motion: spindle, tools, stops, coolant.
+
+SPINDLE: Final = {
+    M.SPINDLE_CW: Kind.SPINDLE_CW,
+    M.SPINDLE_CCW: Kind.SPINDLE_CCW,
+    M.SPINDLE_OFF: Kind.SPINDLE_OFF,
+}
+
+
+class MachineWords:
+    """S, T and M words in, rows out; knows the speed, the tool and whether the end came."""
+
+    def __init__(self, path: ToolpathBuilder, rules: Rules, notes: ReadNotes) -> None:
+        self.ended = False
+        self._path = path
+        self._rules = rules
+        self._notes = notes
+        self._speed: float | None = None
+        self._spindle: Kind | None = None
+        self._tool: int | None = None
+        self._changed = False
+
+    def read(self, block: Block, codes: list[int], numbers: dict[str, float]) -> None:
+        """Tool, then spindle, in front of the block's motion; takes S and T out."""
+        groups = [M_CODES[code] for code in codes]
+        if len(set(groups)) != len(groups):
+            block.fail_at("M", "two M words of one group")
+        speed = numbers.pop("S", None)
+        if speed is not None and speed < 0.0:
+            block.fail_at("S", "a speed below 0")
+        self._speed = self._speed if speed is None else speed
+        if "T" in numbers:
+            self._tool = self._number_of_tool(block, numbers.pop("T"))
+        pauses = M.PAUSE in codes and self._rules.tools == "pause" and self._tool is not None
+        self._changed = M.CHANGE in codes or pauses
+        if self._changed:
+            self._change(block)
+        self._turn(block, codes, said=speed is not None)
+        if any(M_CODES[code] == "coolant" for code in codes):
+            self._notes.coolant.append(block.index)
+
+    def stop(self, block: Block, codes: list[int]) -> None:
+        """Behind the block's motion: M2 and M30 end the program; M0 and M1 wait."""
+        for code in codes:
+            if code in (M.END, M.END_AND_REWIND):
+                self._path.event(Kind.END)
+                self.ended = True
+            elif M_CODES[code] == "stop" and not self._changed:
+                self._notes.pauses.append(block.index)
+
+    def _turn(self, block: Block, codes: list[int], *, said: bool) -> None:
+        """The spindle's words; a speed alone tells the running spindle."""
+        turn = next((SPINDLE[M(code)] for code in codes if code in SPINDLE), None)
+        if turn == Kind.SPINDLE_OFF:
+            self._spindle = None
+            self._path.event(turn)
+        elif turn is not None:
+            if self._speed is None:
+                self._notes.speedless.append(block.index)
+            self._spindle = turn
+            self._path.event(turn, self._speed)
+        elif said and self._spindle is not None:
+            self._path.event(self._spindle, self._speed)
+
+    def _change(self, block: Block) -> None:
+        """M6 stops the spindle; after a pause the tool is the one that was asked for."""
+        if self._tool is None:
+            block.fail_at("M", "a tool change before a T word was said")
+        self._path.event(Kind.TOOL_CHANGE, float(self._tool))
+        if self._rules.tools == "change":
+            self._spindle = None
+        else:
+            self._tool = None
+
+    def _number_of_tool(self, block: Block, value: float) -> int:
+        if not (0.0 <= value <= self._rules.most_tool and value == math.floor(value)):
+            block.fail_at("T", f"T takes a whole number from 0 to {self._rules.most_tool}")
+        return int(value)
+
+
+# Geometry of arcs as their readers need it: centre from radius, and turn.
+
+Point = tuple[float, float]
+
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class Circle:
+    """An arc from `start` to `end` about `centre`, mm."""
+
+    start: Point
+    end: Point
+    centre: Point
+    ccw: bool
+
+
+def centre_of_radius(
+    start: Point, end: Point, radius: float, ccw: bool, slack_mm: float
+) -> Point | str:
+    """The centre of an arc given by its radius, or why there is none.
+
+    With m the middle of the chord of length d, the centre lies √(R² − d²/4) beside it: on the left
+    of the way for a CCW arc of at most half a turn; a negative R asks for more than half a turn,
+    whose centre is on the other side. Half the chord may exceed |R| by the slack.
+    """
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    chord = math.hypot(dx, dy)
+    if chord == 0.0:
+        return "an arc by its radius that ends where it starts has no centre"
+    if chord / 2.0 - abs(radius) > slack_mm:
+        return f"half the chord is {chord / 2.0:.4f} mm, more than the radius"
+    aside = math.sqrt(max(0.0, radius * radius - chord * chord / 4.0))
+    left = aside if ccw == (radius > 0.0) else -aside
+    return (
+        (start[0] + end[0]) / 2.0 - left * dy / chord,
+        (start[1] + end[1]) / 2.0 + left * dx / chord,
+    )
+
+
+def turn_of(circle: Circle) -> float:
+    """How far the arc turns, rad, in (−π, π]: near 0 for the shortest and for the longest."""
+    ox, oy = circle.start[0] - circle.centre[0], circle.start[1] - circle.centre[1]
+    ex, ey = circle.end[0] - circle.centre[0], circle.end[1] - circle.centre[1]
+    return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)
+
+
+@dataclass(frozen=True)
+class Way:
+    """How an arc is run: mm/min; the turn (rad) below which the controller takes it for a full
+    circle; and how many turns it begins."""
+
+    feed: float
+    full_turn_rad: float
+    turns: int = 1
+
+
+def follow(path: ToolpathBuilder, circle: Circle, to_z: float, way: Way) -> None:
+    """The rows of an arc read at the path's position, a helix where it rises or sinks.
+
+    Whole turns come first, each with its share of the height. An arc so short that the controller
+    takes it for a full circle is one, and a line to its end.
+    """
+    same = circle.start == circle.end
+    turn = turn_of(circle)
+    full = same or abs(turn) <= way.full_turn_rad
+    sweep = _TURN if full else math.fmod((turn if circle.ccw else -turn) + _TURN, _TURN)
+    z = path.position[2]
+    rise = (to_z - z) / (_TURN * (way.turns - 1) + sweep)
+    for done in range(1, way.turns):
+        height = z + rise * _TURN * done
+        path.arc(*circle.start, height, centre=circle.centre, ccw=circle.ccw, feed=way.feed)
+    end = circle.start if full else circle.end
+    path.arc(*end, to_z, centre=circle.centre, ccw=circle.ccw, feed=way.feed)
+    if full and not same:
+        path.line(*circle.end, feed=way.feed)
+
+
+# What the readers of G-code noticed, and tell as one finding each.
+
+
+@dataclass
+class ReadNotes:
+    """Blocks (index from 0) of one run of a reader; `fast` with their feeds, mm/min."""
+
+    max_feed_mm_min: float
+    fast: list[tuple[int, float]] = field(default_factory=list)
+    coolant: list[int] = field(default_factory=list)
+    pauses: list[int] = field(default_factory=list)
+    speedless: list[int] = field(default_factory=list)
+    behind_end: tuple[int, int] | None = None
+    """How many lines stand behind the end, and the first of them (from 1)."""
+
+    def findings(self) -> tuple[Finding, ...]:
+        """One finding for each kind that was noticed."""
+        passed_over = (
+            (self.coolant, "switch coolant"),
+            (self.pauses, "wait for the operator (M0, M1)"),
+        )
+        return (
+            *([self._too_fast()] if self.fast else []),
+            *([self._without_speed()] if self.speedless else []),
+            *([_never_read(*self.behind_end)] if self.behind_end else []),
+            *(_passed_over(blocks, what) for blocks, what in passed_over if blocks),
+        )
+
+    def _without_speed(self) -> Finding:
+        return Finding(
+            Code.SPINDLE_SPEED_NOT_SAID,
+            Severity.WARNING,
+            "the spindle is started and no S word has said its speed: a controller that sets the "
+            "speed turns it at 0",
+            where=f"block {self.speedless[0] + 1}",
+        )
+
+    def _too_fast(self) -> Finding:
+        most = max(feed for _, feed in self.fast)
+        return Finding(
+            Code.FEED_ABOVE_LIMIT,
+            Severity.WARNING,
+            f"{len(self.fast)} F words are above the machine's highest feed, up to "
+            f"{most:g} mm/min where {self.max_feed_mm_min:g} is the limit: the controller holds "
+            "each move to what its axes can do, and so does the simulation",
+            where=f"block {self.fast[0][0] + 1}",
+            measured=most,
+            limit=self.max_feed_mm_min,
+            unit="mm_min",
+        )
+
+
+def _never_read(count: int, line: int) -> Finding:
+    return Finding(
+        Code.NEVER_READ,
+        Severity.WARNING,
+        f"{count} lines stand behind the end of the program, which the controller never reads",
+        where=f"line {line}",
+        measured=float(count),
+        unit="lines",
+    )
+
+
+def _passed_over(blocks: list[int], what: str) -> Finding:
+    return Finding(
+        Code.WORDS_PASSED_OVER,
+        Severity.INFO,
+        f"{len(blocks)} blocks {what}, which moves nothing and is passed over",
+        where=f"block {blocks[0] + 1}",
+    )

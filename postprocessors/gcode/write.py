@@ -1,0 +1,489 @@
+"""Writing grbl and linuxcnc: a Toolpath to modal blocks of words.
+
+    rows ──checked──▶ units, arcs mended ──▶ rows to send ──modal──▶ blocks, comments between them
+
+Coordinates, feeds and motion words are said when they change; an arc always says X Y I J. The
+first move in XY says both, and so does the first after homing: the real tool may then stand
+anywhere. Comment lines and `%` are lines, but no blocks.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Final
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, toolpath_extents
+from camtool.toolpath.program import Program
+
+from .arcs import ArcCounts, Arcs, arcs_of
+from .checks import check, feed_units, place
+from .dialect import GcodeDialect, feed_decimals
+from .format import (
+    Ints,
+    NumberStyle,
+    comment,
+    first_too_long,
+    say_column,
+    say_number,
+    say_units,
+    values_of,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Style:
+    """A dialect's own part of a program.
+
+    `header`: its first blocks; `event`: the block of an event; `message`: what a comment for the
+    operator begins with; `frame`: the line around the program that is no block (%), or "";
+    `path_mode`: the block that asks for a path mode, `own_mode`: that of rows that ask for none.
+    """
+
+    dialect: GcodeDialect
+    header: tuple[str, ...]
+    event: EventWords
+    message: str = ""
+    frame: str = ""
+    path_mode: Callable[[PathMode], str] | None = None
+    own_mode: PathMode | None = None
+
+
+def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
+    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    dialect = style.dialect
+    check(toolpath, machine)
+    feeds, feed_note = feed_units(toolpath, machine)
+    arcs = arcs_of(toolpath, dialect)
+    events = events_of(toolpath, style.event)
+    sent = sent_rows(toolpath, arcs, feeds)
+    texts = block_texts(sent, dialect, feed_decimals(machine))
+    first_mode, changes = _path_modes(toolpath, sent, style)
+    blocks, of_row = _in_order(sent, texts, events, changes)
+    header = (*style.header, *first_mode)
+    footer = _footer(toolpath, events, dialect)
+    ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
+    of_row = [*[-1] * len(header), *of_row, *[-1] * len(footer)]
+    of_row[-1] = len(toolpath) - 1 if ended else -1
+    blocks = [*header, *blocks, *footer]
+    if dialect.block_numbers:
+        blocks = [f"N{index} {block}" for index, block in enumerate(blocks, 1)]
+    lines = [
+        *_header(toolpath, machine, dialect),
+        *_with_comments(toolpath, blocks, of_row, style),
+    ]
+    if style.frame:
+        lines = [style.frame, *lines, style.frame]
+    _check_length(lines, dialect)
+    return Program(
+        data="".join(f"{line}\n" for line in lines).encode("ascii"),
+        extension=machine.target.extension,
+        target=machine.target.name,
+        row_of_block=np.array(of_row, dtype=np.int64),
+        findings=(
+            *([feed_note] if feed_note else []),
+            *_arc_findings(toolpath, arcs.counts, sent.dropped),
+            *_rounded(toolpath, events.rounded),
+        ),
+    )
+
+
+def _path_modes(
+    toolpath: Toolpath, sent: Sent, style: Style
+) -> tuple[tuple[str, ...], dict[int, str]]:
+    """The path mode to begin with, and the blocks that change it, by the place among the rows
+    that are sent; none for dialects that know no such thing."""
+    if style.path_mode is None or style.own_mode is None:
+        return (), {}
+    said = [style.path_mode(mode) for mode in (*toolpath.modes, style.own_mode)]
+    moving = np.flatnonzero(sent.is_motion)
+    asked = toolpath.mode[sent.row[moving]]
+    if len(asked) == 0:
+        return (said[-1],), {}
+    turns = np.flatnonzero(np.diff(asked)) + 1
+    return (said[asked[0]],), {int(moving[k]): said[asked[k]] for k in turns.tolist()}
+
+
+def _in_order(
+    sent: Sent, texts: list[str], events: Events, modes: dict[int, str]
+) -> tuple[list[str], list[int]]:
+    """Blocks of motions and events, with changes of the path mode before them, and the row of
+    each."""
+    blocks, rows = [], []
+    motions = iter(texts)
+    pairs = zip(sent.is_motion.tolist(), sent.row.tolist(), strict=True)
+    for at, (is_motion, row) in enumerate(pairs):
+        if at in modes:
+            blocks.append(modes[at])
+            rows.append(-1)
+        block = next(motions) if is_motion else events.blocks.get(row, "")
+        if block:
+            blocks.append(block)
+            rows.append(row)
+    return blocks, rows
+
+
+def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[str]:
+    """Out of the material (below Z 0) to the highest Z, spindle off, end: only what is missing."""
+    heights = np.append(toolpath.end[:, 2], toolpath.start[2])
+    last = float(toolpath.end[-1, 2]) if len(toolpath) else 0.0
+    retract = dialect.retract and last < 0.0
+    style = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
+    return [
+        *([f"G0 Z{say_number(float(heights.max()), style)}"] if retract else []),
+        *(["M5"] if events.spindle_on else []),
+        dialect.program_end,
+    ]
+
+
+def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[str]:
+    """Comment lines: the tool, machine, drawing and units, and how far the program reaches."""
+    if dialect.comments == "none":
+        return []
+    style = NumberStyle(dialect.decimals)
+    bounds = [
+        f"{axis} {' to '.join(say_column(reach, style))}"
+        for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
+    ]
+    made = [toolpath.made_from, f"settings {_digest(machine)}"] if toolpath.made_from else []
+    lines = [
+        f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
+        *made,
+        "mm and mm/min - part zero at X0 Y0 Z0",
+        *bounds,
+    ]
+    return [comment(line) for line in lines]
+
+
+def _digest(machine: Machine) -> str:
+    """Eight signs that change with any value of the machine."""
+    return hashlib.sha256(msgspec.json.encode(machine)).hexdigest()[:8]
+
+
+def _with_comments(
+    toolpath: Toolpath, blocks: list[str], of_row: list[int], style: Style
+) -> list[str]:
+    """The blocks with messages, and the name of each contour, on lines of their own before."""
+    wanted: dict[int, list[str]] = {}
+    if style.dialect.comments == "contours":
+        motions = np.flatnonzero(toolpath.is_motion)
+        named = toolpath.source[motions]
+        begins = (np.diff(named, prepend=-1) != 0) & (named >= 0)
+        for row in motions[begins].tolist():
+            wanted.setdefault(row, []).append(comment(toolpath.text(row)))
+    for row in np.flatnonzero(toolpath.kind == Kind.MESSAGE).tolist():
+        wanted.setdefault(row, []).append(_message(toolpath, row, style))
+    if not wanted:
+        return blocks
+    # A row that was left out hands its comments to the next block that is sent.
+    waiting = sorted(wanted)
+    lines: list[str] = []
+    following = 0
+    for index, (block, row) in enumerate(zip(blocks, of_row, strict=True)):
+        last = index == len(blocks) - 1
+        while following < len(waiting) and (waiting[following] <= row or last):
+            lines += wanted[waiting[following]]
+            following += 1
+        lines.append(block)
+    return lines
+
+
+def _message(toolpath: Toolpath, row: int, style: Style) -> str:
+    """A message to the operator as a comment."""
+    index = toolpath.value[row]
+    if not (0 <= index < len(toolpath.texts)):
+        raise PostError("a message without its text", where=place(toolpath, row))
+    text = comment(toolpath.texts[int(index)])
+    return f"({style.message}{text[1:]}"
+
+
+def _check_length(lines: list[str], dialect: GcodeDialect) -> None:
+    """PostError for a line that the controller's buffer does not take."""
+    index = first_too_long(lines, dialect.line_chars)
+    if index >= 0:
+        raise PostError(
+            f"a line of {len(lines[index])} characters, the controller takes {dialect.line_chars}",
+            where=f"line {index + 1}",
+            mend="use fewer decimals, or no block numbers",
+        )
+
+
+def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> list[Finding]:
+    found = []
+    if mended := counts.recentred + counts.split + counts.lines:
+        found.append(
+            Finding(
+                Code.ARC_MENDED,
+                Severity.INFO,
+                f"{mended} arcs would not have passed the controller's rule with their rounded "
+                f"numbers: {counts.recentred} were re-centred, {counts.split} split in two, "
+                f"{counts.lines} written as lines",
+                where=place(toolpath, counts.first),
+                measured=float(mended),
+                unit="arcs",
+            )
+        )
+    if collapsed := dropped + counts.flat:
+        found.append(
+            Finding(
+                Code.MOVE_COLLAPSED,
+                Severity.INFO,
+                f"{dropped} moves of less than the last decimal were left out, "
+                f"{counts.flat} arcs flatter than half of it became lines",
+                measured=float(collapsed),
+                unit="moves",
+            )
+        )
+    return found
+
+
+def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> list[Finding]:
+    if not rows:
+        return []
+    return [
+        Finding(
+            Code.VALUE_ROUNDED,
+            Severity.INFO,
+            f"{len(rows)} dwells or spindle speeds were rounded to three decimals",
+            where=place(toolpath, rows[0]),
+        )
+    ]
+
+
+# Which rows grbl and linuxcnc are sent, and the modal text of each, by whole columns.
+
+Bools = npt.NDArray[np.bool_]
+
+WORD: Final = np.array([" G0", " G1", " G2", " G3"], dtype=object)
+
+
+@dataclass(frozen=True, eq=False)
+class Sent:
+    """The rows to send, events among them: kind (M,), end (M, 3) and offset (M, 2) in units,
+    feed (M,) in units of the F word, row (M,) of the toolpath; `says` (M, 3): which coordinates
+    are said; `forget` (M,): homing came since the last motion. `dropped` moves were too small."""
+
+    kind: Ints
+    end: Ints
+    offset: Ints
+    feed: Ints
+    row: Ints
+    says: Bools
+    forget: Bools
+    dropped: int
+
+    @property
+    def is_motion(self) -> Bools:
+        """(M,) true for motions."""
+        return np.asarray(self.kind <= Kind.ARC_CCW)
+
+
+def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
+    """All rows with pieces in place of arcs, without moves that move nothing."""
+    many = np.ones(len(toolpath), dtype=np.int64)
+    for row, pieces in arcs.pieces.items():
+        many[row] = len(pieces)
+    of = np.repeat(np.arange(len(toolpath)), many)
+    kind, end, offset = arcs.kind[of], arcs.end[of], arcs.offset[of]
+    first = np.cumsum(many) - many
+    for row, pieces in arcs.pieces.items():
+        sunk = int(arcs.end[row - 1, 2]) if row else 0
+        rise = int(arcs.end[row, 2]) - sunk
+        for at, piece in enumerate(pieces, int(first[row])):
+            height = sunk + round(rise * piece.share)
+            kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
+    before = np.concatenate([np.zeros((1, 3), dtype=np.int64), end])[: len(end)]
+    motion = kind <= Kind.ARC_CCW
+    is_arc = motion & (kind >= Kind.ARC_CW)
+    says = (end != before) & motion[:, None]
+    home_xy, home_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
+    flat = says[:, :2].any(axis=1) | is_arc
+    # A rapid to where X and Y should be already is not left out before they were ever said.
+    still = (kind == Kind.RAPID) & ~says.any(axis=1)
+    still &= _unsaid(flat, home_xy) & ~_unsaid(says[:, 2], home_z)
+    still &= _unsaid(flat | still, home_xy)
+    both = is_arc | still | (flat & _unsaid(flat | still, home_xy))
+    says[both, :2] = True
+    wanted = (toolpath.end != toolpath.starts).any(axis=1)[of]
+    kept = ~motion | says.any(axis=1)
+    homes = np.cumsum(home_xy | home_z)[kept]
+    return Sent(
+        kind[kept],
+        end[kept],
+        offset[kept],
+        feeds[of][kept],
+        of[kept],
+        says[kept],
+        np.diff(_at_motions(homes, motion[kept]), prepend=0) > 0,
+        int((~kept & wanted).sum()) + arcs.counts.dropped,
+    )
+
+
+def _unsaid(said: Bools, home: Bools) -> Bools:
+    """(M,) true where nothing was said before the row since the start, or since homing."""
+    rows = np.arange(len(said))
+    last_said = np.maximum.accumulate(np.where(said, rows, -1))
+    last_home = np.maximum.accumulate(np.where(home, rows, -1))
+    before = np.concatenate([[-1], last_said])[: len(said)]
+    return np.asarray(before <= last_home)
+
+
+def _at_motions(homes: Ints, motion: Bools) -> Ints:
+    """(M,) `homes` of the motion last passed: it grows only where a motion follows homing."""
+    return np.maximum.accumulate(np.where(motion, homes, 0)) if len(homes) else homes
+
+
+def block_texts(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[str]:
+    """The blocks of the motions among the rows."""
+    take = sent.is_motion
+    kind, end, says = sent.kind[take], sent.end[take], sent.says[take]
+    number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
+    is_arc = kind >= Kind.ARC_CW
+    is_feed = kind >= Kind.LINE
+    feed = sent.feed[take]
+    columns = [
+        _words(kind, (np.diff(kind, prepend=-1) != 0) | sent.forget[take]),
+        *(_said(f" {axis}", end[:, at], says[:, at], number) for at, axis in enumerate("XYZ")),
+        *(
+            _said(f" {axis}", sent.offset[take][:, at], is_arc, number)
+            for at, axis in enumerate("IJ")
+        ),
+        _said(" F", feed, _changes(feed, is_feed), NumberStyle(feed_decimals, strip=True)),
+    ]
+    return ["".join(words)[1:] for words in zip(*columns, strict=True)]
+
+
+def _words(kind: Ints, said: Bools) -> list[str]:
+    words: list[str] = np.where(said, WORD[kind], "").tolist()
+    return words
+
+
+def _changes(values: Ints, counts: Bools) -> Bools:
+    """(M,) true where a row that counts has another value than the last one that counted."""
+    rows = np.flatnonzero(counts)
+    changed = np.zeros(len(values), dtype=bool)
+    changed[rows] = np.diff(values[rows], prepend=-1) != 0
+    return changed
+
+
+def _said(letter: str, units: Ints, said: Bools, style: NumberStyle) -> list[str]:
+    """(M,) the word of a letter where it is said, "" elsewhere."""
+    rows = np.flatnonzero(said)
+    words = [""] * len(units)
+    for row, text in zip(rows.tolist(), say_units(units[rows], style), strict=True):
+        words[row] = letter + text
+    return words
+
+
+# Events of a toolpath as the blocks that grbl and linuxcnc both know.
+
+VALUE: Final = NumberStyle(3, strip=True)
+"""Spindle speeds and dwells are said to a thousandth."""
+
+ROUNDING_PART: Final = 1e-9
+"""A value said within this part of itself was not rounded."""
+
+SPINDLE: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}
+
+EventWords = Callable[["Event"], str]
+
+
+@dataclass(frozen=True)
+class Event:
+    """A row that is no motion; `where` names it in errors. `mounted_before`: a tool change before
+    the first move at a feed."""
+
+    kind: Kind
+    value: float
+    where: str
+    mounted_before: bool = False
+
+    def refuse(self, message: str, mend: str = "") -> PostError:
+        """The error that says why this event cannot be sent."""
+        return PostError(message, where=self.where, mend=mend)
+
+
+@dataclass(frozen=True)
+class Events:
+    """`blocks` of the rows that have one; rows whose value was `rounded`; `spindle_on` at the
+    end of the program."""
+
+    blocks: Mapping[int, str]
+    rounded: tuple[int, ...]
+    spindle_on: bool
+
+
+def events_of(toolpath: Toolpath, words: EventWords) -> Events:
+    """The blocks of all events but END and messages."""
+    blocks: dict[int, str] = {}
+    rounded: list[int] = []
+    spindle_on = False
+    mounted = mounted_before(toolpath)
+    for row in (~toolpath.is_motion).nonzero()[0].tolist():
+        event = Event(
+            Kind(int(toolpath.kind[row])),
+            float(toolpath.value[row]),
+            place(toolpath, row),
+            bool(mounted[row]),
+        )
+        if event.kind == Kind.END:
+            if row != len(toolpath) - 1:
+                raise event.refuse("moves follow the end of the program")
+        elif event.kind == Kind.SET_ZERO:
+            if toolpath.end[row].any():
+                raise event.refuse(
+                    "part zero can only be set at part zero", "set it first, before any move"
+                )
+        elif event.kind != Kind.MESSAGE:
+            if block := words(event):
+                blocks[row] = block
+            spindle_on = (spindle_on or event.kind in SPINDLE) and event.kind != Kind.SPINDLE_OFF
+            if _is_rounded(event):
+                rounded.append(row)
+    return Events(blocks, tuple(rounded), spindle_on)
+
+
+def common_words(event: Event) -> str:
+    """Dwell, spindle and homing; PostError for values that no block can say.
+
+    Homing is a rapid in machine coordinates, `G53 G0`: G28 would go where the operator's memory
+    of it points.
+    """
+    if event.kind == Kind.SPINDLE_OFF:
+        return "M5"
+    if event.kind == Kind.HOME_XY:
+        return "G53 G0 X0 Y0"
+    if event.kind == Kind.HOME_Z:
+        return "G53 G0 Z0"
+    if event.kind not in (*SPINDLE, Kind.DWELL):
+        raise event.refuse(f"a {event.kind.name} has no block in this dialect")
+    if event.kind in SPINDLE and math.isnan(event.value):
+        return SPINDLE[event.kind]  # its speed is nobody's word
+    if not (math.isfinite(event.value) and event.value >= 0.0):
+        raise event.refuse(f"a {event.kind.name} without a value of 0 or more")
+    said = say_number(event.value, VALUE)
+    return f"G4 P{said}" if event.kind == Kind.DWELL else f"{SPINDLE[event.kind]} S{said}"
+
+
+def tool_number(event: Event) -> int:
+    """The tool of a change; PostError when it is no whole number from 0."""
+    if not (event.value >= 0.0 and event.value == math.floor(event.value)):
+        raise event.refuse(f"{event.value:g} is no tool number", "tools are 0, 1, 2 …")
+    return int(event.value)
+
+
+def _is_rounded(event: Event) -> bool:
+    if math.isnan(event.value):
+        return False
+    said = float(values_of(round(event.value * 10.0**VALUE.decimals), VALUE.decimals))  # type: ignore[arg-type]
+    return abs(said - event.value) > ROUNDING_PART * abs(event.value)

@@ -1,0 +1,140 @@
+"""Reading grbl 1.1 as it takes programs: its words, its groups, its rule for arcs (gcode.c).
+
+Commands of grbl itself (`$H`, `$J=…`) and its realtime characters are the sender's, no program's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.controllers import GrblController
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Toolpath
+
+from ..gcode.blocks import Lexing, blocks_of
+from ..gcode.read import M_CODES, ModalReader, Rules
+from .dialect import Dialect, dialect_of
+
+MOST_TOOL: Final = 255
+"""Beyond it grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
+
+SLOW_GUARD: Final = 1e-6
+"""Part of a feed: one below the slowest by less is the slowest."""
+
+MIST: Final = 70
+"""M7, tenfold: grbl's error 20 as it ships (ENABLE_M7 of config.h is off)."""
+
+GROUPS: Final = {
+    **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
+    **dict.fromkeys((40, 530), "one block"),
+    170: "plane",
+    **dict.fromkeys((200, 210), "units"),
+    **dict.fromkeys((900, 910), "distance"),
+    911: "arc distance",
+    940: "feed mode",
+    400: "cutter radius",
+    490: "tool length",
+    **dict.fromkeys(range(540, 600, 10), "work frame"),
+    610: "path",
+}
+
+_FRAME: Final = "moves part zero by what only the controller knows"
+_PLANE: Final = "is another plane; arcs lie in XY here"
+REFUSED: Final = {
+    **dict.fromkeys(("G10", "G92", "G92.1"), _FRAME),
+    **dict.fromkeys(("G28", "G30"), "goes to a place that only the controller remembers"),
+    **dict.fromkeys(("G28.1", "G30.1"), "remembers a place, which is not simulated"),
+    **dict.fromkeys(("G18", "G19"), _PLANE),
+    **dict.fromkeys(("G38.2", "G38.3", "G38.4", "G38.5"), "probes, which cannot be simulated"),
+    "G43": "is unknown to grbl, its error 20",
+    "G43.1": "shifts Z by a tool length",
+    "G93": "says feeds as inverse time, which is not read",
+    "M6": "is unknown to grbl, its error 20",
+    "M7": "is unknown to grbl as it ships, its error 20",
+}
+
+
+def read_grbl(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError with block, line and column."""
+    dialect = dialect_of(machine)
+    lexing = Lexing(
+        letters="GMXYZIJKFSTPRL",
+        lower_case=True,
+        blanks="anywhere",
+        parentheses=True,
+        semicolon=True,
+        block_numbers=True,
+        line_chars=dialect.line_chars,
+        counts_blanks=False,
+    )
+    reader = ModalReader(machine, rules_of(dialect))
+    empty = True
+    for block in blocks_of(data, lexing):
+        reader.block(block)
+        empty = False
+    if empty:
+        raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
+    path = reader.finish()
+    return replace(path, findings=(*path.findings, *_too_slow(path, machine)))
+
+
+def _too_slow(path: Toolpath, machine: Machine) -> Iterator[Finding]:
+    """FEED_TOO_SLOW: cuts slower than the longest tick of the timer allows.
+
+    A line of d mm whose leading axis makes n steps is never slower than d/n mm times the least
+    rate of steps; an arc not slower than where it runs along an axis.
+    """
+    if not isinstance(machine.controller, GrblController):
+        return
+    step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    way = np.abs(path.end - path.starts)
+    steps = (way / step_mm).max(axis=1, initial=0.0)
+    along = np.linalg.norm(way, axis=1) / np.maximum(steps, 1.0)
+    along = np.where(path.is_arc, step_mm[:2].min(), along)
+    least = 60.0 * machine.controller.least_step_hz * along
+    with np.errstate(invalid="ignore"):
+        slow = np.flatnonzero(path.is_feed & (path.feed < least * (1.0 - SLOW_GUARD)))
+    if len(slow):
+        worst = int(slow[(path.feed[slow] / least[slow]).argmin()])
+        yield Finding(
+            Code.FEED_TOO_SLOW,
+            Severity.WARNING,
+            f"{len(slow)} cuts are slower than the controller can step (it makes no less than "
+            f"{machine.controller.least_step_hz:g} steps a second): F{path.feed[worst]:g} runs "
+            f"at {least[worst]:.3g} mm/min, and is simulated so",
+            where=f"block {int(path.block[worst]) + 1}",
+            measured=float(path.feed[worst]),
+            limit=float(least[worst]),
+            unit="mm_min",
+        )
+
+
+def rules_of(dialect: Dialect) -> Rules:
+    """What grbl takes."""
+
+    def arc_fault(r1: float, r2: float) -> str:
+        """grbl's error 33; r1 is the radius that counts."""
+        gap = abs(r1 - r2)
+        wide = gap > dialect.arc_difference_mm and gap > dialect.arc_difference_part * r1
+        if r1 <= dialect.arc_least_radius_mm or gap > dialect.arc_most_difference_mm or wide:
+            return f"grbl's error 33: radius {r1:.4f} mm at the start, {r2:.4f} mm at the end"
+        return ""
+
+    return Rules(
+        groups=GROUPS,
+        refused=REFUSED,
+        first_motion=0,
+        arc_fault=arc_fault,
+        full_turn_rad=dialect.arc_full_turn_rad,
+        chord_slack_mm=dialect.arc_chord_slack_mm,
+        ends_in_plane=True,
+        m_codes={code: group for code, group in M_CODES.items() if code != MIST},
+        tools="pause" if dialect.tool_change == "pause" else "none",
+        most_tool=MOST_TOOL,
+    )

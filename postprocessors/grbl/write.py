@@ -1,0 +1,59 @@
+"""Writing grbl 1.1: what it has of its own beside `_gcode_write`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Toolpath, mounted_before
+from camtool.toolpath.program import Program
+
+from ..gcode.write import Event, Style, common_words, tool_number, write_program
+from .dialect import Dialect, dialect_of
+
+HEADER = ("G17 G21 G90 G94", "G54")
+"""XY plane, mm, absolute, feeds a minute; the first work frame. grbl knows I J as offsets only,
+so it is not told so (G91.1)."""
+
+MOST_TOOL = 255
+"""`MAX_TOOL_NUMBER` of grbl's gcode.c."""
+
+
+MOUNT_FIRST = Finding(
+    Code.EVENT_LEFT_OUT,
+    Severity.INFO,
+    "the tool is not said, since grbl knows no tool change: mount it before the program",
+)
+
+
+def write_grbl(toolpath: Toolpath, machine: Machine) -> Program:
+    """The program; PostError names the move that cannot be said or done."""
+    dialect = dialect_of(machine)
+    style = Style(dialect, HEADER, lambda event: _words(event, dialect))
+    program = write_program(toolpath, machine, style)
+    if dialect.tool_change == "pause" or not mounted_before(toolpath).any():
+        return program
+    return replace(program, findings=(*program.findings, MOUNT_FIRST))
+
+
+def _words(event: Event, dialect: Dialect) -> str:
+    """The block of an event."""
+    if event.kind == Kind.TOOL_CHANGE:
+        if dialect.tool_change == "refuse" and event.mounted_before:
+            return ""
+        if dialect.tool_change == "refuse":
+            raise event.refuse(
+                "grbl knows no tool change",
+                "write one program for each tool, or use --set dialect.tool_change=pause",
+            )
+        if tool_number(event) > MOST_TOOL:
+            raise event.refuse(f"grbl's tools end at {MOST_TOOL}")
+        return f"T{tool_number(event)} M0"
+    block = common_words(event)
+    if event.kind == Kind.DWELL and event.value > dialect.most_dwell_s:
+        raise event.refuse(
+            f"a dwell of {event.value:g} s; grbl counts at most {dialect.most_dwell_s:g} s",
+            "use several dwells",
+        )
+    return block

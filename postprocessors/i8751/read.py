@@ -1,0 +1,607 @@
+"""Reading i8751: packets, a listing or a hex dump as the moves that the controller makes of them.
+
+A record becomes up to four rows: X and Y, the wait T1, Z, the wait T2. Its block is its number,
+from 0; the END has the block after the last record. Ends are steps times the coded step.
+
+The machine has one speed, so nothing tells a rapid from a cut. Part zero is the top of the stock:
+in a program that goes below it, what stays at or above it and what rises straight up are rapids,
+all else are lines. Their feed is the way along the line over the controller's time for it, ramps
+and dog-leg included.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.controllers.i8751_pulses import PulseTimes
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, dialect_of
+
+Ints = npt.NDArray[np.int64]
+
+
+def read_program(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError naming record and byte, or line and column."""
+    return _toolpath(decoded_records(data, machine), machine, dialect_of(machine))
+
+
+def decoded_records(data: bytes, machine: Machine) -> Decoded:
+    """The records of a program in any of its three forms; ProgramError as `read_program`."""
+    dialect = dialect_of(machine)
+    if not data:
+        raise ProgramError("the program is empty", mend="give a file of i8751 packets")
+    if dialect.format == "listing":
+        return ListingReader(machine, dialect).read(data)
+    if dialect.format == "hex":
+        return read_dump(data, dialect)
+    return _read_packets(data, dialect)
+
+
+def _read_packets(data: bytes, dialect: Dialect) -> Decoded:
+    try:
+        return PacketReader(data, dialect).read()
+    except ByteFault as fault:
+        mend = fault.mend
+        if fault.offset == 0:
+            mend = "for text, use --set dialect.format=listing or hex; " + mend
+        raise ProgramError(
+            fault.message,
+            where=f"record {fault.record + 1}, byte {fault.offset + 1} "
+            f"(offset {fault.offset:04X})",
+            mend=mend,
+        ) from None
+
+
+def _toolpath(decoded: Decoded, machine: Machine, dialect: Dialect) -> Toolpath:
+    """Rows of all records, then END."""
+    steps, waits = decoded.steps, decoded.waits
+    step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    moves_xy, moves_z = steps[:, :2].any(axis=1), steps[:, 2] != 0
+    present = np.column_stack([moves_xy, waits[:, 0] > 0, moves_z, waits[:, 1] > 0])
+    # Slots 0 to 3 of a record: X and Y, T1, Z, T2.
+    record, slot = np.nonzero(present)
+    at = np.cumsum(steps, axis=0)
+    ends = at[record]
+    # X and Y have moved before Z does.
+    before_z = slot < 2
+    ends[before_z, 2] -= steps[record[before_z], 2]
+    is_wait = slot % 2 == 1
+    kind = np.where(is_wait, np.int64(Kind.DWELL), _kinds(ends, steps[record], slot))
+    feeds = np.column_stack(_feeds(steps, step_mm, PulseTimes(dialect)))[record, slot // 2]
+    value = np.where(is_wait, waits[record, slot // 2].astype(np.float64), np.nan)
+    count = len(record) + 1
+    last = at[-1:]
+    return Toolpath(
+        kind=np.append(kind, Kind.END),
+        end=np.concatenate([ends, last]) * step_mm,
+        centre=np.full((count, 2), np.nan),
+        feed=np.append(np.where(kind == Kind.LINE, feeds, np.nan), np.nan),
+        value=np.append(value, np.nan),
+        source=np.full(count, -1),
+        block=np.append(record, len(steps)),
+        start=np.zeros(3),
+        findings=(*_findings(decoded), *_two_ways(decoded, dialect)),
+    )
+
+
+def _kinds(ends: Ints, steps: Ints, slot: Ints) -> Ints:
+    """RAPID or LINE for each row, by where it runs; waits are whatever comes out."""
+    if not (ends[:, 2] < 0).any():
+        return np.full(len(ends), np.int64(Kind.LINE))
+    is_z = slot >= 2
+    start_z = ends[:, 2] - np.where(is_z, steps[:, 2], 0)
+    above = np.minimum(start_z, ends[:, 2]) >= 0
+    rises = is_z & (steps[:, 2] > 0)
+    return np.where(above | rises, np.int64(Kind.RAPID), np.int64(Kind.LINE))
+
+
+def _feeds(
+    steps: Ints, step_mm: npt.NDArray[np.float64], times: PulseTimes
+) -> list[npt.NDArray[np.float64]]:
+    """Feeds (R,) in X and Y, and in Z, mm/min; NaN where nothing moves."""
+    way_xy = np.hypot(*(steps[:, :2] * step_mm[:2]).T)
+    way_z = np.abs(steps[:, 2]) * step_mm[2]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return [
+            60.0 * way_xy / times.legs_s(steps[:, :2]).sum(axis=1),
+            60.0 * way_z / times.alone_s(steps[:, 2]),
+        ]
+
+
+def _two_ways(decoded: Decoded, dialect: Dialect) -> Iterator[Finding]:
+    """READ_TWO_WAYS: runs that say a high byte, whose unit is 256 steps or 255."""
+    pulses = dialect.pulses(decoded.steps)
+    high = pulses // dialect.high_byte_steps
+    count = int((high > 0).sum())
+    if count and not dialect.long_runs:
+        record = int((high > 0).any(axis=1).argmax())
+        yield Finding(
+            Code.READ_TWO_WAYS,
+            Severity.WARNING,
+            f"{count} runs of a motor have more than 255 steps; they are read by "
+            f"dialect.high_byte = {dialect.high_byte}, and by the other reading (255 or 256) a "
+            f"motor ends up to {int(high.sum(axis=0).max())} steps elsewhere: post again in "
+            "shorter runs, or say dialect.long_runs=true where it is known",
+            where=f"record {record + 1}",
+            measured=float(count),
+            unit="runs",
+        )
+
+
+def _findings(decoded: Decoded) -> tuple[Finding, ...]:
+    if not decoded.rounded:
+        return ()
+    return (
+        Finding(
+            Code.VALUE_ROUNDED,
+            Severity.INFO,
+            f"{decoded.rounded} distances are no whole steps and were rounded, at most by "
+            f"{decoded.worst_steps:.2f} steps",
+            measured=decoded.worst_steps,
+            unit="steps",
+        ),
+    )
+
+
+# Reading packets: bytes as the controller stores them, and refused where it could not.
+#
+# One pattern takes a whole record; only a record that does not match is walked byte by byte, to
+# say where it goes wrong.
+
+ACCESS: Final = 0x13
+"""The byte that opens the access, as it is read."""
+PACKET_END: Final = 0x45
+"""The byte behind a packet, as it is read."""
+DATA_END: Final = 0x54
+"""The byte behind the last packet, as it is read."""
+
+_MOTOR: Final = rb"(?:\x05|([\x03\x04])(.)(.))"
+
+
+class PacketReader:
+    """Bytes in, records out; ByteFault at the first byte that does not fit."""
+
+    def __init__(self, data: bytes, dialect: Dialect) -> None:
+        self._data = data
+        self._dialect = dialect
+        mark = re.escape(bytes([dialect.dwell_mark_byte]))
+        pair = mark + rb"(.)"
+        self._pattern = re.compile(
+            rb"\x01" + _MOTOR + rb"\x02" + _MOTOR + pair + rb"\x03" + _MOTOR + pair, re.DOTALL
+        )
+        self._steps: list[tuple[int, int, int]] = []
+        self._waits: list[tuple[int, int]] = []
+        self._at = 0
+
+    def read(self) -> Decoded:
+        """All records of the stream."""
+        self._take_key()
+        while True:
+            self._packet()
+            if self._peek("45H before it ended a packet: now 54H or another packet") == DATA_END:
+                break
+            if self._dialect.key == "each-packet":
+                self._take_key()
+        if self._at + 1 != len(self._data):
+            raise self._fault(self._at + 1, "a byte after 54H, the end of data", "remove it")
+        return Decoded(
+            np.array(self._steps, dtype=np.int64), np.array(self._waits, dtype=np.int64)
+        )
+
+    def _peek(self, wanted: str) -> int:
+        """The byte here; a fault when there is none."""
+        if self._at >= len(self._data):
+            raise self._fault(self._at, f"the program breaks off: wanted {wanted}")
+        return self._data[self._at]
+
+    def _take_key(self) -> None:
+        if self._peek("the access key 13H") != ACCESS:
+            mend = "see dialect.key" if self._at else "give a file of i8751 packets"
+            byte = self._data[self._at]
+            raise self._fault(self._at, f"{byte:02X}H is not the access key 13H", mend)
+        self._at += 1
+
+    def _packet(self) -> None:
+        """Records up to and with the 45H behind the last one."""
+        for record in range(RECORDS_PER_PACKET + 1):
+            byte = self._peek("motor 01H of a record" + (", or 45H" if record else ""))
+            if record and byte == PACKET_END:
+                self._at += 1
+                return
+            if record == RECORDS_PER_PACKET:
+                raise self._fault(
+                    self._at,
+                    f"{byte:02X}H where the packet must end: it has {RECORDS_PER_PACKET} records",
+                    "end it with 45H",
+                )
+            self._record()
+
+    def _record(self) -> None:
+        match = self._pattern.match(self._data, self._at)
+        if match is None:
+            self._walk()
+            raise self._fault(self._at, "no record")
+        sense1, high1, low1, sense2, high2, low2, wait1, sense3, high3, low3, wait2 = (
+            match.groups()
+        )
+        x, y, z = self._dialect.signs
+        self._steps.append(
+            (
+                x * self._moved(sense1, high1, low1, match.start(2)),
+                y * self._moved(sense2, high2, low2, match.start(5)),
+                z * self._moved(sense3, high3, low3, match.start(9)),
+            )
+        )
+        self._waits.append((wait1[0], wait2[0]))
+        self._at = match.end()
+
+    def _moved(self, sense: bytes | None, high: bytes, low: bytes, offset: int) -> int:
+        """Steps of a motor, forward positive; a motor that turns for 0 steps is a fault."""
+        if sense is None:
+            return 0
+        pulses = high[0] * self._dialect.high_byte_steps + low[0]
+        if not pulses:
+            raise self._fault(offset, "a motor turns, but for 0 steps", "say 05H: it stands")
+        steps = pulses - self._dialect.lost_pulses
+        return steps if sense == b"\x03" else -steps
+
+    def _walk(self) -> None:
+        """ByteFault at the first byte that keeps the record from being one."""
+        at = self._motor(self._at, 1)
+        at = self._wait(self._motor(at, 2), "T1")
+        self._wait(self._motor(at, 3), "T2")
+
+    def _motor(self, at: int, number: int) -> int:
+        self._want(at, (number,), f"motor {number:02d}H")
+        self._want(at + 1, (3, 4, 5), f"the sense of motor {number}: 03H, 04H or 05H")
+        if self._data[at + 1] == 5:
+            return at + 2
+        self._want(at + 2, None, f"PH of motor {number}")
+        self._want(at + 3, None, f"PL of motor {number}")
+        return at + 4
+
+    def _wait(self, at: int, name: str) -> int:
+        mark = self._dialect.dwell_mark_byte
+        self._want(at, (mark,), f"{mark:02X}H before {name}")
+        self._want(at + 1, None, f"the seconds of {name}")
+        return at + 2
+
+    def _want(self, at: int, allowed: tuple[int, ...] | None, what: str) -> None:
+        if at >= len(self._data):
+            raise self._fault(at, f"the program breaks off: wanted {what}")
+        byte = self._data[at]
+        if allowed is not None and byte not in allowed:
+            mend = ""
+            if {byte, *allowed} == {0x00, 0x30}:
+                mend = f"use --set dialect.dwell_mark={byte:02X}H"
+            raise self._fault(at, f"{byte:02X}H: wanted {what}", mend)
+
+    def _fault(self, at: int, message: str, mend: str = "") -> ByteFault:
+        return ByteFault(at, len(self._steps), message, mend)
+
+
+def replies(data: bytes, decoded: Decoded, dialect: Dialect) -> list[str]:
+    """What the controller is expected to answer to each byte of a stream that was read."""
+    to_wait = dialect.dwell_replies
+    standing = [dialect.motor_reply, "M"]
+    moving = [dialect.motor_reply, "M", "M", "M"]
+    answers: list[str] = []
+    for _ in range(len(decoded.steps)):
+        if data[len(answers)] == ACCESS:
+            answers.append("LISTO")
+        for motor in range(3):
+            answers += standing if data[len(answers) + 1] == 5 else moving
+            if motor:
+                answers += to_wait
+        # A record begins with 01H, so that this cannot be the first byte of the next one.
+        if data[len(answers)] == PACKET_END:
+            answers.append("F")
+    return [*answers, "A"]
+
+
+# Reading the signed-mm listing: `X+10.000 Y-2.500 T0 Z+0.000 T0`, one record a line, END last.
+#
+# Every word must be there, in this order, every distance with its sign (L5250-5254). A distance is
+# rounded to whole steps, as the operator's program must do; each on its own.
+
+WHOLE_STEP_TOLERANCE: Final = 0.05
+"""A distance within this much (in steps) of a whole step is that step, without a word."""
+
+LAST_LINE: Final = "END"
+
+_DISTANCE: Final = r"([+-]\d{1,6}\.\d{1,9})"
+_WORDS: Final = (
+    ("X", _DISTANCE, "X with a sign, digits, a point and decimals"),
+    ("Y", _DISTANCE, "Y with a sign, digits, a point and decimals"),
+    ("T", r"(\d{1,3})", "T with whole seconds"),
+    ("Z", _DISTANCE, "Z with a sign, digits, a point and decimals"),
+    ("T", r"(\d{1,3})", "T with whole seconds"),
+)
+_BETWEEN: Final = "[ \t]+"
+_RECORD: Final = re.compile(_BETWEEN.join(letter + value for letter, value, _ in _WORDS))
+
+
+class ListingReader:
+    """Lines in, records out; ProgramError with record, line and column."""
+
+    def __init__(self, machine: Machine, dialect: Dialect) -> None:
+        self._step_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._most = dialect.sayable_steps
+        self._steps: list[list[int]] = []
+        self._waits: list[tuple[int, int]] = []
+        self._rounded = 0
+        self._worst = 0.0
+        self._line = 0
+
+    def read(self, data: bytes) -> Decoded:
+        """All records of a listing."""
+        lines = text_lines(data)
+        ended = False
+        for self._line, line in enumerate(lines, 1):
+            text = line.strip(" \t")
+            if not text or text.startswith(";"):
+                continue
+            indent = len(line) - len(line.lstrip(" \t"))
+            if ended:
+                raise self._error(indent, f"{shown(text)} after END", "remove it")
+            ended = text == LAST_LINE
+            if not ended:
+                self._record(text, indent)
+        if not ended:
+            raise self._error(len(lines[-1]), "the listing breaks off", "its last line is END")
+        if not self._steps:
+            raise ProgramError("the program is empty", mend="a listing has records before END")
+        return Decoded(
+            np.array(self._steps, dtype=np.int64),
+            np.array(self._waits, dtype=np.int64),
+            self._rounded,
+            self._worst,
+        )
+
+    def _record(self, text: str, indent: int) -> None:
+        match = _RECORD.fullmatch(text)
+        if match is None:
+            raise self._no_record(text, indent)
+        waits = (
+            self._wait(match[3], indent + match.start(3)),
+            self._wait(match[5], indent + match.start(5)),
+        )
+        steps = [
+            self._whole(match[group], axis, indent + match.start(group))
+            for axis, group in enumerate((1, 2, 4))
+        ]
+        self._steps.append(steps)
+        self._waits.append(waits)
+
+    def _whole(self, text: str, axis: int, column: int) -> int:
+        """A distance in steps, half a step away from zero."""
+        exact = abs(float(text)) / self._step_mm[axis]
+        steps = math.floor(exact + 0.5)
+        if steps > self._most:
+            raise self._error(
+                column, f"{text} mm is more than {self._most} steps", "say it in two records"
+            )
+        off = abs(exact - steps)
+        if off > WHOLE_STEP_TOLERANCE:
+            self._rounded += 1
+            self._worst = max(self._worst, off)
+        return -steps if text[0] == "-" else steps
+
+    def _wait(self, text: str, column: int) -> int:
+        seconds = int(text)
+        if seconds > MOST_DWELL_BYTE_S:
+            raise self._error(
+                column,
+                f"{seconds} s is more than a byte can say",
+                f"use {MOST_DWELL_BYTE_S} s or less, and another record for the rest",
+            )
+        return seconds
+
+    def _no_record(self, text: str, indent: int) -> ProgramError:
+        """The first word of a line that is not what it must be."""
+        at, wanted = 0, "nothing more"
+        for number, (letter, value, what) in enumerate(_WORDS):
+            word = re.compile((_BETWEEN if number else "") + letter + value).match(text, at)
+            if word is None:
+                wanted = what
+                break
+            at = word.end()
+        blanks = re.compile("[ \t]*").match(text, at)
+        column = blanks.end() if blanks else at
+        mend = "write a point, no comma" if "," in text[: column + SHOWN_AHEAD] else ""
+        return self._error(indent + column, f"{shown(text)}: wanted {wanted}", mend)
+
+    def _error(self, column: int, message: str, mend: str = "") -> ProgramError:
+        """ProgramError in the present line at a column from 0."""
+        return ProgramError(
+            message,
+            where=f"record {len(self._steps) + 1}, line {self._line}, column {column + 1}",
+            mend=mend,
+        )
+
+
+SHOWN_AHEAD: Final = 12
+"""A comma so many characters behind the fault is taken for a decimal one."""
+
+
+# Reading a hex dump: offset, bytes, and after `;` a comment that may state the replies.
+#
+# Offsets must be those of the bytes, and replies those that the bytes get; all else in a comment
+# is passed over.
+
+_LINE: Final = re.compile(r"([0-9A-Fa-f]{4,8})[ \t]+([0-9A-Fa-f][0-9A-Fa-f \t]*)(?:;(.*))?")
+
+_REPLIES: Final = re.compile(r"<-([^<]*)$")
+
+
+class _Run(NamedTuple):
+    """A line with bytes: its number from 1, the offset of its first byte, how many, the column
+    of its first byte from 1, and its comment."""
+
+    line: int
+    offset: int
+    size: int
+    column: int
+    comment: str
+
+
+def read_dump(data: bytes, dialect: Dialect) -> Decoded:
+    """The records of a hex dump; ProgramError with record, byte, line and column."""
+    lines = text_lines(data)
+    runs, stream = _runs(lines)
+    if not runs:
+        raise ProgramError("the program is empty", mend="give a hex dump of i8751 packets")
+    try:
+        decoded = PacketReader(stream, dialect).read()
+    except ByteFault as fault:
+        raise _placed(fault, runs, lines) from None
+    _check_replies(runs, replies(stream, decoded, dialect))
+    if lines[-1]:
+        raise ProgramError(
+            "the last line has no end: is the dump complete?",
+            where=f"line {len(lines)}, column {len(lines[-1]) + 1}",
+            mend="end it with a line end",
+        )
+    return decoded
+
+
+def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
+    """The lines with bytes, and all bytes in order."""
+    runs: list[_Run] = []
+    stream = bytearray()
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith(";"):
+            continue
+        match = _LINE.fullmatch(line)
+        found = _bytes(match[2]) if match else b""
+        if match is None or not found:
+            raise _no_line(number, line)
+        if int(match[1], 16) != len(stream):
+            raise ProgramError(
+                f"offset {match[1]}, but {len(stream):04X} bytes came before",
+                where=f"line {number}, column 1",
+                mend="look for a line that is missing or doubled",
+            )
+        column = match.start(2) + 1
+        runs.append(_Run(number, len(stream), len(found), column, match[3] or ""))
+        stream += found
+    return runs, bytes(stream)
+
+
+def _bytes(text: str) -> bytes:
+    """Pairs of hex digits with blanks between them; b"" when it is no such text."""
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        return b""
+
+
+def _no_line(number: int, line: str) -> ProgramError:
+    """Where a line stops being offset and bytes."""
+    offset = re.match(r"[0-9A-Fa-f]{4,8}(?=[ \t]|$)", line)
+    column = 1
+    if offset:
+        good = re.match(r"[ \t]*(?:[0-9A-Fa-f]{2}(?:[ \t]+|$))*", line[offset.end() :])
+        column = offset.end() + (good.end() if good else 0) + 1
+    return ProgramError(
+        f"{shown(line)} is no line of a hex dump: wanted an offset of four digits or more, bytes "
+        "of two digits, and perhaps a comment behind a semicolon",
+        where=f"line {number}, column {column}",
+        mend="for a listing, use --set dialect.format=listing",
+    )
+
+
+def _placed(fault: ByteFault, runs: list[_Run], lines: list[str]) -> ProgramError:
+    """The fault of a byte with the line and column in which the byte stands."""
+    run = runs[bisect_right([run.offset for run in runs], fault.offset) - 1]
+    inside = fault.offset - run.offset
+    column = run.column
+    if inside < run.size:
+        digits = re.finditer(r"[0-9A-Fa-f]{2}", lines[run.line - 1][run.column - 1 :])
+        column += next(islice(digits, inside, None)).start()
+    return ProgramError(
+        fault.message,
+        where=f"record {fault.record + 1}, offset {fault.offset:04X}, line {run.line}, "
+        f"column {column}",
+        mend=fault.mend,
+    )
+
+
+def _check_replies(runs: list[_Run], expected: list[str]) -> None:
+    """Replies that a comment states, other than ?, must be those of the protocol."""
+    for run in runs:
+        stated = _REPLIES.search(run.comment)
+        if not stated:
+            continue
+        wanted = expected[run.offset : run.offset + run.size]
+        given = stated[1].split()
+        unknown = [a if b == "?" else b for a, b in zip(wanted, given, strict=False)]
+        if len(given) != len(wanted) or unknown != wanted:
+            raise ProgramError(
+                f"replies {shown(' '.join(given))}, expected {shown(' '.join(wanted))}",
+                where=f"offset {run.offset:04X}, line {run.line}",
+                mend="see dialect.motor_reply and dialect.dwell_reply, or leave out the replies",
+            )
+
+
+# What the readers of the three formats share: records as read, and where one goes wrong.
+
+SHOWN_CHARS: Final = 40
+"""An error message shows no more of a line than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decoded:
+    """R records as the controller holds them: steps (R, 3), signed by part axes, and waits (R, 2)
+    s; `rounded` distances of a listing that were no whole steps, the worst off by so many."""
+
+    steps: Ints
+    waits: Ints
+    rounded: int = 0
+    worst_steps: float = 0.0
+
+
+class ByteFault(Exception):
+    """A byte (offset from 0) that no controller could take at this place of a record (from 0).
+
+    The reader of packets or of a hex dump turns it into a ProgramError that says the place.
+    """
+
+    def __init__(self, offset: int, record: int, message: str, mend: str = "") -> None:
+        self.offset = offset
+        self.record = record
+        self.message = message
+        self.mend = mend
+        super().__init__(message)
+
+
+def text_lines(data: bytes) -> list[str]:
+    """The lines of a text without their ends (CR LF, LF or CR); ProgramError at the first byte
+    that is no printable ASCII."""
+    odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
+    if odd:
+        lines = re.split(rb"\r\n|\n|\r", data[: odd.start()])
+        raise ProgramError(
+            f"the byte {data[odd.start()]:02X}H belongs to no text",
+            where=f"line {len(lines)}, column {len(lines[-1]) + 1}",
+            mend="for packets, use --set dialect.format=packets",
+        )
+    return re.split("\r\n|\n|\r", data.decode("ascii"))
+
+
+def shown(text: str) -> str:
+    """A line for a message: quoted, and cut when long."""
+    return repr(text if len(text) <= SHOWN_CHARS else text[:SHOWN_CHARS] + "…")

@@ -1,0 +1,375 @@
+"""The writer's first stage: what this machine cannot do is refused before anything is written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import PostError
+from camtool.machine.model import Machine
+from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
+from camtool.toolpath.moves import Kind, Toolpath, mounted_before
+
+from .dialect import MOST_DWELL_BYTE_S, Dialect
+from .dogleg import FREE, Line, elbows, reaches
+
+Bools = npt.NDArray[np.bool_]
+
+MOST_STEPS: Final = 10_000_000
+"""A coordinate of more steps is taken for a mistake: 26 hours at the machine's speed."""
+
+MOST_DWELL_S: Final = 36_000.0
+"""A longer dwell (10 hours) is taken for a mistake."""
+
+REFUSED: Final = {
+    Kind.HOME_XY: "this machine has no limit switches to go home to",
+    Kind.HOME_Z: "this machine has no limit switches to go home to",
+}
+"""Homing was proposed and not built (L5267-5273)."""
+
+
+def place(toolpath: Toolpath, row: int) -> str:
+    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
+    source = toolpath.text(row)
+    return f"move {row} ({source})" if source else f"move {row}"
+
+
+def check_toolpath(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> None:
+    """PostError for the first row that this machine cannot do."""
+    if toolpath.start.any():
+        x, y, z = toolpath.start.tolist()
+        raise PostError(
+            f"the toolpath starts at ({x:g}, {y:g}, {z:g}) mm, a program starts at part zero",
+            mend="begin with a rapid from (0, 0, 0)",
+        )
+    _check_events(toolpath)
+    _check_coordinates(toolpath, machine)
+    with np.errstate(invalid="ignore"):
+        bad_feed = toolpath.is_feed & ~((toolpath.feed > 0.0) & np.isfinite(toolpath.feed))
+    _refuse(
+        bad_feed,
+        toolpath,
+        lambda row: f"feed {toolpath.feed[row]:g} mm/min is no feed",
+        "give a feed above 0; this machine then moves at its own speed",
+    )
+    _check_arcs(toolpath, dialect)
+
+
+def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend: str) -> None:
+    """PostError for the first bad row, if there is one."""
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise PostError(message(row), where=place(toolpath, row), mend=mend)
+
+
+def _check_events(toolpath: Toolpath) -> None:
+    kind, value = toolpath.kind, toolpath.value
+    _refuse(
+        (kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
+        toolpath,
+        lambda row: "this machine has no stop for a tool change",
+        "write a program for each tool",
+    )
+    for refused, message in REFUSED.items():
+        _refuse(
+            kind == refused,
+            toolpath,
+            lambda row, message=message: message,  # type: ignore[misc]
+            "leave it out, and do it by hand before the program",
+        )
+    _refuse(
+        (kind == Kind.SET_ZERO) & toolpath.end.any(axis=1),
+        toolpath,
+        lambda row: "part zero is where the program starts",
+        "set it first, before any move",
+    )
+    with np.errstate(invalid="ignore"):
+        bad = (kind == Kind.DWELL) & ~((value >= 0.0) & (value <= MOST_DWELL_S))
+    _refuse(
+        bad,
+        toolpath,
+        lambda row: f"dwell {value[row]:g} s cannot be said",
+        f"use 0 to {MOST_DWELL_S:g} s",
+    )
+    ended = np.cumsum(kind == Kind.END) - (kind == Kind.END)
+    _refuse(
+        ended > 0,
+        toolpath,
+        lambda row: "something follows the end of the program",
+        "end the program once, last of all",
+    )
+
+
+def _check_coordinates(toolpath: Toolpath, machine: Machine) -> None:
+    for axis, (name, given) in enumerate(zip("XYZ", machine.axes, strict=True)):
+        most_mm = MOST_STEPS * given.coded_step_mm
+        values = toolpath.end[:, axis]
+        _refuse(
+            np.abs(values) > most_mm,
+            toolpath,
+            lambda row, name=name, values=values: (  # type: ignore[misc]
+                f"{name} = {values[row]:.6g} mm is more than {MOST_STEPS} steps"
+            ),
+            "check the unit of the drawing and the machine's coded_step_mm",
+        )
+
+
+def _check_arcs(toolpath: Toolpath, dialect: Dialect) -> None:
+    """The two radii of an arc may differ by its tolerance, since its chords end at its end."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        out, back = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
+        spread = np.abs(np.hypot(out[:, 0], out[:, 1]) - np.hypot(back[:, 0], back[:, 1]))
+        bad = toolpath.is_arc & ~(spread <= dialect.arc_tolerance_mm)
+    _refuse(
+        bad,
+        toolpath,
+        lambda row: f"start and end differ by {spread[row]:g} mm in their distance to the centre",
+        "give the arc one radius",
+    )
+
+
+# The writer's second stage: a toolpath as records, in whole steps.
+#
+# A record moves X and Y, waits T1, moves Z, waits T2 (L4151-4167). Every end is rounded to whole
+# steps from part zero, never from the record before, so that rounding does not add up. Arcs become
+# chords, slopes become flat moves and small ones of Z, lines are cut where their dog-leg would
+# stray too far (`_i8751_dogleg`) and where a motor would make more steps than two bytes can say.
+
+Ints = npt.NDArray[np.int64]
+
+MOST_RECORDS: Final = 2_000_000
+"""A program of more records (30 MB, hours over the link) is taken for a mistake."""
+
+
+@dataclass
+class Counts:
+    """What was changed on the way, for the findings; places name the first of each kind."""
+
+    arcs: int = 0
+    chords: int = 0
+    slopes: int = 0
+    slopes_place: str = ""
+    slope_step_mm: float = 0.0
+    cut_lines: int = 0
+    cut_pieces: int = 0
+    long_moves: int = 0
+    dropped: int = 0
+    dwells_rounded: int = 0
+    spindle: int = 0
+    spindle_place: str = ""
+    tools: int = 0
+    feeds: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """R records: steps (R, 3), waits (R, 2) s, row (R,) of the toolpath that each came from;
+    `messages` as (record that it precedes, text); `end_row` of the END, -1 without one."""
+
+    steps: Ints
+    waits: Ints
+    row: Ints
+    messages: tuple[tuple[int, str], ...]
+    end_row: int
+    counts: Counts = field(default_factory=Counts)
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+
+def records_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Records:
+    """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
+    counts = Counts()
+    lowered, row = _lowered(toolpath, slope_step_mm(machine), dialect, counts)
+    targets = _rounded(lowered, machine)
+    deltas = np.diff(targets, axis=0, prepend=np.zeros((1, 3), dtype=np.int64))
+    _check_events_stand(lowered, deltas)
+    pieces = _cut_rows(lowered, deltas, machine, dialect, counts)
+    # Parts of slopes may be small: only whole rows are missed.
+    whole = np.bincount(row, minlength=len(toolpath))[row] == 1
+    counts.dropped = int((lowered.is_motion & ~deltas.any(axis=1) & whole).sum())
+    counts.feeds = int(toolpath.is_feed.sum())
+    each = np.where(deltas.any(axis=1), 1, 0)
+    for index, parts in pieces.items():
+        each[index] = len(parts)
+    owner = np.repeat(np.arange(len(lowered)), each)
+    first = np.cumsum(each) - each
+    steps = deltas[owner]
+    for index, parts in pieces.items():
+        steps[first[index] : first[index] + len(parts)] = parts
+    if dialect.z_alone == "with-step":
+        steps = _with_step(steps)
+    plain = _Plain(steps, owner, lowered, counts)
+    records = plain.with_waits(row, first)
+    if dialect.z_alone == "with-step" and not records.steps[:, :2].any(axis=1).all():
+        raise PostError(
+            "a dwell needs a record in which nothing moves, and this controller takes none",
+            mend="dwell after a move and for 255 s at most, or use --set dialect.z_alone=plain",
+        )
+    return records
+
+
+def _lowered(
+    toolpath: Toolpath, step_mm: float, dialect: Dialect, counts: Counts
+) -> tuple[Toolpath, Ints]:
+    """Lines of XY or Z only, and the row of the toolpath that each came from."""
+    two = helices_to_steps(toolpath, step_mm)
+    # A rapid in two parts is as good as one; a cut in steps is another cut.
+    cut = (np.bincount(two.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
+    counts.slopes, counts.slope_step_mm = int(cut.sum()), step_mm
+    counts.slopes_place = place(toolpath, int(cut.argmax())) if counts.slopes else ""
+    arcs = two.toolpath.is_arc
+    lines = arcs_to_lines(two.toolpath, arcs, dialect.arc_tolerance_mm)
+    counts.arcs = int(arcs.sum())
+    counts.chords = counts.arcs + len(lines.toolpath) - len(two.toolpath)
+    return lines.toolpath, two.row[lines.row]
+
+
+def _rounded(toolpath: Toolpath, machine: Machine) -> Ints:
+    """(N, 3) ends in whole steps, half away from zero."""
+    scaled = toolpath.end / np.array([axis.coded_step_mm for axis in machine.axes])
+    return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
+
+
+def _check_events_stand(toolpath: Toolpath, deltas: Ints) -> None:
+    bad = ~toolpath.is_motion & deltas.any(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise PostError(
+            f"a {Kind(int(toolpath.kind[row])).name} cannot move the tool",
+            where=place(toolpath, row),
+            mend="give the row the position of the tool",
+        )
+
+
+def _cut_rows(
+    toolpath: Toolpath, deltas: Ints, machine: Machine, dialect: Dialect, counts: Counts
+) -> dict[int, Ints]:
+    """The rows that need more than one record, each with the steps (k, 3) of its records."""
+    xy = deltas[:, :2]
+    # A step aside (`_with_step`) comes on top.
+    most = dialect.most_steps - (1 if dialect.z_alone == "with-step" else 0)
+    step_mm = (machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    reach = np.where(toolpath.is_feed, reaches(xy, step_mm, dialect.tolerance_mm), FREE)
+    strays = (reach != FREE) & (elbows(xy) > reach)
+    far = np.abs(deltas).max(axis=1, initial=0) > most
+    counts.long_moves = int((far & ~strays).sum())
+    counts.cut_lines = int(strays.sum())
+    of_elbows = np.where(strays, elbows(xy) / (2.0 * np.maximum(reach, 1)), 0.0)
+    _refuse_too_many(np.abs(deltas).max(axis=1, initial=0) / most + of_elbows)
+    pieces = {}
+    for row in np.flatnonzero(strays | far).tolist():
+        dx, dy, dz = deltas[row].tolist()
+        if dz:
+            parts = [(0, 0, part) for part in _chopped(dz, most)]
+        else:
+            line = Line(dx, dy, int(reach[row]))
+            parts = [(*part, 0) for part in line.pieces(most)]
+        pieces[row] = np.array(parts, dtype=np.int64)
+        counts.cut_pieces += len(parts) if strays[row] else 0
+    return pieces
+
+
+def _refuse_too_many(each: npt.NDArray[np.float64]) -> None:
+    """PostError for rows (N,) that need about so many records, or more."""
+    total = float(np.maximum(each, 1.0).sum())
+    if total > MOST_RECORDS:
+        raise PostError(
+            f"the program would have about {total:.3g} records, more than {MOST_RECORDS}",
+            mend="use a larger dialect.tolerance_mm, or check the unit of the drawing",
+        )
+
+
+def _chopped(steps: int, most: int) -> list[int]:
+    """`steps` in parts of at most `most`, the rest last."""
+    full, rest = divmod(abs(steps), most)
+    sign = 1 if steps > 0 else -1
+    return [sign * most] * full + ([sign * rest] if rest else [])
+
+
+def _with_step(steps: Ints) -> Ints:
+    """Records in which Z never moves alone: X goes one step aside, and back in the next record.
+
+    Only for controllers that take no record in which both X and Y stand still (the thesis shows
+    none). The step aside is taken back as soon as a record moves X or Y anyway, or at the end.
+    """
+    out = steps.copy()
+    aside = 0
+    for record, (x, y, z) in enumerate(steps.tolist()):
+        if not (x or y):
+            wanted = 1 - aside
+        else:
+            # A record that would stand still by going back leaves it to a later one.
+            wanted = aside if (x, y, z) == (aside, 0, 0) and aside else 0
+        out[record, 0] += wanted - aside
+        aside = wanted
+    return np.concatenate([out, [[-1, 0, 0]]]) if aside else out
+
+
+@dataclass(frozen=True, eq=False)
+class _Plain:
+    """Records that move, before the waits are put between them."""
+
+    steps: Ints
+    owner: Ints
+    lowered: Toolpath
+    counts: Counts
+
+    def with_waits(self, row: Ints, first: Ints) -> Records:
+        """The records with waits, messages and end; `first` (N,) is the record of each row.
+
+        A wait follows in T2 of the record before it; what that cannot hold, or what comes before
+        the first record, goes into records of their own that move nothing.
+        """
+        if not len(self.steps):
+            raise PostError("nothing moves by a whole step: there is no program to write")
+        # A step back at the end belongs to the last row that moved.
+        back = np.full(len(self.steps) - len(self.owner), self.owner[-1])
+        owner = np.concatenate([self.owner, back])
+        waits = np.zeros((len(self.steps), 2), dtype=np.int64)
+        own: list[tuple[int, int, int]] = []
+        messages: list[tuple[int, str]] = []
+        end_row = -1
+        for index in np.flatnonzero(~self.lowered.is_motion).tolist():
+            kind, record = Kind(int(self.lowered.kind[index])), int(first[index])
+            if kind == Kind.DWELL:
+                left = self._whole_seconds(index)
+                if record and not (own and own[-1][0] == record):
+                    given = min(left, MOST_DWELL_BYTE_S - int(waits[record - 1, 1]))
+                    waits[record - 1, 1] += given
+                    left -= given
+                own += [(record, part, index) for part in _chopped(left, MOST_DWELL_BYTE_S)]
+            elif kind == Kind.MESSAGE:
+                text = self.lowered.texts[int(self.lowered.value[index])]
+                messages.append((record + len(own), text))
+            elif kind == Kind.END:
+                end_row = int(row[index])
+            elif kind == Kind.TOOL_CHANGE:
+                self.counts.tools += 1
+            elif kind != Kind.SET_ZERO:
+                self._note_spindle(index)
+        at = [record for record, _, _ in own]
+        return Records(
+            steps=np.insert(self.steps, at, 0, axis=0),
+            waits=np.insert(waits, at, [[0, seconds] for _, seconds, _ in own] or 0, axis=0),
+            row=row[np.insert(owner, at, [index for _, _, index in own])],
+            messages=tuple(messages),
+            end_row=end_row,
+            counts=self.counts,
+        )
+
+    def _whole_seconds(self, index: int) -> int:
+        """A dwell rounded up: it is at least as long as wanted."""
+        seconds = float(self.lowered.value[index])
+        self.counts.dwells_rounded += seconds != math.floor(seconds)
+        return math.ceil(seconds)
+
+    def _note_spindle(self, index: int) -> None:
+        if not self.counts.spindle:
+            self.counts.spindle_place = place(self.lowered, index)
+        self.counts.spindle += 1

@@ -1,0 +1,39 @@
+"""How many bytes go over the line for a program in any of its three forms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camtool.machine.model import Machine
+from camtool.toolpath.program import Listing
+
+from .dialect import dialect_of
+from .read import decoded_records
+from .records import Records
+from .write import END_OF_DATA, byte_table, packet_bytes
+
+
+def packet_count(data: bytes, machine: Machine) -> int:
+    """The length of the program as packets; ProgramError as its reader has it."""
+    dialect = dialect_of(machine)
+    if dialect.format == "packets":
+        return len(data)
+    decoded = decoded_records(data, machine)
+    rows = np.zeros(len(decoded.steps), dtype=np.int64)
+    return len(packet_bytes(Records(decoded.steps, decoded.waits, rows, (), -1), dialect))
+
+
+# The packets of a program record by record, for people.
+
+
+def listing(data: bytes, machine: Machine) -> Listing:
+    """The bytes of each record in hex, then the end of the data; whatever the form of the file."""
+    dialect = dialect_of(machine)
+    decoded = decoded_records(data, machine)
+    end = f"{END_OF_DATA:02X}"
+    if not len(decoded.steps):
+        return Listing((end,), binary=True)
+    rows = np.zeros(len(decoded.steps), dtype=np.int64)
+    table, used = byte_table(Records(decoded.steps, decoded.waits, rows, (), -1), dialect)
+    lines = (row[sent].tobytes().hex(" ").upper() for row, sent in zip(table, used, strict=True))
+    return Listing((*lines, end), binary=True)

@@ -1,0 +1,55 @@
+"""Writing LinuxCNC: what it has of its own beside `_gcode_write`."""
+
+from __future__ import annotations
+
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
+from camtool.toolpath.program import Program
+
+from ..gcode.format import NumberStyle, say_number
+from ..gcode.write import Event, Style, common_words, tool_number, write_program
+from .dialect import dialect_of
+
+MODES = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
+"""XY plane, mm, no cutter radius, no tool length, the first work frame, no cycle, absolute, I J as
+offsets, feeds a minute: whatever the last program left."""
+
+MOST_TOOL = 99_999
+"""Ours: LinuxCNC's tool tables hold far fewer."""
+
+TOLERANCE = NumberStyle(6, strip=True)
+
+
+def write_linuxcnc(toolpath: Toolpath, machine: Machine) -> Program:
+    """The program; PostError names the move that cannot be said or done."""
+    dialect = dialect_of(machine)
+    style = Style(
+        dialect,
+        (MODES,),
+        _words,
+        message="MSG,",
+        frame="%" if dialect.percent else "",
+        path_mode=_path_mode,
+        own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
+    )
+    return write_program(toolpath, machine, style)
+
+
+def _path_mode(mode: PathMode) -> str:
+    """The block that asks for it."""
+    if mode.corners == "exact-path":
+        return "G61"
+    if mode.corners == "exact-stop":
+        return "G61.1"
+    corner = f" P{say_number(mode.tolerance_mm, TOLERANCE)}" if mode.tolerance_mm else ""
+    apart = mode.merging_mm != mode.tolerance_mm
+    return f"G64{corner}" + (f" Q{say_number(mode.merging_mm, TOLERANCE)}" if apart else "")
+
+
+def _words(event: Event) -> str:
+    """The block of an event."""
+    if event.kind == Kind.TOOL_CHANGE:
+        if tool_number(event) > MOST_TOOL:
+            raise event.refuse(f"tools end at {MOST_TOOL}")
+        return f"T{tool_number(event)} M6"
+    return common_words(event)

@@ -1,0 +1,536 @@
+"""The reader's jobs: what the master would hold after receiving one, checked as a whole, and the
+moves that the machine then makes.
+
+A number that would make a slave run away or never end is an error here, with its place, because
+no path could be told: the loop of the slaves runs `distance / 2 − 1` times in an unsigned int16
+(L5589-5729), so a distance of 1 (or a first point below 2) runs 65535 times, and a speed of 0
+never gets there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final, NoReturn
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import ProgramError
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Ints
+from camtool.toolpath.program import Listing
+
+from .dialect import CHUNK_UNITS, FIXED_Y_UNITS, MOST_NUMBER, UNIT_MM, Dialect, dialect_of
+
+Bools = npt.NDArray[np.bool_]
+
+Where = Callable[[str, int, int], str]
+"""The place of a number in the file, by the name of its array, its row and its column."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReadJob:
+    """`first` (2,) and `length` (2, n) units, `speed` (2, n) counts in 5 ms with the signs of the
+    directions; `number` from 1; `where` names places."""
+
+    number: int
+    first: Ints
+    length: Ints
+    speed: Ints
+    where: Where
+
+    @property
+    def steps(self) -> Ints:
+        """(2, n) units, signed: the ways that the program asks for."""
+        return np.asarray(np.where(self.speed < 0, -self.length, self.length))
+
+
+@dataclass(frozen=True, eq=False)
+class Executed:
+    """`points` (n+1, 2) units where the machine comes to stand, and where it was `asked` to."""
+
+    points: Ints
+    asked: Ints
+
+
+def fail(where: str, message: str, mend: str = "") -> NoReturn:
+    """ProgramError at a place."""
+    raise ProgramError(message, where=where, mend=mend)
+
+
+def check_count(count: int, where: Where, dialect: Dialect) -> None:
+    """The master's arrays hold so many lines, and it does not look (L4625-4635)."""
+    if not 1 <= count <= dialect.max_lines:
+        fail(
+            where("size_of_array", 0, 0),
+            f"{count} lines: a job has 1 to {dialect.max_lines}",
+            "post the drawing again: it is split into jobs then",
+        )
+
+
+def check_job(job: ReadJob, dialect: Dialect) -> None:
+    """ProgramError for the first number with which the machine would run away or stop."""
+    for name, table in (("lxy", job.length), ("velxy", job.speed)):
+        _refuse(job, name, np.abs(table) > MOST_NUMBER, "is beyond an int16")
+    _refuse(job, "lxy", job.length < 0, "is negative: the sign stands in velxy")
+    runaway = "makes the slave run away"
+    if dialect.odd == "truncated":
+        _refuse(job, "lxy", job.length == 1, runaway)
+    dead = (job.length > 0) & (job.speed == 0)
+    _refuse(job, "velxy", dead, "never ends: there is a distance to go")
+    for axis, name in enumerate(("first_pointx", "first_pointy")):
+        first = int(job.first[axis])
+        if axis == 1 and dialect.master_y == "fixed":
+            continue
+        if not CHUNK_UNITS <= first <= MOST_NUMBER:
+            reason = runaway if 0 <= first < CHUNK_UNITS else "is out of reach"
+            fail(
+                job.where(name, 0, 0),
+                f"a first point at {first} {reason}",
+                f"begin {CHUNK_UNITS * UNIT_MM:g} mm from home at the least",
+            )
+
+
+def _refuse(job: ReadJob, name: str, bad: Bools, what: str) -> None:
+    if bad.any():
+        column, row = (int(index) for index in np.argwhere(bad.T)[0])
+        table = job.length if name == "lxy" else job.speed
+        fail(job.where(name, row, column), f"{int(table[row, column])} in {name} {what}")
+
+
+def execute(job: ReadJob, dialect: Dialect) -> Executed:
+    """Where the slaves and the listed master really bring the tool."""
+    asked = _along(job.first, job.steps)
+    first = job.first.copy()
+    if dialect.master_y == "fixed":
+        first[1] = FIXED_Y_UNITS
+    steps = job.steps
+    if dialect.odd == "truncated":
+        first = first // CHUNK_UNITS * CHUNK_UNITS
+        steps = np.sign(steps) * (np.abs(steps) // CHUNK_UNITS * CHUNK_UNITS)
+    return Executed(_along(first, steps), asked)
+
+
+def _along(first: Ints, steps: Ints) -> Ints:
+    return np.asarray(
+        first + np.concatenate([np.zeros((1, 2), dtype=np.int64), steps.T.cumsum(0)])
+    )
+
+
+# Reading the .m file: `name = numbers;` and nothing else. Numbers are read, nothing is ever run.
+#
+#     xy = [                          two rows of whole numbers; a line's end or ; ends a row
+#       151 400
+#        86 265
+#     ];
+#     size_of_array = 1;              one whole number
+#     jobs{1} = {xy, lxy, ...};       after a complete job of several: exactly these words
+#     % anything                      a comment
+#
+# A job is complete when each of its six names has been assigned once; the next assignment then
+# begins another job.
+
+TABLES: Final = ("xy", "lxy", "velxy")
+NAMES: Final = (*TABLES, "size_of_array", "first_pointx", "first_pointy")
+
+SHOWN_CHARS: Final = 24
+"""An error message shows no more of a program than this."""
+
+_BLANK: Final = re.compile(r"(?:[ \t\r\n]+|%[^\n]*)*")
+_NAME: Final = re.compile(r"([A-Za-z]\w*)(?:\{(\d{1,6})\})?[ \t]*=[ \t]*", re.ASCII)
+_TEXT_NUMBER: Final = re.compile(r"[+-]?\d{1,5}")
+_WHOLE: Final = re.compile(r"(?:[ \t\r\n,;]*[+-]?\d{1,5}(?![0-9+-]))*[ \t\r\n,;]*")
+_ROWS: Final = re.compile(r"\[([0-9 \t\r\n,;+-]*)\]")
+_TOKEN: Final = re.compile(r"[^ \t\r\n,;]+")
+_ROW_END: Final = re.compile(r"[;\n]")
+_END: Final = re.compile(r"[ \t]*(?:;[ \t]*)?(?=%|\r?\n|\Z)")
+_LIST: Final = re.compile(r"\{" + r",[ \t]*".join(NAMES) + r"\}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Value:
+    """What a name was set to: numbers (rows, columns), and where they begin in the text."""
+
+    table: Ints
+    offset: int
+
+
+def read_text(data: bytes, dialect: Dialect) -> Iterator[ReadJob]:
+    """The jobs of a .m file, checked; ProgramError naming line and column."""
+    text = _Text(data)
+    values: dict[str, _Value] = {}
+    number = 0
+    while not text.ended:
+        name, index, at = text.name()
+        if name == "jobs" and index is not None:
+            if values or int(index) != number:
+                text.fail(at, f"jobs{{{index}}} does not stand behind job {index}")
+            text.listed()
+            continue
+        if index is not None or name not in NAMES:
+            mend = f"a program sets {', '.join(NAMES)} to plain numbers; nothing is run"
+            text.fail(at, f"{name[:SHOWN_CHARS]!r} is none of the arrays", mend)
+        if name in values:
+            missing = next(known for known in NAMES if known not in values)
+            text.fail(at, f"{name} is assigned twice", f"{missing} of this job is missing")
+        values[name] = text.table() if name in TABLES else text.scalar()
+        if len(values) == len(NAMES):
+            number += 1
+            yield _job_of_arrays(text, number, values, dialect)
+            values = {}
+    if values:
+        missing = next(known for known in NAMES if known not in values)
+        text.fail(text.at, f"the program ends before {missing} of job {number + 1}")
+    if number == 0:
+        raise ProgramError("the program is empty", mend="a program sets xy, lxy, velxy, ...")
+
+
+def _job_of_arrays(
+    text: _Text, number: int, values: dict[str, _Value], dialect: Dialect
+) -> ReadJob:
+    """The six values as one job, once they agree."""
+    scalar = {name: int(values[name].table[0, 0]) for name in NAMES if name not in TABLES}
+
+    def where(name: str, row: int, column: int) -> str:
+        return text.where_in(values[name], row, column)
+
+    count = scalar["size_of_array"]
+    check_count(count, where, dialect)
+    for name in TABLES:
+        wanted = (2, count + 1 if name == "xy" else count)
+        if values[name].table.shape != wanted:
+            rows, columns = values[name].table.shape
+            text.fail(
+                values[name].offset,
+                f"{name} has {rows} rows of {columns} numbers, not {wanted[0]} of {wanted[1]}",
+                f"size_of_array is {count}",
+            )
+    job = ReadJob(
+        number,
+        np.array([scalar["first_pointx"], scalar["first_pointy"]]),
+        values["lxy"].table,
+        values["velxy"].table,
+        where,
+    )
+    _agree(job, values["xy"].table)
+    check_job(job, dialect)
+    return job
+
+
+def _agree(job: ReadJob, xy: Ints) -> None:
+    """xy says again what first point, lxy and the signs of velxy say."""
+    for axis, name in enumerate(("first_pointx", "first_pointy")):
+        if int(job.first[axis]) != int(xy[axis, 0]):
+            fail(
+                job.where(name, 0, 0),
+                f"{name} is {int(job.first[axis])}, xy begins at {int(xy[axis, 0])}",
+            )
+    step = np.diff(xy, axis=1)
+    for name, table, bad in (
+        ("lxy", job.length, np.abs(step) != job.length),
+        ("velxy", job.speed, step * job.speed < 0),
+    ):
+        if bad.any():
+            column, row = (int(index) for index in np.argwhere(bad.T)[0])
+            fail(
+                job.where(name, row, column),
+                f"{int(table[row, column])} in {name} does not fit xy, which goes by"
+                f" {int(step[row, column])}",
+            )
+
+
+class _Text:
+    """The text and how far it has been read."""
+
+    def __init__(self, data: bytes) -> None:
+        odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
+        self.text = data[: odd.start() if odd else len(data)].decode("ascii")
+        if odd:
+            byte = data[odd.start()]
+            self.fail(len(self.text), f"the byte 0x{byte:02x} belongs to no program")
+        self.at = self._blank(0)
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing but blanks is left."""
+        return self.at == len(self.text)
+
+    def fail(self, offset: int, message: str, mend: str = "") -> None:
+        """ProgramError at an offset; never returns."""
+        fail(self._where(offset), message, mend)
+
+    def where_in(self, value: _Value, row: int, column: int) -> str:
+        """Line and column of a number of a table."""
+        rest = row * value.table.shape[1] + column
+        for index, match in enumerate(_TOKEN.finditer(self.text, value.offset)):
+            if index == rest:
+                return self._where(match.start())
+        return self._where(value.offset)
+
+    def name(self) -> tuple[str, str | None, int]:
+        """`name =` or `name{1} =`: the name, the number in braces, and where it stood."""
+        at = self.at
+        match = _NAME.match(self.text, at)
+        if match is None:
+            self.fail(at, f"{self._shown(at)} is no `name = numbers;`", "remove it")
+            raise AssertionError
+        self.at = match.end()
+        return match[1], match[2], at
+
+    def scalar(self) -> _Value:
+        """One whole number and the end of its statement."""
+        match = _TEXT_NUMBER.match(self.text, self.at)
+        if match is None:
+            self.fail(self.at, f"{self._shown(self.at)} is no whole number")
+            raise AssertionError
+        self._finish(match.end())
+        return _Value(np.array([[self._int(match[0], match.start())]]), match.start())
+
+    def listed(self) -> None:
+        """The list of a job's six names."""
+        match = _LIST.match(self.text, self.at)
+        if match is None:
+            self.fail(self.at, "jobs takes the six names of a job, in their order")
+            raise AssertionError
+        self._finish(match.end())
+
+    def table(self) -> _Value:
+        """Numbers in brackets, in rows of one length, and the end of the statement."""
+        match = _ROWS.match(self.text, self.at)
+        if match is None:
+            self._fail_rows()
+            raise AssertionError
+        begin = match.start(1)
+        if _WHOLE.fullmatch(match[1]) is None:
+            self._refuse_words(begin, match.end(1))
+        rows: list[list[int]] = []
+        offset = begin
+        for part in _ROW_END.split(match[1]):
+            if words := part.replace(",", " ").split():
+                rows.append(list(map(int, words)))
+                if len(words) != len(rows[0]):
+                    self.fail(
+                        offset + len(part) - len(part.lstrip()),
+                        f"a row has {len(words)} numbers, the first one {len(rows[0])}",
+                        "numbers are whole tenths of a millimetre, without decimals",
+                    )
+            offset += len(part) + 1
+        if not rows:
+            self.fail(begin, "an array is empty")
+        table = np.array(rows, dtype=np.int64)
+        if np.abs(table).max() > MOST_NUMBER:
+            self._refuse_words(begin, match.end(1))
+        self._finish(match.end())
+        return _Value(table, begin)
+
+    def _refuse_words(self, begin: int, end: int) -> None:
+        """ProgramError at the first word between two places that is no number of an int16."""
+        for match in _TOKEN.finditer(self.text, begin, end):
+            self._int(match[0], match.start())
+
+    def _int(self, word: str, offset: int) -> int:
+        """A word at an offset as a whole number."""
+        if _TEXT_NUMBER.fullmatch(word) is None or abs(int(word)) > MOST_NUMBER:
+            self.fail(offset, f"{word[:SHOWN_CHARS]!r} is no whole number of an int16")
+        return int(word)
+
+    def _fail_rows(self) -> None:
+        """Where an array goes wrong: its opening, a sign in it, or its end."""
+        if self.text[self.at : self.at + 1] != "[":
+            self.fail(self.at, f"{self._shown(self.at)} is no array", "write [ and ]")
+        odd = re.compile(r"[^0-9 \t\r\n,;+-]").search(self.text, self.at + 1)
+        if odd is None:
+            self.fail(len(self.text), "the program breaks off inside an array")
+        elif odd[0] == ".":
+            mend = "numbers are whole tenths of a millimetre, without decimals"
+            self.fail(odd.start(), "a decimal point in an array", mend)
+        else:
+            self.fail(odd.start(), f"{self._shown(odd.start())} stands in an array")
+
+    def _finish(self, offset: int) -> None:
+        """Nothing but ; and a comment stands behind a value on its line."""
+        match = _END.match(self.text, offset)
+        if match is None:
+            self.fail(offset, f"{self._shown(offset)} stands behind a value")
+            raise AssertionError
+        self.at = self._blank(match.end())
+
+    def _blank(self, offset: int) -> int:
+        match = _BLANK.match(self.text, offset)
+        return match.end() if match else offset
+
+    def _shown(self, offset: int) -> str:
+        line = self.text[offset : offset + SHOWN_CHARS].splitlines()
+        return repr(line[0]) if line else "nothing"
+
+    def _where(self, offset: int) -> str:
+        line = self.text.count("\n", 0, offset) + 1
+        return f"line {line}, column {offset - self.text.rfind(chr(10), 0, offset)}"
+
+
+# Reading the serial stream as the master does: numbers in digits, each ended by a carriage
+# return, in this order: lines n, first x, first y, n lx, n ly, n velx, n vely (L4294-4360,
+# L4668-4708). Jobs follow one another; a master takes one and must be reset for the next.
+
+HEADER: Final = ("size_of_array", "first_pointx", "first_pointy")
+BODY: Final = {"lxy": 0, "velxy": 2}
+"""Which of the four rows of n numbers an array's x stands in."""
+
+MOST_DIGITS: Final = 5
+"""The master's buffer takes six characters, a sign and five digits (L4668-4708)."""
+
+_STREAM_NUMBER: Final = re.compile(rb"-?\d{1,%d}" % MOST_DIGITS)
+SHOWN_BYTES: Final = 12
+"""An error message shows no more of a number than this."""
+
+
+def read_stream(data: bytes, dialect: Dialect) -> Iterator[ReadJob]:
+    """The jobs of a stream, checked; ProgramError naming job, number and byte."""
+    if not data:
+        raise ProgramError("the stream is empty", mend="a stream begins with the count of lines")
+    feed = data.find(b"\r\n") if dialect.first_y == "number" else -1
+    if feed >= 0:
+        fail(f"byte {feed + 2}", "a line feed: the master takes it for part of the next number")
+    words = data.split(b"\r")
+    if words[-1]:
+        at = len(data) - len(words[-1]) + 1
+        fail(f"byte {at}", "the stream breaks off inside a number", "end it with a CR")
+    words.pop()
+    first = 0
+    number = 0
+    while first < len(words):
+        number += 1
+        job = _job_of_words(words, first, number, dialect)
+        check_job(job, dialect)
+        yield job
+        first += len(HEADER) + 2 * job.length.size
+
+
+def _job_of_words(words: list[bytes], first: int, number: int, dialect: Dialect) -> ReadJob:
+    """The job whose header begins at this word."""
+
+    def place(word: int) -> str:
+        byte = sum(map(len, words[: first + word])) + first + word + 1
+        return f"job {number}, number {word + 1}, byte {byte}"
+
+    def where(name: str, row: int, column: int) -> str:
+        if name in HEADER:
+            return place(HEADER.index(name))
+        return place(len(HEADER) + (BODY[name] + row) * count + column)
+
+    head = words[first : first + len(HEADER)]
+    if len(head) < len(HEADER):
+        fail(place(len(head)), "the stream ends inside the header of a job")
+    for index in (0, 1):
+        if _STREAM_NUMBER.fullmatch(head[index]) is None:
+            _fail_number(head[index], place(index))
+    count, x = int(head[0]), int(head[1])
+    check_count(count, where, dialect)
+    y = _first_y(head[2], place, dialect)
+    begin = first + len(HEADER)
+    body = words[begin : begin + 4 * count]
+    for index, word in enumerate(body):
+        if _STREAM_NUMBER.fullmatch(word) is None:
+            _fail_number(word, place(len(HEADER) + index))
+    if len(body) < 4 * count:
+        fail(
+            place(len(HEADER) + len(body)),
+            f"the stream ends after {len(body)} of {4 * count} numbers",
+            f"a job of {count} lines has four for each",
+        )
+    table = np.array(list(map(int, body)), dtype=np.int64).reshape(4, count)
+    return ReadJob(number, np.array([x, y]), table[:2], table[2:], where)
+
+
+def _fail_number(word: bytes, where: str) -> NoReturn:
+    fail(
+        where,
+        f"{word[:SHOWN_BYTES]!r} is no whole number of at most {MOST_DIGITS} digits",
+        "each number is digits and a CR, nothing else",
+    )
+
+
+def _first_y(word: bytes, place: Callable[[int], str], dialect: Dialect) -> int:
+    """y of the first point; sent as a character, the master's atol makes its digit or 0 of it."""
+    if dialect.first_y == "character":
+        if len(word) != 1:
+            fail(
+                place(2),
+                f"{word[:SHOWN_BYTES]!r} is not one character",
+                "use --set dialect.first_y=number",
+            )
+        return int(word) if word.isdigit() else 0
+    if _STREAM_NUMBER.fullmatch(word) is None:
+        if len(word) == 1:
+            fail(
+                place(2),
+                f"y of the first point is the character {word!r}, as the listing sends it",
+                "use --set dialect.profile=listing",
+            )
+        _fail_number(word, place(2))
+    return int(word)
+
+
+# A program for people: each block as the columns of the arrays that make it, 1-based as there.
+#
+# The .m file has no lines that are blocks. A block is a column of three arrays, so it is shown as
+# those columns, in the words of the language: `xy(:,13) = [400; 265]; lxy(:,12) = [249; 179];
+# velxy(:,12) = [480; 345];`. A job's own block, its way to the first point, is that point. The
+# serial stream says no names; its numbers are shown with the names of the arrays that they fill.
+
+
+def listing(data: bytes, machine: Machine) -> Listing:
+    """The blocks of a program that its reader takes."""
+    dialect = dialect_of(machine)
+    if dialect.format == "stream":
+        jobs = [_streamed(words) for words in _words_of(data, read_stream(data, dialect))]
+    else:
+        jobs = [_arrays(job) for job in read_text(data, dialect)]
+    if len(jobs) == 1:
+        return Listing(tuple(jobs[0]))
+    named = ([f"job {number}: {block}" for block in job] for number, job in enumerate(jobs, 1))
+    return Listing(tuple(block for job in named for block in job))
+
+
+def _arrays(job: ReadJob) -> list[str]:
+    """The first point, then a column of `xy`, `lxy` and `velxy` for each line."""
+    x, y = job.first.tolist()
+    at = (job.first[:, None] + job.steps.cumsum(axis=1)).T.tolist()
+    lengths, speeds = job.length.T.tolist(), job.speed.T.tolist()
+    return [
+        f"xy(:,1) = [{x}; {y}]; first_pointx = {x}; first_pointy = {y};",
+        *(
+            f"xy(:,{column + 1}) = [{end[0]}; {end[1]}]; "
+            f"lxy(:,{column}) = [{length[0]}; {length[1]}]; "
+            f"velxy(:,{column}) = [{speed[0]}; {speed[1]}];"
+            for column, (end, length, speed) in enumerate(zip(at, lengths, speeds, strict=True), 1)
+        ),
+    ]
+
+
+def _words_of(data: bytes, jobs: Iterator[ReadJob]) -> Iterator[list[str]]:
+    """The numbers of each job as they are sent; a character that cannot be shown as its code."""
+    escaped = data.decode("latin-1").encode("unicode_escape").decode("ascii")
+    words = escaped.split(r"\r")
+    begin = 0
+    for job in jobs:
+        end = begin + len(HEADER) + 2 * job.length.size
+        yield words[begin:end]
+        begin = end
+
+
+def _streamed(words: list[str]) -> list[str]:
+    """The header, then the four numbers of each line."""
+    count = int(words[0])
+    body = words[len(HEADER) :]
+    head = (f"{name} {word}" for name, word in zip(HEADER, words, strict=False))
+    rows = [body[row * count : (row + 1) * count] for row in range(4)]
+    return [
+        "  ".join(head),
+        *(
+            f"lxy {column}: {lx} {ly}  velxy {column}: {vx} {vy}"
+            for column, (lx, ly, vx, vy) in enumerate(zip(*rows, strict=True), 1)
+        ),
+    ]

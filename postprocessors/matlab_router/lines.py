@@ -1,0 +1,500 @@
+"""The writer's second stage: lines in mm become jobs of lines that the slaves can run.
+
+All numbers here are whole units of 0.1 mm, counted from home. A slave runs a distance in chunks
+of two units and counts `distance / 2 − 1` of them downwards (L5589-5729), so that
+
+- a distance of 1 (and a first point at 0 or 1) makes it run away: never sent;
+- an odd distance loses its unit: vertices lie on a grid of two units unless asked otherwise;
+- a speed of 0 on a distance never ends: never sent.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Floats, Ints, Toolpath
+
+from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Dialect
+from .strokes import Cuts, place
+
+Bools = npt.NDArray[np.bool_]
+
+TIE_TOLERANCE: Final = 1e-6
+"""A coordinate within this part of the grid of half-way between two of its lines is half-way, and
+goes to the farther one."""
+
+FEED_TOLERANCE: Final = 1e-6
+"""A feed within this many counts of the limit is on it."""
+
+FASTEST_COUNTS: Final = 1023
+"""The slaves throw away a speed that they measure above this (L5496-5516)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """L lines that the slaves can run: `start`, `end` (L, 2) units from home; `feed` (L,) mm/min;
+    `row` (L,) of the toolpath; `stroke` (L,) ascending."""
+
+    start: Ints
+    end: Ints
+    feed: Floats
+    row: Ints
+    stroke: Ints
+
+    def chosen(self, keep: Bools) -> Lines:
+        """The lines where `keep` (L,) is true."""
+        return Lines(
+            self.start[keep], self.end[keep], self.feed[keep], self.row[keep], self.stroke[keep]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Jobs:
+    """All jobs in columns: their lines, the signed speeds (L, 2) of these in counts in 5 ms, and
+    `offsets` (J+1,): job j has the lines offsets[j]:offsets[j+1]."""
+
+    lines: Lines
+    speed: Ints
+    offsets: list[int]
+
+
+def jobs_of(cuts: Cuts, toolpath: Toolpath, machine: Machine, dialect: Dialect) -> _Maker:
+    """The maker of the jobs: `jobs` and `notes` of what was changed on the way.
+
+    PostError for what lies outside of the area or has a feed that cannot be said.
+    """
+    return _Maker(cuts, toolpath, machine, dialect)
+
+
+class _Maker:
+    """One run over all lines."""
+
+    def __init__(self, cuts: Cuts, toolpath: Toolpath, machine: Machine, dialect: Dialect) -> None:
+        self.notes = Notes()
+        self._toolpath = toolpath
+        self._dialect = dialect
+        self._machine = machine
+        self._zero = np.array(machine.controller.machine_zero_mm[:2])
+        self._unit = machine.feed.unit_mm_min
+        self._least = max(CHUNK_UNITS, dialect.grid_units)
+        self._most_counts = min(
+            FASTEST_COUNTS, int(machine.max_feed_mm_min / self._unit + FEED_TOLERANCE)
+        )
+        lines = self._straight(self._mended(self._on_grid(cuts)))
+        self.jobs = Jobs(lines, self._speeds(lines), self._offsets(lines))
+
+    def _on_grid(self, cuts: Cuts) -> Lines:
+        """Vertices at the nearest point of the grid, the first one of a stroke not nearer to home
+        than a chunk; PostError for those outside the area."""
+        grid, count = self._dialect.grid_units, len(cuts.row)
+        rows = np.concatenate([cuts.row, cuts.row])
+        wanted = (np.concatenate([cuts.start, cuts.end]) - self._zero) * UNITS_PER_MM
+        units = np.floor(wanted / grid + 0.5 + TIE_TOLERANCE) * grid
+        self._refuse_outside(rows, units)
+        first = np.concatenate([np.diff(cuts.stroke, prepend=-1) != 0, np.zeros(count, np.bool_)])
+        early = first & (units < CHUNK_UNITS).any(axis=1)
+        units[early] = np.maximum(units[early], self._least)
+        self.notes.late_starts += int(early.sum())
+        if count:
+            moved = np.hypot(*(units - wanted).T)
+            row = int(rows[int(np.argmax(moved))])
+            self.notes.snapped(float(moved.max()) * UNIT_MM, place(self._toolpath, row))
+        whole = units.astype(np.int64)
+        return Lines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
+
+    def _refuse_outside(self, rows: Ints, units: Floats) -> None:
+        for axis, name in enumerate("XY"):
+            travel = (self._machine.axes.x, self._machine.axes.y)[axis].travel_mm
+            most = MOST_NUMBER if travel is None else min(MOST_NUMBER, travel * UNITS_PER_MM)
+            bad = ~((units[:, axis] >= 0.0) & (units[:, axis] <= most + TIE_TOLERANCE))
+            if bad.any():
+                line = int(np.argmax(bad))
+                raise PostError(
+                    f"{name} {units[line, axis] * UNIT_MM:.1f} mm from home is outside of 0 to"
+                    f" {most * UNIT_MM:g} mm",
+                    where=place(self._toolpath, int(rows[line])),
+                    mend=self._room(units, axis, most),
+                )
+
+    def _room(self, units: Floats, axis: int, most: float) -> str:
+        """How to bring everything into the area along an axis: the place of home that does it."""
+        low, high = float(units[:, axis].min()), float(units[:, axis].max())
+        if not high - low <= most:
+            return "scale the drawing down"
+        # Whole millimetres, and one to spare where there is room for it.
+        zero = list(self._machine.controller.machine_zero_mm)
+        shift = min(math.ceil(-low * UNIT_MM) + 1.0, (most - high) * UNIT_MM)
+        zero[axis] -= shift
+        said = ",".join(f"{value:g}" for value in zero)
+        return f"use --origin lower-left, or --set controller.machine_zero_mm=[{said}]"
+
+    def _mended(self, lines: Lines) -> Lines:
+        """No distance of 1 and no line of no length."""
+        if (np.abs(lines.end - lines.start) == 1).any():
+            lines = self._without_ones(lines)
+        keep = (lines.end != lines.start).any(axis=1)
+        self.notes.dropped += int(len(keep) - keep.sum())
+        left = np.unique(lines.stroke[keep])
+        for stroke in np.setdiff1d(lines.stroke, left).tolist():
+            row = int(lines.row[int(np.searchsorted(lines.stroke, stroke))])
+            self.notes.lost(place(self._toolpath, row))
+        return lines.chosen(keep)
+
+    def _without_ones(self, lines: Lines) -> Lines:
+        """A vertex one unit from the one before it (in X or Y) moves there; each vertex is moved
+        from its own place, so no error adds up."""
+        starts, ends, strokes = lines.start.tolist(), lines.end.tolist(), lines.stroke.tolist()
+        for line, end in enumerate(ends):
+            if line and strokes[line] == strokes[line - 1]:
+                starts[line] = ends[line - 1]
+            for axis in (0, 1):
+                if abs(end[axis] - starts[line][axis]) == 1:
+                    end[axis] = starts[line][axis]
+                    self.notes.ones += 1
+        return replace(lines, start=np.array(starts), end=np.array(ends))
+
+    def _majors(self, lines: Lines) -> tuple[Ints, Floats, Ints]:
+        """Distances (L, 2); the larger of each line as a float (L,); its speed in counts (L,)."""
+        distance = np.abs(lines.end - lines.start)
+        larger = distance.max(axis=1).astype(np.float64)
+        slant = np.hypot(*distance.T) / larger
+        share = 1.0 / slant if self._dialect.speed == "path" else 1.0
+        wanted = np.minimum(lines.feed * share / self._unit, float(MOST_NUMBER))
+        counts = np.floor(wanted + 0.5).astype(np.int64)
+        fast = counts > self._most_counts
+        if self._dialect.too_fast == "limited":
+            self.notes.limited = max(self.notes.limited, int(fast.sum()))
+            wanted = np.where(fast, self._most_counts, wanted)
+            counts = np.minimum(counts, self._most_counts)
+        else:
+            self._refuse_feed(lines, fast, "above what its axes run at")
+        self._refuse_feed(lines, counts < 1, "below one count of the encoder in 5 ms")
+        off = np.abs(wanted - counts) * self._unit
+        self.notes.feed_off = max(self.notes.feed_off, float(off.max(initial=0.0)))
+        if self._dialect.speed == "axis":
+            self.notes.faster = max(self.notes.faster, float(slant.max(initial=1.0)))
+        return distance, larger, counts
+
+    def _refuse_feed(self, lines: Lines, bad: Bools, what: str) -> None:
+        if bad.any():
+            line = int(np.argmax(bad))
+            raise PostError(
+                f"feed {lines.feed[line]:g} mm/min is {what}",
+                where=place(self._toolpath, int(lines.row[line])),
+                mend=f"an axis runs at {self._unit:g} to {self._most_counts * self._unit:g}"
+                " mm/min; --set dialect.too_fast=limited takes the highest",
+            )
+
+    def _speeds(self, lines: Lines) -> Ints:
+        """(L, 2) signed counts: the larger distance at its speed, the other one in proportion,
+        by the same operations as the listing (L4444-4515) so that ties fall alike."""
+        distance, larger, counts = self._majors(lines)
+        with np.errstate(divide="ignore"):
+            factor = larger[:, None] / distance
+        speed = np.floor(counts[:, None] / factor + 0.5).astype(np.int64)
+        if ((speed == 0) & (distance > 0)).any() or (distance == 1).any():
+            raise PostError("internal fault: a line that the slaves would never end")
+        return np.asarray(np.where(lines.end < lines.start, -speed, speed))
+
+    def _straight(self, lines: Lines) -> Lines:
+        """Lines that whole speeds would bend too much, or stop, in pieces."""
+        distance, larger, counts = self._majors(lines)
+        limits = Limits(
+            self._dialect.bend_tolerance_mm * UNITS_PER_MM, self._dialect.grid_units, self._least
+        )
+        bad = np.flatnonzero(bends(larger, distance.min(axis=1), counts, limits.tolerance))
+        if len(bad) == 0:
+            return lines
+        self.notes.bent += len(bad)
+        starts, ends = lines.start[bad].tolist(), lines.end[bad].tolist()
+        pieces = [
+            split_line(start, end, count, limits)
+            for start, end, count in zip(starts, ends, counts[bad].tolist(), strict=True)
+        ]
+        times = np.ones(len(larger), dtype=np.int64)
+        times[bad] = [len(part) for part in pieces]
+        source = np.repeat(np.arange(len(times)), times)
+        inner = np.isin(source, bad)
+        end = lines.end[source]
+        end[inner] = [point for part in pieces for point in part]
+        start = lines.start[source]
+        again = np.diff(source, prepend=-1) == 0
+        start[again] = end[np.flatnonzero(again) - 1]
+        return Lines(start, end, lines.feed[source], lines.row[source], lines.stroke[source])
+
+    def _offsets(self, lines: Lines) -> list[int]:
+        """Where each job begins, and the end of the last one."""
+        count = len(lines.row)
+        if count == 0:
+            return [0]
+        begins = np.flatnonzero(np.diff(lines.stroke, prepend=-1)).tolist()
+        offsets = []
+        for first, last in zip(begins, [*begins[1:], count], strict=True):
+            begin = first
+            while begin < last:
+                offsets.append(begin)
+                begin = self._cut_at(lines, begin, last)
+                self.notes.more_jobs += begin < last
+        return [*offsets, count]
+
+    def _cut_at(self, lines: Lines, first: int, last: int) -> int:
+        """Where the job that begins with this line ends: at most `max_lines` on, and at a vertex
+        from which the next job can begin."""
+        most = first + self._dialect.max_lines
+        if most >= last:
+            return last
+        usable = (lines.end[first:most] >= CHUNK_UNITS).all(axis=1)
+        if not usable.any():
+            raise PostError(
+                f"{self._dialect.max_lines} lines on without a vertex at which a job could begin: "
+                "all lie on X 0 or Y 0",
+                where=place(self._toolpath, int(lines.row[first])),
+                mend="move the drawing away from home",
+            )
+        return first + 1 + int(np.flatnonzero(usable)[-1])
+
+
+# Lines that whole speeds would bend, in pieces that stay straight.
+#
+# Speeds are whole counts, so the slower axis is a little too fast or too slow, and one axis
+# arrives first: the line bends. For distances D ≥ d and speeds V, v of the faster and the slower
+# axis
+#
+#     r = (v/V) / (d/D),   bend = d · (1 − min(r, 1/r))
+#
+# Lines that bend by more than a tolerance are halved until they do not, or until the slower axis
+# has a single chunk left; if its speed still is 0, the line becomes three: along the faster axis,
+# across with v = 1 (d · V long), along again.
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How far a line may bend, the grid of its ends, and the least distance; all in units."""
+
+    tolerance: float
+    grid: int
+    least: int
+
+
+def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bools:
+    """(n,) which lines stop (v = 0) or bend by more than the tolerance (units)."""
+    slanted = smaller > 0
+    wanted = counts * smaller / larger
+    whole = np.floor(wanted + 0.5)
+    ratio = np.where(slanted, whole / np.where(slanted, wanted, 1.0), 1.0)
+    with np.errstate(divide="ignore"):
+        bend = smaller * (1.0 - np.minimum(ratio, 1.0 / ratio))
+    return np.asarray(slanted & ((whole == 0.0) | (bend > tolerance)))
+
+
+def split_line(start: list[int], end: list[int], counts: int, limits: Limits) -> list[list[int]]:
+    """The ends of the pieces of one line from `start` to `end` (x, y), its own end last."""
+    way = (end[0] - start[0], end[1] - start[1])
+    major = 0 if abs(way[0]) >= abs(way[1]) else 1
+    at = list(start)
+    ends = []
+    for along, across in _pieces(abs(way[major]), abs(way[1 - major]), counts, limits):
+        at[major] += along if way[major] > 0 else -along
+        at[1 - major] += across if way[1 - major] > 0 else -across
+        ends.append(list(at))
+    return ends
+
+
+def _bend(longer: int, shorter: int, counts: int) -> float:
+    """How far one line bends (units); inf when its slower axis would stop."""
+    wanted = counts * shorter / longer
+    whole = math.floor(wanted + 0.5)
+    if shorter == 0:
+        return 0.0
+    if whole == 0:
+        return math.inf
+    return shorter * (1.0 - min(whole / wanted, wanted / whole))
+
+
+def _pieces(longer: int, shorter: int, counts: int, limits: Limits) -> list[tuple[int, int]]:
+    """A line of these distances as pieces (along, across) that do not bend too much."""
+    bend = _bend(longer, shorter, counts)
+    if bend <= limits.tolerance:
+        return [(longer, shorter)]
+    grid = limits.grid
+    if shorter >= 2 * limits.least:
+        along, across = longer // 2 // grid * grid, shorter // 2 // grid * grid
+        return [
+            *_pieces(along, across, counts, limits),
+            *_pieces(longer - along, shorter - across, counts, limits),
+        ]
+    if bend < math.inf:
+        return [(longer, shorter)]
+    rest = longer - shorter * counts
+    before = rest // 2 // grid * grid
+    before = before if before >= limits.least else 0
+    parts = [(before, 0), (shorter * counts, shorter), (rest - before, 0)]
+    return [part for part in parts if part != (0, 0)]
+
+
+# What the writer changed, counted, and told as one finding each.
+
+FEED_NOTICE: Final = 1e-6
+"""A feed that is off by less than this many mm/min is as wanted."""
+
+SNAP_NOTICE_MM: Final = 1e-6
+"""A vertex that is moved by less lies on the grid already."""
+
+
+@dataclass
+class Notes:
+    """Counts of one run of the writer; places name the worst or the first of each kind."""
+
+    snap_mm: float = 0.0
+    snap_place: str = ""
+    late_starts: int = 0
+    ones: int = 0
+    dropped: int = 0
+    lost_strokes: int = 0
+    lost_place: str = ""
+    bent: int = 0
+    more_jobs: int = 0
+    limited: int = 0
+    feed_off: float = 0.0
+    faster: float = 1.0
+
+    def snapped(self, moved_mm: float, place: str) -> None:
+        """A stroke whose worst vertex was moved by this much."""
+        if moved_mm > max(self.snap_mm, SNAP_NOTICE_MM):
+            self.snap_mm, self.snap_place = moved_mm, place
+
+    def lost(self, place: str) -> None:
+        """A stroke of which nothing is left on the grid."""
+        self.lost_strokes += 1
+        self.lost_place = self.lost_place or place
+
+    def findings(self, dialect: Dialect) -> list[Finding]:
+        """One finding for each kind of change that was made."""
+        return [*self._places(dialect), *self._lines(dialect), *self._feeds()]
+
+    def _places(self, dialect: Dialect) -> list[Finding]:
+        grid_mm = dialect.grid_units * UNIT_MM
+        found = []
+        if self.snap_mm:
+            starts = (
+                f"; {self.late_starts} strokes begin at least {grid_mm:g} mm from home, because"
+                " the way to a first point of 0 would never end"
+                if self.late_starts
+                else ""
+            )
+            found.append(
+                Finding(
+                    Code.PLACES_SNAPPED,
+                    Severity.WARNING,
+                    f"vertices were moved to the grid of {grid_mm:g} mm, by"
+                    f" {self.snap_mm * 1000.0:.0f} µm at most{starts}",
+                    where=self.snap_place,
+                    measured=self.snap_mm,
+                    limit=grid_mm,
+                    unit="mm",
+                )
+            )
+        if self.ones:
+            found.append(
+                Finding(
+                    Code.PLACES_SNAPPED,
+                    Severity.WARNING,
+                    f"{self.ones} vertices were moved by 0.1 mm, because a distance of 0.1 mm"
+                    " would never end",
+                    measured=float(self.ones),
+                )
+            )
+        return found
+
+    def _lines(self, dialect: Dialect) -> list[Finding]:
+        grid_mm = dialect.grid_units * UNIT_MM
+        found = []
+        if self.lost_strokes:
+            found.append(
+                Finding(
+                    Code.MOVE_COLLAPSED,
+                    Severity.WARNING,
+                    f"{self.lost_strokes} strokes are smaller than the grid of {grid_mm:g} mm and"
+                    " are not cut at all; scale the drawing up",
+                    where=self.lost_place,
+                    measured=float(self.lost_strokes),
+                    unit="strokes",
+                )
+            )
+        if self.dropped:
+            found.append(
+                Finding(
+                    Code.MOVE_COLLAPSED,
+                    Severity.INFO,
+                    f"{self.dropped} lines shorter than the grid of {grid_mm:g} mm were left out",
+                    measured=float(self.dropped),
+                    unit="moves",
+                )
+            )
+        if self.bent:
+            found.append(
+                Finding(
+                    Code.MOVE_SPLIT,
+                    Severity.INFO,
+                    f"{self.bent} lines nearly along an axis became several, because whole speeds"
+                    f" would bend them by more than {dialect.bend_tolerance_mm:g} mm",
+                    measured=float(self.bent),
+                    unit="moves",
+                )
+            )
+        if self.more_jobs:
+            found.append(
+                Finding(
+                    Code.MOVE_SPLIT,
+                    Severity.WARNING,
+                    f"strokes of more than {dialect.max_lines} lines became {self.more_jobs} more"
+                    " jobs: between two jobs the machine goes home, and begins where it ended",
+                    measured=float(self.more_jobs),
+                    unit="jobs",
+                )
+            )
+        return found
+
+    def _feeds(self) -> list[Finding]:
+        found = []
+        if self.limited:
+            found.append(
+                Finding(
+                    Code.FEED_ROUNDED,
+                    Severity.WARNING,
+                    f"{self.limited} lines run at the highest speed of an axis, less than wanted",
+                    measured=float(self.limited),
+                    unit="moves",
+                )
+            )
+        if self.feed_off > FEED_NOTICE:
+            found.append(
+                Finding(
+                    Code.FEED_ROUNDED,
+                    Severity.INFO,
+                    "feeds were rounded to whole counts of the encoder in 5 ms, by"
+                    f" {self.feed_off:.3g} mm/min at most",
+                    measured=self.feed_off,
+                    unit="mm_min",
+                )
+            )
+        if self.faster > 1.0:
+            found.append(
+                Finding(
+                    Code.FEED_ROUNDED,
+                    Severity.INFO,
+                    "the feed is that of the faster axis: on slanted lines the tool runs up to"
+                    f" {self.faster:.2f} times as fast; use --set dialect.speed=path",
+                    measured=self.faster,
+                    unit="times",
+                )
+            )
+        return found

@@ -1,0 +1,347 @@
+"""Reading a matlab-router program, .m or stream, into the moves that the machine makes of it.
+
+Each job: home with Z, then X and Y; to the first point along X, then along Y; the plunge; the
+lines, one after the other, with a full stop at each vertex (L4718-4929). Going home is written as
+rapids to the place of home, so that other machines can follow.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
+
+from .dialect import FIXED_Y_UNITS, UNIT_MM, UNITS_PER_MM, Dialect, cut_z_mm, dialect_of
+from .jobs import Executed, ReadJob, execute, read_stream, read_text
+
+_STREAM: Final = re.compile(rb"-?\d+\r(?!\n)")
+
+
+def read_program(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError naming the place when it is none."""
+    dialect = dialect_of(machine)
+    streamed = _STREAM.match(data) is not None
+    if streamed != (dialect.format == "stream"):
+        if streamed:
+            raise ProgramError("this is a serial stream", mend="use --set dialect.format=stream")
+        if data and _looks_like_text(data):
+            raise ProgramError("this is no serial stream", mend="use --set dialect.format=m")
+    read = read_stream if dialect.format == "stream" else read_text
+    moves = _Moves(machine, dialect)
+    for job in read(data, dialect):
+        moves.add(job)
+    return moves.finish()
+
+
+def _looks_like_text(data: bytes) -> bool:
+    return re.match(rb"\s*(?:%|[a-z])", data) is not None
+
+
+class _Moves:
+    """Jobs in, the columns of a toolpath out."""
+
+    def __init__(self, machine: Machine, dialect: Dialect) -> None:
+        self._machine = machine
+        self._dialect = dialect
+        self._home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
+        self._position = np.zeros(3)
+        self._kind: list[Ints] = []
+        self._end: list[Floats] = []
+        self._feed: list[Floats] = []
+        self._value: list[Floats] = []
+        self._block: list[Ints] = []
+        self._blocks = 0
+        self._seen = Seen(machine, dialect)
+
+    def add(self, job: ReadJob) -> None:
+        """The rows of one job."""
+        done = execute(job, self._dialect)
+        self._seen.add(job, done)
+        self._go_home(self._blocks)
+        x, y = self._home[:2] + done.points[0] / UNITS_PER_MM
+        up, down = self._home[2], cut_z_mm(self._machine, self._dialect)
+        self._rapid((x, self._home[1], up), self._blocks)
+        self._rapid((x, y, up), self._blocks)
+        self._row(Kind.LINE, (x, y, down), self._blocks, feed=self._dialect.plunge_mm_min)
+        if self._dialect.spindle_rpm is not None:
+            self._row(Kind.SPINDLE_CW, (x, y, down), self._blocks, value=self._dialect.spindle_rpm)
+        self._lines(job, done, down)
+        self._blocks += job.length.shape[1] + 1
+        last = self._blocks - 1
+        if self._dialect.spindle_rpm is not None:
+            self._row(Kind.SPINDLE_OFF, tuple(self._position), last)
+        if self._dialect.end == "raise":
+            self._go_home(last)
+
+    def finish(self) -> Toolpath:
+        """The toolpath of all jobs."""
+        self._row(Kind.END, tuple(self._position), max(0, self._blocks - 1))
+        kind = np.concatenate(self._kind)
+        return Toolpath(
+            kind=kind,
+            end=np.concatenate(self._end),
+            centre=np.full((len(kind), 2), np.nan),
+            feed=np.concatenate(self._feed),
+            value=np.concatenate(self._value),
+            source=np.full(len(kind), -1),
+            block=np.concatenate(self._block),
+            start=np.zeros(3),
+            findings=tuple(self._seen.findings()),
+        )
+
+    def _lines(self, job: ReadJob, done: Executed, z: float) -> None:
+        """One row a line; two where its speeds bend it by more than the tolerance."""
+        run = Run(done.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
+        self._seen.bent.add(
+            run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"
+        )
+        if len(run.end) == 0:
+            return
+        xy = self._home[:2] + run.end / UNITS_PER_MM
+        count = len(run.end)
+        self._kind.append(np.full(count, Kind.LINE, dtype=np.int64))
+        self._end.append(np.column_stack([xy, np.full(count, z)]))
+        self._feed.append(run.speed * self._machine.feed.unit_mm_min)
+        self._value.append(np.full(count, np.nan))
+        self._block.append(self._blocks + 1 + run.line)
+        self._position = self._end[-1][-1]
+
+    def _go_home(self, block: int) -> None:
+        """Z first, then X and Y (state 0, L4718-4793)."""
+        x, y, _ = self._position
+        self._rapid((x, y, self._home[2]), block)
+        self._rapid((self._home[0], y, self._home[2]), block)
+        self._rapid((self._home[0], self._home[1], self._home[2]), block)
+
+    def _rapid(self, to: tuple[float, ...], block: int) -> None:
+        if tuple(self._position) != to:
+            self._row(Kind.RAPID, to, block)
+
+    def _row(
+        self,
+        kind: Kind,
+        to: tuple[float, ...],
+        block: int,
+        *,
+        feed: float = np.nan,
+        value: float = np.nan,
+    ) -> None:
+        self._position = np.array(to, dtype=np.float64)
+        self._kind.append(np.array([kind], dtype=np.int64))
+        self._end.append(self._position[None, :])
+        self._feed.append(np.array([feed]))
+        self._value.append(np.array([value]))
+        self._block.append(np.array([block], dtype=np.int64))
+
+
+# How the axes run the lines of a job: both start together, each stops by itself.
+
+Bools = npt.NDArray[np.bool_]
+
+MOST_OFF = 8.0
+"""Counts in 5 ms by which the speed of an axis may differ from what its distance asks for (the
+GUI's own differ by half a count, and by some when distances are cut short)."""
+
+
+class Run:
+    """Lines of points (n+1, 2) units at speeds (n, 2) counts in 5 ms, as the axes run them.
+
+    Both start together, each stops by itself (L4855-4929). With distances d and speeds v they
+    take t = d/v; the earlier one, at t₁, leaves the other alone until t₂:
+
+        the line bends at t₁ · v, by (1 − t₁/t₂) of the distance of the later axis.
+
+    A line becomes two ways when it bends by more than the tolerance, or when a speed is off by
+    more than `MOST_OFF` from that of its distance: from the ways and the speed along them the
+    speeds of the axes can be told again. `end` (m, 2) units, `speed` (m,) counts in 5 ms of both
+    axes together, `line` (m,) its index; `bent` counts the lines beyond the tolerance.
+    """
+
+    def __init__(self, points: Ints, speed: Ints, tolerance_mm: float) -> None:
+        way = np.diff(points, axis=0).astype(np.float64)
+        distance = np.abs(way)
+        moving = distance > 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            took = np.where(moving, distance / speed, 0.0)
+            last = took.max(axis=1)
+            both = moving.all(axis=1)
+            share = np.where(both, took.min(axis=1) / last, 1.0)
+        along = np.hypot(*np.where(moving, speed, 0).T.astype(np.float64))
+        lag = np.where(both, _lag(distance, took, share), 0.0)
+        bent = lag > tolerance_mm * UNITS_PER_MM
+        self.bent = int(bent.sum())
+        self.most_bend = float(lag.max(initial=0.0))
+        self.first_bent = int(np.argmax(bent)) if self.bent else 0
+        keep = moving.any(axis=1)
+        parted = bent | (both & (_off(distance, speed, along) > MOST_OFF))
+        times = np.where(keep, np.where(parted, 2, 1), 0)
+        self.line = np.repeat(np.arange(len(way)), times)
+        self.end = points[1:][self.line].astype(np.float64)
+        self.speed = along[self.line]
+        if parted.any():
+            self._bend(points, way, speed, took, parted, times)
+
+    def _bend(
+        self,
+        points: Ints,
+        way: Floats,
+        speed: Ints,
+        took: Floats,
+        bent: Bools,
+        times: Ints,
+    ) -> None:
+        """Rows of bent lines: to the bend with both axes, then with the later one alone."""
+        rows = np.flatnonzero(bent)
+        first = (np.cumsum(times) - times)[rows]
+        soon = took[rows].min(axis=1)[:, None]
+        part = np.minimum(soon * speed[rows], np.abs(way[rows]))
+        self.end[first] = points[:-1][rows] + np.sign(way[rows]) * part
+        self.speed[first] = np.hypot(*speed[rows].T)
+        later = took[rows].argmax(axis=1)
+        self.speed[first + 1] = speed[rows, later]
+
+
+def _lag(distance: Floats, took: Floats, share: Floats) -> Floats:
+    """(n,) units by which a line bends: what is left of the later axis, seen across the line."""
+    later = took.argmax(axis=1)
+    left = distance[np.arange(len(distance)), later] * (1.0 - share)
+    other = distance[np.arange(len(distance)), 1 - later]
+    length = np.hypot(*distance.T)
+    return np.asarray(left * other / np.where(length > 0.0, length, 1.0))
+
+
+def _off(distance: Floats, speed: Ints, along: Floats) -> Floats:
+    """(n,) counts by which the speeds are off those that would go straight."""
+    length = np.hypot(*distance.T)
+    straight = distance * (along / np.where(length > 0.0, length, 1.0))[:, None]
+    return np.asarray(np.abs(speed - straight).max(axis=1))
+
+
+# What the reader noticed in the jobs, counted, and told as one finding each.
+
+FEED_GUARD: Final = 1e-6
+"""A speed that is above its limit by less than this (in counts) is at the limit."""
+
+TRAVEL_GUARD: Final = 1e-6
+"""A position that is beyond the travel by less than this (in units) is at its end."""
+
+
+@dataclass
+class Worst:
+    """How many are beyond a limit, by how much at most, and where the first is."""
+
+    count: int = 0
+    most: float = 0.0
+    first: str = ""
+
+    def add(self, count: int, most: float, place: str) -> None:
+        """So many more, which begin at `place`."""
+        if count:
+            self.first = self.first or place
+            self.count += count
+            self.most = max(self.most, most)
+
+    def finding(
+        self, code: Code, severity: Severity, message: str, *, unit: str = "mm"
+    ) -> list[Finding]:
+        """The finding, `{count}` and `{most}` filled in; none when nothing was beyond."""
+        if not self.count:
+            return []
+        text = message.format(count=self.count, most=self.most)
+        return [Finding(code, severity, text, where=self.first, measured=self.most, unit=unit)]
+
+
+@dataclass
+class Seen:
+    """What was noticed in all jobs."""
+
+    machine: Machine
+    dialect: Dialect
+    odd: Worst = field(default_factory=Worst)
+    empty: Worst = field(default_factory=Worst)
+    fast: Worst = field(default_factory=Worst)
+    outside: Worst = field(default_factory=Worst)
+    fixed_y: Worst = field(default_factory=Worst)
+    bent: Worst = field(default_factory=Worst)
+
+    def add(self, job: ReadJob, done: Executed) -> None:
+        """What one job has in it that the machine does otherwise, or cannot do."""
+        place = f"job {job.number}"
+        odd = int((job.length % 2).sum() + (job.first % 2).sum())
+        if self.dialect.odd == "truncated" and odd:
+            drift = done.points - done.asked
+            if self.dialect.master_y == "fixed":
+                drift[:, 1] -= drift[0, 1]
+            self.odd.add(odd, float(np.abs(drift).max()) * UNIT_MM, place)
+        if self.dialect.master_y == "fixed" and int(job.first[1]) != FIXED_Y_UNITS:
+            off = abs(int(job.first[1]) - FIXED_Y_UNITS) * UNIT_MM
+            self.fixed_y.add(1, off, place)
+        empty = (np.diff(done.points, axis=0) == 0).all(axis=1)
+        line = int(np.argmax(empty)) + 1
+        self.empty.add(int(empty.sum()), 0.0, f"{place}, line {line}")
+        self._fast(job, place)
+        self._outside(done, place)
+
+    def _fast(self, job: ReadJob, place: str) -> None:
+        limit = self.machine.max_feed_mm_min / self.machine.feed.unit_mm_min
+        speed = np.where(job.length > 0, np.abs(job.speed), 0)
+        fast = speed > limit + FEED_GUARD
+        line = int(np.argmax(fast.any(axis=0))) + 1
+        most = float(speed.max()) * self.machine.feed.unit_mm_min
+        self.fast.add(int(fast.sum()), most, f"{place}, line {line}")
+
+    def _outside(self, done: Executed, place: str) -> None:
+        axes = self.machine.axes
+        for axis, travel in enumerate((axes.x.travel_mm, axes.y.travel_mm)):
+            at = done.points[:, axis]
+            bad = at < 0
+            if travel is not None:
+                bad = bad | (at > travel * UNITS_PER_MM + TRAVEL_GUARD)
+            most = float(np.abs(at).max()) * UNIT_MM
+            line = max(1, int(np.argmax(bad)))
+            self.outside.add(int(bad.sum()), most, f"{place}, line {line}")
+
+    def findings(self) -> list[Finding]:
+        """One finding for each kind that was noticed."""
+        start_mm = FIXED_Y_UNITS * UNIT_MM
+        return [
+            *self.outside.finding(
+                Code.OUT_OF_TRAVEL,
+                Severity.ERROR,
+                "points outside of the machine's area: {count}, up to {most:.1f} mm from home",
+            ),
+            *self.fast.finding(
+                Code.FEED_ABOVE_LIMIT,
+                Severity.ERROR,
+                "speeds above the limit of an axis: {count}, up to {most:.4g} mm/min",
+                unit="mm_min",
+            ),
+            *self.odd.finding(
+                Code.EXECUTED_OTHERWISE,
+                Severity.WARNING,
+                "odd distances are cut short by 0.1 mm each, because the slaves run chunks of"
+                " 0.2 mm: {count}; places are off by {most:.1f} mm at most; use"
+                " --set dialect.grid_mm=0.2",
+            ),
+            *self.fixed_y.finding(
+                Code.EXECUTED_OTHERWISE,
+                Severity.WARNING,
+                f"jobs that begin at Y {start_mm:g} mm, whatever the program says: {{count}};"
+                " for a master that obeys: --set dialect.master_y=sent",
+            ),
+            *self.bent.finding(
+                Code.EXECUTED_OTHERWISE,
+                Severity.WARNING,
+                "lines that are bent by their speeds, because one axis arrives first: {count}, by"
+                " {most:.2f} mm at most",
+            ),
+            *self.empty.finding(Code.MOVE_COLLAPSED, Severity.INFO, "lines of no length: {count}"),
+        ]

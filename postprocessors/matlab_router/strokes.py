@@ -1,0 +1,205 @@
+"""The writer's first stage: which moves of a toolpath are strokes, and whether this machine can
+make them at all.
+
+A stroke is what is cut between one plunge and the next raise of the tool; each becomes a job of
+its own (L3938-3949). Everything above the stock is travel: the master goes home and to the first
+point of each job by itself. What it cannot do is a PostError that names the move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.machine.model import Machine
+from camtool.toolpath.lower import arcs_to_lines, xy_then_z
+from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
+
+from .dialect import Dialect, cut_z_mm
+
+Bools = npt.NDArray[np.bool_]
+
+DEPTH_TOLERANCE_MM: Final = 0.005
+"""A cut may lie this much above or below the one depth that the machine plunges to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cuts:
+    """The lines to be cut, in their order, L rows: `start`, `end` (L, 2) mm in the work frame;
+    `feed` (L,) mm/min; `row` (L,) the row of the toolpath that each came from; `stroke` (L,)
+    ascends from 0. Within a stroke each line starts where the one before it ended."""
+
+    start: Floats
+    end: Floats
+    feed: Floats
+    row: Ints
+    stroke: Ints
+
+
+def place(toolpath: Toolpath, row: int) -> str:
+    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
+    source = toolpath.text(row)
+    return f"move {row} ({source})" if source else f"move {row}"
+
+
+def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> tuple[Cuts, list[Finding]]:
+    """The strokes of a toolpath, and what had to be changed to have them."""
+    findings = _events(toolpath)
+    apart = xy_then_z(toolpath)
+    lowered = arcs_to_lines(apart.toolpath, apart.toolpath.is_arc, dialect.arc_tolerance_mm).after(
+        apart
+    )
+    if split := len(apart.row) - len(toolpath):
+        first = int(np.argmax(np.bincount(apart.row) > 1))
+        findings.append(
+            Finding(
+                Code.MOVE_SPLIT,
+                Severity.WARNING,
+                f"{split} moves in XY and Z were split: up first, down last, because Z only goes "
+                "from home to its one depth",
+                where=place(toolpath, first),
+                measured=float(split),
+                unit="moves",
+            )
+        )
+    path = lowered.toolpath
+    below = np.asarray(path.end[:, 2] < -POSITION_EPS_MM)
+    moves = path.is_motion & (path.end[:, :2] != path.starts[:, :2]).any(axis=1)
+    cut = moves & below
+    rows = lowered.row
+    _refuse_moves(toolpath, path, cut, rows)
+    _refuse_depths(toolpath, path.end[:, 2], cut, rows, machine, dialect)
+    # Each time the tool is above the stock, another stroke begins.
+    number: Ints = np.cumsum(~below, dtype=np.int64)
+    _refuse_holes(toolpath, number, below & path.is_motion, cut, rows)
+    stroke = np.unique(number[cut], return_inverse=True)[1].reshape(-1)
+    lines = Cuts(path.starts[cut, :2], path.end[cut, :2], path.feed[cut], rows[cut], stroke)
+    return lines, findings
+
+
+def _refuse(bad: Bools, rows: Ints, toolpath: Toolpath, message: str, mend: str = "") -> None:
+    """PostError naming the first bad row, if there is one."""
+    if bad.any():
+        row = int(rows[int(np.argmax(bad))])
+        raise PostError(message, where=place(toolpath, row), mend=mend)
+
+
+def _refuse_moves(toolpath: Toolpath, path: Toolpath, cut: Bools, rows: Ints) -> None:
+    rapid = cut & (path.kind == Kind.RAPID)
+    _refuse(rapid, rows, toolpath, "a rapid below the top of the stock", "raise the tool first")
+    with np.errstate(invalid="ignore"):
+        still = cut & ~((path.feed > 0.0) & np.isfinite(path.feed))
+    _refuse(still, rows, toolpath, "a cut without a feed above 0", "give each cut a feed")
+    homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
+    under = homing & (path.end != path.starts)[:, :2].any(axis=1) & (path.end[:, 2] < 0.0)
+    _refuse(under, rows, toolpath, "X and Y go home below the top of the stock")
+    ended = np.cumsum(path.kind == Kind.END) > 0
+    after = ended & (path.kind != Kind.END)
+    _refuse(after, rows, toolpath, "rows follow the end of the program")
+
+
+def _refuse_depths(
+    toolpath: Toolpath,
+    z: Floats,
+    cut: Bools,
+    rows: Ints,
+    machine: Machine,
+    dialect: Dialect,
+) -> None:
+    """All cuts lie at the one depth that the machine plunges to."""
+    depth = cut_z_mm(machine, dialect)
+    if depth >= 0.0:
+        raise PostError(
+            f"from home, {machine.controller.machine_zero_mm[2]:g} mm above the stock, a plunge of"
+            f" {dialect.plunge_mm:g} mm does not reach it",
+            mend="set the third number of controller.machine_zero_mm: plunge less depth",
+        )
+    bad = cut & ~(np.abs(z - depth) <= DEPTH_TOLERANCE_MM)
+    slopes = toolpath.is_feed & (toolpath.end != toolpath.starts)[:, 2]
+    slopes &= (toolpath.end != toolpath.starts)[:, :2].any(axis=1) | toolpath.is_arc
+    _refuse(
+        bad & slopes[rows],
+        rows,
+        toolpath,
+        f"a slope in the stock: this machine only cuts at Z {depth:g} mm",
+        "enter by a plunge, without tabs, and cut in one pass",
+    )
+    if bad.any():
+        wanted = float(z[int(np.argmax(bad))])
+        x, y, _ = machine.controller.machine_zero_mm
+        home = wanted + dialect.plunge_mm
+        _refuse(
+            bad,
+            rows,
+            toolpath,
+            f"a cut at Z {wanted:g} mm: this machine always plunges {dialect.plunge_mm:g} mm from"
+            f" home, to Z {depth:g} mm",
+            f"place the stock {home:g} mm below the raised tool and say so: "
+            f"--set controller.machine_zero_mm=[{x:g},{y:g},{home:g}]",
+        )
+
+
+def _refuse_holes(toolpath: Toolpath, number: Ints, below: Bools, cut: Bools, rows: Ints) -> None:
+    """A plunge without a line behind it: the master has no job of no lines."""
+    hole = below & ~np.isin(number, number[cut])
+    _refuse(
+        hole,
+        rows,
+        toolpath,
+        "a plunge without a line behind it: this machine drills no holes",
+        "leave it out, or draw a short line",
+    )
+
+
+def _events(toolpath: Toolpath) -> list[Finding]:
+    """Which events the master has in its own order, and which nobody can tell it."""
+    kind = toolpath.kind
+    rows = np.arange(len(kind))
+    message = "the tool turns one way only: it can be switched on and off, no more"
+    _refuse(kind == Kind.SPINDLE_CCW, rows, toolpath, message)
+    moved = (toolpath.end != 0.0).any(axis=1)
+    _refuse(
+        (kind == Kind.SET_ZERO) & moved,
+        rows,
+        toolpath,
+        "part zero can only be set at part zero",
+        "set it first, before any move",
+    )
+    cutting = np.cumsum(toolpath.is_motion & (toolpath.end[:, 2] < 0.0)) > 0
+    _refuse(
+        (kind == Kind.TOOL_CHANGE) & cutting,
+        rows,
+        toolpath,
+        "a tool change between cuts",
+        "post a program for each tool",
+    )
+    return [
+        *_unsaid(toolpath, kind == Kind.DWELL, "dwells", Severity.WARNING),
+        *_unsaid(toolpath, kind == Kind.TOOL_CHANGE, "tool numbers", Severity.INFO),
+        *_unsaid(toolpath, _with_speed(toolpath), "spindle speeds", Severity.INFO),
+    ]
+
+
+def _with_speed(toolpath: Toolpath) -> Bools:
+    return np.asarray((toolpath.kind == Kind.SPINDLE_CW) & np.isfinite(toolpath.value))
+
+
+def _unsaid(toolpath: Toolpath, rows: Bools, what: str, severity: Severity) -> list[Finding]:
+    count = int(rows.sum())
+    if not count:
+        return []
+    return [
+        Finding(
+            Code.EVENT_LEFT_OUT,
+            severity,
+            f"{count} {what} are not sent: the arrays have no place for them",
+            where=place(toolpath, int(np.argmax(rows))),
+            measured=float(count),
+        )
+    ]

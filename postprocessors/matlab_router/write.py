@@ -1,0 +1,141 @@
+"""Writing a matlab-router program: strokes become jobs, jobs become a .m file or serial bytes.
+
+    toolpath ──cuts_of──▶ lines (mm) ──jobs_of──▶ jobs (0.1 mm, counts) ──▶ text or bytes
+
+Nothing of a drawing's own text is ever written: a program holds numbers and camtool's words only.
+Blocks, for the map to the toolpath: each job has one for its way to the first point, then one for
+each line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from camtool.errors import PostError
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.program import Program
+
+from .dialect import UNIT_MM, Dialect, dialect_of
+from .lines import Jobs, jobs_of
+from .strokes import cuts_of
+
+STREAM_EXTENSION: Final = ".stream"
+
+CHARACTER_LIMIT: Final = 255
+"""A number sent as one character must be one byte."""
+
+CARRIAGE_RETURN: Final = 13
+"""Ends each number; a number sent as this very character would be taken for an end."""
+
+
+def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+    """The program; PostError for the first thing that this machine cannot do."""
+    dialect = dialect_of(machine)
+    cuts, findings = cuts_of(toolpath, machine, dialect)
+    made = jobs_of(cuts, toolpath, machine, dialect)
+    if len(made.jobs.lines.row) == 0:
+        raise PostError(
+            "nothing is left to cut"
+            + (f" on a grid of {dialect.grid_units * UNIT_MM:g} mm" if len(cuts.row) else ""),
+            mend="scale the drawing up" if len(cuts.row) else "cut below the stock's top, Z < 0",
+        )
+    stream = dialect.format == "stream"
+    jobs = _said(made.jobs)
+    heads = np.array(made.jobs.offsets[:-1])
+    return Program(
+        data=_stream(jobs, dialect) if stream else _matlab(jobs, dialect),
+        extension=STREAM_EXTENSION if stream else machine.target.extension,
+        target=machine.target.name,
+        row_of_block=np.insert(made.jobs.lines.row, heads, -1),
+        findings=(*findings, *made.notes.findings(dialect)),
+    )
+
+
+@dataclass(frozen=True)
+class _Said:
+    """One job as the words of its numbers: x and y in a pair each."""
+
+    count: int
+    first: tuple[int, int]
+    xy: tuple[list[int], list[int]]
+    lxy: tuple[list[int], list[int]]
+    velxy: tuple[list[int], list[int]]
+
+
+def _said(jobs: Jobs) -> list[_Said]:
+    """All jobs as plain numbers."""
+    lines = jobs.lines
+    start, end = lines.start.T.tolist(), lines.end.T.tolist()
+    length, speed = np.abs(lines.end - lines.start).T.tolist(), jobs.speed.T.tolist()
+    said = []
+    for low, high in pairwise(jobs.offsets):
+        x, y = start[0][low], start[1][low]
+        xy = [x, *end[0][low:high]], [y, *end[1][low:high]]
+        lxy = length[0][low:high], length[1][low:high]
+        velxy = speed[0][low:high], speed[1][low:high]
+        said.append(_Said(high - low, (x, y), xy, lxy, velxy))
+    return said
+
+
+def _matlab(jobs: list[_Said], dialect: Dialect) -> bytes:
+    """One section a job: the last job's arrays remain when all are run; `jobs` then holds all."""
+    lines = [
+        f"% camtool: matlab-router, profile {dialect.profile}, {_count(len(jobs), 'job')}",
+        "% xy, lxy and first point in 0.1 mm from home; velxy in counts of the encoder in 5 ms",
+        f"% serial line: {dialect.baud} baud, {dialect.data_bits} bits, no parity, 1 stop bit",
+    ]
+    if len(jobs) > 1:
+        lines.append("% run one section, send it, reset the master, then run the next one")
+    for number, job in enumerate(jobs, 1):
+        lines += [
+            f"%% job {number} of {len(jobs)}: {_count(job.count, 'line')}",
+            *_matrix("xy", job.xy),
+            *_matrix("lxy", job.lxy),
+            *_matrix("velxy", job.velxy),
+            f"size_of_array = {job.count};",
+            f"first_pointx = {job.first[0]};",
+            f"first_pointy = {job.first[1]};",
+        ]
+        if len(jobs) > 1:
+            names = "xy, lxy, velxy, size_of_array, first_pointx, first_pointy"
+            lines.append(f"jobs{{{number}}} = {{{names}}};")
+    return ("\n".join(lines) + "\n").encode("ascii")
+
+
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _matrix(name: str, rows: tuple[list[int], list[int]]) -> list[str]:
+    """Two rows of numbers in columns."""
+    first, second = (("%5d " * len(row) % tuple(row)).rstrip() for row in rows)
+    return [f"{name} = [", first, second, "];"]
+
+
+def _stream(jobs: list[_Said], dialect: Dialect) -> bytes:
+    """Each number in digits and a carriage return: lines, first x and y, all lx, ly, velx, vely
+    (L4294-4360)."""
+    parts = []
+    for number, job in enumerate(jobs, 1):
+        body = job.lxy[0] + job.lxy[1] + job.velxy[0] + job.velxy[1]
+        parts += [b"%d\r%d\r" % (job.count, job.first[0]), _first_y(job.first[1], number, dialect)]
+        parts.append(b"%d\r" * len(body) % tuple(body))
+    return b"".join(parts)
+
+
+def _first_y(y: int, number: int, dialect: Dialect) -> bytes:
+    """y of the first point: in digits, or as the one character of that number (L4306)."""
+    if dialect.first_y == "number":
+        return b"%d\r" % y
+    if y > CHARACTER_LIMIT or y == CARRIAGE_RETURN:
+        raise PostError(
+            f"job {number} begins at Y {y * UNIT_MM:.1f} mm, and {y} cannot be sent as one"
+            " character as the listing does",
+            mend="use --set dialect.first_y=number",
+        )
+    return bytes([y, CARRIAGE_RETURN])

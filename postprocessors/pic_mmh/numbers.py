@@ -1,0 +1,334 @@
+"""Numbers of the writer: what the dialect can say, and the steps that the controller makes of it.
+
+A *unit* is the finest difference that the form can say: 0.01 µm in the example form, 1 µm in the
+annex form. A position is held twice, as whole units (what is sent) and as whole steps (where the
+controller then stands):  steps = round(units · unit / step), half away from zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.controllers import PicMmhController
+from camtool.machine.model import Machine, controller_of
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import Dialect
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+HALF_STEP_TOLERANCE: Final = 1e-6
+"""A coordinate within this much (in steps) of half a step is half-way between two steps."""
+
+UNITS_PER_MM: Final = {"example": 100_000, "annex": 1_000}
+MOST_UNITS: Final = {"example": 9_999_999, "annex": 99_999}
+
+
+def say_example(units: int) -> str:
+    """`02969.00`, `-00000.14`: five digits, a point, two digits; whole units in, so never `-0`."""
+    whole, rest = divmod(abs(units), 100)
+    return f"{'-' if units < 0 else ''}{whole:05d}.{rest:02d}"
+
+
+def say_annex(units: int) -> str:
+    """`+02969`, `-00001`: always a sign, then five digits."""
+    return f"{units:+06d}"
+
+
+SAY: Final = {"example": say_example, "annex": say_annex}
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The units of one form laid over the steps of one axis."""
+
+    units_per_mm: int
+    most_units: int
+    step_mm: float
+
+    @classmethod
+    def of(cls, dialect: Dialect, step_mm: float) -> Grid:
+        """The grid of a form for an axis whose coded step is `step_mm`."""
+        return cls(UNITS_PER_MM[dialect.form], MOST_UNITS[dialect.form], step_mm)
+
+    @property
+    def resolution_mm(self) -> float:
+        """The coarser of unit and step."""
+        return max(1.0 / self.units_per_mm, self.step_mm)
+
+    def fits(self, values_mm: Floats) -> Bools:
+        """Which values are finite and have no more digits than the form."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return np.asarray(np.abs(values_mm) * self.units_per_mm < self.most_units + 0.5)
+
+    def units(self, values_mm: Floats) -> Ints:
+        """Values (mm, any shape) as whole units; they must fit.
+
+        A value that would lie half-way between two steps is said one unit farther from zero: the
+        step stays the same, and no longer hangs on the last bit of the controller's division.
+        """
+        scaled = values_mm * self.units_per_mm
+        units = (np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64)
+        in_steps = np.abs(units) / (self.units_per_mm * self.step_mm)
+        halfway = np.abs(in_steps - np.floor(in_steps) - 0.5) < HALF_STEP_TOLERANCE
+        return np.asarray(units + np.where(halfway, np.sign(units), 0))
+
+    def steps(self, units: Ints) -> Ints:
+        """The steps at which the controller stands after being sent these units."""
+        in_steps = np.abs(units) / (self.units_per_mm * self.step_mm)
+        return np.asarray((np.sign(units) * np.floor(in_steps + 0.5)).astype(np.int64))
+
+    def nearest_units(self, steps: Ints) -> Ints:
+        """The units nearest to these steps; `says` tells which of them really mean the step."""
+        scaled = steps * (self.units_per_mm * self.step_mm)
+        return np.asarray(np.rint(scaled).astype(np.int64))
+
+    def says(self, steps: Ints) -> Bools:
+        """Which steps some whole unit means (the nearest one, if any does)."""
+        units = self.nearest_units(steps)
+        return np.asarray((self.steps(units) == steps) & (np.abs(units) <= self.most_units))
+
+
+# The writer's first stage: every number of a toolpath checked, and turned into the dialect's own.
+#
+# Nothing is sent from here. What this machine or its dialect cannot do is a PostError that names
+# the move, its source and the value.
+
+FEED_TOLERANCE: Final = 1e-6
+"""A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""
+
+MOST_FEED_UNITS: Final = 99
+"""Two digits (L3297-3309)."""
+
+ARC_RADIUS_SPREAD_MM: Final = 0.005
+"""The radii at the start and at the end of an arc may differ by this much, no more. It is above
+what rounding centre and ends to 1 µm makes of an arc (√2 µm at each end)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """One item per row: ends (x, y, z) and centres (x, y) as units and as steps, feed words.
+
+    `centre_*` are (0, 0) and `feed_words` "" where the row has none; a centre that cannot be said
+    is none (`far_arcs`).
+    """
+
+    grids: tuple[Grid, Grid, Grid]
+    end_units: list[list[int]]
+    end_steps: list[list[int]]
+    centre_units: list[list[int]]
+    centre_steps: list[list[int]]
+    sweeps: list[float]
+    feed_words: list[str]
+    feed_finding: Finding | None
+
+
+def numbers_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Numbers:
+    """All numbers of a toolpath; PostError for the first that cannot be said or done."""
+    x, y, z = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
+    grids = (x, y, z)
+    _check_coordinates(toolpath, grids)
+    words, finding = _feed_words(toolpath, machine)
+    centred = toolpath.is_arc & ~far_arcs(toolpath, machine, dialect)
+    centres = np.where(centred[:, None], toolpath.centre, 0.0)
+    end_units, end_steps = _both(toolpath.end, grids)
+    centre_units, centre_steps = _both(centres, grids)
+    return Numbers(
+        grids=grids,
+        end_units=end_units.tolist(),
+        end_steps=end_steps.tolist(),
+        centre_units=centre_units.tolist(),
+        centre_steps=centre_steps.tolist(),
+        sweeps=toolpath.sweeps().tolist(),
+        feed_words=words,
+        feed_finding=finding,
+    )
+
+
+def place(toolpath: Toolpath, row: int) -> str:
+    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
+    source = toolpath.text(row)
+    return f"move {row} ({source})" if source else f"move {row}"
+
+
+def _both(values_mm: Floats, grids: tuple[Grid, Grid, Grid]) -> tuple[Ints, Ints]:
+    """Columns of mm as units and as steps, each column by its own axis."""
+    columns = list(zip(grids, values_mm.T, strict=False))
+    units = [grid.units(column) for grid, column in columns]
+    steps = [grid.steps(column) for (grid, _), column in zip(columns, units, strict=True)]
+    return np.column_stack(units), np.column_stack(steps)
+
+
+def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend: str) -> None:
+    """PostError for the first bad row, if there is one."""
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise PostError(message(row), where=place(toolpath, row), mend=mend)
+
+
+def check_motion(toolpath: Toolpath, machine: Machine) -> None:
+    """What hangs on more than one number: where the path starts, and that arcs are arcs."""
+    _check_start(toolpath)
+    _check_arcs(toolpath, machine)
+
+
+def _check_start(toolpath: Toolpath) -> None:
+    if toolpath.start.any():
+        x, y, z = toolpath.start.tolist()
+        raise PostError(
+            f"the toolpath starts at ({x:g}, {y:g}, {z:g}) mm, a program starts at part zero",
+            mend="begin with a rapid from (0, 0, 0)",
+        )
+
+
+def _check_arcs(toolpath: Toolpath, machine: Machine) -> None:
+    """Arcs are planned for one interpolator, for equal steps, and must be arcs."""
+    rows = toolpath.is_arc
+    if not rows.any():
+        return
+    arcs = controller_of(machine, PicMmhController).arcs
+    if arcs != "dsm":
+        raise PostError(
+            f"arcs are written for direct search, not for {arcs!r}",
+            mend="use --set controller.arcs=dsm",
+        )
+    if machine.axes.x.coded_step_mm != machine.axes.y.coded_step_mm:
+        raise PostError(
+            "this controller draws no circles when the coded steps of X and Y differ",
+            mend="set axes.x.coded_step_mm and axes.y.coded_step_mm to one value",
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        out, back = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
+        spread = np.abs(np.hypot(out[:, 0], out[:, 1]) - np.hypot(back[:, 0], back[:, 1]))
+        bad = rows & ~(spread <= ARC_RADIUS_SPREAD_MM)
+    _refuse(
+        bad,
+        toolpath,
+        lambda row: f"start and end differ by {spread[row]:g} mm in their distance to the centre",
+        "give the arc one radius",
+    )
+
+
+def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> None:
+    """Five digits of µm (L3284-3285) for every end."""
+    for name, values, grid in zip("XYZ", toolpath.end.T, grids, strict=True):
+        _refuse(
+            ~grid.fits(values),
+            toolpath,
+            lambda row, name=name, values=values: (  # type: ignore[misc]
+                f"{name} = {values[row]:.6g} mm has more than five digits of µm"
+            ),
+            "keep every coordinate within ±99.999 mm",
+        )
+
+
+def far_arcs(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Bools:
+    """(N,) true for arcs whose centre has more than five digits of µm: nearly straight ones."""
+    grids = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
+    said = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
+    return np.asarray(toolpath.is_arc & ~(said[0] & said[1]))
+
+
+def _feed_words(toolpath: Toolpath, machine: Machine) -> tuple[list[str], Finding | None]:
+    """`F08` for each feed move, and what was lost by rounding down to the word's unit.
+
+    The link carries one report per step and so bounds the step rate, feed / (60 · step)
+    (L3196-3199); F00 would make the controller divide by 0.
+    """
+    unit = machine.feed.unit_mm_min
+    most = min(MOST_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + FEED_TOLERANCE))
+    mend = f"the highest feed is {most * unit:g} mm/min, the lowest {unit:g} mm/min"
+    used = toolpath.is_feed
+    feed = np.where(used, toolpath.feed, unit)
+    highest = min(machine.max_feed_mm_min, MOST_FEED_UNITS * unit)
+    _refuse(~(feed > 0.0), toolpath, lambda row: f"feed {feed[row]:g} mm/min is no feed", mend)
+    _refuse(
+        feed > highest + FEED_TOLERANCE * unit,
+        toolpath,
+        lambda row: f"feed {feed[row]:g} mm/min is above what the link to the machine allows",
+        mend,
+    )
+    units = np.floor(feed / unit + FEED_TOLERANCE).astype(np.int64)
+    _refuse(units < 1, toolpath, lambda row: f"feed {feed[row]:g} mm/min would be F00", mend)
+    lost = feed - units * unit
+    rounded = lost > FEED_TOLERANCE * unit
+    known = {number: f"F{number:02d}" for number in np.unique(units).tolist()}
+    words = [
+        known[number] if is_used else ""
+        for number, is_used in zip(units.tolist(), used.tolist(), strict=True)
+    ]
+    if not rounded.any():
+        return words, None
+    row = int(np.argmax(lost))
+    return words, Finding(
+        Code.FEED_ROUNDED,
+        Severity.INFO,
+        f"the feed of {int(rounded.sum())} moves was rounded down to whole steps of {unit:g} "
+        f"mm/min, at most from {feed[row]:g} to {units[row] * unit:g}",
+        where=place(toolpath, row),
+        measured=float(lost[row]),
+        limit=unit,
+        unit="mm_min",
+    )
+
+
+MOST_DWELL_S: Final = 9900.0
+"""A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
+
+DWELL_DIGITS_S: Final = 99
+"""Seconds that the two digits of one G04 can say (L3359-3366)."""
+
+MOST_SPINDLE: Final = 9999
+"""Rev/min that the four digits of S can say (L3418-3426)."""
+
+MOST_TOOL: Final = 99
+"""Tools that the two digits of T can say (L3455-3464)."""
+
+
+def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
+    """The blocks of a dwell, spindle or tool event, and whether its value had to be rounded.
+
+    Dwells are whole seconds of two digits (L3359-3366), rounded up and split; spindle speeds have
+    four digits (L3418-3426), tools two (L3455-3464).
+    """
+    kind, value = Kind(int(toolpath.kind[row])), float(toolpath.value[row])
+    if kind == Kind.SPINDLE_OFF:
+        return ["M05;"], False
+    name, most = {
+        Kind.DWELL: ("dwell", MOST_DWELL_S),
+        Kind.SPINDLE_CW: ("spindle speed", MOST_SPINDLE),
+        Kind.SPINDLE_CCW: ("spindle speed", MOST_SPINDLE),
+        Kind.TOOL_CHANGE: ("tool", MOST_TOOL),
+    }[kind]
+    if math.isnan(value) and name == "spindle speed":
+        raise PostError(
+            "the spindle is started without a speed, which M03 and M04 must say here",
+            where=place(toolpath, row),
+            mend="say S in the program",
+        )
+    whole = kind != Kind.TOOL_CHANGE or value == math.floor(value)
+    if not (0.0 <= value <= most and whole):
+        raise PostError(
+            f"{name} {value:g} cannot be said",
+            where=place(toolpath, row),
+            mend=f"use a whole number from 0 to {most:g}",
+        )
+    number = math.ceil(value) if kind == Kind.DWELL else round(value)
+    if kind == Kind.DWELL:
+        full, rest = divmod(number, DWELL_DIGITS_S)
+        blocks = [f"G04P{DWELL_DIGITS_S:02d};"] * full + ([f"G04P{rest:02d};"] if rest else [])
+    elif kind == Kind.TOOL_CHANGE:
+        blocks = [f"M06T{number:02d};"]
+    else:
+        blocks = [f"{'M03' if kind == Kind.SPINDLE_CW else 'M04'}S{number:04d};"]
+    return blocks, number != value

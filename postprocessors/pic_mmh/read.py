@@ -1,0 +1,319 @@
+"""Reading pic-mmh as its controller decodes it, and more strictly: what it would silently ignore
+(L1755-1757) is an error here, with the block and the column.
+
+A program is cut at `;`; line ends and blanks between blocks are passed over. The first characters
+choose the pattern that the whole block must match (`_pic_mmh_grammar`); only a block that does
+not is walked word by word, to say where it goes wrong.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final, NoReturn
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import dialect_of
+
+BLANKS: Final = " \t\r\n"
+
+FEED_GUARD: Final = 1e-9
+"""Part of a feed: a feed above its limit by less is at the limit."""
+
+MOTIONS: Final = frozenset({"G00", "G01", "G02", "G03"})
+EVENTS: Final = {
+    "G04": Kind.DWELL,
+    "M03": Kind.SPINDLE_CW,
+    "M04": Kind.SPINDLE_CCW,
+    "M05": Kind.SPINDLE_OFF,
+    "M06": Kind.TOOL_CHANGE,
+    "M30": Kind.END,
+    "G54": Kind.SET_ZERO,
+}
+
+
+def read_program(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError naming block and column when it is none."""
+    *blocks, rest = _ascii(data).split(";")
+    reader = _Reader(machine)
+    for index, block in enumerate(blocks):
+        reader.block(index, block.strip(BLANKS))
+    tail = rest.strip(BLANKS)
+    if tail:
+        _fail(len(blocks), len(tail), "the program breaks off inside a block", "end it with ;")
+    if not blocks:
+        raise ProgramError("the program is empty", mend="a program has blocks such as G54;")
+    return reader.path.finish(reader.findings())
+
+
+def _fail(index: int, column: int, message: str, mend: str = "") -> NoReturn:
+    """ProgramError at a block (index from 0) and a column (from 1, from its first character)."""
+    raise ProgramError(message, where=f"block {index + 1}, column {column}", mend=mend)
+
+
+def _ascii(data: bytes) -> str:
+    """The text; ProgramError at the first byte that is no printable ASCII and no line end."""
+    odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
+    if odd:
+        before = data[: odd.start()]
+        begun = before[before.rfind(b";") + 1 :].lstrip(BLANKS.encode())
+        _fail(
+            before.count(b";"),
+            len(begun) + 1,
+            f"the byte 0x{data[odd.start()]:02x} belongs to no program",
+            "give a pic-mmh program",
+        )
+    return data.decode("ascii")
+
+
+def _mm(whole: str, decimals: str) -> float:
+    """µm as text, in mm by a single division, so the nearest float; `-00000.00` is 0."""
+    return int(whole + decimals) / (100_000 if decimals else 1_000)
+
+
+@dataclass
+class _Excess:
+    """How many blocks go beyond a limit, by how much at most, and where first."""
+
+    count: int = 0
+    most: float = 0.0
+    first: int = 0
+
+    def add(self, index: int, value: float) -> None:
+        self.first = self.first if self.count else index
+        self.count += 1
+        self.most = max(self.most, value)
+
+
+class _Reader:
+    """Blocks in, rows out; knows where the tool stands and whether the program has ended."""
+
+    def __init__(self, machine: Machine) -> None:
+        dialect = dialect_of(machine)
+        self.path = ToolpathBuilder()
+        self._form = dialect.form
+        self._buffer_chars = dialect.buffer_chars
+        self._patterns = patterns(dialect.form)
+        self._feeds_per_mm_min = 1.0 / machine.feed.unit_mm_min
+        self._max_feed = machine.max_feed_mm_min
+        self._zero = machine.controller.machine_zero_mm
+        self._ended = False
+        self._long = _Excess()
+        self._fast = _Excess()
+
+    def block(self, index: int, text: str) -> None:
+        """One block, without its `;` and the blanks around it."""
+        if self._ended:
+            _fail(index, 1, "a block after M30, the end of the program", "remove it")
+        if self._buffer_chars is not None and len(text) >= self._buffer_chars:
+            self._long.add(index, len(text) + 1)
+        code = text[:3]
+        for letters, pattern in self._patterns.get(code, ()):
+            match = pattern.fullmatch(text, 3)
+            if match:
+                self.path.block = index
+                if code in MOTIONS:
+                    self._motion(code, letters, match, index)
+                else:
+                    self._event(code, letters, match, index)
+                return
+        fault = fault_of(text, self._form)
+        _fail(index, fault.column, fault.message, fault.mend)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What goes beyond the controller's limits."""
+        found = []
+        if self._long.count:
+            found.append(
+                Finding(
+                    Code.BLOCK_TOO_LONG,
+                    Severity.WARNING,
+                    f"{self._long.count} blocks exceed the controller's buffer of "
+                    f"{self._buffer_chars} characters, the longest has {self._long.most:.0f}; "
+                    "use --set dialect.form=annex",
+                    where=f"block {self._long.first + 1}",
+                    measured=self._long.most,
+                    limit=float(self._buffer_chars or 0),
+                    unit="chars",
+                )
+            )
+        if self._fast.count:
+            found.append(
+                Finding(
+                    Code.FEED_ABOVE_LIMIT,
+                    Severity.WARNING,
+                    f"{self._fast.count} blocks have a feed above what the link carries, up to "
+                    f"{self._fast.most:g} mm/min: it holds them at {self._max_feed:.4g}",
+                    where=f"block {self._fast.first + 1}",
+                    measured=self._fast.most,
+                    limit=self._max_feed,
+                    unit="mm_min",
+                )
+            )
+        return tuple(found)
+
+    def _motion(self, code: str, letters: str, match: re.Match[str], index: int) -> None:
+        """G00 to G03: coordinates are absolute µm, F counts the feed word's unit."""
+        groups = match.groups()
+        feed = self._feed(match, index) if letters[-1] == "F" else 0.0
+        if letters[0] == "Z":
+            x, y, z = None, None, _mm(*groups[:2])
+        else:
+            x, y, z = _mm(*groups[:2]), _mm(*groups[2:4]), None
+        if code == "G00":
+            self.path.rapid(x, y, z)
+        elif code == "G01":
+            self.path.line(x, y, z, feed=feed)
+        elif x is not None and y is not None:
+            centre = _mm(*groups[4:6]), _mm(*groups[6:8])
+            self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=feed)
+
+    def _feed(self, match: re.Match[str], index: int) -> float:
+        """F08 as 0.8 mm/min (equation 3.1: tenths of mm/min); F00 would divide by 0."""
+        number = int(match[match.re.groups])
+        if number == 0:
+            column = match.start(match.re.groups) + 1
+            _fail(index, column, "the controller divides by the feed, F00", "write F01 or more")
+        feed = number / self._feeds_per_mm_min
+        if feed > self._max_feed * (1.0 + FEED_GUARD):
+            self._fast.add(index, feed)
+        return feed
+
+    def _event(self, code: str, letters: str, match: re.Match[str], index: int) -> None:
+        """All other codes. G90 says what always holds here and gives no row."""
+        x, y, z = self.path.position
+        zero_x, zero_y, zero_z = self._zero
+        if code == "G90":
+            return
+        if code == "G28" and letters == "Z":
+            self.path.moved_to(x, y, zero_z).event(Kind.HOME_Z)
+        elif code == "G28":
+            self.path.moved_to(zero_x, zero_y, z).event(Kind.HOME_XY)
+        else:
+            if code == "G54" and (x, y, z) != (0.0, 0.0, 0.0):
+                message = "G54 away from part zero would shift all that follows"
+                _fail(index, 1, message, "set part zero once, before the first move")
+            self.path.event(EVENTS[code], int(match[1]) if match.re.groups else None)
+            self._ended = code == "M30"
+
+
+# The reader's grammar of a pic-mmh block: the patterns that match one, and the words that say
+# where a block goes wrong.
+
+SHOWN_CHARS: Final = 48
+"""An error message shows no more of a block than this."""
+
+Shape = tuple[tuple[str, str], ...]
+"""The words behind a code: letter and kind of value ("c" is a coordinate)."""
+
+_ARC: Final[Shape] = (("X", "c"), ("Y", "c"), ("I", "c"), ("J", "c"), ("F", "2"))
+
+# Annex A.1, L3265-3471; Z blocks by the same rule (the decoder takes any axis letter, L1817-1849).
+SHAPES: Final[dict[str, tuple[Shape, ...]]] = {
+    "G00": ((("X", "c"), ("Y", "c")), (("Z", "c"),)),
+    "G01": ((("X", "c"), ("Y", "c"), ("F", "2")), (("Z", "c"), ("F", "2"))),
+    "G02": (_ARC,),
+    "G03": (_ARC,),
+    "G04": ((("P", "2"),),),
+    "G28": ((("X", "0"), ("Y", "0")), (("Z", "0"),)),
+    "G54": ((),),
+    "G90": ((),),
+    "M03": ((("S", "4"),),),
+    "M04": ((("S", "4"),),),
+    "M05": ((),),
+    "M06": ((("T", "2"),),),
+    "M30": ((),),
+}
+
+# The routine of the sign asks for "-" and takes anything else for the other sense (L1765-1768);
+# "JX+;" shows it a "+" (L1730), so that the example form may have one too.
+_COORDINATES: Final = {"example": r"([+-]?\d{5})\.(\d\d)", "annex": r"([+-]\d{5})()"}
+_COORDINATE_WORDS: Final = {
+    "example": "five digits, a point and two digits (in front of them a sign or none)",
+    "annex": "a sign and five digits",
+}
+_VALUES: Final = {"2": r"(\d\d)", "4": r"(\d{4})", "0": "0"}
+_VALUE_WORDS: Final = {"2": "two digits", "4": "four digits", "0": "the digit 0"}
+
+# The interactive commands of the annex (L3474-3505): the operator's, not a program's.
+_INTERACTIVE: Final = re.compile(
+    r"A|H|Q|W|V|J[XYZ][+-]|&(?:[XYZ][+-]){2,3}|P[XYZ][+-]\d{4}|B[XYZ]\d{3}|F[XYZ][+-]\d{3}"
+)
+
+Patterns = dict[str, tuple[tuple[str, re.Pattern[str]], ...]]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Where a block goes wrong (column from 1), how, and what mends it."""
+
+    column: int
+    message: str
+    mend: str = ""
+
+
+def patterns(form: str) -> Patterns:
+    """For each code its shapes: their letters ("XYF") and the pattern of what is behind the code.
+
+    A coordinate has two groups, digits before and after the point; other values have one.
+    """
+    return {
+        code: tuple(
+            (
+                "".join(letter for letter, _ in shape),
+                re.compile("".join(letter + _value(kind, form) for letter, kind in shape)),
+            )
+            for shape in shapes
+        )
+        for code, shapes in SHAPES.items()
+    }
+
+
+def fault_of(text: str, form: str) -> Fault:
+    """Why a block (without its `;`) is none in this form."""
+    if not text:
+        return Fault(1, "an empty block", "remove the ; that has nothing before it")
+    if _INTERACTIVE.fullmatch(text):
+        return Fault(1, f"{text!r} is an interactive command, not part of a program", "remove it")
+    if small := re.search("[a-z]", text[: SHOWN_CHARS * 2]):
+        return Fault(
+            small.start() + 1, "this controller takes no small letters", "write capital letters"
+        )
+    if text[0] not in "GM":
+        return Fault(1, f"{_shown(text)} is no block: it begins with neither G nor M")
+    if not re.match(r"\d\d", text[1:3]):
+        return Fault(2, f"{_shown(text)}: wanted two digits after {text[0]}")
+    shapes = SHAPES.get(text[:3])
+    if shapes is None:
+        known = " ".join(SHAPES)
+        return Fault(1, f"this controller does not know {text[:3]}", f"it knows {known}")
+    for other in _COORDINATES:
+        if any(pattern.fullmatch(text, 3) for _, pattern in patterns(other)[text[:3]]):
+            return Fault(5, f"the block is in the {other} form", f"use --set dialect.form={other}")
+    return max((_walk(text, shape, form) for shape in shapes), key=lambda fault: fault.column)
+
+
+def _value(kind: str, form: str) -> str:
+    return _COORDINATES[form] if kind == "c" else _VALUES[kind]
+
+
+def _walk(text: str, shape: Shape, form: str) -> Fault:
+    """The first word of the shape that the block does not have."""
+    at = 3
+    for letter, kind in shape:
+        match = re.compile(letter + _value(kind, form)).match(text, at)
+        if match is None:
+            at += text.startswith(letter, at)
+            words = _COORDINATE_WORDS[form] if kind == "c" else _VALUE_WORDS[kind]
+            return Fault(at + 1, f"{_shown(text)}: wanted {letter} with {words}")
+        at = match.end()
+    return Fault(at + 1, f"{_shown(text)}: wanted ; after the last word of {text[:3]}")
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= SHOWN_CHARS else f"{text[:SHOWN_CHARS]}…")

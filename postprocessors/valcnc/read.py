@@ -1,0 +1,268 @@
+"""Reading valcnc as its firmware takes a block: blanks dropped, then the first X, Y, Z, I and J of
+the block, wherever they stand (L1179, L1222-1226).
+
+What the firmware would meet and the thesis does not tell (a missing word, Z along with X, a full
+circle, an arc whose chord exceeds its diameter) is an error with block, line and column, unless an
+option of `[dialect]` says what happens.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, NoReturn
+
+from camtool.errors import ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Toolpath
+
+from ..gcode.blocks import Block, Lexing, blocks_of
+from .dialect import dialect_of, scales_of
+
+CODES: Final = ("00", "01", "02", "03")
+PLAIN: Final = frozenset({"GXYZ", "GXYZIJ"})
+"""Letters of a block as they mostly come; other orders are as good."""
+
+MOST_UNITS: Final = 99_999.0
+"""Numbers beyond this are taken for a mistake."""
+
+CHORD_GUARD: Final = 1e-9
+"""Part of an arc's diameter: a chord longer by less is a diameter."""
+
+NEARLY_DIAMETER: Final = 0.9
+"""Part of an arc's diameter: for shorter chords the arcsine errs as little as the numbers do."""
+
+SCALE_GUARD: Final = 1e-12
+"""Part of a scale: X and Y whose scales differ by less are alike."""
+
+Point = tuple[float, float, float]
+
+
+def read_program(data: bytes, machine: Machine) -> Toolpath:
+    """The moves of a program; ProgramError naming block, line and column when it is none."""
+    reader = _Reader(machine)
+    for block in blocks_of(data, reader.lexing):
+        reader.block(block)
+    if not reader.blocks:
+        raise ProgramError(
+            "the program is empty", mend="a program has blocks such as G00 X1 Y1 Z0"
+        )
+    return reader.path.finish(reader.findings())
+
+
+@dataclass
+class _Missed:
+    """How many arcs the controller's own angle takes past or short of their end, and the worst."""
+
+    count: int = 0
+    most_mm: float = 0.0
+    where: str = ""
+
+
+class _Reader:
+    """Blocks in, rows out, in mm."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._dialect = dialect_of(machine)
+        scale_x, scale_y, scale_z = scales_of(machine, self._dialect).tolist()
+        self._scales = (scale_x, scale_y, scale_z)
+        self._alike = abs(scale_x - scale_y) <= SCALE_GUARD * scale_x
+        self._feed = machine.max_feed_mm_min
+        self._step_mm = machine.axes.x.coded_step_mm
+        self._at: Point = (0.0, 0.0, 0.0)
+        self._missed = _Missed()
+        self.lexing = Lexing(
+            letters="GXYZIJ", blanks="anywhere", line_chars=self._dialect.block_chars
+        )
+        self.path = ToolpathBuilder()
+        self.blocks = 0
+
+    def block(self, block: Block) -> None:
+        """One block."""
+        self.blocks += 1
+        words = block.words
+        code, letters = words[0][1], "".join([letter for letter, _ in words])
+        if letters not in PLAIN or code not in CODES or "\t" in block.text:
+            self._check_words(block, letters)
+        values = {letter: float(text) for letter, text in words[1:]}
+        if not max(map(abs, values.values()), default=0.0) <= MOST_UNITS:
+            at = next(at for at, value in enumerate(values.values(), 1) if abs(value) > MOST_UNITS)
+            block.fail(f"a number beyond ±{MOST_UNITS:g}", word=at, mend="check the units")
+        self.path.block = block.index
+        if letters.startswith("GXYZ"):
+            end = values["X"], values["Y"], values["Z"]
+        else:
+            end = self._end(block, values)
+        if code in ("02", "03"):
+            self._arc(block, code, values, end)
+        else:
+            self._line(block, code, values, end)
+        self._at = end
+
+    def _check_words(self, block: Block, letters: str) -> None:
+        """ProgramError for an unknown code, for a word that stands twice, and for tabs."""
+        first = "".join(block.words[0])
+        if letters[0] != "G" or block.words[0][1] not in CODES:
+            known = " ".join(f"G{code}" for code in CODES)
+            block.fail(f"{first} is no code of this controller", mend=f"known: {known}, in front")
+        if "\t" in block.text:
+            block.fail("a tab: only spaces are dropped", mend="use spaces")
+        for at, letter in enumerate(letters):
+            if letter in letters[:at]:
+                block.fail(
+                    f"a second {letter}: only the first counts", word=at, mend="one block a line"
+                )
+
+    def findings(self) -> tuple[Finding, ...]:
+        """The scale that was taken, and arcs that the controller's angle does not bring home."""
+        found = []
+        if not self._dialect.coord_scale_checked:
+            found.append(
+                Finding(
+                    Code.COORDINATES_SCALED,
+                    Severity.WARNING,
+                    f"lengths are the program's numbers divided by {self._dialect.coord_scale:g} "
+                    "(dialect.coord_scale)",
+                    measured=self._dialect.coord_scale,
+                )
+            )
+        if self._missed.count:
+            found.append(
+                Finding(
+                    Code.ARC_MISSES_END,
+                    Severity.WARNING,
+                    f"{self._missed.count} arcs of about 180°: the controller takes their angle "
+                    f"from an arcsine and ends up to {self._missed.most_mm:.3g} mm off",
+                    where=self._missed.where,
+                    measured=self._missed.most_mm,
+                    limit=self._step_mm,
+                    unit="mm",
+                )
+            )
+        return tuple(found)
+
+    def _end(self, block: Block, values: dict[str, float]) -> Point:
+        """Where the block goes, in the program's units; absolute (L1135)."""
+        missing = [letter for letter in "XYZ" if letter not in values]
+        if missing and self._dialect.missing_words == "refused":
+            block.fail(
+                f"no {missing[0]}: whether it then stays or becomes 0 is not known",
+                mend="write X, Y and Z, or say --set dialect.missing_words=keep",
+            )
+        zero = self._dialect.missing_words == "zero"
+        x, y, z = (
+            values.get(letter, 0.0 if zero else old)
+            for letter, old in zip("XYZ", self._at, strict=True)
+        )
+        return x, y, z
+
+    def _mm(self, x: float, y: float, z: float) -> Point:
+        a, b, c = self._scales
+        return x / a + 0.0, y / b + 0.0, z / c + 0.0
+
+    def _line(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
+        """A line; in two where the option puts Z before or after X and Y."""
+        if "I" in values or "J" in values:
+            at, letter = next((at, one) for at, one in enumerate(values, 1) if one in "IJ")
+            block.fail(f"{letter} in a G{code}", word=at, mend="only arcs have a centre")
+        first = self._in_order(block, end)
+        for point in (first, end) if first else (end,):
+            x, y, z = self._mm(*point)
+            if code == "00":
+                self.path.rapid(x, y, z)
+            else:
+                self.path.line(x, y, z, feed=self._feed)
+
+    def _in_order(self, block: Block, end: Point) -> Point | None:
+        """The point on the way where Z and XY change turns, if they do."""
+        old, order = self._at, self._dialect.z_order
+        if end[:2] == old[:2] or end[2] == old[2] or order == "together":
+            return None
+        if order == "refused":
+            letters = [letter for letter, _ in block.words]
+            block.fail(
+                "Z moves along with X or Y: which goes first is not known",
+                word=letters.index("Z") if "Z" in letters else None,
+                mend="move them in two blocks, or say --set dialect.z_order=before",
+            )
+        return (*old[:2], end[2]) if order == "before" else (*end[:2], old[2])
+
+    def _arc(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
+        """An arc; Z in a block of its own before or after it where the option says so."""
+        if "I" not in values or "J" not in values:
+            missing = "J" if "I" in values else "I"
+            block.fail(f"an arc without {missing}", mend="give I and J from the start")
+        if not self._alike:
+            block.fail(
+                "on axes of unequal steps this arc is an ellipse",
+                mend="set axes.x.coded_step_mm and axes.y.coded_step_mm to one value",
+            )
+        i, j = values["I"], values["J"]
+        self._check_arc(block, (i, j), end)
+        x, y, z = self._mm(*end)
+        old_x, old_y, _ = self.path.position
+        centre = old_x + i / self._scales[0], old_y + j / self._scales[1]
+        order = self._dialect.z_order
+        if end[2] != self._at[2]:
+            if order in ("refused", "together"):
+                block.fail("Z moves along with an arc", mend="move Z in a block of its own")
+            if order == "before":
+                self.path.line(old_x, old_y, z, feed=self._feed)
+        self.path.arc(x, y, centre=centre, ccw=code == "03", feed=self._feed)
+        if end[2] != self._at[2] and order == "after":
+            self.path.line(x, y, z, feed=self._feed)
+
+    def _check_arc(self, block: Block, offset: tuple[float, float], end: Point) -> None:
+        """That the firmware's formulas (L1284-1326) have a value, and nearly the right one."""
+        i, j = offset
+        radius = math.hypot(i, j)
+        chord = end[0] - self._at[0], end[1] - self._at[1]
+        other = math.hypot(chord[0] - i, chord[1] - j)
+        if radius == 0.0:
+            _fail_at_i(block, "an arc about its own start", "give I and J from the start")
+        spread, most = abs(radius - other) / self._scales[0], self._dialect.arc_spread_mm
+        if spread > most:
+            message = f"the radii at the arc's start and end differ by {spread:.4g} mm"
+            _fail_at_i(block, message, f"they may differ by {most:g} mm")
+        length = math.hypot(*chord)
+        if length == 0.0:
+            if self._dialect.full_circles == "refused":
+                block.fail(
+                    "an arc that ends where it starts: its angle is 0 by one formula, 360° by the "
+                    "other",
+                    mend="write it in parts, or say --set dialect.full_circles=whole",
+                )
+            return
+        ratio = length / (2.0 * radius)
+        if ratio > 1.0 + CHORD_GUARD:
+            message = (
+                "the arc's chord is longer than its diameter: the controller's arcsine has no "
+            )
+            _fail_at_i(block, f"{message}value", "write it in parts of 90°")
+        if ratio > NEARLY_DIAMETER:
+            self._note_miss(block, offset, chord)
+
+    def _note_miss(
+        self, block: Block, offset: tuple[float, float], chord: tuple[float, float]
+    ) -> None:
+        """Compare 2·arcsin(C/2R), or 2π less it, with the angle between the two arms."""
+        out = -offset[0], -offset[1]
+        back = chord[0] - offset[0], chord[1] - offset[1]
+        cross, dot = out[0] * back[1] - out[1] * back[0], out[0] * back[0] + out[1] * back[1]
+        angle = abs(math.atan2(cross, dot))
+        radius = math.hypot(*offset)
+        taken = 2.0 * math.asin(min(1.0, math.hypot(*chord) / (2.0 * radius)))
+        miss_mm = abs(taken - angle) * radius / self._scales[0]
+        if miss_mm > self._step_mm:
+            self._missed.count += 1
+            if miss_mm > self._missed.most_mm:
+                self._missed.most_mm = miss_mm
+                self._missed.where = f"block {block.index + 1}"
+
+
+def _fail_at_i(block: Block, message: str, mend: str) -> NoReturn:
+    """ProgramError at the I word of an arc."""
+    at = next(index for index, (letter, _) in enumerate(block.words) if letter == "I")
+    block.fail(message, word=at, mend=mend)

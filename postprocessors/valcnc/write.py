@@ -1,0 +1,187 @@
+"""Writing valcnc: each block says its code and all of X, Y and Z; arcs say I and J too.
+
+    rows ──checked──▶ XY and Z apart ──arcs cut short──▶ scaled ──units──▶ blocks
+
+Lengths are scaled before they are rounded, so arcs are made consistent in the very numbers that
+the controller computes with. On axes of unequal steps a circle would be an ellipse in those
+numbers: there arcs become lines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from camtool.errors import PostError
+from camtool.findings import Code, Finding, Severity
+from camtool.machine.model import Machine
+from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
+from camtool.toolpath.moves import Kind, Toolpath, mounted_before
+from camtool.toolpath.program import Program
+
+from ..gcode.checks import check_plain, left_out, place, split_z
+from ..gcode.format import Floats, NumberStyle, first_too_long, say_units
+from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
+from .dialect import Dialect, dialect_of, scales_of
+
+WORD: Final[dict[int, str]] = {
+    Kind.RAPID: "G00",
+    Kind.LINE: "G01",
+    Kind.ARC_CW: "G02",
+    Kind.ARC_CCW: "G03",
+}
+UNSAID: Final = (
+    Kind.DWELL,
+    Kind.SPINDLE_CW,
+    Kind.SPINDLE_CCW,
+    Kind.SPINDLE_OFF,
+    Kind.TOOL_CHANGE,
+)
+FEED_TOLERANCE: Final = 1e-6
+"""A feed within this part of the machine's only speed is that speed."""
+
+MOST_UNITS: Final = 99_999.0
+"""An arc's centre farther from its start (in units of the program) makes it lines."""
+
+
+def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    dialect = dialect_of(machine)
+    check_plain(toolpath, machine)
+    _check_tools(toolpath)
+    scales = scales_of(machine, dialect)
+    lowered, split_note = split_z(toolpath, machine)
+    lowered, squeezed = _arcs_lowered(lowered, scales, machine, dialect)
+    rules = ArcRules(dialect.decimals, "halves", MOST_UNITS, chord_fits=True)
+    rows = plain_rows(_scaled(lowered.toolpath, scales), rules)
+    of_row = lowered.row[rows.row]
+    sent = rows.moves
+    blocks = [
+        block
+        for block, wanted in zip(_blocks(rows, dialect), sent.tolist(), strict=True)
+        if wanted
+    ]
+    _check_length(blocks, dialect)
+    first = place(toolpath, int(lowered.row[rows.first])) if rows.first >= 0 else ""
+    return Program(
+        data="".join(f"{block}\n" for block in blocks).encode("ascii"),
+        extension=machine.target.extension,
+        target=machine.target.name,
+        row_of_block=of_row[sent],
+        findings=(
+            *_scale_note(dialect),
+            *([split_note] if split_note else []),
+            *squeezed,
+            *arc_findings(rows, first),
+            *_feed_note(toolpath, machine),
+            *left_out(toolpath, UNSAID, "this machine has no codes but G00 to G03; do it by hand"),
+        ),
+    )
+
+
+def _check_tools(toolpath: Toolpath) -> None:
+    """Nothing would stop the machine for another tool."""
+    bad = (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath)
+    if bad.any():
+        raise PostError(
+            "this machine has no code that stops it for a tool change",
+            where=place(toolpath, int(bad.argmax())),
+            mend="write a program for each tool",
+        )
+
+
+def _arcs_lowered(
+    lowered: Lowered, scales: Floats, machine: Machine, dialect: Dialect
+) -> tuple[Lowered, list[Finding]]:
+    """Arcs of no more than the dialect's sweep; lines where X and Y are scaled differently."""
+    path = lowered.toolpath
+    count = int(path.is_arc.sum())
+    if scales[0] == scales[1] or not count:
+        short = arcs_within(path, math.radians(dialect.max_sweep_deg))
+        return short.after(lowered), []
+    tolerance = machine.defaults.fit_tolerance_mm
+    chords = arcs_to_lines(path, path.is_arc, tolerance)
+    finding = Finding(
+        Code.ARC_MENDED,
+        Severity.INFO,
+        f"{count} arcs were written as lines within {tolerance:g} mm: on axes of unequal steps "
+        "the controller would make ellipses of them",
+        measured=float(count),
+        unit="moves",
+    )
+    return chords.after(lowered), [finding]
+
+
+def _scaled(toolpath: Toolpath, scales: Floats) -> Toolpath:
+    """The toolpath in the units of the program."""
+    return replace(
+        toolpath,
+        end=toolpath.end * scales,
+        centre=toolpath.centre * scales[:2],
+        start=toolpath.start * scales,
+    )
+
+
+def _blocks(rows: PlainRows, dialect: Dialect) -> list[str]:
+    """The block of each row, without a code for events."""
+    style = NumberStyle(dialect.decimals)
+    x, y, z = (say_units(rows.end[:, axis], style) for axis in range(3))
+    words = [WORD.get(kind, "") for kind in rows.kind.tolist()]
+    blocks = [f"{w} X{a} Y{b} Z{c}" for w, a, b, c in zip(words, x, y, z, strict=True)]
+    arcs = np.flatnonzero(rows.is_arc)
+    i, j = (say_units(rows.offset[arcs, axis], style) for axis in range(2))
+    for row, a, b in zip(arcs.tolist(), i, j, strict=True):
+        blocks[row] += f" I{a} J{b}"
+    return blocks
+
+
+def _check_length(blocks: list[str], dialect: Dialect) -> None:
+    index = first_too_long(blocks, dialect.block_chars)
+    if index >= 0:
+        raise PostError(
+            f"a block of {len(blocks[index])} characters, the controller takes "
+            f"{dialect.block_chars}",
+            where=f"block {index + 1}",
+            mend="use fewer decimals, or check the units",
+        )
+
+
+def _scale_note(dialect: Dialect) -> list[Finding]:
+    """The warning that a wrong scale makes parts 8 times too large or too small."""
+    if dialect.coord_scale_checked:
+        return []
+    return [
+        Finding(
+            Code.COORDINATES_SCALED,
+            Severity.WARNING,
+            f"the program says {dialect.coord_scale:g} for 1 mm; the thesis gives 200 steps a "
+            "unit and 25 steps a mm: measure a move, then set dialect.coord_scale (1 if a unit "
+            "moves 1 mm) and dialect.coord_scale_checked=true",
+            measured=dialect.coord_scale,
+        )
+    ]
+
+
+def _feed_note(toolpath: Toolpath, machine: Machine) -> list[Finding]:
+    """Feeds that the machine will not keep: it has one speed."""
+    speed = machine.max_feed_mm_min
+    with np.errstate(invalid="ignore"):
+        other = toolpath.is_feed & (np.abs(toolpath.feed - speed) > FEED_TOLERANCE * speed)
+    if not other.any():
+        return []
+    row = int(other.argmax())
+    return [
+        Finding(
+            Code.FEED_ROUNDED,
+            Severity.WARNING,
+            f"the feeds of {int(other.sum())} moves are not said: the machine has one speed, "
+            f"{speed:g} mm/min",
+            where=place(toolpath, row),
+            measured=float(toolpath.feed[row]),
+            limit=speed,
+            unit="mm_min",
+        )
+    ]
