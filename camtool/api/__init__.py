@@ -28,7 +28,7 @@ from camtool.results import (
     Toolpath,
     Verification,
 )
-from camtool.simulation.options import Effects
+from camtool.simulation.motion import Effects
 from camtool.verify.gates import Gates
 
 __all__ = [

@@ -16,7 +16,7 @@ from camtool.cli.types import duration, length
 if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Judging, Way
-    from camtool.simulation.options import Effects
+    from camtool.simulation.motion import Effects
     from camtool.verify.gates import Gates
 
 _LIMITS = "Limits (exit code 1 beyond them)"

@@ -156,7 +156,7 @@ def _page(subject: Subject, pictures: tuple[tuple[str, str], ...]) -> Page:
 
 
 def _setup(subject: Subject) -> Setup:
-    from camtool.machine.changes import changed_values, machine_digest
+    from camtool.machine.registry import changed_values, machine_digest
     from camtool.verify.page import Changed, Setup
 
     machine, program = subject.target.machine, subject.program

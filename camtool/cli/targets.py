@@ -18,8 +18,7 @@ from camtool.plain import one_line, to_json
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-    from camtool.machine.mechanics import PlayCells
-    from camtool.machine.model import Machine
+    from camtool.machine.model import Machine, PlayCells
 
 
 class _Targets(click.Group):

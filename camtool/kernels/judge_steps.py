@@ -7,12 +7,10 @@ one is made: nothing is kept of the steps themselves.
 An arc runs for as many samples as are known (`camtool.kernels.arc_stops`), or until it stands on
 its end. One that passes it must stop at its nearest approach, so near the end, on the turn that is
 expected, the arc is first run ahead to see what becomes of it
-(`camtool.simulation.interpolators.arc_reach` does that with whole arcs, always). A path of direct
-search or stairs is never farther than one step from the circle through its start; so the end,
-when it is within `NEAR_RADIUS` of that circle, is passed within `NEAR_STEPS`, and no nearest
-approach lies outside. Other arcs are run ahead from their start.
-
-Exact: integers, as in the kernels that fill the buffer. Compiled, since rows may have three steps.
+(`arc_reach` of `camtool_postprocessors.pic_mmh.controller` does that with whole arcs, always). A
+path of direct search or stairs is never farther than one step from the circle through its start;
+so the end, when it is within `NEAR_RADIUS` of that circle, is passed within `NEAR_STEPS`, and no
+nearest approach lies outside. Other arcs are run ahead from their start.
 """
 
 from __future__ import annotations

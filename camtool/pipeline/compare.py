@@ -68,9 +68,8 @@ def compare_picture(
     import numpy as np
 
     from camtool.preview.overlay import Overlay
-    from camtool.simulation.models import model_of
-    from camtool.simulation.options import ALL, Options
-    from camtool.simulation.simulate import simulate
+    from camtool.simulation.motion import ALL, Options
+    from camtool.simulation.simulate import model_of, simulate
     from camtool.verify.contrast import strokes_within, worst_place
     from camtool.verify.cuts import cut_moves
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.items import Step
     from camtool.planning.job import Job
-    from camtool.simulation.options import Effects
+    from camtool.simulation.motion import Effects
     from camtool.toolpath.moves import Bent, Toolpath
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import Kept
@@ -158,7 +158,7 @@ def verify_program(
     """(decoded toolpath, verification) of any program of the target; against `drawing` planned
     with `job` when there is one. ProgramError names file, block and column."""
     from camtool.planning.job import Job
-    from camtool.simulation.options import ALL
+    from camtool.simulation.motion import ALL
     from camtool.verify.case import TRACE_POINTS, WORST_LISTED
     from camtool.verify.verify import VerifyOptions
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline.judge import Judging
-    from camtool.simulation.options import Effects
+    from camtool.simulation.motion import Effects
 
 EFFECTS = ("play", "compensation", "scale", "squareness", "repeatability")
 """The parts of the mechanics that can be left out."""
@@ -63,7 +63,7 @@ def altered(target: LoadedTarget, settings: Sequence[str]) -> LoadedTarget:
 
 def left_out(names: Sequence[str]) -> Effects:
     """The mechanics without these effects; OptionError for others."""
-    from camtool.simulation.options import ALL
+    from camtool.simulation.motion import ALL
 
     unknown = [name for name in names if name not in EFFECTS]
     if unknown:
@@ -84,7 +84,7 @@ def _interpolators(target: LoadedTarget, judging: Judging) -> list[Way]:
 
 def _mechanics(target: LoadedTarget, judging: Judging) -> list[Way]:
     """With all of it, without each part that acts, and without any."""
-    from camtool.simulation.options import IDEAL
+    from camtool.simulation.motion import IDEAL
 
     return [
         Way("as it is", target, judging),

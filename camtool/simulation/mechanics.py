@@ -21,10 +21,8 @@ import numpy as np
 
 from camtool.kernels.lattice import to_steps
 from camtool.kernels.play import play_fill, play_limits, play_start, play_varied_fill
-from camtool.machine.mechanics import PlayCells
-from camtool.machine.model import Axis, Machine
-from camtool.simulation.motion import Floats, Ints
-from camtool.simulation.options import Effects
+from camtool.machine.model import Axis, Machine, PlayCells
+from camtool.simulation.motion import Effects, Floats, Ints
 
 REVERSAL_STEPS = 0.5
 """An axis has reversed when it came back by this much of a coded step."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from camtool.geometry.drawing import Drawing
 from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
-from camtool.simulation.options import ALL, Effects, Options
+from camtool.simulation.motion import ALL, Effects, Options
 from camtool.toolpath.moves import Bent, Toolpath
 from camtool.toolpath.wanted import Kept
 from camtool.verify.asked import Asked
@@ -105,7 +105,7 @@ class Case:
     @property
     def spacing_mm(self) -> float:
         """How far apart the samples of the motion are, about."""
-        from camtool.simulation.models import model_of
+        from camtool.simulation.simulate import model_of
 
         return model_of(self.machine).spacing_mm(self.decoded, self.machine)
 

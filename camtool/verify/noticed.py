@@ -11,7 +11,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
 from camtool.planning.places import own_numbers
-from camtool.simulation.models import findings_of
+from camtool.simulation.simulate import findings_of
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
 from camtool.units import UM_PER_MM

@@ -265,7 +265,7 @@ class Result:
 
 def assumptions(case: Case) -> tuple[str, ...]:
     """What the times and figures take for granted."""
-    from camtool.simulation.models import model_of
+    from camtool.simulation.simulate import model_of
 
     link = case.machine.link
     said = model_of(case.machine).assumptions(case.decoded, case.machine)
@@ -287,7 +287,7 @@ def _max_rms(figure: Figure) -> record.MaxRms:
 
 def _interpolator(case: Case) -> str:
     """How the controller makes lines and arcs."""
-    from camtool.simulation.models import model_of
+    from camtool.simulation.simulate import model_of
 
     return model_of(case.machine).interpolation(case.decoded, case.machine, case.simulation)
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from camtool.errors import ProgramError
 from camtool.geometry.polylines import Floats, Ints
-from camtool.simulation.models import StepsOnTheWay
 from camtool.simulation.motion import Chunk, still_ledger
+from camtool.simulation.simulate import StepsOnTheWay
 from camtool.verify.ballbar import BothWays, Pairs, Reversing, reversing
 from camtool.verify.circles import UNSEEN, Circle, CircleFigures, circle_figures
 from camtool.verify.compare import Target

@@ -20,9 +20,14 @@ import msgspec
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
-from camtool.simulation.models import StepsOnTheWay, model_of, steps_on_the_way
 from camtool.simulation.motion import Chunk
-from camtool.simulation.simulate import check_options, simulate
+from camtool.simulation.simulate import (
+    StepsOnTheWay,
+    check_options,
+    model_of,
+    simulate,
+    steps_on_the_way,
+)
 from camtool.toolpath.moves import Bent, Toolpath, toolpath_extents
 from camtool.verify.against import Held, hold
 from camtool.verify.asked import Asked

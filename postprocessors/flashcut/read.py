@@ -17,18 +17,13 @@ from camtool.errors import ProgramError
 from camtool.findings import Code, Finding, Severity
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import FlashcutController
-from camtool.machine.controllers.flashcut_timers import (
-    feeds_of,
-    half_periods_ms,
-    shortest_ms,
-    steps_too_many,
-)
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import Block, Lexing, blocks_of
 from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
 
 LEXING: Final = Lexing(letters="GMXYZIJF")
 

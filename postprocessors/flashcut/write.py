@@ -17,7 +17,6 @@ from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import FlashcutController
-from camtool.machine.controllers.flashcut_timers import half_periods_ms
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import MAX_PARTS, Lowered
 from camtool.toolpath.moves import Kind, Toolpath
@@ -29,6 +28,7 @@ from ..gcode.format import Ints as Ints_here
 from ..gcode.format import NumberStyle, say_units
 from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
 from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from .timers import half_periods_ms
 
 WORD: Final[dict[int, str]] = {
     Kind.RAPID: "G00",

@@ -10,10 +10,11 @@ import re
 from typing import Final, Literal
 
 from camtool.errors import MachineError
-from camtool.machine.controllers.i8751_pulses import Firmware
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
 from camtool.machine.ranges import Tolerance
+
+from .pulses import Firmware
 
 RECORDS_PER_PACKET: Final = 5
 """15 blocks of three motors (L4106-4134)."""

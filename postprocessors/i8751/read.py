@@ -24,11 +24,11 @@ import numpy.typing as npt
 
 from camtool.errors import ProgramError
 from camtool.findings import Code, Finding, Severity
-from camtool.machine.controllers.i8751_pulses import PulseTimes
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, dialect_of
+from .pulses import PulseTimes
 
 Ints = npt.NDArray[np.int64]
 

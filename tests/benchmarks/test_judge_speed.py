@@ -17,7 +17,7 @@ import pytest
 
 from camtool.kernels.circle_bins import bin_directions
 from camtool.kernels.error_bins import BEFORE_FIRST, BINS
-from camtool.simulation.options import Options
+from camtool.simulation.motion import Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath

@@ -8,7 +8,7 @@ import pytest
 
 from camtool.machine.registry import load_target
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.options import ALL, CHUNK_STEPS
+from camtool.simulation.motion import ALL, CHUNK_STEPS
 
 pytestmark = pytest.mark.benchmark
 

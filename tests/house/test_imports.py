@@ -28,7 +28,7 @@ ALLOWED = {
     "importers": SHARED,
     "planning": SHARED,
     "simulation": SHARED,
-    "postprocessors": SHARED,
+    "postprocessors": SHARED | {"simulation"},
     "verify": JUDGE,
     "preview": JUDGE,
     "calibration": SHARED,

@@ -4,9 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-
-from camtool.errors import MachineError
-from camtool.machine.controllers.i8751_pulses import (
+from camtool_postprocessors.i8751.pulses import (
     DELAY_PERIODS,
     RAMP_PULSES,
     RAMP_RELOAD,
@@ -14,6 +12,8 @@ from camtool.machine.controllers.i8751_pulses import (
     PulseTimes,
     firmware_of,
 )
+
+from camtool.errors import MachineError
 from tests.oracles.i8751_run import CRYSTAL_HZ, Reading, listing_periods, record
 from tests.postprocessors.i8751_machines import loaded
 

@@ -21,6 +21,6 @@ def linuxcnc_machine(*settings: str) -> Machine:
 
 
 def _machine(name: str, settings: tuple[str, ...]) -> Machine:
-    path = FOLDER / f"{name}.toml"
+    path = FOLDER / name / "machine.toml"
     model = f"controller.model={name}"
     return build_machine(read_table(path), str(path), settings=(model, *settings))

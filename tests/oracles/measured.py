@@ -15,7 +15,7 @@ import numpy as np
 from camtool.calibration.coupons import Path, Sheet
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.options import ALL
+from camtool.simulation.motion import ALL
 
 CHORD_RAD = 0.002
 

@@ -10,9 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from camtool.machine.mechanics import PlayCells
-from camtool.machine.model import Axis, Machine
-from camtool.simulation.options import Effects
+from camtool.machine.model import Axis, Machine, PlayCells
+from camtool.simulation.motion import Effects
 
 WORD = 1 << 64
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.transform import scaled
 from camtool.machine.controllers import PathController, PicMmhController
-from camtool.machine.mechanics import PlayCells, PlayMap
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, PlayCells, PlayMap
 from camtool.planning.items import Run
 from camtool.planning.reversing.approach import (
     APPROACH_MARGIN_MM,
@@ -23,7 +22,7 @@ from camtool.planning.reversing.approach import (
 from camtool.planning.reversing.residual import residuals
 from camtool.planning.reversing.reversals import reversals_of
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.options import ALL
+from camtool.simulation.motion import ALL
 from camtool.simulation.simulate import simulate
 from camtool.verify.cuts import cut_moves
 from tests.planning.reversal_parts import run_of, square, toolpath, with_play

@@ -10,9 +10,8 @@ from camtool.errors import PostError
 from camtool.findings import Code, Severity
 from camtool.kernels.lattice import to_steps
 from camtool.machine.registry import LoadedTarget, load_target
-from camtool.simulation.models import findings_of
-from camtool.simulation.options import IDEAL, Options
-from camtool.simulation.simulate import simulate
+from camtool.simulation.motion import IDEAL, Options
+from camtool.simulation.simulate import findings_of, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from camtool_postprocessors.flashcut import controller
 from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
-from camtool.simulation import flashcut_moves
-from camtool.simulation.options import Effects, Options
+from camtool.simulation.motion import Effects, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -154,7 +154,7 @@ def test_arcs_of_whole_chords_have_no_further_one(quarters: int) -> None:
         centre = here - spoke
         end = here if quarters == 4 else centre + spoke * 1j**quarters
         path.arc(end.real, end.imag, centre=(centre.real, centre.imag), ccw=True, feed=3.0)
-    table = flashcut_moves.MoveTable.of(path.finish(), machine())
+    table = controller.MoveTable.of(path.finish(), machine())
     assert set(table.chords.tolist()) == {18 * quarters}
 
 

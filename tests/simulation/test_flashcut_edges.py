@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from camtool_postprocessors.flashcut import controller
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import FlashcutController, SlideStart
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
-from camtool.simulation import flashcut
-from camtool.simulation.options import IDEAL, Options
+from camtool.simulation.motion import IDEAL, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -126,17 +126,17 @@ def test_bad_options_are_named(setting: str) -> None:
 
 def test_another_controller_is_refused() -> None:
     with pytest.raises(MachineError, match="needs the controller flashcut"):
-        flashcut.assumptions(ToolpathBuilder().finish(), machine("controller.model=path"))
+        controller.assumptions(ToolpathBuilder().finish(), machine("controller.model=path"))
 
 
 def test_held_are_the_lengths_that_the_program_says() -> None:
     path = ToolpathBuilder().line(0.1234, 0.0567, feed=3.0).event(Kind.HOME_XY).finish()
-    held = flashcut.held(path, machine("controller.machine_zero_mm=[1.0, 2.0, 3.0]"))
+    held = controller.held(path, machine("controller.machine_zero_mm=[1.0, 2.0, 3.0]"))
     assert held.end.tolist() == [[0.1234, 0.0567, 0.0], [1.0, 2.0, 0.0]]
 
 
 def test_the_page_names_every_option() -> None:
-    page = TARGET.parents[1] / "docs" / "controllers" / "flashcut.md"
+    page = TARGET.parents[2] / "docs" / "controllers" / "flashcut.md"
     text = page.read_text(encoding="utf-8")
     own = set(FlashcutController.__struct_fields__) - set(SlideStart.__struct_fields__)
     assert len(own) == 8
@@ -144,7 +144,7 @@ def test_the_page_names_every_option() -> None:
 
 
 def test_the_assumptions_name_the_fastest_feed() -> None:
-    fastest, *others = flashcut.assumptions(
+    fastest, *others = controller.assumptions(
         ToolpathBuilder().finish(), machine("controller.half_period_ms=20")
     )
     assert "2.71 or 14.2 mm/min" in fastest  # 1.9 µm in 42 and in 8 ms

@@ -9,7 +9,7 @@ from camtool.errors import MachineError, ProgramError
 from camtool.findings import Code, Severity
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
-from camtool.simulation.options import CHUNK_STEPS, Options
+from camtool.simulation.motion import CHUNK_STEPS, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

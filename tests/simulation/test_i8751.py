@@ -6,14 +6,13 @@ import re
 
 import numpy as np
 import pytest
+from camtool_postprocessors.i8751.pulses import Firmware
 
 from camtool.errors import ProgramError
-from camtool.machine.controllers.i8751_pulses import Firmware
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
-from camtool.simulation.models import model_of
-from camtool.simulation.options import IDEAL, Options
-from camtool.simulation.simulate import simulate
+from camtool.simulation.motion import IDEAL, Options
+from camtool.simulation.simulate import model_of, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verify.verify import verify

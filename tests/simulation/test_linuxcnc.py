@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from camtool_postprocessors.linuxcnc.controller import assumptions, merged
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,10 +13,7 @@ from camtool.errors import MachineError, ProgramError
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
-from camtool.simulation.linuxcnc import assumptions
-from camtool.simulation.linuxcnc_moves import merged
-from camtool.simulation.motion import Floats
-from camtool.simulation.options import CHUNK_STEPS, Options
+from camtool.simulation.motion import CHUNK_STEPS, Floats, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

@@ -8,6 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from camtool_postprocessors.matlab_router.controller import (
+    TEXT_KID,
+    TEXT_KPD,
+    assumptions,
+    held,
+    lines_of,
+    spacing_mm,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,11 +23,7 @@ from camtool.errors import MachineError, ProgramError
 from camtool.machine.controllers import MatlabRouterController
 from camtool.machine.model import Machine, controller_of
 from camtool.machine.registry import load_target
-from camtool.simulation.matlab_router import assumptions, held, spacing_mm
-from camtool.simulation.matlab_router_lines import lines_of
-from camtool.simulation.matlab_router_program import TEXT_KID, TEXT_KPD
-from camtool.simulation.motion import Chunk
-from camtool.simulation.options import IDEAL, Options
+from camtool.simulation.motion import IDEAL, Chunk, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

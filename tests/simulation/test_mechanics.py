@@ -9,8 +9,7 @@ import pytest
 
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Floats, Ints
-from camtool.simulation.options import ALL, IDEAL, Effects
+from camtool.simulation.motion import ALL, IDEAL, Effects, Floats, Ints
 from tests.oracles.mechanics import LiteralMechanics
 from tests.oracles.path_machine import STEP, path_machine
 

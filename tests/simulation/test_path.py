@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError, ProgramError
 from camtool.machine.model import Machine
-from camtool.simulation import path_samples
-from camtool.simulation.motion import Chunk
-from camtool.simulation.options import IDEAL, Options
-from camtool.simulation.path import held
-from camtool.simulation.path_samples import PathSamples, move_lengths, sample_spacing_mm
+from camtool.simulation import path
+from camtool.simulation.motion import IDEAL, Chunk, Options
+from camtool.simulation.path import PathSamples, held, move_lengths, sample_spacing_mm
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
@@ -116,9 +114,7 @@ def test_ends_are_met_and_samples_are_no_wider_than_a_step(toolpath: Toolpath) -
             continue
         assert mine[-1].tolist() == list(move.end)
         apart = np.linalg.norm(np.diff([move.start, *mine.tolist()], axis=0), axis=1)
-        assert apart.max() <= sample_spacing_mm(toolpath, machine) * (
-            1.0 + path_samples.SPACING_EPS
-        )
+        assert apart.max() <= sample_spacing_mm(toolpath, machine) * (1.0 + path.SPACING_EPS)
         assert len(mine) <= length_of(toolpath, index) / STEP + 5
 
 
@@ -335,7 +331,7 @@ def test_rounding_turns_no_arc_inside_out(missing: float, ccw: bool) -> None:
 
 
 def test_long_programs_are_sampled_more_coarsely(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(path_samples, "MAX_SAMPLES", 100)
+    monkeypatch.setattr(path, "MAX_SAMPLES", 100)
     b = ToolpathBuilder((3.0, 0.0, 0.0)).arc(3, 0, centre=(0, 0.0), ccw=True, feed=60)
     toolpath = b.line(-3, 1, feed=60).finish()
     machine = path_machine(*both("backlash_mm", 0.1))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camtool.machine.registry import load_target
-from camtool.simulation.options import Effects, Options
+from camtool.simulation.motion import Effects, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.motion_rows import rows_of

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Floats
-from camtool.simulation.options import ALL
+from camtool.simulation.motion import ALL, Floats
 from tests.oracles.mechanics import deviates, split_mix_64
 from tests.oracles.path_machine import path_machine
 

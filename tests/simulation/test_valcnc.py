@@ -11,9 +11,8 @@ from camtool.errors import MachineError, ProgramError
 from camtool.machine.controllers import SlideStart, ValcncController
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
-from camtool.simulation.models import model_of
-from camtool.simulation.options import IDEAL, Effects, Options
-from camtool.simulation.simulate import simulate
+from camtool.simulation.motion import IDEAL, Effects, Options
+from camtool.simulation.simulate import model_of, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verify.verify import verify

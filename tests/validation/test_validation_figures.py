@@ -18,7 +18,7 @@ from camtool.importers.read import read_drawing
 from camtool.machine.registry import LoadedTarget, load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
-from camtool.simulation.options import IDEAL, Options
+from camtool.simulation.motion import IDEAL, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath

@@ -14,7 +14,7 @@ import pytest
 from camtool.machine.controllers import Interpolator
 from camtool.machine.registry import load_target
 from camtool.pipeline import Judging, verify_program
-from camtool.simulation.options import IDEAL, Options
+from camtool.simulation.motion import IDEAL, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verify.report import Report

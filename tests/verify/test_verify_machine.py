@@ -7,9 +7,8 @@ import pytest
 
 from camtool.findings import Code, Severity
 from camtool.machine.registry import load_target
-from camtool.simulation.models import model_of
-from camtool.simulation.options import Options
-from camtool.simulation.simulate import simulate
+from camtool.simulation.motion import Options
+from camtool.simulation.simulate import model_of, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from camtool.verify.verify import VerifyOptions, verify

@@ -6,10 +6,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh.controller import judged_steps
 
 from camtool.machine.model import Machine
-from camtool.simulation.options import Options
-from camtool.simulation.pic_mmh import judged_steps
+from camtool.simulation.motion import Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

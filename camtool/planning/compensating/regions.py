@@ -13,8 +13,7 @@ from itertools import pairwise
 import msgspec
 
 from camtool.kernels.lattice import to_steps
-from camtool.machine.mechanics import PlayCells
-from camtool.machine.model import Axis, Machine
+from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.planning.compensating.stretch import Stretch
 from camtool.planning.reversing.residual import Residual, residual
 

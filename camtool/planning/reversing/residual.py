@@ -23,8 +23,7 @@ from itertools import chain
 import msgspec
 
 from camtool.machine.controllers import Controller
-from camtool.machine.mechanics import PlayCells
-from camtool.machine.model import Axis, Machine
+from camtool.machine.model import Axis, Machine, PlayCells
 
 
 @dataclass(frozen=True)

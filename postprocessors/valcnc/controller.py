@@ -29,16 +29,17 @@ from camtool.kernels.valcnc_arcs import arc_angles
 from camtool.machine.controllers import ValcncController
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation import path
-from camtool.simulation.legs import LegRun, Legs, Standing
-from camtool.simulation.legs_rows import (
+from camtool.simulation.legs import (
     MAX_STEPS,
+    LegRun,
+    Legs,
+    Standing,
     check_rows,
     coded_steps_mm,
     place,
     waits_s,
 )
-from camtool.simulation.motion import Chunk, Floats, Ints
-from camtool.simulation.options import Options
+from camtool.simulation.motion import Chunk, Floats, Ints, Options
 from camtool.toolpath.moves import Kind, Toolpath
 
 PIECES_AT_ONCE = 1 << 14
@@ -49,7 +50,7 @@ PIECE_EPS = 1e-9
 
 
 def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.models.ControllerModel`."""
+    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
     pieces = _Pieces(toolpath, machine)
     period_s = 1.0 / controller_of(machine, ValcncController).step_rate_hz
     waits = waits_s(toolpath, toolpath.running)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from camtool.machine.controllers.flashcut import FlashcutController
+from camtool.machine.controllers import FlashcutController
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

@@ -1,23 +1,111 @@
-"""One run of a toolpath on the PIC18F8720, row by row: see `camtool.simulation.pic_mmh`."""
+"""The controller on the PIC18F8720: lines by DDA, arcs by direct search, one step at a time.
+
+What it does with a row of the toolpath, in the order of this file:
+
+1. Millimetres become steps, each coordinate by itself: round(mm / coded step), halves away from
+   zero. Lines and arcs start where the controller stands.
+2. XY first, then Z (2.5 axes). Lines, rapids and homing are DDA lines; arcs go by
+   `controller.arcs` about the rounded centre until the position equals the rounded end.
+3. Every output takes one period 1/f, f = feed / (60 · coded step), rapids run at
+   `limits.rapid_step_rate_hz` (equation 3.1, L853-878). The link reports each step, and holds
+   faster feeds at `limits.max_step_rate_hz` (L3196-3199). `time_base` "event": a pass without a
+   pulse costs nothing (annex A.3 loops back at once); "iteration": each pass takes one period.
+4. At each change of an axis's direction the compensation steps are issued, a period each.
+
+What the controller takes for the end of an arc is not said (`controller.arc_end`,
+`camtool.kernels.arc_stops`); it goes on from where the arc stopped. By "equal" an arc that passes
+its end without standing on it goes round again on the real machine, mostly for ever. Here its
+samples stop at the nearest approach to the end in the expected sweep, `ended` is False, and the
+next row goes on from the programmed end, without a reversal on the way there. An arc that starts
+at its centre has no samples and the same fate.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from camtool.errors import MachineError, ProgramError
+from camtool.findings import Code, Finding, Severity
+from camtool.kernels import arc_stops as stopping
+from camtool.kernels import leg_steps as columns
+from camtool.kernels.approach import approach_scan, approach_start, expected_quadrants
+from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
+from camtool.kernels.direct_search import direct_search_fill, direct_search_start
+from camtool.kernels.heading import rounded_radius
 from camtool.kernels.lattice import to_steps
-from camtool.machine.controllers import PicMmhController
+from camtool.kernels.stairs import stairs_fill, stairs_start
+from camtool.machine.controllers import Interpolator, PicMmhController
 from camtool.machine.model import Machine, controller_of
-from camtool.simulation.interpolators import Arc, Filler, arc_filler, arc_reach, line_filler
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, one_row
-from camtool.simulation.options import Options
-from camtool.simulation.pic_mmh_legs import METHODS, JudgedSteps, legs_of, positions
+from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, Options, one_row
 from camtool.toolpath.moves import Kind, Toolpath
+
+from .legs import METHODS, JudgedSteps, legs_of, positions
+
+
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
+    return PicMmh(toolpath, machine, options).run()
+
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The same with start, ends and arc centres at their nearest steps."""
+    coded_mm = [axis.coded_step_mm for axis in machine.axes]
+    centre = _on_grid(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), coded_mm[:2])
+    return replace(
+        toolpath,
+        start=_on_grid(toolpath.start[None, :], coded_mm)[0],
+        end=_on_grid(toolpath.end, coded_mm),
+        centre=np.where(toolpath.is_arc[:, None], centre, np.nan),
+    )
+
+
+def judged_steps(toolpath: Toolpath, machine: Machine, options: Options) -> JudgedSteps | None:
+    """The same motion as that of `run`, judged as it is made, without chunks; None where the
+    mechanics needs these. Raises as `run` does, all at once."""
+    return PicMmh(toolpath, machine, options).judged_steps()
+
+
+def findings(toolpath: Toolpath, machine: Machine, options: Options) -> tuple[Finding, ...]:
+    """Arcs that do not end alike by every reading of the thesis."""
+    if interpolation(toolpath, machine, options) != "dsm" or not toolpath.is_arc.any():
+        return ()
+
+    return arc_end_findings(toolpath, machine, PicMmh(toolpath, machine, options).legs_as_said())
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A step: every output is a sample."""
+    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+
+
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
+    """How arcs are made: dsm, dda or stairs."""
+    return options.interpolator or controller_of(machine, PicMmhController).arcs
+
+
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
+    """What the times take for granted."""
+    base = controller_of(machine, PicMmhController).time_base
+    return (
+        f"each {base} of the interpolator takes one period of the feed (controller.time_base)",
+        f"rapids run at {machine.limits.rapid_step_rate_hz:g} steps/s (limits.rapid_step_rate_hz)",
+        "each step of a compensation takes a period of its own",
+    )
+
+
+def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:
+    """Points (J, A) mm, each coordinate at its nearest step."""
+    columns = [to_steps(points[:, axis], step) * step for axis, step in enumerate(coded_mm)]
+    return np.column_stack(columns)
+
+
+# One run of a toolpath on the PIC18F8720, row by row.
 
 MAX_STEPS = 1 << 30
 """Positions beyond this many steps (150 m at 140 nm) are refused: squares must fit 64 bits."""
@@ -307,3 +395,142 @@ class PicMmh:
         """The block (from 1) that a row was read from, or the row when it was planned."""
         block = int(self._toolpath.block[row])
         return f"block {block + 1}" if block >= 0 else f"move {row}"
+
+
+# The interpolators as one kind of thing: a filler that writes the next positions to a buffer.
+#
+# Positions are steps: relative to the arc's centre for arcs, magnitudes from the start for lines.
+
+Filler: TypeAlias = Callable[[Ints], tuple[int, int, bool]]
+"""(n, 2) buffer → rows filled, passes run, and whether the end is met with the last row."""
+
+SEARCH_ROWS = 1 << 14
+"""Positions that the search for the end looks at in one go (256 KiB, stays in the cache)."""
+
+
+@dataclass(frozen=True)
+class Arc:
+    """An arc in steps: start (x, y) and end relative to its centre."""
+
+    x: int
+    y: int
+    clockwise: bool
+    end_x: int
+    end_y: int
+
+
+def line_filler(a: int, b: int) -> Filler:
+    """A DDA line of a ≥ 0 and b ≥ 0 steps."""
+    registers, counters = np.zeros(2), np.zeros(2, dtype=np.int64)
+
+    def fill(buffer: Ints) -> tuple[int, int, bool]:
+        filled, passes, done = dda_line_fill(a, b, registers, counters, buffer)
+        return filled, passes, done
+
+    return fill
+
+
+def arc_filler(arc: Arc, method: Interpolator, *, rounded: bool) -> Filler:
+    """An arc whose start is not its centre; `rounded`: the error at the start is that against
+    the circle of the rounded radius (DSM and stairs), else 0."""
+    state: Ints
+    if method == "dda":
+        state = dda_arc_start(arc.x, arc.y, arc.clockwise)
+
+        def fill(buffer: Ints) -> tuple[int, int, bool]:
+            filled, passes, met = dda_arc_fill(state, arc.end_x, arc.end_y, buffer)
+            return filled, passes, met
+
+        return fill
+    start, run = {
+        "dsm": (direct_search_start, direct_search_fill),
+        "stairs": (stairs_start, stairs_fill),
+    }[method]
+    error = arc.x**2 + arc.y**2 - rounded_radius(arc.x, arc.y) ** 2 if rounded else 0
+    state = start(arc.x, arc.y, arc.clockwise, error)
+
+    def fill_each(buffer: Ints) -> tuple[int, int, bool]:
+        filled, met = run(state, arc.end_x, arc.end_y, buffer)
+        return filled, filled, met
+
+    return fill_each
+
+
+def arc_reach(arc: Arc, fill: Filler) -> tuple[int, bool]:
+    """How many positions a fresh filler gives until the stop test is met, and True.
+
+    When it is not met in the expected sweep and a quadrant more: how many until the nearest
+    approach to the end there, and False. The controller then goes round at least once more, if it
+    ever stops. Bounded in time and memory.
+    """
+    expected = expected_quadrants(arc.x, arc.y, arc.clockwise, arc.end_x, arc.end_y)
+    low, high = expected - 1, expected + 1
+    end = np.array([arc.end_x, arc.end_y], dtype=np.int64)
+    tracker: Ints = approach_start(arc.x, arc.y, arc.end_x, arc.end_y, low)
+    turn = 8 * (max(abs(arc.x), abs(arc.y)) + 1)
+    buffer = np.empty((min(SEARCH_ROWS, turn), 2), dtype=np.int64)
+    while True:
+        filled, _, met = fill(buffer)
+        approach_scan(buffer[:filled], end, tracker, low, high)
+        entered, seen, nearest = int(tracker[2]), int(tracker[3]), int(tracker[4])
+        if entered > high:
+            return nearest, False
+        if met:
+            return seen, True
+
+
+# What each reading of the controller's stop test does to the arcs of a program.
+#
+# The readings are those of `camtool.kernels.arc_stops`, each with both values of D that the
+# controller may start with. An arc that stands on its end by the strictest of them, whatever D
+# was, stops there by all; of the others the machine's owner must know what may become of them.
+
+
+def arc_end_findings(toolpath: Toolpath, machine: Machine, legs: Ints) -> tuple[Finding, ...]:
+    """One ARC_END_UNSURE for the arcs of `legs` (L, 14), each from the end of the row before it,
+    that do not stop on their end by every reading."""
+    arcs = legs[
+        (legs[:, columns.KIND] == columns.ARC) & (legs[:, [columns.A, columns.B]] != 0).any(axis=1)
+    ]
+    met = [
+        _stops(arcs, rounded, stopping.EQUAL)[:, stopping.MET] != 0 for rounded in (False, True)
+    ]
+    unsure = ~(met[0] & met[1])
+    if not unsure.any():
+        return ()
+    apart = {
+        name: max(float(_apart(arcs[unsure], rounded, number).max()) for rounded in (False, True))
+        for name, number in stopping.READINGS.items()
+        if number != stopping.EQUAL
+    }
+    row = int(arcs[unsure][0, columns.ROW])
+    block = int(toolpath.block[row])
+    taken = controller_of(machine, PicMmhController).arc_end
+    return (
+        Finding(
+            Code.ARC_END_UNSURE,
+            Severity.WARNING,
+            f"{int(unsure.sum())} of {len(arcs)} arcs do not stand on their end by every reading "
+            f"of the thesis (controller.arc_end): by equal {int((~met[0]).sum())} run on past it "
+            f"({int((~met[1]).sum())} with initial_error=rounded-radius), by final-quadrant they "
+            f"stop up to {apart['final-quadrant']:.1f} steps beside it, by nearest up to "
+            f"{apart['nearest']:.1f}; simulated is {taken}",
+            where=f"block {block + 1}" if block >= 0 else f"move {row}",
+            measured=float(unsure.sum()),
+            limit=0.0,
+            unit="arcs",
+        ),
+    )
+
+
+def _stops(arcs: Ints, rounded: bool, reading: int) -> Ints:
+    """(L, 4) of `camtool.kernels.arc_stops`, by direct search."""
+    out = np.empty((len(arcs), stopping.STOP_COLUMNS), dtype=np.int64)
+    stopping.arc_stops(np.ascontiguousarray(arcs), (columns.DSM, rounded, reading), out)
+    return out
+
+
+def _apart(arcs: Ints, rounded: bool, reading: int) -> Floats:
+    """(L,) steps from the stop of each arc to its end."""
+    stops = _stops(arcs, rounded, reading)[:, [stopping.STOP_X, stopping.STOP_Y]]
+    return np.asarray(np.hypot(*(stops - arcs[:, [columns.END_X, columns.END_Y]]).T))

@@ -6,7 +6,7 @@ What it does with a row of the toolpath:
    where it stands (L5246-5254), so nothing is rounded twice.
 2. X and Y step together as often as the one with fewer steps, then the other one goes on alone
    (L4683-4705); Z moves after them (L4204-4222). Each of the three is a leg.
-3. Each leg takes its pulses' time with their ramps: `camtool.machine.controllers.i8751_pulses`,
+3. Each leg takes its pulses' time with their ramps: `camtool_postprocessors.i8751.pulses`,
    where the options of `[dialect]` say which reading of the thesis is meant.
 
 It issues nothing at reversals; compensation in a machine file would be steps at the start rate.
@@ -21,20 +21,27 @@ import numpy as np
 
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.controllers.i8751_pulses import PulseTimes, firmware_of
 from camtool.machine.model import Machine
-from camtool.simulation.legs import LegRun, Legs, Standing
-from camtool.simulation.legs_rows import check_rows, coded_steps_mm, place, waits_s
-from camtool.simulation.motion import Chunk, Floats, Ints
-from camtool.simulation.options import Options
+from camtool.simulation.legs import (
+    LegRun,
+    Legs,
+    Standing,
+    check_rows,
+    coded_steps_mm,
+    place,
+    waits_s,
+)
+from camtool.simulation.motion import Chunk, Floats, Ints, Options
 from camtool.toolpath.moves import Toolpath
+
+from .pulses import PulseTimes, firmware_of
 
 ROWS_AT_ONCE = 1 << 14
 """Rows whose legs are worked out together: some 5 MB."""
 
 
 def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.models.ControllerModel`."""
+    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
     _check(toolpath, machine)
     count = toolpath.running
     times = PulseTimes(firmware_of(machine))

@@ -1,0 +1,408 @@
+"""grbl 1.1: arcs as chords, lines of whole steps, speeds planned some blocks ahead.
+
+What it does with a program, in the order of the files:
+
+1. Numbers become 32-bit floats, arcs the ends of chords (`grbl_chords`).
+2. Targets become steps and blocks (`grbl_blocks`); each block is a Bresenham line in X, Y and Z
+   at once (`camtool.kernels.step_lines`). Its smoothing (AMASS) shifts steps of the slower axes
+   within an event; at the end of each event the axes stand where they do without it.
+3. Speeds: limits of the axes, corners by junction deviation, the ring of blocks
+   (`camtool.kernels.lookahead`), trapezoids (`speed_plan`). They change times, not positions.
+
+Positions are absolute: a row starts at the step where the one before ended, and no rounding adds
+up. grbl compensates no play.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import MachineError, ProgramError
+from camtool.kernels.step_lines import step_lines_fill, steps_taken
+from camtool.machine.controllers import GrblController
+from camtool.machine.model import Machine, controller_of
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import Chunk, Floats, Ints, Options
+from camtool.simulation.path import check_positions, check_rows, placed
+from camtool.simulation.row_chunks import RowTotals, row_chunks
+from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
+from camtool.toolpath.moves import Kind, Toolpath
+
+ALWAYS_ON = 255
+"""The $1 that leaves the motors on, and holds nothing at a stop."""
+
+DWELL_STEP_S = 0.05
+"""Dwells are counted in whole steps of this, rounded up (DWELL_TIME_STEP, `delay_sec`)."""
+
+
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
+    controller = _controller(machine)
+    path = held(toolpath, machine)
+    rows = path.running
+    check_rows(path, rows)
+    path = path.first(rows)
+    blocks = blocks_of(path, machine, controller)
+    samples = GrblSamples(blocks, rows, machine)
+    plan = speeds_of(blocks, path, machine)
+    seconds = np.zeros(rows)
+    np.add.at(seconds, blocks.row, plan.seconds(controller.buffer_blocks - 1))
+    if controller.idle_delay_ms != ALWAYS_ON:
+        held_s = controller.idle_delay_ms / 1000.0
+        np.add.at(seconds, blocks.row[stops(blocks, path)], held_s)
+    dwell = path.kind == Kind.DWELL
+    seconds[dwell] = [_dwell_s(value) for value in path.value[dwell].tolist()]
+    mechanics = Mechanics(machine, samples.start_mm(path.start), options.effects)
+    return row_chunks(samples, RowTotals(seconds, iterates=True), mechanics, options.chunk_steps)
+
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The moves as read, homing at machine zero: grbl rounds to steps when it makes blocks, and
+    its numbers are 32-bit floats, nearer than a hundredth of a step."""
+    check_positions(toolpath, machine)
+    return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A step: every step event is a sample."""
+    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+
+
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
+    """Chords, and Bresenham lines."""
+    return "chords"
+
+
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
+    """What the times take for granted."""
+    controller = _controller(machine)
+    return (
+        f"arcs are chords within {controller.arc_tolerance_mm:g} mm ($12), lines whole steps",
+        f"corners by a junction deviation of {controller.junction_deviation_mm:g} mm ($11), "
+        f"speeds planned {controller.buffer_blocks - 1} blocks ahead",
+        "the sender keeps grbl's buffer full; overrides stand at 100 %",
+    )
+
+
+class GrblSamples:
+    """All step events of a program, numbered from 0; none are held."""
+
+    def __init__(self, blocks: Blocks, rows: int, machine: Machine) -> None:
+        self._blocks = blocks
+        self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+        self._offsets = np.concatenate([[0], np.cumsum(blocks.events)])
+        self._travelled = np.zeros((len(blocks.row) + 1, 3), dtype=np.int64)
+        self._travelled[1:] = np.cumsum(np.abs(blocks.way), axis=0)
+        self.first = self._offsets[np.searchsorted(blocks.row, np.arange(rows + 1))]
+
+    def start_mm(self, start: Floats) -> Floats:
+        """Where the machine stands before the first block."""
+        if len(self._blocks.row) == 0:
+            return start
+        return np.asarray(self._blocks.start[0] * self._step_mm)
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row and position of the events low:high."""
+        blocks = self._blocks
+        begin = int(np.searchsorted(self._offsets, low, side="right")) - 1
+        end = int(np.searchsorted(self._offsets, high, side="left"))
+        commanded = np.empty((high - low, 3))
+        first = (begin, low - int(self._offsets[begin]))
+        step_lines_fill((blocks.start, blocks.way), first, self._step_mm, commanded)
+        bounds = np.clip(self._offsets[begin : end + 1], low, high)
+        return np.repeat(blocks.row[begin:end], np.diff(bounds)), commanded
+
+    def steps(self, bounds: Ints) -> Ints:
+        """Steps of each axis between events."""
+        block = np.searchsorted(self._offsets, bounds, side="right") - 1
+        count = self._travelled[block]
+        inside = np.flatnonzero(bounds > self._offsets[block])
+        event = bounds[inside] - self._offsets[block[inside]]
+        count[inside] += np.abs(steps_taken(self._blocks.way[block[inside]], event))
+        return np.asarray(np.diff(count, axis=0))
+
+
+def _controller(machine: Machine) -> GrblController:
+    """The machine's controller; MachineError for a compensation that grbl does not do."""
+    for name, axis in zip("xyz", machine.axes, strict=True):
+        if axis.compensation_mm > 0.0:
+            raise MachineError(
+                "grbl compensates no play",
+                where=f"table [axes.{name}], key compensation_mm",
+                mend="leave it out",
+            )
+    return controller_of(machine, GrblController)
+
+
+def _dwell_s(seconds: float) -> float:
+    """What `delay_sec` makes of a dwell; its count is a 32-bit float."""
+    per_second = np.float32(1.0 / DWELL_STEP_S)
+    return math.ceil(per_second * np.float32(seconds)) * DWELL_STEP_S
+
+
+# The blocks of grbl's planner: targets rounded to steps, and how fast each may go.
+#
+# From `plan_buffer_line` (planner.c): a target in mm, times the steps of a mm, goes to the nearest
+# step (halves away from zero), each by itself, so that nothing drifts. A target in the step where
+# the machine stands makes no block. Length and direction are those of the whole steps.
+
+MAX_STEPS = 1 << 29
+"""Positions beyond this many steps (2 km at 4 µm) are refused: products of two counts must fit
+64 bits. grbl's own 32-bit floats count no single steps beyond 2²⁴."""
+
+STRAIGHT_COS = 0.999999
+"""Cosine between two blocks beyond which a corner is none, or a way straight back (planner.c)."""
+
+LEAST_SPEED_MM_S = 1.0 / 60.0
+"""No block is slower (MINIMUM_FEED_RATE, config.h)."""
+
+WAITS = (
+    Kind.DWELL,
+    Kind.SPINDLE_CW,
+    Kind.SPINDLE_CCW,
+    Kind.SPINDLE_OFF,
+    Kind.TOOL_CHANGE,
+    Kind.END,
+)
+"""Before these the machine comes to rest (`protocol_buffer_synchronize`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """B blocks in order: the row (B,) that each is of, where it starts and its way, both (B, 3)
+    steps."""
+
+    row: Ints
+    start: Ints
+    way: Ints
+
+    @property
+    def events(self) -> Ints:
+        """(B,) steps of the axis that has the most of them."""
+        return np.asarray(np.abs(self.way).max(axis=1, initial=0))
+
+
+def blocks_of(path: Toolpath, machine: Machine, controller: GrblController) -> Blocks:
+    """The blocks of a program; ProgramError for positions beyond all that grbl can count."""
+    targets = targets_of(path, machine, controller)
+    steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
+    stop = _rounded(targets.mm, steps_per_mm)
+    begin = _rounded(path.start[None, :].astype(np.float32), steps_per_mm)
+    far = (np.abs(stop) > MAX_STEPS).any(axis=1)
+    if far.any():
+        row = int(targets.row[far.argmax()])
+        block = int(path.block[row])
+        raise ProgramError(
+            "a position is beyond all that the controller can count",
+            where=f"block {block + 1}" if block >= 0 else f"move {row}",
+        )
+    start = np.concatenate([begin, stop[:-1]])[: len(stop)]
+    way = stop - start
+    moves = way.any(axis=1)
+    return Blocks(targets.row[moves], start[moves], way[moves])
+
+
+def _rounded(mm: Singles, steps_per_mm: Singles) -> Ints:
+    """(T, 3) steps: the 32-bit product, to the nearest whole, halves away from zero."""
+    product = (mm * steps_per_mm).astype(np.float64)
+    return np.asarray(np.copysign(np.floor(np.abs(product) + 0.5), product).astype(np.int64))
+
+
+def speeds_of(blocks: Blocks, path: Toolpath, machine: Machine) -> SpeedPlan:
+    """How fast each block may go, and each corner be passed.
+
+    Along a unit vector u no axis exceeds its own limit, so a block is held to min(limit / |u|).
+    At a corner between u1 and u2, with θ the angle between −u1 and u2, a circle touches both at
+    `junction_deviation_mm` δ from the corner, and is followed (for its speed alone) at the
+    acceleration a that u2 − u1 allows:  v² = a δ sin(θ/2) / (1 − sin(θ/2)).
+
+    The timer cannot wait longer than `least_step_hz` says, so slower blocks run at that rate.
+    """
+    controller = machine.controller
+    assert isinstance(controller, GrblController)
+    step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    way = blocks.way * step_mm
+    length = np.sqrt((way**2).sum(axis=1))
+    unit = way / length[:, None]
+    rate = axis_limits(machine, "max_rate_mm_min") / 60.0
+    acceleration = axis_limits(machine, "acceleration_mm_s2")
+    highest = allowed_along(rate, unit)
+    feed = np.where(path.is_feed, path.feed, np.inf)[blocks.row] / 60.0
+    speed = np.maximum(np.minimum(feed, highest), LEAST_SPEED_MM_S)
+    speed = np.maximum(speed, controller.least_step_hz * length / blocks.events)
+    turn = np.zeros_like(unit)
+    turn[1:] = unit[1:] - unit[:-1]
+    across = np.sqrt((turn**2).sum(axis=1))
+    cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
+    half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        allowed = allowed_along(acceleration, turn / np.where(across > 0.0, across, 1.0)[:, None])
+        square = allowed * controller.junction_deviation_mm * half_sine / (1.0 - half_sine)
+    corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
+    corner[(cosine > STRAIGHT_COS) | _from_rest(blocks, path)] = 0.0
+    return SpeedPlan(length, speed, allowed_along(acceleration, unit), corner)
+
+
+def stops(blocks: Blocks, path: Toolpath) -> Ints:
+    """The blocks (S,) behind which the machine comes to rest."""
+    begins = np.flatnonzero(_from_rest(blocks, path))
+    return np.append(begins[1:], len(blocks.row))[: len(begins)] - 1
+
+
+def _from_rest(blocks: Blocks, path: Toolpath) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(B,) true for blocks before which the machine stands."""
+    waits = np.cumsum(np.isin(path.kind, WAITS))[blocks.row]
+    return np.asarray(np.diff(waits, prepend=-1) > 0)
+
+
+# The targets that grbl 1.1 hands to its planner, in its own 32-bit floats.
+#
+# Lines have one, their end; an arc has the ends of its chords (`mc_arc` in motion_control.c): all
+# but the last lie on the circle about its centre with the radius of its start, the last is its
+# end. Every operation rounds to 32 bits as the C code does on a processor whose double has 32 bits
+# (AVR); sine, cosine and arc tangent may differ from its library's in the last bit.
+
+Singles = npt.NDArray[np.float32]
+
+MAX_DIGITS = 8
+"""grbl drops the digits of a number behind so many (MAX_INT_DIGITS, nuts_bolts.c)."""
+
+DECIMAL_EPS = 1e-6
+"""Units of the last decimal: a number farther than this from all such units was not written with
+so many decimals, and is taken as its nearest float."""
+
+FULL_TURN_RAD = np.float32(5e-7)
+"""An arc that turns by less is a full circle (ARC_ANGULAR_TRAVEL_EPSILON, config.h)."""
+
+MOST_SEGMENTS = 1 << 16
+"""The chords of an arc are counted in 16 bits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """T targets in order: mm (T, 3), 32-bit, and the row (T,) of each."""
+
+    row: Ints
+    mm: Singles
+
+
+def targets_of(path: Toolpath, machine: Machine, controller: GrblController) -> Targets:
+    """What the rows of a program ask of the planner; rows that do not move ask nothing."""
+    ends = as_read(path.end, machine)
+    homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
+    arcs = np.flatnonzero(path.is_arc)
+    counts = np.where(path.is_motion | homing, 1, 0)
+    start = as_read(path.start, machine)
+    begins = np.concatenate([start[None, :], ends[:-1]]) if len(path) else ends
+    chords = _Chords(path, machine, begins[arcs], ends[arcs], arcs)
+    counts[arcs] = chords.segments(controller)
+    row = np.repeat(np.arange(len(path)), counts)
+    mm = ends[row]
+    first = np.cumsum(counts) - counts
+    inside, points = chords.points(counts[arcs], first[arcs], controller.arc_correction)
+    mm[inside] = points
+    return Targets(row, mm)
+
+
+def as_read(values: Floats, machine: Machine) -> Singles:
+    """Numbers as `read_float` (nuts_bolts.c) makes them from their digits.
+
+    The digits are one whole number, which is multiplied by 0.01 and 0.1 until the point is where
+    it belongs, each time rounded. How many decimals were written only `dialect.decimals` says;
+    where it does not, or the number has others, it is taken as the nearest float.
+    """
+    nearest = values.astype(np.float32)
+    decimals = machine.dialect.get("decimals")
+    if not isinstance(decimals, int):
+        return nearest
+    scaled = np.abs(values) * 10.0**decimals
+    digits = np.rint(scaled)
+    whole = np.maximum(np.floor(np.log10(np.maximum(np.trunc(np.abs(values)), 1.0))), 0.0) + 1.0
+    dropped = np.clip(whole + decimals - MAX_DIGITS, 0, decimals).astype(np.int64)
+    made = np.floor(digits / 10.0**dropped).astype(np.float32)
+    left = decimals - dropped
+    for _ in range(decimals // 2):
+        made = np.where(left >= 2, made * np.float32(0.01), made)
+        left = np.where(left >= 2, left - 2, left)
+    made = np.where(left == 1, made * np.float32(0.1), made)
+    written = np.abs(scaled - digits) <= DECIMAL_EPS
+    return np.asarray(np.where(written, np.copysign(made, nearest), nearest))
+
+
+class _Chords:
+    """The arcs of a program, J of them, from `begin` to `end` (J, 3) mm."""
+
+    def __init__(
+        self, path: Toolpath, machine: Machine, begin: Singles, end: Singles, arcs: Ints
+    ) -> None:
+        self._begin, self._end = begin, end
+        offset = as_read(path.centre[arcs] - path.starts[arcs, :2], machine)
+        self._offset = offset
+        self._centre = begin[:, :2] + offset
+        self._radius = np.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1])
+        rx, ry = -offset[:, 0], -offset[:, 1]
+        tx, ty = end[:, 0] - self._centre[:, 0], end[:, 1] - self._centre[:, 1]
+        turn = np.arctan2(rx * ty - ry * tx, rx * tx + ry * ty)
+        full = np.float32(2.0 * np.pi)
+        clockwise = path.kind[arcs] == Kind.ARC_CW
+        down = np.where(turn >= -FULL_TURN_RAD, turn - full, turn)
+        up = np.where(turn <= FULL_TURN_RAD, turn + full, turn)
+        self._turn = np.where(clockwise, down, up)
+
+    def segments(self, controller: GrblController) -> Ints:
+        """(J,) chords of each: ⌊|½ φ r| / √(δ (2r − δ))⌋, δ the arc tolerance; at least the one
+        to the end."""
+        tolerance = np.float32(controller.arc_tolerance_mm)
+        half = tolerance * (np.float32(2.0) * self._radius - tolerance)
+        way = np.abs(np.float32(0.5) * self._turn * self._radius)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            count = np.floor(way / np.sqrt(half))
+        counted = np.where(np.isfinite(count), count, 0.0).astype(np.int64) % MOST_SEGMENTS
+        return np.maximum(counted, 1)
+
+    def points(self, segments: Ints, first: Ints, correction: int) -> tuple[Ints, Singles]:
+        """Which targets (P,) are ends of chords within an arc, and where these lie (P, 3) mm.
+
+        A radius vector is turned by the angle of a chord, θ, with cos θ ≈ 1 − θ²/2 and
+        sin θ ≈ θ − θ³/6; after `correction` turns the next one is computed anew.
+        """
+        inner = segments - 1
+        arc = np.repeat(np.arange(len(segments)), inner)
+        number = np.arange(len(arc)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
+        theta = (self._turn / segments.astype(np.float32))[arc]
+        x0, y0 = -self._offset[arc, 0], -self._offset[arc, 1]
+        turned = number % (correction + 1)
+        angle = (number - turned).astype(np.float32) * theta
+        cos_i, sin_i = np.cos(angle), np.sin(angle)
+        anew = number >= turned + 1
+        x = np.where(anew, x0 * cos_i - y0 * sin_i, x0)
+        y = np.where(anew, x0 * sin_i + y0 * cos_i, y0)
+        cos_t = np.float32(2.0) - theta * theta
+        sin_t = theta * np.float32(0.16666667) * (cos_t + np.float32(4.0))
+        cos_t = cos_t * np.float32(0.5)
+        for step in range(1, correction + 1):
+            on = np.flatnonzero(turned >= step)
+            c, s, u, v = cos_t[on], sin_t[on], x[on], y[on]
+            x[on], y[on] = u * c - v * s, u * s + v * c
+        points = np.empty((len(arc), 3), dtype=np.float32)
+        points[:, 0] = self._centre[arc, 0] + x
+        points[:, 1] = self._centre[arc, 1] + y
+        points[:, 2] = self._heights(segments, arc)
+        return np.repeat(first, inner) + number - 1, points
+
+    def _heights(self, segments: Ints, arc: Ints) -> Singles:
+        """Z of the chords' ends within the arcs: an equal rise added each time."""
+        z: Singles = self._begin[arc, 2].copy()
+        rise = (self._end[:, 2] - self._begin[:, 2]) / segments.astype(np.float32)
+        behind = np.cumsum(segments - 1)
+        for which in np.flatnonzero((rise != 0.0) & (segments > 1)).tolist():
+            low, high = int(behind[which] - segments[which] + 1), int(behind[which])
+            z[low] += rise[which]
+            z[low + 1 : high] = rise[which]
+            z[low:high] = np.add.accumulate(z[low:high])
+        return z

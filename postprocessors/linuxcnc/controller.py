@@ -1,0 +1,589 @@
+"""The moves of LinuxCNC's planner: rows merged into lines, and what bounds each of them.
+
+From `emccanon.cc`. Along a unit vector u a line is held to min(limit / |u|) of the axes. An arc of
+radius r and sweep φ turns in XY, at no more than the slower axis v_xy, a_xy:
+
+    v² ≤ a_xy · √¾ · r_e,   r_e² = (least r)² + (dr/dφ)²       (`arc`, ARC_FEED)
+
+and a helix lets Z keep its own limits. Along an arc half of the acceleration is used, the rest is
+kept for turning (`tcGetTangentialMaxAccel`, tc.c); no move takes less than `LEAST_PERIODS` of the
+servo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import cast, get_args
+
+import numpy as np
+
+from camtool.errors import MachineError
+from camtool.kernels.lattice import to_steps
+from camtool.kernels.merge_lines import merge_lines
+from camtool.machine.controllers import LinuxcncController
+from camtool.machine.model import Machine, controller_of
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import Bools, Chunk, Floats, Ints, Options
+from camtool.simulation.path import (
+    PathSamples,
+    check_positions,
+    check_rows,
+    move_lengths,
+    placed,
+    sample_spacing_mm,
+)
+from camtool.simulation.row_chunks import RowTotals, row_chunks
+from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
+from camtool.toolpath.moves import Arms, Kind, PathMode, Toolpath
+from camtool.toolpath.moves import Corners as CornerMode
+
+NORMAL_RATIO = np.sqrt(0.75)
+"""How much of the acceleration a turn may take (BLEND_ACC_RATIO_NORMAL)."""
+
+TANGENT_RATIO = 0.5
+"""How much of it is used along the way of an arc (BLEND_ACC_RATIO_TANGENTIAL)."""
+
+LEAST_PERIODS = 1.02
+"""Servo periods that the shortest move lasts (TP_MIN_SEGMENT_CYCLES, tp_types.h)."""
+
+WAITS = (
+    Kind.DWELL,
+    Kind.SPINDLE_CW,
+    Kind.SPINDLE_CCW,
+    Kind.SPINDLE_OFF,
+    Kind.TOOL_CHANGE,
+    Kind.END,
+)
+"""Before these the machine comes to rest (their preconditions in emctaskmain.cc)."""
+
+
+def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
+    """The rows with the ends of merged lines on their common line, and the line of each row (N,);
+    `tolerance_mm` (N,) of each row, 0: it is not merged.
+
+    Only feed moves with one feed and one path mode, and nothing but moves of no length between
+    them, are merged; any event, an MSG comment too, ends a line.
+    """
+    count = len(path)
+    chain, moved = np.arange(count), path.end.copy()
+    if tolerance_mm.any():
+        same_feed = np.zeros(count, dtype=np.bool_)
+        same_feed[1:] = path.feed[1:] == path.feed[:-1]
+        is_line = path.kind == Kind.LINE
+        apart = ~(is_line & same_feed) | (tolerance_mm == 0.0)
+        apart[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
+        points = np.concatenate([path.start[None, :], path.end])
+        merge_lines(points, apart, tolerance_mm, chain, moved)
+    return replace(path, end=moved), chain
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
+    move; row (M,): the first of each. length mm, speed mm/s (as programmed, within the limits),
+    acceleration mm/s² (along the way), each (M,); begin, end (M, 3): unit tangents; is_arc (M,);
+    waits (M,): the machine comes to rest before this move, whatever the corner; like (M,): this
+    move and the one before are both rapids or both at a feed."""
+
+    row_of: Ints
+    row: Ints
+    length: Floats
+    speed: Floats
+    acceleration: Floats
+    begin: Floats
+    end: Floats
+    is_arc: Bools
+    waits: Bools
+    like: Bools
+
+
+def moves_of(path: Toolpath, chain: Ints, machine: Machine, period_s: float) -> Moves:
+    """The moves of merged rows; MachineError for limits that are not said."""
+    rate = axis_limits(machine, "max_rate_mm_min") / 60.0
+    acceleration = axis_limits(machine, "acceleration_mm_s2")
+    row_length = move_lengths(path)
+    length: Floats = np.bincount(chain, row_length, minlength=len(path)).astype(np.float64)
+    lasting = np.flatnonzero((length > 0.0) & (np.bincount(chain, minlength=len(path)) > 0))
+    number = np.full(len(path), -1, dtype=np.int64)
+    number[lasting] = np.arange(len(lasting))
+    row_of = np.where(row_length > 0.0, number[chain], -1)
+    rows, first = np.unique(row_of[row_of >= 0], return_index=True)
+    lead = np.flatnonzero(row_of >= 0)[first]  # the first row of each move
+    assert len(rows) == len(lead)
+    lengths = length[lasting]
+    begin, end = _tangents(path, lead)
+    highest, along = allowed_along(rate, begin), allowed_along(acceleration, begin)
+    arms = Arms(path, path.is_arc)
+    arm_of_row = np.full(len(path), -1, dtype=np.int64)
+    arm_of_row[arms.row] = np.arange(len(arms.row))
+    arm = arm_of_row[lead]
+    on = np.flatnonzero(arm >= 0)
+    highest[on], along[on] = _arc_limits(arms, arm[on], lengths[on], (rate, acceleration))
+    highest = np.minimum(highest, lengths / (LEAST_PERIODS * period_s))
+    feed = np.where(path.is_feed, path.feed, np.inf)[lead] / 60.0
+    waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
+    cuts = path.is_feed[lead]
+    like = cuts == np.roll(cuts, 1)
+    speed = np.minimum(feed, highest)
+    return Moves(row_of, lead, lengths, speed, along, begin, end, arm >= 0, waits, like)
+
+
+def _tangents(path: Toolpath, lead: Ints) -> tuple[Floats, Floats]:
+    """(M, 3) unit tangents at the start and end of the rows `lead`; merged rows are straight."""
+    way = (path.end - path.starts)[lead]
+    begin, end = way.copy(), way.copy()
+    arms = Arms(path, path.is_arc)
+    at = np.searchsorted(arms.row, lead)
+    on = np.flatnonzero(path.is_arc[lead])
+    for tangent, radius, share in ((begin, arms.radius, 0.0), (end, arms.end_radius, 1.0)):
+        arm = at[on]
+        sweep, grows = arms.sweep[arm], (arms.end_radius - arms.radius)[arm]
+        angle, r = arms.angle[arm] + share * sweep, radius[arm]
+        cos, sin = np.cos(angle), np.sin(angle)
+        tangent[on, 0] = grows * cos - r * sweep * sin
+        tangent[on, 1] = grows * sin + r * sweep * cos
+    begin /= np.linalg.norm(begin, axis=1)[:, None]
+    end /= np.linalg.norm(end, axis=1)[:, None]
+    return begin, end
+
+
+def _arc_limits(
+    arms: Arms, arm: Ints, length: Floats, limits: tuple[Floats, Floats]
+) -> tuple[Floats, Floats]:
+    """Highest speed and acceleration along the way of arcs."""
+    rate, acceleration = limits
+    v_xy, a_xy = rate[:2].min(), acceleration[:2].min()
+    r, r_end, sweep = arms.radius[arm], arms.end_radius[arm], np.abs(arms.sweep[arm])
+    rise = np.abs(arms.end[arm, 2] - arms.begin[arm, 2])
+    grows = r_end - r
+    least = np.minimum(r, r_end)
+    radius = np.hypot(least, grows / sweep)
+    level = np.hypot(least * sweep, grows)
+    planar = np.minimum(v_xy, np.sqrt(a_xy * NORMAL_RATIO * radius))
+    highest = length / np.maximum(rise / rate[2], level / planar)
+    overall = length / np.maximum(rise / acceleration[2], level / a_xy)
+    highest = np.minimum(highest, np.sqrt(NORMAL_RATIO * overall * radius))
+    return highest, TANGENT_RATIO * overall
+
+
+# How LinuxCNC meets the corners between its moves.
+#
+# At each corner with unit tangents u1 before and u2 behind it (`tpSetupTangent`, tp.c):
+#
+# - within 2° of straight back: a stop;
+# - a bend that takes less than `kink_ratio` of the highest acceleration of any axis in one servo
+#   period: no corner at all, but both moves accelerate less by that part;
+# - else a stop in the modes "exact-path" and "exact-stop" (which stops at the others too), and in
+#   "blend" an arc that touches both moves (`blendComputeParameters`, blendmath.c).
+#
+# With θ half the angle between −u1 and u2, an arc of radius R touches lines at d from the corner
+# and leaves it by T:
+#
+#     R = d tan θ,   T = R (1/sin θ − 1) = d (1 − sin θ)/cos θ,   v² ≤ √¾ a R
+#
+# T is at most the tolerance and a quarter of the shorter move; d at most half a line, the last two
+# thirds of an arc, and its first third. No blend is wider than its speed needs, v²/(√¾ a), or than
+# as long a time at that speed as half the acceleration would need to reach it. Where arcs meet
+# other moves LinuxCNC bends theirs a little, within the same tolerance.
+
+STRAIGHT_BACK_RAD = np.deg2rad(2.0)
+"""A way back within this angle is a stop (SHARP_CORNER_DEG)."""
+
+TOLERANCE_PART = 0.25
+"""Of the shorter move: no blend leaves its corner by more (`tcFindBlendTolerance`)."""
+
+LINE_PART = 0.5
+"""Of a line: a blend uses no more at each end (BLEND_DIST_FRACTION)."""
+
+ARC_END_PART = 2.0 / 3.0
+"""Of an arc: a blend at its end uses no more (`blendInit3FromArcLine`)."""
+
+ARC_START_PART = 1.0 / 3.0
+"""Of an arc: a blend at its start uses no more (`blendInit3FromLineArc`)."""
+
+LEAST_BEND_RAD = 1e-3
+"""Moves that bend by less have no arc between them (TP_MIN_ARC_ANGLE)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
+    the part of the acceleration that a bend takes from the moves on both sides; `reach` (M,) mm:
+    how far from the corner a blend begins and ends, 0 without one; `acceleration` (M,) mm/s²
+    along blends; `inward` (M, 3) and `onward` (M, 3): unit vectors to the blend's centre and
+    along it; `theta` (M,) rad."""
+
+    speed: Floats
+    lost: Floats
+    reach: Floats
+    acceleration: Floats
+    inward: Floats
+    onward: Floats
+    theta: Floats
+
+    @property
+    def way(self) -> Floats:
+        """(M,) mm along the blends."""
+        return np.asarray(self.reach * np.tan(self.theta) * (np.pi - 2.0 * self.theta))
+
+
+@dataclass(frozen=True)
+class CornerRules:
+    """`blend` (M,) and `stop` (M,): moves behind which corners are blended, and met with a stop;
+    `tolerance_mm` (M,) of each move, inf: none; `kink_ratio`; `period_s` of the servo; limits (3,)
+    of the axes, mm/s and mm/s²."""
+
+    blend: Bools
+    stop: Bools
+    tolerance_mm: Floats
+    kink_ratio: float
+    period_s: float
+    rate: Floats
+    acceleration: Floats
+
+
+def corners_of(moves: Moves, rules: CornerRules) -> Corners:
+    """What happens at the start of each move."""
+    count = len(moves.length)
+    before, after = np.roll(moves.end, 1, axis=0), moves.begin
+    turn, both = after - before, after + before
+    back = np.linalg.norm(both, axis=1) < STRAIGHT_BACK_RAD
+    # The move before a corner says how it is met; both say how far a blend may leave it.
+    free = ~moves.waits & moves.like & ~back & ~np.roll(rules.stop, 1)
+    # A kink: the change of velocity within one period, as a part of what each axis can do.
+    highest = np.minimum(np.roll(moves.speed, 1), moves.speed)
+    jolt = highest / rules.period_s + moves.acceleration
+    part = (np.abs(turn) * jolt[:, None] / rules.acceleration).max(axis=1, initial=0.0)
+    part = np.where(moves.is_arc | np.roll(moves.is_arc, 1), part / TANGENT_RATIO, part)
+    smooth = free & (part < rules.kink_ratio)
+    corners = Corners(
+        speed=np.where(smooth, np.inf, 0.0),
+        lost=np.where(smooth, part, 0.0),
+        reach=np.zeros(count),
+        acceleration=np.zeros(count),
+        inward=_unit(turn),
+        onward=_unit(both),
+        theta=0.5 * np.arccos(np.clip(-(before * after).sum(axis=1), -1.0, 1.0)),
+    )
+    on = np.flatnonzero(free & ~smooth & np.roll(rules.blend, 1))
+    _blend(corners, moves, on, rules)
+    # A bend that passes for straight at low speed, where that is faster than the blend.
+    kink = highest[on] * rules.kink_ratio / part[on]
+    faster = kink > corners.speed[on]
+    corners.speed[on] = np.maximum(corners.speed[on], kink)
+    corners.lost[on[faster]] = rules.kink_ratio
+    corners.reach[on[faster]] = 0.0
+    return corners
+
+
+def _blend(corners: Corners, moves: Moves, on: Ints, rules: CornerRules) -> None:
+    """Fill in speed, reach and acceleration of the blends at the corners `on`.
+
+    In the plane of both tangents, with unit normal m, no axis exceeds its limit when the whole is
+    held to min(limit / √(1 − m²)).
+    """
+    theta = corners.theta[on]
+    normal = _unit(np.cross(moves.end[on - 1], moves.begin[on]))
+    with np.errstate(divide="ignore"):
+        share = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
+        whole = (rules.acceleration / share).min(axis=1, initial=np.inf)
+        rate = (rules.rate / share).min(axis=1, initial=np.inf)
+    across = NORMAL_RATIO * whole
+    reach = _most_reach(moves, on, theta, rules.tolerance_mm)
+    widest = reach * np.tan(theta)
+    wanted = np.maximum(moves.speed[on - 1], moves.speed[on])
+    planned = np.minimum(np.minimum(wanted, rate), np.sqrt(across * widest))
+    half = 0.5 * whole
+    by_time = np.minimum(np.sqrt(2.0 * half * reach), planned) / half * planned
+    turned = np.pi - 2.0 * theta
+    by_time /= np.maximum(turned, LEAST_BEND_RAD)
+    radius = np.maximum(planned**2 / across, np.minimum(by_time, widest))
+    lasting = radius * turned / (LEAST_PERIODS * rules.period_s)
+    corners.speed[on] = np.minimum(planned, lasting)
+    corners.reach[on] = radius / np.tan(theta)
+    corners.acceleration[on] = TANGENT_RATIO * whole
+
+
+def _most_reach(moves: Moves, on: Ints, theta: Floats, tolerance_mm: Floats) -> Floats:
+    """The largest d at the corners `on`; 0 where the moves hardly bend."""
+    shorter = np.minimum(moves.length[on], moves.length[on - 1])
+    asked = np.minimum(tolerance_mm[on], tolerance_mm[on - 1])
+    leaves = np.minimum(asked, TOLERANCE_PART * shorter)
+    flat = np.pi - 2.0 * theta < LEAST_BEND_RAD
+    by_tolerance = leaves * np.cos(theta) / np.where(flat, 1.0, 1.0 - np.sin(theta))
+    end_part = np.where(moves.is_arc[on - 1], ARC_END_PART, LINE_PART)
+    start_part = np.where(moves.is_arc[on], ARC_START_PART, LINE_PART)
+    by_length = np.minimum(end_part * moves.length[on - 1], start_part * moves.length[on])
+    return np.asarray(np.where(flat, 0.0, np.minimum(by_tolerance, by_length)))
+
+
+def _unit(vectors: Floats) -> Floats:
+    """(M, 3) of length 1; vectors of none stay."""
+    length = np.linalg.norm(vectors, axis=1)
+    return np.asarray(vectors / np.where(length > 0.0, length, 1.0)[:, None])
+
+
+# LinuxCNC: the programmed lines and arcs themselves, corners as the path mode says.
+#
+# What it does with a program, in the order of the files:
+#
+# 1. Each row has the path mode that the program says there (G61, G61.1, G64 P Q), or that of the
+#    machine file. In the mode "blend", lines that lie on one line but for a tolerance are merged
+#    (`linuxcnc_moves`, `camtool.kernels.merge_lines`).
+# 2. Corners: stops, bends that pass for straight, blends (`linuxcnc_corners`), as they come out at
+#    the programmed feed. No blend leaves its corner by more than the tolerance.
+# 3. Speeds: limits of the axes, turning in arcs, corners, so many moves ahead
+#    (`camtool.kernels.lookahead`), trapezoids (`speed_plan`).
+#
+# Positions are the trajectory's, in 64-bit floats. The step generator follows them to the nearest
+# step, or an encoder to its count: half a step of each axis, which is not in the samples. Steps
+# are counted, not taken. Rounding never adds up.
+#
+# BACKLASH of an axis (`compensation_mm`) is added at a change of its direction. LinuxCNC spreads
+# it over some milliseconds at half of the axis's limits; here it acts at once, and takes no time.
+
+LEAST_WAY_MM = 1e-9
+"""What blends leave of a move is nothing when it is shorter."""
+
+LAST_PART = 0.5
+"""Of its acceleration: what the last move before a wait uses in the mode "blend"."""
+
+REST_PERIODS = 1.0
+"""Servo periods that coming to rest takes beyond the trapezoid (measured)."""
+
+PERIOD_EPS = 1e-6
+"""Periods: a time longer than a whole number of them by less is that number."""
+
+
+def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
+    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
+    path = held(toolpath, machine)
+    rows = path.running
+    check_rows(path, rows)
+    path = path.first(rows)
+    modes = _modes(path, machine)
+    path, chain = merged(path, modes.merging_mm)
+    moves = moves_of(
+        path, chain, machine, controller_of(machine, LinuxcncController).servo_period_s
+    )
+    corners = corners_of(moves, _rules(modes, moves, machine))
+    samples = LinuxcncSamples(path, machine, moves, corners)
+    seconds = _seconds(path, machine, (moves, modes), corners)
+    mechanics = Mechanics(machine, path.start, options.effects)
+    return row_chunks(samples, RowTotals(seconds), mechanics, options.chunk_steps)
+
+
+def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The moves as read, homing at machine zero: nothing is rounded."""
+    check_positions(toolpath, machine)
+    return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
+
+
+def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """A coded step, or what a million samples of the whole program allow."""
+    return sample_spacing_mm(toolpath, machine)
+
+
+def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
+    """Blends, or the path alone."""
+    blends = any(mode.corners == "blend" for mode in _asked(toolpath, machine))
+    return "blend" if blends else "path"
+
+
+def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
+    """What the figures and times take for granted."""
+    return (
+        *dict.fromkeys(_corners_said(mode) for mode in _asked(toolpath, machine)),
+        "speeds by trapezoids within the limits of the axes, overrides at 100 %",
+        "the step generator may be half a step off on each axis, which is not in the figures",
+    )
+
+
+def _corners_said(mode: PathMode) -> str:
+    if mode.corners == "exact-path":
+        return "no corner is rounded (G61)"
+    if mode.corners == "exact-stop":
+        return "the machine stops at each corner (G61.1)"
+    if mode.tolerance_mm == 0.0:
+        return "corners are blended as far as the moves allow (G64 without P)"
+    return f"corners are blended within {mode.tolerance_mm:g} mm (G64 P), as the speed needs"
+
+
+class LinuxcncSamples:
+    """Points along the moves, blends included, numbered from 0; only one window is held."""
+
+    def __init__(self, path: Toolpath, machine: Machine, moves: Moves, corners: Corners) -> None:
+        self._samples = PathSamples(path, sample_spacing_mm(path, machine))
+        self.first = self._samples.first
+        self._step_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._moves, self._corners = moves, corners
+        self._row_length = move_lengths(path)
+        lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
+        so_far = np.cumsum(lengths) - lengths
+        begins = np.concatenate([[0.0], np.cumsum(moves.length)])
+        self._into = so_far - begins[np.maximum(moves.row_of, 0)]
+        self._at = self._in_steps(path.start[None, :])
+        self._counts = np.zeros((1, 3), dtype=np.int64)
+        self._low = 0
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row and position of the samples low:high, which follow those of the last call."""
+        row, share = self._samples.places(low, high)
+        points = self._samples.points(row, share)
+        self._blend(points, row, share)
+        steps = np.concatenate([self._at, self._in_steps(points)])
+        self._at, self._low = steps[-1:], low
+        self._counts = np.zeros((len(steps), 3), dtype=np.int64)
+        np.cumsum(np.abs(np.diff(steps, axis=0)), axis=0, out=self._counts[1:])
+        return row, points
+
+    def steps(self, bounds: Ints) -> Ints:
+        """Steps of each axis between samples of the window: changes of the nearest step."""
+        return np.diff(self._counts[bounds - self._low], axis=0)
+
+    def _blend(self, points: Floats, row: Ints, share: Floats) -> None:
+        """Move points (K, 3) near blended corners inward.
+
+        On the tangent at s from the corner P stands Q = P ∓ s t_±; the blend's point there is
+        B = P + h n + R (−n cos α ∓ t sin α), with α = (π/2 − θ) s / d, n inward, t onward, and
+        h = d / cos θ. What lies between them, B − Q, is added to the point of the move itself.
+        """
+        moves, corners = self._moves, self._corners
+        if not corners.reach.any():
+            return
+        move = moves.row_of[row]
+        along = self._into[row] + share * self._row_length[row]
+        left = np.maximum(moves.length[move] - along, 0.0)
+        following = np.append(corners.reach, 0.0)
+        ahead = np.flatnonzero(left < following[move + 1])
+        behind = np.flatnonzero(along < corners.reach[move])
+        self._inward(points, ahead, move[ahead] + 1, left[ahead], -1.0)
+        self._inward(points, behind, move[behind], along[behind], 1.0)
+
+    def _inward(self, points: Floats, on: Ints, corner: Ints, s: Floats, side: float) -> None:
+        corners = self._corners
+        d, theta = corners.reach[corner], corners.theta[corner]
+        alpha = (0.5 * np.pi - theta) * s / d
+        radius, height = d * np.tan(theta), d / np.cos(theta)
+        # n and t parts of B − P and of Q − P = s (n cos θ ± t sin θ)
+        inward = height - radius * np.cos(alpha) - s * np.cos(theta)
+        onward = side * (radius * np.sin(alpha) - s * np.sin(theta))
+        points[on] += inward[:, None] * corners.inward[corner]
+        points[on] += onward[:, None] * corners.onward[corner]
+
+    def _in_steps(self, points: Floats) -> Ints:
+        columns = [to_steps(points[:, axis], step) for axis, step in enumerate(self._step_mm)]
+        return np.column_stack(columns)
+
+
+def _seconds(
+    path: Toolpath, machine: Machine, planned: tuple[Moves, Modes], corners: Corners
+) -> Floats:
+    """(N,) s of each row.
+
+    Blends are blocks of their own, half of each belongs to the row on either side; the rows of a
+    merged line share its time by their lengths. In the mode "blend" the last move before a wait
+    accelerates by half: it was kept ready for a blend that never came (`tcGetOverallMaxAccel`).
+    """
+    controller, (moves, modes) = controller_of(machine, LinuxcncController), planned
+    seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
+    count = len(moves.length)
+    following = np.append(corners.reach[1:], 0.0)
+    plan = np.zeros((2 * count, 4))  # at even places the blend before a move, then the move
+    plan[0::2] = np.column_stack(
+        [corners.way, corners.speed, corners.acceleration, np.full(count, np.inf)]
+    )
+    own = np.maximum(moves.length - corners.reach - following, 0.0)
+    blended = corners.reach > 0.0
+    entry = np.where(blended, np.inf, corners.speed)
+    lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
+    last = np.append(moves.waits[1:], np.ones(min(count, 1), dtype=np.bool_))
+    spared = np.where(last & modes.blend[moves.row], LAST_PART, 1.0)
+    acceleration = moves.acceleration * (1.0 - lost) * spared
+    plan[1::2] = np.column_stack([own, moves.speed, acceleration, entry])
+    lasting = np.flatnonzero(plan[:, 0] > LEAST_WAY_MM)
+    taken = np.zeros(2 * count + 1)
+    speeds = SpeedPlan(*plan[lasting].T)
+    taken[lasting] = _in_periods(speeds, controller.lookahead_moves, controller.servo_period_s)
+    whole = taken[1::2] + 0.5 * (taken[0:-1:2] + taken[2::2])
+    moving = np.flatnonzero(moves.row_of >= 0)
+    move = moves.row_of[moving]
+    seconds[moving] = whole[move] * (move_lengths(path)[moving] / moves.length[move])
+    return seconds
+
+
+def _in_periods(plan: SpeedPlan, window: int, period_s: float) -> Floats:
+    """(N,) s of each block; from rest to rest it takes whole servo periods, and `REST_PERIODS`."""
+    seconds = plan.seconds(window)
+    from_rest = np.flatnonzero(plan.entries(window)[:-1] == 0.0)
+    if len(from_rest):
+        runs = np.add.reduceat(seconds, from_rest)
+        periods = np.ceil(runs / period_s - PERIOD_EPS) + REST_PERIODS
+        seconds[np.append(from_rest[1:], len(seconds)) - 1] += periods * period_s - runs
+    return seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """How N rows meet the corners behind them: `blend` (N,) and `stop` (N,), which are neither
+    where the path is kept without a stop; `tolerance_mm` (N,) of blends, inf: none; `merging_mm`
+    (N,), 0: none."""
+
+    blend: Bools
+    stop: Bools
+    tolerance_mm: Floats
+    merging_mm: Floats
+
+
+def _modes(path: Toolpath, machine: Machine) -> Modes:
+    """What the program says of each row, and where it says nothing, the machine file."""
+    table = np.array(
+        [
+            (mode.corners == "blend", mode.corners == "exact-stop", mode.tolerance_mm or np.inf,
+             mode.merging_mm)
+            for mode in _asked(path, machine)
+        ]
+    )[path.mode]  # fmt: skip
+    return Modes(table[:, 0] > 0.0, table[:, 1] > 0.0, table[:, 2], table[:, 3])
+
+
+def _asked(path: Toolpath, machine: Machine) -> tuple[PathMode, ...]:
+    """The modes of the program, and behind them (at −1) that of the machine file where any row
+    leaves it to that."""
+    silent = len(path) == 0 or bool((path.mode < 0).any())
+    return (*path.modes, _machine_mode(machine)) if silent else path.modes
+
+
+def _rules(modes: Modes, moves: Moves, machine: Machine) -> CornerRules:
+    controller = controller_of(machine, LinuxcncController)
+    return CornerRules(
+        blend=modes.blend[moves.row],
+        stop=modes.stop[moves.row],
+        tolerance_mm=modes.tolerance_mm[moves.row],
+        kink_ratio=controller.kink_ratio,
+        period_s=controller.servo_period_s,
+        rate=axis_limits(machine, "max_rate_mm_min") / 60.0,
+        acceleration=axis_limits(machine, "acceleration_mm_s2"),
+    )
+
+
+def _machine_mode(machine: Machine) -> PathMode:
+    """What `[dialect]` says of corners; MachineError when it does not."""
+    mode = machine.dialect.get("path")
+    tolerance = machine.dialect.get("blend_tolerance_mm")
+    if mode not in get_args(CornerMode):
+        raise MachineError(
+            "LinuxCNC needs to know how it meets corners",
+            where="table [dialect], key path",
+            mend=f"one of {', '.join(get_args(CornerMode))}",
+        )
+    if mode != "blend":
+        return PathMode(cast(CornerMode, mode))
+    if not isinstance(tolerance, (int, float)):
+        raise MachineError(
+            "blending needs its tolerance",
+            where="table [dialect], key blend_tolerance_mm",
+            mend="the P of G64, in mm",
+        )
+    return PathMode("blend", float(tolerance), float(tolerance))
