@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from camtool.jobs.given import Given, Key
-from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE
-from camtool.jobs.values import layers
+from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE, Given, Key, layers
 from camtool.planning.job import Job
 from camtool.planning.job import job_of as made
 

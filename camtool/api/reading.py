@@ -96,7 +96,7 @@ def read_job(
     OptionError, which names file, table, key and mend. Source: docs/jobs.md.
     """
     from camtool.jobs.build import job_of_file
-    from camtool.jobs.layers import refuse_unmatched
+    from camtool.jobs.drawing import refuse_unmatched
 
     job = job_of_file(Path(file), _patterns(operations))
     if isinstance(drawing, DrawingRecord):
@@ -111,8 +111,7 @@ def as_drawing(
 ) -> DrawingRecord:
     """The drawing, or what is in its file on the layers that the job's operations take."""
     from camtool.importers.select import NoMatchError
-    from camtool.jobs.layers import layers_of, refuse_unmatched, unmatched
-    from camtool.jobs.reading import read_to_scale
+    from camtool.jobs.drawing import layers_of, read_to_scale, refuse_unmatched, unmatched
 
     if isinstance(drawing, DrawingRecord):
         return drawing

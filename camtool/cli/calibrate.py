@@ -7,9 +7,8 @@ from typing import Any
 
 import click
 
-from camtool.cli.options import talk_options
-from camtool.cli.output import STDOUT, check_places, write_all
-from camtool.cli.sections import SectionedCommand
+from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.options import SectionedCommand, talk_options
 
 
 @click.command(cls=SectionedCommand, short_help="A machine's numbers from measured coupons.")
@@ -39,8 +38,8 @@ def calibrate(
     from camtool.calibration.machinefile import machine_file
     from camtool.calibration.measurements import read_measurements
     from camtool.calibration.report import outliers, to_data, to_text
+    from camtool.cli.messages import say, show_text
     from camtool.cli.options import MachineFlags
-    from camtool.cli.talk import say, show_text
     from camtool.plain import one_line, to_json
 
     check_places([measurements, machine], [output, report])

@@ -1,26 +1,151 @@
-"""`camtool check`: what an importer sees in a drawing."""
+"""The facts of a drawing as lines for people: `name      value`, one fact a line.
+
+Long lists show their first rows; the JSON has all of them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.drawing import DrawingFlags, drawing_options
-from camtool.cli.options import talk_options
-from camtool.cli.output import STDOUT, check_places, write_all
-from camtool.cli.pictureflags import DRAWING, PictureFlags, picture_options
-from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say_error, say_findings, say_first_run
-from camtool.cli.terminal import DRAWING_MARKS, show_facts
-from camtool.cli.types import picture as picture_name
+from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.messages import DRAWING_MARKS, say_error, say_findings, say_first_run, show_facts
+from camtool.cli.options import (
+    DrawingFlags,
+    SectionedCommand,
+    drawing_options,
+    picture_name,
+    talk_options,
+)
+from camtool.cli.picture_options import DRAWING, PictureFlags, picture_options
 from camtool.errors import CamtoolError
-from camtool.plain import to_json
+from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
+
+
+SHOWN = 10
+"""So many rows of a list are shown, unless asked for all."""
+
+NAME_WIDTH = 10
+"""Columns before the values."""
+
+
+def table(facts: dict[str, Any], *, verbose: bool) -> str:
+    """The facts of `camtool check`; `verbose` shows long lists whole."""
+    most = None if verbose else SHOWN
+    rows = [*_head(facts), *_layers(facts, most), *_entities(facts), *_places(facts, most)]
+    return "\n".join(one_line(f"{name:<{NAME_WIDTH}}{value}".rstrip()) for name, value in rows)
+
+
+_Rows = Iterator[tuple[str, str]]
+
+
+def _head(facts: dict[str, Any]) -> _Rows:
+    """Units, size and how much there is."""
+    units, size, extents = facts["units"], facts["size_mm"], facts["extents_mm"]
+    yield "file", facts["file"]
+    yield "units", f"{units['name']} ({units['why']})"
+    yield "size", f"{size[0]:.4g} × {size[1]:.4g} mm"
+    yield (
+        "extents",
+        f"x {extents['x'][0]:.4f} … {extents['x'][1]:.4f}   "
+        f"y {extents['y'][0]:.4f} … {extents['y'][1]:.4f} mm",
+    )
+    yield (
+        "contours",
+        f"{facts['closed']} closed, {facts['open']} open, {facts['length_mm']:.4g} mm long, "
+        f"{facts['lines']} lines, {facts['arcs']} arcs",
+    )
+    if facts["marks"]:
+        yield "points", f"{facts['marks']} single"
+    for finding in facts["findings"]:
+        if finding["code"] == "SECTION_CHOSEN":
+            yield "taken", finding["message"]
+    if facts["fit_um"]["max"] > 0.0:
+        yield "fitted", f"curves within {facts['fit_um']['max']:.3g} µm"
+    for name, found in facts["smallest"].items():
+        if found is not None:
+            x, y = found["at_mm"]
+            yield "smallest", f"{_SMALLEST[name]} {found['size_mm']:.4g} mm at {x:.4f}, {y:.4f}"
+
+
+_SMALLEST = {
+    "radius": "radius",
+    "segment": "line or arc, length",
+    "contour": "contour, width",
+    "distance": "distance of contours",
+}
+
+
+def _layers(facts: dict[str, Any], most: int | None) -> _Rows:
+    """Layers, colours and line types, where there is a choice."""
+    for name, layer in _first(list(facts["layers"].items()), most):
+        points = f", {layer['marks']} points" if layer["marks"] else ""
+        yield "layer", f"{name}: {layer['closed']} closed, {layer['open']} open{points}"
+    yield from _more("layer", facts["layers"], most)
+    for key, name, none in (("colours", "colour", "none"), ("line_types", "line type", "plain")):
+        if len(facts[key]) > 1:
+            counts = list(facts[key].items())
+            listed = ", ".join(f"{count} {word or none}" for word, count in _first(counts, most))
+            yield name, listed + (" …" if most is not None and len(counts) > most else "")
+
+
+def _entities(facts: dict[str, Any]) -> _Rows:
+    """What of the file was used, what was not, and what was mended."""
+    used = ", ".join(f"{count} {kind}" for kind, count in facts["entities_used"].items())
+    yield "entities", used or "none"
+    for item in facts["entities_not_used"]:
+        yield "not used", f"{item['count']} {item['kind']}: {item['reason']}"
+    for key, what in (("duplicates", "drawn twice"), ("overlaps", "parts lying on others")):
+        if facts[key]["count"]:
+            length = facts[key]["length_mm"]
+            yield "left out", f"{facts[key]['count']} {what}, {length:.4g} mm"
+    if facts["tiny_merged"]:
+        yield "merged", f"{facts['tiny_merged']} tiny segments"
+    if facts["arcs_recognised"]:
+        yield "arcs", f"{facts['arcs_recognised']} recognised in chords"
+
+
+def _places(facts: dict[str, Any], most: int | None) -> _Rows:
+    """Gaps, branches, crossings and open ends, with their places."""
+    for key, what in (("gaps", "stays open"), ("closed_gaps", "was closed")):
+        for gap in _first(facts[key], most):
+            yield "gap", f"{gap['size_mm']:.4g} mm at {_at(gap)} on {gap['layer']}, {what}"
+        yield from _more("gap", facts[key], most)
+    for item in _first(facts["branches"], most):
+        yield "branch", f"{item['ends']} ends at {_at(item)} on {item['layer']}"
+    yield from _more("branch", facts["branches"], most)
+    for item in _first(facts["crossings"], most):
+        yield "crossing", f"of a contour with itself at {_at(item)} on {item['layer']}"
+    yield from _more("crossing", facts["crossings"], most)
+    ends = list(zip(facts["open_ends"][::2], facts["open_ends"][1::2], strict=True))
+    for begin, end in _first(ends, most):
+        yield "open", f"from {_at(begin)} to {_at(end)} on {begin['layer']}"
+    yield from _more("open", ends, most)
+
+
+def _at(item: dict[str, Any]) -> str:
+    x, y = item["at_mm"]
+    return f"{x:.4f}, {y:.4f}"
+
+
+def _first(items: list[Any], most: int | None) -> list[Any]:
+    return items if most is None else items[:most]
+
+
+def _more(name: str, items: Any, most: int | None) -> _Rows:
+    """One line for the rows that are not shown."""
+    if most is not None and len(items) > most:
+        yield name, f"and {len(items) - most} more (-v shows all)"
+
+
+# `camtool check`: what an importer sees in a drawing.
 
 
 @click.command(cls=SectionedCommand, short_help="What is in a drawing.")
@@ -100,8 +225,6 @@ def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
         files[asked.preview] = painted(asked.preview)
     write_all(files)
     if asked.report != STDOUT and not asked.quiet:
-        from camtool.cli.check_table import NAME_WIDTH, table
-
         show_facts(table(facts, verbose=asked.verbose), NAME_WIDTH, DRAWING_MARKS)
     say_findings(read.findings, quiet=asked.quiet, verbose=asked.verbose)
     return 1 if worst(read.findings) >= Severity.ERROR else 0

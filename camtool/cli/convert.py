@@ -6,15 +6,12 @@ from pathlib import Path
 
 import click
 
-from camtool.cli.finish import Asked, finish
-from camtool.cli.options import MachineFlags, talk_options
-from camtool.cli.pictureflags import RESULT, UNVERIFIED, PictureFlags, picture_options
-from camtool.cli.programs import read_bytes, shown
+from camtool.cli.files import read_bytes, shown
+from camtool.cli.messages import say_first_run
+from camtool.cli.options import MachineFlags, SectionedCommand, feed, picture_name, talk_options
+from camtool.cli.picture_options import RESULT, UNVERIFIED, PictureFlags, picture_options
+from camtool.cli.post import Asked, finish
 from camtool.cli.report import flags_given, pictures_asked, report_option
-from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say_first_run
-from camtool.cli.types import feed
-from camtool.cli.types import picture as picture_name
 
 
 @click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")

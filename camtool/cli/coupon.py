@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from camtool.cli.options import MachineFlags, machine_options, talk_options
-from camtool.cli.output import STDOUT, check_new, check_places, write_all
-from camtool.cli.sections import SectionedCommand
+from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import OptionError
 
 if TYPE_CHECKING:
@@ -92,7 +91,7 @@ def coupon(
     from camtool.calibration import drawings
     from camtool.calibration.coupons import sheet
     from camtool.calibration.skeleton import skeleton
-    from camtool.cli.talk import say
+    from camtool.cli.messages import say
 
     output = output or "coupon.dxf"
     if output != STDOUT and PurePath(output).suffix.lower() not in DRAWINGS:

@@ -13,16 +13,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.finish import Asked, finish
-from camtool.cli.options import talk_options
-from camtool.cli.output import STDOUT
-from camtool.cli.pictureflags import PictureFlags
-from camtool.cli.posting import posting_options
-from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say
+from camtool.cli.files import STDOUT
+from camtool.cli.messages import say
+from camtool.cli.options import SectionedCommand, talk_options
+from camtool.cli.picture_options import PictureFlags
+from camtool.cli.post import Asked, finish, posting_options
 
 if TYPE_CHECKING:
-    from camtool.cli.posting import Posting
+    from camtool.cli.post import Posting
 
 TARGET = "linuxcnc"
 BEGUN, READ, MADE, DONE = 1, 20, 95, 100

@@ -7,10 +7,15 @@ from typing import Any
 
 import click
 
-from camtool.cli.drawing import DrawingFlags, drawing_options
-from camtool.cli.jobflags import JobFlags
-from camtool.cli.options import MachineFlags, machine_options, talk_options
-from camtool.cli.sections import SectionedCommand
+from camtool.cli.options import (
+    DrawingFlags,
+    JobFlags,
+    MachineFlags,
+    SectionedCommand,
+    drawing_options,
+    machine_options,
+    talk_options,
+)
 
 MOST_GROUPS = 12
 """So many groups of contours of an operation are printed."""
@@ -45,8 +50,8 @@ def new(
 
     It works as it is; every other key stands there as a comment.
     """
-    from camtool.cli.output import STDOUT, check_new, check_places, write_all
-    from camtool.cli.talk import say, say_findings, say_first_run
+    from camtool.cli.files import STDOUT, check_new, check_places, write_all
+    from camtool.cli.messages import say, say_findings, say_first_run
     from camtool.jobs.template import job_template
 
     output = output or "job.toml"
@@ -79,9 +84,9 @@ def check(
 ) -> None:
     """Check the job FILE, and say what each operation does; with --against, to which paths, on
     which side of them, and why."""
-    from camtool.cli.output import STDOUT, check_places, write_all
-    from camtool.cli.talk import say_findings, show_text
-    from camtool.jobs.described import described
+    from camtool.cli.files import STDOUT, check_places, write_all
+    from camtool.cli.messages import say_findings, show_text
+    from camtool.jobs.description import described
     from camtool.plain import one_line, to_json
 
     reads = [*JobFlags(file, (), {}).files(), against, *machine.files()]

@@ -21,20 +21,18 @@ from typing import NoReturn, TextIO
 import click
 
 from camtool import __version__
-from camtool.cli.alive import life_signs
 from camtool.cli.batch import batch
 from camtool.cli.calibrate import calibrate
 from camtool.cli.check import check
-from camtool.cli.completion import VARIABLE, completion, values_told
+from camtool.cli.completion import VARIABLE, completion, take_over, values_told
 from camtool.cli.convert import convert
 from camtool.cli.coupon import coupon
 from camtool.cli.filter import filter_command
 from camtool.cli.job import job
+from camtool.cli.messages import life_signs, say, say_error
 from camtool.cli.post import post
 from camtool.cli.preview import preview
-from camtool.cli.shells import take_over
 from camtool.cli.stale import stale
-from camtool.cli.talk import say, say_error
 from camtool.cli.targets import targets
 from camtool.cli.verify import verify
 from camtool.errors import CamtoolError, InputError, OutputError

@@ -1,29 +1,184 @@
-"""`camtool post`: the main job, drawing to verified program."""
+"""The flags with which a drawing becomes a program, as one record: for `post` and its like."""
 
 from __future__ import annotations
 
+import hashlib
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.finish import Asked, finish
-from camtool.cli.options import talk_options
-from camtool.cli.output import STDOUT
-from camtool.cli.pictureflags import (
+from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.first_run import compiled_beside
+from camtool.cli.messages import (
+    REPORT_NAMES,
+    report_marks,
+    say,
+    say_error,
+    say_findings,
+    show_facts,
+)
+from camtool.cli.options import (
+    Command,
+    DrawingFlags,
+    GateFlags,
+    JobFlags,
+    MachineFlags,
+    SectionedCommand,
+    decorate,
+    drawing_options,
+    gate_options,
+    gather,
+    job_options,
+    machine_options,
+    picture_name,
+    talk_options,
+)
+from camtool.cli.picture_options import (
     RESULT,
     UNVERIFIED,
     PictureFlags,
     check_beside,
     picture_options,
 )
-from camtool.cli.posting import posting_options
-from camtool.cli.report import flags_given, pictures_asked, report_option
-from camtool.cli.sections import SectionedCommand
-from camtool.cli.types import picture as picture_name
-from camtool.cli.watch import watch
+from camtool.cli.report import (
+    Subject,
+    flags_given,
+    linked_picture,
+    picture_beside,
+    pictures_asked,
+    refuse_foreign_picture,
+    report_files,
+    report_option,
+)
+from camtool.errors import CamtoolError, OptionError
 
 if TYPE_CHECKING:
-    from camtool.cli.posting import Posting
+    from camtool.cli.picture_options import Painter
+    from camtool.cli.report import Flags
+    from camtool.geometry.drawing import Drawing
+    from camtool.machine.registry import LoadedTarget
+    from camtool.pipeline import Posted
+    from camtool.planning.job import Job
+    from camtool.preview.scene import Scene
+
+
+JOB_ENDING = ".toml"
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A drawing and what was made of it."""
+
+    drawing: Drawing
+    job: Job
+    posted: Posted
+    target: LoadedTarget
+
+    def scenes(self, *, before: bool = False) -> list[Scene]:
+        """The predicted result; `before` it that of the job without what it does against reversals
+        and play. OptionError where it does nothing of that kind."""
+        if not before or self.posted.failed:
+            return [self._scene(self.posted)]
+        if self.posted.before is None:
+            raise OptionError(
+                "the job does nothing against reversals or play",
+                where="--before-after",
+                mend="add --compensate, --minimise reversals or --approach, or drop it",
+            )
+        return [self._scene(self.posted.before, ", before"), self._scene(self.posted, ", after")]
+
+    def _scene(self, posted: Posted, when: str = "") -> Scene:
+        from camtool.pipeline import posted_scene
+
+        title = f"{Path(self.drawing.file).name}{when}"
+        return posted_scene(posted, self.target, title=title, drawing=self.drawing, job=self.job)
+
+
+@dataclass(frozen=True)
+class Posting:
+    """How drawings are posted."""
+
+    machine: MachineFlags
+    gates: GateFlags
+    job: JobFlags
+    drawing: DrawingFlags
+    no_verify: bool
+    compensate: bool
+
+    def load(self) -> LoadedTarget:
+        """The target; a usage error when the flags contradict each other."""
+        if self.no_verify and self.gates.given:
+            raise click.UsageError("--no-verify leaves nothing to hold against limits")
+        return self.machine.load()
+
+    def make(
+        self,
+        source: str,
+        target: LoadedTarget,
+        *,
+        quiet: bool,
+        on_read: Callable[[], None] | None = None,
+        preview: str | None = None,
+    ) -> Made:
+        """The drawing posted, for a picture of this name; `on_read` is called when it has been
+        read."""
+        from camtool.pipeline import points_for, post_drawing
+
+        name, judging = target.machine.target.name, not self.no_verify
+        with compiled_beside(name, quiet=quiet, judging=judging):
+            wanted = self.job.job(self.drawing)
+            read = self.drawing.read(source, target.machine, wanted)
+            if on_read is not None:
+                on_read()
+            with self.job.blamed():
+                posted = post_drawing(
+                    read,
+                    wanted,
+                    target,
+                    check=not self.no_verify,
+                    compensate=self.compensate,
+                    gates=self.gates.gates(),
+                    trace_points=points_for(preview),
+                )
+        return Made(read, wanted, posted, target)
+
+    def files(self, source: str) -> list[str]:
+        """The files that a program is made of: drawing, job, its tool table, and machine."""
+        return [source, *self.job.files(), *self.machine.files()]
+
+    def of(self, source: str) -> Posting:
+        """The same with the drawing's own job file, `part.toml` beside `part.dxf`, if it has one.
+
+        Its own job takes the place of `--job`; flags are laid over either.
+        """
+        if not Path(source).name:  # the folder ., which is an error later
+            return self
+        own = Path(source).with_suffix(JOB_ENDING)
+        if not own.is_file():
+            return self
+        return replace(self, job=replace(self.job, file=str(own)))
+
+
+def posting_options(command: Command) -> Command:
+    """Adds `posting: Posting`."""
+    names = ("machine", "gates", "job", "drawing", "no_verify", "compensate")
+    inner = drawing_options(gather("posting", Posting, names)(command))
+    verify, bend = (
+        click.option("--no-verify", is_flag=True, help="Write without simulating the machine."),
+        click.option(
+            "--compensate",
+            is_flag=True,
+            help="Bend the path against the machine's play, scale and squareness.",
+        ),
+    )
+    return decorate(machine_options(gate_options(job_options(inner))), [verify, bend])
+
+
+# `camtool post`: the main job, drawing to verified program.
 
 
 @click.command(cls=SectionedCommand, short_help="Drawing to verified program.")
@@ -91,3 +246,183 @@ def post(
         )
 
     return watch(once, lambda: posting.files(source), quiet=quiet) if watching else once()
+
+
+# How `post` and `convert` end: all files or none, and a short summary.
+
+ANY_MACHINE = "travel, rates and backlash are placeholders: camtool targets new NAME --extends {}"
+"""What is said where nobody has told what the machine is."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the user wants written; `source` names what it is made of, None is not wanted.
+
+    `reads` are all files that are read for it.
+    """
+
+    source: str
+    output: str | None
+    report: str | None
+    preview: str | None = None
+    page: str | None = None
+    flags: Flags = ()
+    reads: Sequence[str] = ()
+
+    def check(self, extension: str, *, verified: bool) -> None:
+        """OutputError, before any work is done, when a place cannot be written."""
+        for flag, name in (("--json", self.report), ("--report", self.page)):
+            if name is not None and not verified:
+                raise click.UsageError(
+                    f"{flag} is the report of the verification that --no-verify leaves out"
+                )
+        outputs = [self.program(extension), self.preview, self.report, self.page]
+        check_places(self.reads, [*outputs, picture_beside(self.page, self.preview)])
+        refuse_foreign_picture(self.page, self.preview)
+
+    def program(self, extension: str) -> str:
+        """The program's name; when none is given the source's, here; stdin goes to stdout."""
+        if self.output is not None:
+            return self.output
+        return STDOUT if self.source == STDOUT else Path(self.source).stem + extension
+
+
+def finish(
+    made: Posted,
+    asked: Asked,
+    *,
+    quiet: bool,
+    verbose: bool,
+    picture: Painter,
+    target: LoadedTarget,
+) -> int:
+    """Writes what was made and says so; the exit code. `picture` draws the ones that were asked.
+
+    Where something is wrong only the page that was asked for is written: it says what.
+    """
+    say_findings(made.findings, quiet=quiet, verbose=verbose)
+    if made.failed or made.program is None:
+        if asked.page is not None:
+            write_all(_page_alone(made, asked, picture, target))
+        no = "nothing" if asked.page is None else "no program"
+        say(
+            f"camtool: error: {asked.source}: {no} was written; mend the errors above",
+            quiet=False,
+        )
+        return 1
+    # A dialect of several forms (binary, listing) says only now which extension it takes.
+    asked.check(made.program.extension, verified=True)
+    output = asked.program(made.program.extension)
+    files = {output: made.program.data}
+    if asked.preview is not None:
+        files[asked.preview] = picture(asked.preview)
+    if asked.report is not None and made.verification is not None:
+        files[asked.report] = made.verification.report.to_json().encode()
+    if asked.page is not None:
+        files.update(_page(made, asked, picture, target))
+    write_all(files)
+    if made.verification is not None and not quiet:
+        said = made.verification.report.to_text(findings=False)
+        if target.any_machine:
+            said += f"\n{'machine':<10} {ANY_MACHINE.format(target.machine.target.name)}"
+        show_facts(said, REPORT_NAMES, report_marks(made.findings), err=True)
+    where = "stdout" if output == STDOUT else output
+    say(f"written: {where} ({len(made.program.data)} bytes)", quiet=quiet)
+    return 0
+
+
+def _page_alone(
+    made: Posted, asked: Asked, picture: Painter, target: LoadedTarget
+) -> dict[str, bytes]:
+    """The files of the page, and the picture of `--preview` if that is what the page shows."""
+    files, linked = _page(made, asked, picture, target), linked_picture(asked.page, asked.preview)
+    return files if linked is None or linked in files else {**files, linked: picture(linked)}
+
+
+def _page(made: Posted, asked: Asked, picture: Painter, target: LoadedTarget) -> dict[str, bytes]:
+    """The files of the page that was asked for."""
+    subject = Subject(
+        title=Path(asked.source).name if asked.source != STDOUT else "<stdin>",
+        target=target,
+        report=made.verification.report if made.verification is not None else None,
+        findings=made.findings,
+        program=made.program.data if made.program is not None else None,
+        flags=asked.flags,
+    )
+    return report_files(str(asked.page), subject, picture, preview=asked.preview)
+
+
+# `--watch`: the same again whenever one of its files has changed.
+#
+# Files are looked at by their content, so that a save without a change does nothing and no clock
+# of a network drive matters. A change counts when it has settled: an editor may write in several
+# goes.
+
+POLL_S = 0.4
+"""Files are looked at so often."""
+
+SETTLED_S = 0.2
+"""A change counts when the files are the same after so long."""
+
+Files = Callable[[], Sequence[str]]
+Digests = dict[str, bytes | None]
+
+
+def watch(
+    again: Callable[[], int],
+    files: Files,
+    *,
+    quiet: bool,
+    wait: Callable[[float], None] = time.sleep,
+) -> int:
+    """Calls `again` now and after each change of the `files`, until Ctrl-C; then 0.
+
+    Which files these are may change with what they hold: a job file names a tool table.
+    What is wrong is said on one line, and watching goes on: the next save may mend it.
+    """
+    try:
+        seen = _digests(files)
+        say(f"camtool: watching {', '.join(seen)}; Ctrl-C ends", quiet=quiet)
+        _tried(again)
+        while True:
+            wait(POLL_S)
+            now = _settled(files, seen, wait)
+            changed = [file for file in now if file not in seen or now[file] != seen[file]]
+            seen = now
+            if changed:
+                say(f"camtool: changed: {', '.join(changed)}", quiet=quiet)
+                _tried(again)
+    except KeyboardInterrupt:
+        say("camtool: watching ended", quiet=quiet)
+        return 0
+
+
+def _tried(again: Callable[[], int]) -> None:
+    try:
+        again()
+    except CamtoolError as error:
+        say_error(error)
+
+
+def _settled(files: Files, seen: Digests, wait: Callable[[float], None]) -> Digests:
+    """What the files hold; where that has changed, once it stays the same."""
+    now = _digests(files)
+    while now != seen:
+        wait(SETTLED_S)
+        before, now = now, _digests(files)
+        if now == before:
+            break
+    return now
+
+
+def _digests(files: Files) -> Digests:
+    """The content of each file as a digest; None for what cannot be read just now."""
+    return {file: _digest(Path(file)) for file in files()}
+
+
+def _digest(file: Path) -> bytes | None:
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").digest()
+    except OSError:
+        return None

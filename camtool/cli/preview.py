@@ -8,15 +8,21 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.drawing import DrawingFlags, drawing_options
-from camtool.cli.jobflags import JobFlags, job_options
+from camtool.cli.files import STDOUT, check_places, read_bytes, write_all
+from camtool.cli.messages import say, say_findings, say_first_run
 from camtool.cli.options import (
+    DrawingFlags,
+    JobFlags,
     MachineFlags,
+    SectionedCommand,
+    drawing_options,
+    is_viewer,
+    job_options,
     machine_options,
+    picture_name,
     talk_options,
 )
-from camtool.cli.output import STDOUT, check_places, write_all
-from camtool.cli.pictureflags import (
+from camtool.cli.picture_options import (
     DRAWING,
     RESULT,
     Canvas,
@@ -24,11 +30,6 @@ from camtool.cli.pictureflags import (
     check_beside,
     picture_options,
 )
-from camtool.cli.programs import read_bytes
-from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say, say_findings, say_first_run
-from camtool.cli.types import is_viewer
-from camtool.cli.types import picture as picture_name
 from camtool.errors import CamtoolError, DrawingError
 
 if TYPE_CHECKING:

@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.output import STDOUT
-from camtool.cli.pictureflags import FLAGS as PICTURE_FLAGS
-from camtool.cli.seal import is_foreign, sealed
-from camtool.cli.types import is_viewer, page
+from camtool.cli.files import STDOUT, is_foreign, sealed
+from camtool.cli.options import is_viewer, page_name
+from camtool.cli.picture_options import FLAGS as PICTURE_FLAGS
 from camtool.errors import OutputError
 
 if TYPE_CHECKING:
-    from camtool.cli.painter import Painter
+    from camtool.cli.picture_options import Painter
     from camtool.findings import Finding
     from camtool.machine.registry import LoadedTarget
     from camtool.verify.page import Page, Setup
@@ -56,7 +55,7 @@ class Subject:
 def report_option(command: Any) -> Any:
     """Adds `page: str | None`, the name of the page that `--report` asks for."""
     text = "A page: summary, picture, tables, findings; .html, .md or .json; - is Markdown."
-    add = click.option("--report", "page", metavar="FILE", callback=page, help=text)
+    add = click.option("--report", "page", metavar="FILE", callback=page_name, help=text)
     return add(command)
 
 

@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.options import talk_options
-from camtool.cli.posting import JOB_ENDING, posting_options
-from camtool.cli.sections import SectionedCommand
-from camtool.cli.talk import say
+from camtool.cli.messages import say
+from camtool.cli.options import SectionedCommand, talk_options
+from camtool.cli.post import JOB_ENDING, posting_options
 from camtool.errors import CamtoolError, InputError
 from camtool.findings import Severity
 
 if TYPE_CHECKING:
-    from camtool.cli.posting import Posting
+    from camtool.cli.post import Posting
     from camtool.machine.registry import LoadedTarget
     from camtool.toolpath.program import Program
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.messages import in_colour, say, show_text
 from camtool.cli.options import talk_options
-from camtool.cli.output import STDOUT, check_new, check_places, write_all
-from camtool.cli.talk import in_colour, say, show_text
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:

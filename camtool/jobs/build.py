@@ -1,25 +1,280 @@
-"""The job that a file and the flags say together.
+"""Job files: TOML that says how a drawing is cut, read as strictly as a machine's.
 
-    defaults of the file ◀ keys of the operation ◀ flags        the nearest value counts
+    safe_z = "0.5mm"                # the job as a whole
+    depth = "0.1mm"                 # keys of operations up here hold for all that know them
+    [place]                         # the drawing in the work frame
+    [stock]
+    [tools.finish]
+    [[operations]]                  # in the order in which they are cut
 
-A key that no operation of the job can use is refused, wherever it was given.
+A file without `[[operations]]` is one operation, whose keys stand at its top. docs/jobs.md
+explains every key. What is read here is not yet a job: `build` lays the flags over it.
 """
 
 from __future__ import annotations
 
 import difflib
 import re
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-from camtool.errors import OptionError
-from camtool.jobs.file import Said, read_job_file
-from camtool.jobs.given import Table, record_of, why_idle
-from camtool.jobs.keys import OPERATION, PLACE, STOCK, WHOLE
-from camtool.jobs.tools import Tools, refuse_bad_tools, with_table
-from camtool.planning.job import Job, Operation, Placement, Stock
+from camtool.errors import MachineError, OptionError
+from camtool.jobs.keys import (
+    OPERATION,
+    PLACE,
+    STOCK,
+    TOOL,
+    TOOL_KEYS,
+    TOOL_NAME,
+    WHOLE,
+    Given,
+    Table,
+    record_of,
+    refuse_idle,
+    table_of,
+    why_idle,
+)
+from camtool.machine.loader import read_table
+from camtool.planning.job import Job, Operation, Placement, Stock, Tool
+from camtool.planning.tooltable import TableTool, read_tool_table
 
-_NUMBER = re.compile(r"\d{1,6}")
+OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
+"""Keys of `[[operations]]`."""
+
+TABLES = ("place", "stock", "tools", "operations")
+"""Tables of a job file."""
+
+AT_THE_TOP = (*WHOLE, *OF_OPERATIONS, "origin", *TABLES)
+"""Keys at the top of a job file; the origin may stand here too."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a file, or the flags, say of a job: its tables as given. `defaults` hold for all
+    `operations`; None are the operations of the other source."""
+
+    whole: Table = field(default_factory=Table)
+    place: Table = field(default_factory=Table)
+    stock: Table | None = None
+    tools: Mapping[str, Table] = field(default_factory=dict)
+    defaults: Table = field(default_factory=Table)
+    operations: tuple[Table, ...] | None = None
+    folder: Path = Path()
+
+
+def read_job_file(path: Path) -> Said:
+    """The tables of a job file; OptionError names file, table, key and mend."""
+    try:
+        values = read_table(path)
+    except MachineError as error:
+        raise OptionError(error.message, file=error.file, mend=error.mend) from error
+    return said_of(values, path)
+
+
+def said_of(values: dict[str, Any], path: Path) -> Said:
+    """The tables of a job as TOML gives them; `path` names the file."""
+    file = str(path)
+    top = table_of(values, AT_THE_TOP, "", file)
+    defaults = top.only(OF_OPERATIONS)
+    operations = _operation_tables(values, file)
+    if operations is None:
+        defaults, operations = Table(file=file), (defaults,)
+    elif "name" in defaults.given:
+        raise defaults.given["name"].refused(
+            "every operation needs a name of its own", "move it into [[operations]]"
+        )
+    return Said(
+        whole=top.only(WHOLE),
+        place=_place_table(top, values, file),
+        stock=table_of(values["stock"], STOCK, "table [stock]", file)
+        if "stock" in values
+        else None,
+        tools=_tool_tables(values, file),
+        defaults=defaults,
+        operations=operations,
+        folder=path.parent,
+    )
+
+
+def _operation_tables(values: dict[str, Any], file: str) -> tuple[Table, ...] | None:
+    """The tables of `[[operations]]`, None without any."""
+    if "operations" not in values:
+        return None
+    rows = values["operations"]
+    if not isinstance(rows, list) or not rows:
+        raise OptionError(
+            "is no list of operations",
+            file=file,
+            where="key operations",
+            mend="begin each operation with [[operations]]",
+        )
+    return tuple(
+        table_of(row, OF_OPERATIONS, f"table [[operations]] {_called(n, row)}", file)
+        for n, row in enumerate(rows, start=1)
+    )
+
+
+def _called(number: int, row: object) -> str:
+    name = row.get("name") if isinstance(row, dict) else None
+    return f"{number} {name!r}" if isinstance(name, str) else str(number)
+
+
+def _place_table(top: Table, values: dict[str, Any], file: str) -> Table:
+    place = table_of(values.get("place", {}), PLACE, "table [place]", file)
+    if "origin" in top.given and "origin" in place.given:
+        raise top.given["origin"].refused("stands in [place] too", "give it once")
+    return place.over(top.only(["origin"]))
+
+
+def _tool_tables(values: dict[str, Any], file: str) -> dict[str, Table]:
+    tools = values.get("tools", {})
+    if not isinstance(tools, dict):
+        raise Given(tools, "key tools", file).refused(
+            "is no table of tools", "begin each tool with [tools.NAME]"
+        )
+    return {
+        name: table_of(tool, TOOL, f"table [tools.{name}]", file) for name, tool in tools.items()
+    }
+
+
+# The tool of an operation: by name, by number, or key by key.
+
+_TOOL_NUMBER = re.compile(r"\d{1,9}")
+"""A tool by its number."""
+
+
+@dataclass(frozen=True)
+class Tools:
+    """The tools of a job: `named` in its file, and by number in a LinuxCNC `table`, whose lengths
+    have the unit `units`."""
+
+    named: Mapping[str, Table] = field(default_factory=dict)
+    table: Mapping[int, TableTool] = field(default_factory=dict)
+    table_file: str = ""
+    units: str = "mm"
+
+    def of(self, layers: Sequence[Table], kind: str) -> Tool:
+        """The tool of an operation of this kind. `layers`: what is said of it, the nearest last.
+
+        The nearest name or number counts, and single keys (`tool_diameter`) of that layer and
+        of nearer ones change it.
+        """
+        at = max((n for n, layer in enumerate(layers) if TOOL_NAME in layer.given), default=-1)
+        name, keys = ("", Table()) if at < 0 else self._chosen(layers[at].given[TOOL_NAME])
+        for n, layer in enumerate(layers[max(at, 0) :], start=max(at, 0)):
+            own = layer.only(TOOL_KEYS)
+            if n == at and own.given:
+                raise next(iter(own.given.values())).refused(
+                    "contradicts the tool that is named beside it", "give one of the two"
+                )
+            given = {key.removeprefix("tool_"): value for key, value in own.given.items()}
+            keys = Table(given, own.where, own.file).over(keys)
+        return _tool(name, keys, kind)
+
+    def _chosen(self, given: Given) -> tuple[str, Table]:
+        """Name and keys of the tool that a name or a number says."""
+        value = given.value
+        if isinstance(value, str) and value in self.named:
+            return value, self._completed(self.named[value])
+        if isinstance(value, str) and _TOOL_NUMBER.fullmatch(value.strip()):
+            value = int(value)
+        if type(value) is int:
+            return self._numbered(value, given)
+        if not isinstance(value, str):
+            raise given.refused(f"{value!r} is no tool", "give its name in quotes, or its number")
+        near = difflib.get_close_matches(value, self.named, n=1)
+        raise given.refused(
+            f"there is no tool {value!r}",
+            (f"did you mean {near[0]!r}? " if near else "")
+            + (f"known: {', '.join(self.named)}" if self.named else f"write [tools.{value}]"),
+        )
+
+    def _numbered(self, number: int, given: Given) -> tuple[str, Table]:
+        for name, keys in self.named.items():
+            if _number_of(keys) == number:
+                return name, self._completed(keys)
+        if number in self.table:
+            return self.table[number].remark, self._of_table(number)
+        known = [str(each) for each in self.table]
+        raise given.refused(
+            f"there is no tool {number}",
+            f"{self.table_file} has: {', '.join(known) or 'none'}"
+            if self.table_file
+            else 'give the tool table: tool_table = "tool.tbl"',
+        )
+
+    def _completed(self, keys: Table) -> Table:
+        """A named tool of a number may leave its diameter to the tool table."""
+        number = _number_of(keys)
+        if number is None or number not in self.table:
+            return keys
+        return keys.over(self._of_table(number, needed="diameter" not in keys.given))
+
+    def _of_table(self, number: int, *, needed: bool = True) -> Table:
+        """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
+        tool = self.table[number]
+        table = Table({}, f"line {tool.line}", self.table_file)
+        if tool.diameter is None and needed:
+            raise table.refused(f"tool {number} has no diameter", "give it a D")
+        values = {"number": number, "diameter": f"{tool.diameter!r}{self.units}"}
+        if tool.diameter is None:
+            del values["diameter"]
+        given = {name: Given(value, table.where, table.file) for name, value in values.items()}
+        return replace(table, given=given)
+
+
+def with_table(tools: Tools, path: Path) -> Tools:
+    """The tools, and those of a LinuxCNC tool table; OptionError names file and line."""
+    try:
+        text = path.read_bytes().decode("utf-8", errors="replace")
+    except OSError as error:
+        raise OptionError(
+            f"cannot be read ({error.strerror})", file=str(path), mend="check the path"
+        ) from error
+    return replace(tools, table=read_tool_table(text, str(path)), table_file=str(path))
+
+
+def refuse_bad_tools(named: Mapping[str, Table]) -> None:
+    """Refuse what is no tool, used or not, and two tools of one number."""
+    seen: dict[int, str] = {}
+    for name, keys in named.items():
+        _tool(name, keys, "")
+        number = _number_of(keys)
+        if number is None:
+            continue
+        if number in seen:
+            raise keys.given["number"].refused(
+                f"tool {number} is {seen[number]!r} already", "give each tool a number of its own"
+            )
+        seen[number] = name
+
+
+def _number_of(keys: Table) -> int | None:
+    """The number of a tool of the file, if it has one."""
+    given = keys.given.get("number")
+    number: int | None = None if given is None else TOOL["number"].read(given)
+    return number
+
+
+def _tool(name: str, keys: Table, kind: str) -> Tool:
+    """The record; a tool with a tip that does not say its kind is a V bit, or drills."""
+    if "tip_angle" in keys.given and "kind" not in keys.given:
+        meant = Given("drill" if kind == "drill" else "v", keys.where, keys.file)
+        keys = Table({**keys.given, "kind": meant}, keys.where, keys.file)
+    tool = record_of(Tool, TOOL, keys)
+    refuse_idle(TOOL, keys, tool)
+    return replace(tool, name=name)
+
+
+# The job that a file and the flags say together.
+#
+#     defaults of the file ◀ keys of the operation ◀ flags        the nearest value counts
+#
+# A key that no operation of the job can use is refused, wherever it was given.
+
+_OPERATION_NUMBER = re.compile(r"\d{1,6}")
 """An operation by its number."""
 
 _TABLE_KEYS = ("tool_table", "tool_table_units")
@@ -135,7 +390,7 @@ def _rows(operations: list[Operation], chosen: tuple[str, ...]) -> list[int]:
     for text in chosen:
         if text in names:
             rows.add(names.index(text))
-        elif _NUMBER.fullmatch(text) and 1 <= int(text) <= len(names):
+        elif _OPERATION_NUMBER.fullmatch(text) and 1 <= int(text) <= len(names):
             rows.add(int(text) - 1)
         else:
             near = difflib.get_close_matches(text, names, n=1)

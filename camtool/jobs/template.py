@@ -17,8 +17,7 @@ import numpy as np
 
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.measure import extents
-from camtool.jobs.given import Key
-from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE
+from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, Key
 from camtool.planning.drill import circle_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import pytest
 from camtool.batch.manifest import Manifest
 from camtool.batch.records import Outcome, State, Task
 from camtool.batch.run import Order, run_batch
-from camtool.cli.output import write_all
+from camtool.cli.files import write_all
 from tests.oracles.batch_works import HerePool, Obedient
 
 NOBODY = 65534

@@ -7,7 +7,7 @@ import pytest
 
 from camtool.batch.digests import content_digest, digest_of, file_digest, packages_digest
 from camtool.batch.manifest import NAME, Entry, Manifest
-from camtool.cli.output import write_all
+from camtool.cli.files import write_all
 
 
 def entry(folder: Path, name: str, key: str) -> Entry:

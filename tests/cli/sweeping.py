@@ -15,8 +15,8 @@ from pathlib import Path
 
 import click
 
-from camtool.cli.jobflags import _flag
 from camtool.cli.main import cli, main
+from camtool.cli.options import flag_name
 from camtool.jobs.keys import OPERATION, TOOL_KEYS
 from tests.waiting import HANG_S
 
@@ -132,10 +132,10 @@ class Flag:
 
 
 _KINDS = {
-    _flag(name): next(kind for kind in KINDS if kind in key.kinds)
+    flag_name(name): next(kind for kind in KINDS if kind in key.kinds)
     for name, key in OPERATION.items()
     if key.help
-} | {_flag(name): "vcarve" if "tip" in name else "profile" for name in TOOL_KEYS}
+} | {flag_name(name): "vcarve" if "tip" in name else "profile" for name in TOOL_KEYS}
 _NEEDED = {
     "--last-pass": ("--step-down", "0.5"),
     "--mitre-limit": ("--joins", "mitre"),

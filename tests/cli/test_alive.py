@@ -5,8 +5,8 @@ import threading
 
 import pytest
 
-from camtool.cli import alive
-from camtool.cli.alive import life_signs
+from camtool.cli import messages
+from camtool.cli.messages import life_signs
 
 
 class Terminal(io.StringIO):
@@ -28,8 +28,8 @@ class Terminal(io.StringIO):
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(alive, "AFTER_S", 0.0)
-    monkeypatch.setattr(alive, "EVERY_S", 0.0)
+    monkeypatch.setattr(messages, "AFTER_S", 0.0)
+    monkeypatch.setattr(messages, "EVERY_S", 0.0)
 
 
 def test_seconds_are_told_and_wiped_out_at_the_end() -> None:
@@ -44,7 +44,7 @@ def test_seconds_are_told_and_wiped_out_at_the_end() -> None:
 
 
 def test_a_short_run_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alive, "AFTER_S", 1e6)
+    monkeypatch.setattr(messages, "AFTER_S", 1e6)
     stream = Terminal()
     with life_signs(stream, ["post"]):
         pass

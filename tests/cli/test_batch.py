@@ -14,10 +14,10 @@ import pytest
 from camtool.batch import digests as digests_module
 from camtool.batch.lock import alone_in
 from camtool.batch.records import Made, Pool, Task
-from camtool.cli import batchrun, batchwork
-from camtool.cli.batchstop import stoppable
-from camtool.cli.drawing import DrawingFlags
-from camtool.cli.pictureflags import PictureFlags
+from camtool.cli import batch, batch_work
+from camtool.cli.batch import stoppable
+from camtool.cli.options import DrawingFlags
+from camtool.cli.picture_options import PictureFlags
 from camtool.errors import CamtoolError
 from camtool.machine.registry import load_target
 from camtool.verify.gates import Gates
@@ -33,12 +33,12 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[HerePool]:
     """The drawings are made in this process; the pool of each run, to see what it was asked."""
     made: list[HerePool] = []
 
-    def here(batched: batchrun.Batched, note: object) -> Pool:
+    def here(batched: batch.Batched, note: object) -> Pool:
         made.append(HerePool(batched.work))
         return made[-1]
 
-    monkeypatch.setattr(batchrun.Batched, "_pool", here)
-    monkeypatch.setattr(batchwork, "code_digest", lambda files: "of no matter here")
+    monkeypatch.setattr(batch.Batched, "_pool", here)
+    monkeypatch.setattr(batch_work, "code_digest", lambda files: "of no matter here")
     return made
 
 
@@ -272,7 +272,7 @@ def test_an_output_folder_within_the_drawings(camtool: Run, drawings: Path) -> N
 
 
 def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyPatch) -> None:
-    work = batchwork.PostWork(load_target("grbl"), DrawingFlags((), (), (), (), {}))
+    work = batch_work.PostWork(load_target("grbl"), DrawingFlags((), (), (), (), {}))
     other = {
         "target": load_target("grbl", settings=["axes.x.backlash_mm=0.2"]),
         "drawing": DrawingFlags((), (), (), (), {"gap_mm": 0.5}),
@@ -288,7 +288,7 @@ def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(digests_module, "_version", lambda name: "another one")
     digests.append(work.digest())
     monkeypatch.undo()
-    monkeypatch.setattr(batchwork, "code_digest", lambda files: "of other code")
+    monkeypatch.setattr(batch_work, "code_digest", lambda files: "of other code")
     digests.append(work.digest())
     assert len(set(digests)) == len(digests)
 
@@ -315,7 +315,7 @@ def test_a_run_that_is_interrupted_at_once_says_so(
     def interrupted(path: Path) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(batchrun, "own_job", interrupted)
+    monkeypatch.setattr(batch, "own_job", interrupted)
     done = camtool("batch", "drawings/in", *PIC, *QUICK)
     assert done.returncode == 128 + signal.SIGINT
     assert b"interrupted; what is written is whole" in done.stderr
@@ -331,7 +331,7 @@ def test_a_run_that_cannot_go_on_still_sums_up(
             yield from super().results(tasks[:1])
             raise CamtoolError("the scheduler was lost", where="--scheduler")
 
-    monkeypatch.setattr(batchrun.Batched, "_pool", lambda batched, note: Lost(batched.work))
+    monkeypatch.setattr(batch.Batched, "_pool", lambda batched, note: Lost(batched.work))
     sources = ("drawings/letter.svg", "drawings/in/square.dxf")
     done = camtool("batch", *sources, *PIC, *QUICK, "--json", "-")
     assert done.returncode == 2

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from camtool.cli.terminal import REPORT_NAMES, report_marks, show_compared, show_facts
+from camtool.cli.messages import REPORT_NAMES, report_marks, show_compared, show_facts
 from camtool.findings import Code, Finding, Severity
 
 RED = b"\x1b[31m"
@@ -86,7 +86,7 @@ def above(flag: str, code: Code = Code.ABOVE_GATE) -> Finding:
 @pytest.fixture
 def coloured(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """stdout is taken for a terminal of 40 columns."""
-    monkeypatch.setattr("camtool.cli.terminal.in_colour", lambda stream: True)
+    monkeypatch.setattr("camtool.cli.messages.in_colour", lambda stream: True)
     monkeypatch.setattr("click.utils.should_strip_ansi", lambda *_: False)
     monkeypatch.setenv("COLUMNS", "40")
 

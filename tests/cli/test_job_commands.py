@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.jobs.build import build_job
-from camtool.jobs.file import Said, read_job_file
+from camtool.jobs.build import Said, build_job, read_job_file
 from camtool.planning.job import Job
 from tests.cli.conftest import ROOT, Run
 

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from camtool.cli.drawing import DrawingFlags
-from camtool.cli.jobflags import JobFlags
-from camtool.jobs.build import build_job
-from camtool.jobs.file import Said, read_job_file
+from camtool.cli.options import DrawingFlags, JobFlags
+from camtool.jobs.build import Said, build_job, read_job_file
 from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE
 from camtool.planning.job import (
     Entry,

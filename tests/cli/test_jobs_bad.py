@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.cli.drawing import DrawingFlags
-from camtool.cli.jobflags import JobFlags
+from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.errors import OptionError
 from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE
 from camtool.planning.job import Job

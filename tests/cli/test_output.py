@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from camtool.cli import output
-from camtool.cli.output import check_places, write_all
+from camtool.cli import files
+from camtool.cli.files import check_places, write_all
 from camtool.errors import OutputError
 
 
@@ -34,7 +34,7 @@ def test_a_disk_that_fills_up_leaves_nothing(
     def full(handle: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(output.os, "fsync", full)
+    monkeypatch.setattr(files.os, "fsync", full)
     with pytest.raises(OutputError, match="No space left"):
         write_all({str(tmp_path / "a.pic"): b"new"})
     assert list(tmp_path.iterdir()) == []

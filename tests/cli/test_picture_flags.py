@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 import click
 import pytest
 
-from camtool.cli.batchrun import Batched
+from camtool.cli.batch import Batched
+from camtool.cli.files import sealed
 from camtool.cli.main import cli
-from camtool.cli.seal import sealed
 from camtool.errors import OptionError
 from camtool.preview.options import Options
 from tests.cli.conftest import Run

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from camtool.cli.jobflags import JobFlags
-from camtool.cli.watch import POLL_S, SETTLED_S, watch
+from camtool.cli.options import JobFlags
+from camtool.cli.post import POLL_S, SETTLED_S, watch
 from camtool.errors import DrawingError
 from tests.cli.conftest import Run
 from tests.waiting import HANG_S, heard_from

@@ -8,10 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.jobs.build import build_job
-from camtool.jobs.file import AT_THE_TOP, OF_OPERATIONS, Said, said_of
-from camtool.jobs.keys import PLACE, STOCK, TOOL
-from camtool.jobs.values import ENTRY, LEAD, TABS
+from camtool.jobs.build import AT_THE_TOP, OF_OPERATIONS, Said, build_job, said_of
+from camtool.jobs.keys import ENTRY, LEAD, PLACE, STOCK, TABS, TOOL
 from camtool.planning.job import ENTRIES, KINDS, LEADS, Job
 
 _words = st.sampled_from(

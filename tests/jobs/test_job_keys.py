@@ -4,8 +4,7 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
-from camtool.jobs.keys import OPERATION, PLACE, STOCK, TOOL, WHOLE
-from camtool.jobs.values import ENTRY, LEAD, TABS
+from camtool.jobs.keys import ENTRY, LEAD, OPERATION, PLACE, STOCK, TABS, TOOL, WHOLE
 from camtool.planning.job import Entry, Job, Lead, Operation, Placement, Stock, Tabs, Tool
 
 PAGE = Path("docs/jobs.md").read_text(encoding="utf-8")

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 import camtool
-from camtool.cli.drawing import DrawingFlags
-from camtool.cli.jobflags import JobFlags
+from camtool.cli.options import DrawingFlags, JobFlags
 
 SAMPLES = Path("samples")
 DRAWINGS = {"logo.toml": "logo.dxf", "plate.toml": "plate.dxf"}

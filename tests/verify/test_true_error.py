@@ -14,7 +14,7 @@ import pytest
 from camtool.api.judging import verify
 from camtool.api.reading import as_drawing, read_drawing
 from camtool.findings import Code
-from camtool.jobs.reading import read_to_scale
+from camtool.jobs.drawing import read_to_scale
 from camtool.machine.registry import load_target
 from camtool.pipeline import Posted, post_drawing
 from camtool.planning.job import Job, Tool, job_of

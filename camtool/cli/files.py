@@ -9,6 +9,7 @@ is gone, Ctrl-C) leaves old files as they were and no new one.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import os
 import stat
@@ -17,9 +18,9 @@ import tempfile
 import unicodedata
 from collections.abc import Hashable, Iterable
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 
-from camtool.errors import OutputError
+from camtool.errors import OutputError, ProgramError
 
 STDOUT = "-"
 """Stdout among outputs, stdin among inputs."""
@@ -246,3 +247,52 @@ def _mode_for(place: Path) -> int:
         mask = os.umask(0)
         os.umask(mask)
         return 0o666 & ~mask
+
+
+# Programs as they come: files, or stdin for `-`.
+
+
+def shown(name: str) -> str:
+    """The name of a file in messages."""
+    return "<stdin>" if name == STDOUT else name
+
+
+def read_bytes(name: str) -> bytes:
+    """The bytes of a file, or of stdin for `-`; ProgramError when it cannot be read."""
+    if name == STDOUT and sys.stdin is None:
+        raise ProgramError("there is no standard input", file=shown(name), mend="name a file")
+    try:
+        if name == STDOUT:
+            return sys.stdin.buffer.read()
+        return Path(name).read_bytes()
+    except OSError as error:
+        raise ProgramError(
+            f"cannot be read ({error.strerror})", file=shown(name), mend="check the path"
+        ) from error
+
+
+# Pictures that nobody asked for by name carry a seal, by which camtool knows them again.
+#
+# A page in Markdown brings a picture along, a batch one for each program. They lie beside
+# drawings, which may be SVG too: only a picture that bears the seal of its maker, and is as it was
+# written, is replaced. The seal is a comment at the end of the SVG.
+
+_SEAL_BEGINS = b"<!-- camtool: sha256 "
+
+
+def sealed(svg: bytes, maker: str) -> bytes:
+    """The picture with the seal of its maker, the name of a page or of a drawing's outputs."""
+    name = os.fsencode(PurePath(maker).name)
+    digest = hashlib.sha256(name + b"\n" + svg).hexdigest().encode()
+    return svg + _SEAL_BEGINS + digest + b" -->\n"
+
+
+def is_foreign(place: str | Path, maker: str) -> bool:
+    """Whether something lies there that is no picture of this maker as it was written."""
+    if not os.path.lexists(place):
+        return False
+    try:
+        data = Path(place).read_bytes()
+    except OSError:  # whatever it is, it is none of ours
+        return True
+    return data != sealed(data[: data.rfind(_SEAL_BEGINS)], maker)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 from camtool import __version__
 from camtool.batch.digests import code_digest, content_digest, digest_of, packages_digest
 from camtool.batch.records import Made, Task
-from camtool.cli.drawing import DrawingFlags
-from camtool.cli.jobflags import JobFlags
-from camtool.cli.pictureflags import PictureFlags
-from camtool.cli.seal import sealed
+from camtool.cli.files import sealed
+from camtool.cli.options import DrawingFlags, JobFlags
+from camtool.cli.picture_options import PictureFlags
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ class PostWork:
 
     def warm(self) -> None:
         """Load, and compile if nobody has yet, what every drawing needs."""
-        from camtool.cli.ahead import SMALL_JOB
+        from camtool.cli.first_run import SMALL_JOB
         from camtool.importers.read import read_bytes
         from camtool.pipeline import post_drawing
         from camtool.planning.job import job_of

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from camtool.cli.talk import first_run, say_first_run
+from camtool.cli.messages import first_run, say_first_run
 
 SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">
 <circle cx="1" cy="1" r="0.2"/></svg>"""
@@ -28,7 +28,7 @@ def compiled_beside(target: str, *, quiet: bool, judging: bool) -> Iterator[None
     if first_run(judging=judging):
         say_first_run(quiet=quiet, judging=judging)
         none = subprocess.DEVNULL
-        command = [sys.executable, "-m", "camtool.cli.ahead", target]
+        command = [sys.executable, "-m", "camtool.cli.first_run", target]
         helper = subprocess.Popen(command, stdin=none, stdout=none, stderr=none)
     try:
         yield

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from camtool import __version__
 from camtool.batch.records import Outcome, State
-from camtool.cli.talk import say
+from camtool.cli.messages import say
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:

@@ -1,0 +1,248 @@
+"""What a command says to people: always on stderr, so that stdout stays for machines."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import click
+
+from camtool.plain import one_line
+
+if TYPE_CHECKING:
+    from camtool.errors import CamtoolError
+    from camtool.findings import Finding
+    from camtool.verify.contrast import ContrastRow
+
+
+COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
+"""What a message is called, on a terminal."""
+
+
+def say(text: str, *, quiet: bool) -> None:
+    """One message, unless quiet: one line that can be seen, whatever names it holds."""
+    if not quiet:
+        _tell(tinted(one_line(text)))
+
+
+def show_text(text: str, *, err: bool = False) -> None:
+    """Lines for people on stdout, styled or not, whose names `one_line` has gone through."""
+    if err:
+        _tell(text)
+    else:
+        click.echo(text)
+
+
+def _tell(text: str) -> None:
+    """Text on stderr; where that is full nobody can be told so."""
+    with suppress(OSError):
+        click.echo(text, err=True)
+
+
+def in_colour(stream: TextIO | None) -> bool:
+    """Whether a stream is a terminal of somebody who has said neither NO_COLOR (no-color.org)
+    nor CLICOLOR=0 (bixense.com/clicolors); one that was closed is None."""
+    said = os.environ.get
+    return (
+        stream is not None
+        and stream.isatty()
+        and not said("NO_COLOR")
+        and said("CLICOLOR") != "0"
+        and said("TERM") != "dumb"
+    )
+
+
+def say_error(error: CamtoolError) -> None:
+    """One line for what went wrong; how to mend it stands out on a terminal."""
+    text, mend = one_line(f"camtool: error: {error}"), one_line(" ".join(error.mend.split()))
+    if mend and text.endswith(mend) and in_colour(sys.stderr):
+        text = text.removesuffix(mend) + click.style(mend, bold=True)
+    _tell(tinted(text))
+
+
+def tinted(text: str) -> str:
+    """A message with the word that says how bad it is in colour, where stderr shows colours."""
+    if not in_colour(sys.stderr):
+        return text
+    words = "|".join(COLOURS)
+    return re.sub(
+        rf"^(camtool: )({words})\b",
+        lambda found: found[1] + click.style(found[2], fg=COLOURS[found[2]], bold=True),
+        text,
+    )
+
+
+def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
+    """Errors always, warnings unless quiet, remarks when verbose; one line each, and one for all
+    that are like those before, unless verbose."""
+    from camtool.findings import Severity, summed
+
+    least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
+    told = [finding for finding in findings if finding.severity >= least]
+    for finding, more in [(each, 0) for each in told] if verbose else summed(told):
+        say(f"camtool: {finding}", quiet=False)
+        if more:
+            name = f"{finding.severity.name.lower()} {finding.code.name}"
+            say(f"camtool: {name}: and {more} more (-v shows all)", quiet=False)
+
+
+def say_first_run(*, quiet: bool, judging: bool = False) -> None:
+    """A word before the long silence of the first run; `judging` as below."""
+    if first_run(judging=judging):
+        say("camtool: first run: compiling the kernels, once, for some 12 s", quiet=quiet)
+
+
+def first_run(*, judging: bool = False) -> bool:
+    """Whether no kernel has been compiled yet; with `judging`, none of the judge's: most of the
+    time goes there, and reading a drawing compiles others.
+
+    Their compiled form lies beside them or in NUMBA_CACHE_DIR; where their folder cannot be
+    written numba keeps it elsewhere, and then we cannot tell: False.
+    """
+    import camtool.kernels
+
+    folder = Path(str(camtool.kernels.__file__)).parent
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given is None and not os.access(folder, os.W_OK):
+        return False
+    kept = Path(given) if given else folder / "__pycache__"
+    return not any(kept.rglob("judge*.nbi" if judging else "*.nbi"))
+
+
+# Summaries and tables as a terminal shows them: names bold, what exceeds a limit in colour.
+#
+# What is no terminal gets the same words as they are. Colours are click's and not rich's: loading
+# rich takes a tenth of the time of a whole `verify`.
+
+Marks = Mapping[str, str]
+"""How bad the lines of these names are: "error", "warning" or "info"."""
+
+LEAST_WIDTH = 20
+"""Values are wrapped to the terminal's width, and to no less than so many columns."""
+
+REPORT_NAMES = 11
+"""Columns before the values in the summary of a report."""
+
+DRAWING_MARKS = dict.fromkeys(("not used", "gap", "branch", "crossing", "open"), "warning")
+"""What in the facts of a drawing somebody should look at."""
+
+_LINES = {
+    "--max-error": "error",
+    "--max-time": "time",
+    "--max-reversals": "reversals",
+    "MANY_REVERSALS": "reversals",
+    "END_NOT_REACHED": "ends",
+    "ARC_MISSES_END": "ends",
+}
+"""The line of the summary that says what a limit, or else a finding, is about."""
+
+
+def show_facts(plain: str, name_width: int, marks: Marks, *, err: bool = False) -> None:
+    """Lines of a name and a value; the names are `name_width` wide."""
+    if in_colour(sys.stderr if err else sys.stdout):
+        columns = shutil.get_terminal_size().columns
+        lines = plain.split("\n")
+        plain = "\n".join(_line(line, name_width, marks, columns) for line in lines)
+    show_text(plain, err=err)
+
+
+def show_compared(plain: str, rows: Sequence[ContrastRow]) -> None:
+    """The table of `--compare`: the way with the least error in green, endless ones in red."""
+    if in_colour(sys.stdout):
+        head, *lines = plain.split("\n")
+        ends = [row.total_max_um for row in rows if not row.endless]
+        least = min((error for error in ends if error is not None), default=None)
+        shown = [_way(line, row, least) for line, row in zip(lines, rows, strict=True)]
+        plain = "\n".join([click.style(head, bold=True), *shown])
+    show_text(plain)
+
+
+def report_marks(findings: Iterable[Finding]) -> dict[str, str]:
+    """The lines of a report's summary that these findings are about, and how bad they are."""
+    marks: dict[str, str] = {}
+    for finding in sorted(findings, key=lambda finding: finding.severity):
+        name = _LINES.get(finding.where) or _LINES.get(finding.code.name)
+        if name is not None:
+            marks[name] = finding.severity.name.lower()
+    return marks
+
+
+def _line(line: str, name_width: int, marks: Marks, columns: int) -> str:
+    """A name and its value, wrapped below itself."""
+    name, value = line[:name_width], line[name_width:]
+    mark = marks.get(name.strip())
+    colour = None if mark is None else COLOURS[mark]
+    wide = max(columns - name_width, LEAST_WIDTH)
+    parts = textwrap.wrap(value, wide, break_long_words=False, break_on_hyphens=False)
+    said = f"\n{' ' * name_width}".join(click.style(part, fg=colour) for part in parts)
+    return f"{click.style(name.rstrip(), bold=True, fg=colour)}{name[len(name.rstrip()) :]}{said}"
+
+
+def _way(line: str, row: ContrastRow, least: float | None) -> str:
+    if row.endless:
+        return click.style(line, fg="red")
+    best = least is not None and row.total_max_um == least
+    return click.style(line, fg="green") if best else line
+
+
+# A sign of life on a terminal, where a command works for longer than a few seconds.
+#
+# The sign is a short text that the next line overwrites; it counts the seconds. It stands still
+# while one compiled loop runs, which is seldom long: motion is judged in chunks.
+
+AFTER_S = 3.0
+"""Whoever waits for less needs no sign."""
+
+EVERY_S = 1.0
+"""How often it changes."""
+
+_OWN = ("batch", "--watch")
+_QUIET = ("-q", "--quiet")
+
+
+@contextmanager
+def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[None]:
+    """While the block runs, seconds on `stream` if that is a terminal; none for the `words` of a
+    command line that is to be quiet, or that has signs of its own."""
+    if stream is None or not _life_signs_wanted(stream, words):
+        yield
+        return
+    done = threading.Event()
+    teller = threading.Thread(target=_tell_seconds, args=(stream, done), daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        done.set()
+        teller.join()
+
+
+def _life_signs_wanted(stream: TextIO, words: Sequence[str]) -> bool:
+    if any(word in words for word in (*_OWN, *_QUIET)) or os.environ.get("TERM") == "dumb":
+        return False
+    with suppress(ValueError):  # closed
+        return stream.isatty()
+    return False
+
+
+def _tell_seconds(stream: TextIO, done: threading.Event) -> None:
+    begun, sign = time.monotonic(), ""
+    ended = done.wait(AFTER_S)
+    with suppress(OSError, ValueError):  # a terminal that goes away stops no command
+        while not ended:
+            sign = f"camtool: {time.monotonic() - begun:.0f} s"
+            stream.write(f"{sign}\r")
+            stream.flush()
+            ended = done.wait(EVERY_S)
+        if sign:
+            stream.write(f"{' ' * len(sign)}\r")
+            stream.flush()
