@@ -9,6 +9,7 @@ middle); arcs stay exact, and two arcs with a gap get a short line between them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -17,10 +18,7 @@ import numpy as np
 
 from camtool.errors import GeometryError
 from camtool.geometry.drawing import Branch, Gap
-from camtool.geometry.gaps import open_gaps
-from camtool.geometry.joined import Chains, Joined, joined
-from camtool.geometry.measure import path_lengths
-from camtool.geometry.pairs import Ends, joints
+from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polylines
 
 
@@ -161,3 +159,468 @@ def _closed_gaps(lots: Sequence[Joined], layers: Sequence[str]) -> list[Gap]:
             found.append((of, Gap((at[0], at[1]), size, layers[of])))
     found.sort(key=lambda item: item[0])
     return [gap for _, gap in found]
+
+
+# Which open ends are joined: near ends paired, and the straightest way taken at branches.
+#
+#     ends ──grid──▶ pairs within the gap ──clusters──▶ two ends: joined
+#                                                 └───▶ more ends: a branch, best pairs first
+#
+# The best pair at a branch is, in this order: of the nearest class of distance (a class spans a
+# factor of `CLASS_RATIO`; up to `POSITION_EPS_MM` is one class), of one style (colour, line type),
+# the straightest (turns within `SAME_TURN_RAD` are the same), and then the one that comes first by
+# place, so that the order in which paths were drawn decides nothing. Last, a ring that passes a
+# branch twice becomes two rings: contours touch at corners, they do not run through each other.
+
+CLASS_RATIO = 2.0
+"""Distances of ends whose ratio is below this may count as equal at a branch."""
+
+SAME_TURN_RAD = 1e-6
+"""Turns that differ by less are equal at a branch."""
+
+MOST_PAIRS = 4_000_000
+"""More pairs of ends than this are not looked at together: nearer ones are joined before."""
+
+MOST_NEIGHBOURS = 64
+"""So many others are looked at for each end where very many ends meet at one point."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """The ends of M paths, 2i the start and 2i + 1 the end of path i.
+
+    `points` (2M, 2) mm; `leaving` (2M,) rad, the direction in which the path would go on beyond
+    its end; `group` and `style` (M,) numbers; `is_open` (M,); `weights` (M, 2) segments and arcs.
+    """
+
+    points: Floats
+    leaving: Floats
+    group: Ints
+    style: Ints
+    is_open: Bools
+    weights: Ints
+
+    @classmethod
+    def of(cls, lines: Polylines, group: Ints, style: Ints) -> Ends:
+        """The ends of all paths, those of closed ones too."""
+        vertices, first, last = lines.vertices, lines.offsets[:-1], lines.offsets[1:] - 1
+        rows = np.column_stack([first, last]).ravel()
+        inner = np.column_stack([first + 1, last - 1]).ravel()
+        points = vertices[rows, :2]
+        outward = points - vertices[inner, :2]
+        # An arc leaves its chord by half its sweep, 2 atan(bulge), to either side.
+        bulge = np.column_stack([-vertices[first, 2], vertices[last - 1, 2]]).ravel()
+        leaving = np.arctan2(outward[:, 1], outward[:, 0]) + 2.0 * np.arctan(bulge)
+        counts = np.diff(lines.offsets)
+        arcs = np.add.reduceat(lines.vertices[:, 2] != 0.0, first) if len(first) else counts
+        weights = np.column_stack([counts - ~lines.closed, arcs]).astype(np.int64)
+        return cls(points, leaving, group, style, ~lines.closed, weights)
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """`mates` (2M,): the end that each end is joined to, −1 for none; and where ends branch."""
+
+    mates: Ints
+    branches: tuple[tuple[int, int], ...]
+
+    def named(self, ends: Ends, layers: Sequence[str]) -> tuple[Branch, ...]:
+        """The branches with their places, in the order of place, layer and size."""
+        found = [
+            Branch(
+                (float(ends.points[end, 0]), float(ends.points[end, 1])), size, layers[end // 2]
+            )
+            for end, size in self.branches
+        ]
+        return tuple(sorted(found, key=lambda branch: (branch.at_mm, branch.layer, branch.ends)))
+
+
+def joints(ends: Ends, reach: float) -> Joints:
+    """Which ends are joined, within `reach` and within their group (see the top)."""
+    from camtool.kernels.chaining import join
+
+    mates = np.full(len(ends.points), -1, dtype=np.int64)
+    above = np.arange(len(ends.group))
+    segments, arcs = ends.weights[:, 0].copy(), ends.weights[:, 1].copy()
+    node = np.full(len(mates), -1, dtype=np.int64)
+    branches: dict[int, int] = {}
+    free = np.flatnonzero(np.repeat(ends.is_open, 2))
+    while len(free):
+        near = _bearable(ends.points[free], reach)
+        one, other = _near(ends, free, near)
+        label, size = _clusters(len(mates), one, other)
+        is_branch = size[label[one]] > 2
+        order = np.argsort(one[~is_branch], kind="stable")
+        simple = one[~is_branch][order], other[~is_branch][order]
+        hard = _ranked(ends, one[is_branch], other[is_branch])
+        made = sum(join(*pair, mates, above, segments, arcs) for pair in (simple, hard))
+        meeting = np.flatnonzero(size[label] > 2)
+        node[meeting] = label[meeting]
+        branches.update(_first_ends(ends, meeting, label))
+        if near == reach or made == 0:
+            break
+        free = free[mates[free] < 0]
+    _split(ends, mates, node, reach)
+    return Joints(mates, tuple(branches.items()))
+
+
+def _bearable(points: Floats, reach: float) -> float:
+    """`reach`, or so much less that there are no more than MOST_PAIRS pairs."""
+    while reach > POSITION_EPS_MM:
+        cells = np.floor(points / reach).astype(np.int64)
+        mixed = cells[:, 0] * _MIX + cells[:, 1]
+        counts = np.unique(mixed, return_counts=True)[1].astype(np.float64)
+        if (counts**2).sum() <= MOST_PAIRS:
+            return reach
+        reach = max(0.25 * reach, POSITION_EPS_MM)
+    return reach
+
+
+_MIX = np.int64(0x9E3779B1)
+
+
+def _near(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
+    """The pairs of free ends within `reach` in one group, the lesser end first."""
+    from camtool.kernels.chaining import near_pairs
+
+    points = ends.points[free]
+    # Wider than the reach by a hair, so that rounding cannot put near points two cells apart.
+    cells = np.column_stack([ends.group[free // 2], np.floor(points / (reach * _WIDER))])
+    cells = cells.astype(np.int64)
+    order = np.lexsort((cells[:, 2], cells[:, 1], cells[:, 0]))
+    most = MOST_NEIGHBOURS if reach <= POSITION_EPS_MM else len(free)
+    one, other = near_pairs(cells[order], points[order], reach, most)
+    one, other = free[order[one]], free[order[other]]
+    return np.minimum(one, other), np.maximum(one, other)
+
+
+_WIDER = 1.0 + 1e-9
+
+
+def _clusters(count: int, one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    """For each end the least end of its cluster, and for each such end how many are in it."""
+    from camtool.kernels.chaining import clusters
+
+    label = clusters(count, one, other)
+    return label, np.bincount(label, minlength=count)
+
+
+def _ranked(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    """Pairs at branches, the best first."""
+    apart = np.hypot(*(ends.points[one] - ends.points[other]).T)
+    with np.errstate(divide="ignore"):
+        steps = np.log(apart / POSITION_EPS_MM) / math.log(CLASS_RATIO)
+    distance = np.maximum(np.floor(steps), -1.0)
+    unlike = ends.style[one // 2] != ends.style[other // 2]
+    turn = np.abs(wrapped(ends.leaving[one] - ends.leaving[other] - math.pi))
+    bend = np.round(turn / SAME_TURN_RAD)
+    place = _places(ends, np.unique(np.concatenate([one, other])))
+    first = np.minimum(place[one], place[other])
+    second = np.maximum(place[one], place[other])
+    order = np.lexsort((second, first, bend, unlike, distance))
+    return one[order], other[order]
+
+
+def wrapped(angle: Floats) -> Floats:
+    """Angles (…,) brought into −π ≤ angle < π."""
+    return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+def _places(ends: Ends, chosen: Ints) -> Ints:
+    """(2M,) the rank of the chosen ends by place, direction and the place of the other end."""
+    x, y = (np.round(ends.points[chosen] / POSITION_EPS_MM)).T
+    far_x, far_y = (np.round(ends.points[chosen ^ 1] / POSITION_EPS_MM)).T
+    leaving = np.round(wrapped(ends.leaving[chosen]) / SAME_TURN_RAD)
+    rank = np.zeros(len(ends.points), dtype=np.int64)
+    rank[chosen[np.lexsort((leaving, far_y, far_x, y, x))]] = np.arange(len(chosen))
+    return rank
+
+
+def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, int]:
+    """For each branch its first end by place, and how many ends meet there."""
+    if not len(meeting):
+        return {}
+    rank = _places(ends, meeting)
+    order = meeting[np.lexsort((rank[meeting], label[meeting]))]
+    _, begin, count = np.unique(label[order], return_index=True, return_counts=True)
+    return dict(zip(order[begin].tolist(), count.tolist(), strict=True))
+
+
+def _split(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
+    """Rings that pass a branch twice are parted there, each walked from its first end by place."""
+    if not (node >= 0).any():
+        return
+    from camtool.kernels.chaining import split_loops, walk
+
+    entries, begins, rings = walk(mates, ends.is_open)
+    ring = np.repeat(np.arange(len(rings)), np.diff(begins))
+    both = np.concatenate([entries, entries ^ 1])
+    ring_of = np.concatenate([ring, ring])
+    at_branch = rings[ring_of] & (node[both] >= 0)
+    both, ring_of = both[at_branch], ring_of[at_branch]
+    order = np.argsort(both)
+    both, ring_of = both[order], ring_of[order]
+    if not len(both):
+        return
+    rank = _places(ends, both)
+    order = np.lexsort((rank[both], ring_of))
+    first = np.unique(ring_of[order], return_index=True)[1]
+    split_loops(both[order][first], mates, node, ends.points, reach, ends.weights)
+
+
+# The vertices of chains: pieces laid end to end, and the gaps between them bridged.
+#
+# A joint moves a line to meet its neighbour (two lines to the middle); arcs stay exact, and two
+# arcs with a gap get a short line between them. A chain of which joining leaves nothing (all of it
+# is shorter than the gap, or a ring around nothing) falls back: a ring to an open chain, an open
+# chain to its pieces.
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """C chains of `entries` (E,): the ends by which their paths are entered (2i forwards).
+
+    Chain c has entries[begins[c]:begins[c + 1]]; `rings` (C,) says which are closed by joints.
+    """
+
+    entries: Ints
+    begins: Ints
+    rings: Bools
+
+    def __len__(self) -> int:
+        return len(self.rings)
+
+    def select(self, chosen: Bools, rings: Bools) -> Chains:
+        """The chosen chains (C,), as rings or not."""
+        counts = np.diff(self.begins)
+        rows = np.repeat(chosen, counts)
+        begins = np.concatenate([[0], np.cumsum(counts[chosen])])
+        return Chains(self.entries[rows], begins, rings[chosen])
+
+    def apart(self) -> Chains:
+        """Each path as a chain of its own, travelled as it was drawn."""
+        count = len(self.entries)
+        return Chains(self.entries & ~1, np.arange(count + 1), np.zeros(count, dtype=np.bool_))
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """Chains as paths; and the bridged gaps: chain (G,), place (G, 2) mm, size (G,) mm."""
+
+    chains: Chains
+    lines: Polylines
+    gap_chain: Ints
+    gap_at: Floats
+    gap_size: Floats
+
+
+def joined(lines: Polylines, chains: Chains) -> list[Joined]:
+    """The chains of these open paths as paths, in up to three lots (see the top)."""
+    done: list[Joined] = []
+    left = chains
+    for _ in range(2):
+        if not len(left):
+            return done
+        good, part = _attempt(lines, left)
+        if len(part.chains):
+            done.append(part)
+        # A ring may still be an open chain; an open chain only its pieces.
+        again = left.select(~good, np.zeros(len(left), dtype=np.bool_))
+        open_ones = ~left.rings[~good]
+        pieces = again.select(open_ones, again.rings)
+        if len(pieces):
+            done.append(_laid(lines, pieces.apart()))
+        left = again.select(~open_ones, again.rings)
+    if len(left):
+        done.append(_laid(lines, left.apart()))
+    return done
+
+
+def _attempt(lines: Polylines, chains: Chains) -> tuple[Bools, Joined]:
+    """Which chains (C,) make a path, and those."""
+    vertices, counts, gaps = _bridged(lines, chains)
+    good = np.asarray(counts >= 2)
+    path = np.repeat(np.arange(len(chains)), counts)
+    keep = good[path]
+    made = _columns(vertices[keep], counts[good], chains.rings[good])
+    empty = made.closed & (np.abs(signed_areas(made)) <= POSITION_EPS_MM * path_lengths(made))
+    if empty.any():
+        good[np.flatnonzero(good)[empty]] = False
+        keep = good[path]
+        made = _columns(vertices[keep], counts[good], chains.rings[good])
+    number = np.cumsum(good) - 1
+    gap_chain, at, size = gaps
+    kept = good[gap_chain]
+    part = chains.select(good, chains.rings)
+    return good, Joined(part, made, number[gap_chain[kept]], at[kept], size[kept])
+
+
+def _laid(lines: Polylines, chains: Chains) -> Joined:
+    """Paths as they are."""
+    none = np.empty(0, dtype=np.int64)
+    return Joined(chains, lines.select(chains.entries // 2), none, np.empty((0, 2)), np.empty(0))
+
+
+def _columns(vertices: Floats, counts: Ints, closed: Bools) -> Polylines:
+    return Polylines(vertices, np.concatenate([[0], np.cumsum(counts)]), closed)
+
+
+_Gaps = tuple[Ints, Floats, Floats]
+
+
+def _bridged(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
+    """The vertices (N, 3) of all chains, how many each has (C,), and the gaps bridged."""
+    rows, counts = _rows(lines, chains)
+    vertices = lines.vertices[rows]
+    turned = np.repeat(chains.entries & 1, counts) == 1
+    # The segment that left vertex i now leaves vertex i + 1 and bends the other way.
+    vertices[turned, 2] = 0.0 - lines.vertices[rows[turned] - 1, 2]
+    last = np.cumsum(counts) - 1
+    first = last - counts + 1
+    vertices[last, 2] = 0.0
+    chain = np.repeat(np.arange(len(chains)), np.diff(chains.begins))
+    # Each piece is followed by the next one of its chain, in a ring the last one by the first.
+    following = np.arange(1, len(chain) + 1)
+    following[chains.begins[1:] - 1] = chains.begins[:-1]
+    meets = np.ones(len(chain), dtype=np.bool_)
+    meets[(chains.begins[1:] - 1)[~chains.rings]] = False
+    end, begin = last[meets], first[following[meets]]
+    drop, gaps = _bridge(vertices, end, begin)
+    keep = np.ones(len(vertices), dtype=np.bool_)
+    keep[end[drop]] = False
+    owner = np.repeat(chain, counts)
+    vertices, owner = _without_short(vertices[keep], owner[keep], chains.rings)
+    made = np.bincount(owner, minlength=len(chains)).astype(np.int64)
+    wide, at, size = gaps
+    return vertices, made, (chain[meets][wide], at, size)
+
+
+def _rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
+    """The rows of all vertices in the order of travel, and how many each entry has."""
+    path, turned = chains.entries // 2, chains.entries % 2
+    counts = np.diff(lines.offsets)[path]
+    begin = np.where(turned, lines.offsets[1:][path] - 1, lines.offsets[:-1][path])
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.repeat(begin, counts) + np.repeat(1 - 2 * turned, counts) * within, counts
+
+
+def _bridge(
+    vertices: Floats, end: Ints, begin: Ints
+) -> tuple[Bools, tuple[Bools, Floats, Floats]]:
+    """Moves where pieces begin to where the others end; which ends go, and the gaps.
+
+    The piece before ends at the row `end`, the one after begins at the row `begin`.
+    """
+    before, after = vertices[end, :2], vertices[begin, :2]
+    size = np.hypot(*(before - after).T)
+    middle = 0.5 * (before + after)
+    arc_before = vertices[end - 1, 2] != 0.0
+    arc_after = vertices[begin, 2] != 0.0
+    wide = np.asarray(size > POSITION_EPS_MM)
+    to_arc = arc_before & ~arc_after
+    vertices[begin[to_arc], :2] = before[to_arc]
+    both_lines = ~arc_before & ~arc_after
+    vertices[begin[both_lines], :2] = middle[both_lines]
+    return ~(wide & arc_before & arc_after), (wide, middle[wide], size[wide])
+
+
+def _without_short(vertices: Floats, owner: Ints, rings: Bools) -> tuple[Floats, Ints]:
+    """Vertices without those that moved lines have left on top of each other."""
+    while len(vertices) > 1:
+        counts = np.bincount(owner, minlength=len(rings))
+        last = np.cumsum(counts) - 1
+        there = counts > 0
+        following = np.arange(1, len(vertices) + 1)
+        following[last[there]] = (last - counts + 1)[there]
+        step = vertices[following, :2] - vertices[:, :2]
+        keep = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
+        keep[last[there & ~rings]] = True
+        if keep.all():
+            break
+        vertices, owner = vertices[keep], owner[keep]
+    return vertices, owner
+
+
+# Open ends that may have been meant to meet: near each other, against the size of their paths.
+#
+# A drawing may well have open strokes near each other, so nearness alone says little: a gap counts
+# when it is small against the paths that it parts.
+
+NEAR_GAPS = 100.0
+"""An end that stays open is reported when another end is nearer than this many times the gap."""
+
+OWN_GAP_SHARE = 0.1
+"""The two ends of one path are a gap when they are nearer than this share of its length."""
+
+GAP_SHARE = 0.05
+"""Ends of two paths are a gap when they are nearer than this share of the shorter one."""
+
+SHARPEST_TURN_RAD = 2.6
+"""Two paths that would turn by more than this where they nearly meet lie side by side, as the
+lines of a hatch do: their ends are no gap."""
+
+SPACING_SHARE = 0.1
+"""Ends of two paths are a gap when they are nearer than this share of the distance that ends
+strewn at random over the drawing would have: among very many strokes some ends are near."""
+
+FINEST_CELLS = 16.0
+"""The grid in which near ends are looked for has no cell below this share of the reach."""
+
+
+def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float) -> list[Gap]:
+    """For each open path, the nearest other open end of its group if it looks like a gap.
+
+    `ends` are those of M paths with `lengths` (M,) mm and `layers`. Each pair of ends comes once;
+    ends that lie on each other are no gap.
+    """
+    found: dict[tuple[int, int], Gap] = {}
+    is_open = np.flatnonzero(np.repeat(ends.is_open, 2))
+    for group in np.unique(ends.group[is_open // 2]):
+        rows = is_open[ends.group[is_open // 2] == group]
+        one, other, size = _nearest_ends(
+            ends.points[rows], NEAR_GAPS * max(gap_mm, POSITION_EPS_MM)
+        )
+        one, other = rows[one], rows[other]
+        at_random = SPACING_SHARE * _spacing(ends.points[rows])
+        near = _is_gap(ends, lengths, one, other, size) & (
+            (one // 2 == other // 2) | (size <= at_random)
+        )
+        for a, b, apart in zip(
+            one[near].tolist(), other[near].tolist(), size[near].tolist(), strict=True
+        ):
+            x, y = (0.5 * (ends.points[a] + ends.points[b])).tolist()
+            found.setdefault((min(a, b), max(a, b)), Gap((x, y), apart, layers[a // 2]))
+    return [found[key] for key in sorted(found)]
+
+
+def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -> Bools:
+    """Which pairs of near ends look as if they were meant to meet."""
+    own = one // 2 == other // 2
+    shorter = np.minimum(lengths[one // 2], lengths[other // 2])
+    small = size <= np.where(own, OWN_GAP_SHARE, GAP_SHARE) * shorter
+    turn = np.abs(wrapped(ends.leaving[one] - ends.leaving[other] - np.pi))
+    return np.asarray(small & (own | (turn <= SHARPEST_TURN_RAD)))
+
+
+def _spacing(points: Floats) -> float:
+    """The mean distance of the nearest one of points strewn over the box of these, mm.
+
+    It is half the square root of the area that each has, and half the length on a line.
+    """
+    width, height = (float(side) for side in np.ptp(points, axis=0))
+    count = len(points)
+    return max(0.5 * math.sqrt(width * height / count), 0.5 * max(width, height) / count)
+
+
+def _nearest_ends(points: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
+    """Rows (J,), the row of the nearest other point (J,) and how far it is (J,), within reach."""
+    from camtool.kernels.neighbours import nearest_others
+
+    spread = points.max(axis=0) - points.min(axis=0)
+    spacing = float(np.sqrt(spread[0] * spread[1] / len(points)))
+    size = min(max(spacing, reach / FINEST_CELLS), reach)
+    cells = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
+    order = np.lexsort((cells[:, 1], cells[:, 0]))
+    nearest, distance = nearest_others(cells[order], points[order], size, POSITION_EPS_MM, reach)
+    there = nearest >= 0
+    return order[there], order[nearest[there]], distance[there]

@@ -14,6 +14,7 @@ shorter than `POSITION_EPS_MM`. Arrays are read-only.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -266,3 +267,127 @@ def _refuse(bad: Bools, message: str, offsets: Ints) -> None:
     row = int(np.argmax(bad))
     path = int(np.searchsorted(offsets, row, side="right")) - 1
     raise GeometryError(message, where=f"path {path}, vertex {row - int(offsets[path])}")
+
+
+# Polylines reversed, moved, turned, mirrored, scaled, and begun elsewhere: always new ones.
+
+
+def reverse(p: Polyline) -> Polyline:
+    """The same path travelled the other way; a closed one still begins at its first vertex."""
+    count = len(p.vertices)
+    order = np.arange(count)[::-1]
+    if p.closed:
+        order = np.roll(order, 1)
+    vertices = p.vertices[order]
+    # The segment that left vertex i now leaves vertex i + 1 and bends the other way.
+    vertices[:, 2] = 0.0 - p.vertices[(order - 1) % count, 2]
+    return Polyline(vertices, p.closed)
+
+
+def lines_reversed(lines: Polylines) -> Polylines:
+    """Every path travelled the other way, as `reverse` does."""
+    counts = np.diff(lines.offsets)
+    low, count = np.repeat(lines.offsets[:-1], counts), np.repeat(counts, counts)
+    place = np.arange(len(low)) - low
+    order = np.where(np.repeat(lines.closed, counts), count - place, count - 1 - place) % count
+    vertices = lines.vertices[low + order]
+    vertices[:, 2] = 0.0 - lines.vertices[low + (order - 1) % count, 2]
+    return Polylines._trusted(vertices, lines.offsets, lines.closed)
+
+
+def moved(p: Polyline, dx: float, dy: float) -> Polyline:
+    """The path moved by (dx, dy) mm."""
+    return Polyline(p.vertices + np.array([dx, dy, 0.0]), p.closed)
+
+
+def rotated(p: Polyline, angle_rad: float) -> Polyline:
+    """The path turned about (0, 0), CCW positive."""
+    cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
+    x, y, bulge = p.vertices.T
+    turned = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, bulge])
+    return Polyline(turned, p.closed)
+
+
+def mirrored(p: Polyline) -> Polyline:
+    """The path mirrored about the Y axis: x and every bulge change their sign."""
+    x, y, bulge = p.vertices.T
+    return Polyline(np.column_stack([0.0 - x, y, 0.0 - bulge]), p.closed)
+
+
+def scaled(p: Polyline, factor: float) -> Polyline:
+    """The path scaled about (0, 0) by a factor above 0; GeometryError for any other factor."""
+    if not (math.isfinite(factor) and factor > 0.0):
+        raise GeometryError(f"a scale of {factor} is not above 0", mend="mirror with mirrored()")
+    return Polyline(p.vertices * np.array([factor, factor, 1.0]), p.closed)
+
+
+def rolled(p: Polyline, start_index: int) -> Polyline:
+    """A closed path begun at another of its vertices; GeometryError for an open one."""
+    if not p.closed:
+        raise GeometryError("an open path can only begin at an end")
+    return Polyline(np.roll(p.vertices, -start_index, axis=0), True)
+
+
+# Points that are one: taken out of paths, whatever made them coincide (a drawing that repeats
+# them, a scale that brings them together).
+#
+# Tolerance: POSITION_EPS_MM, below which two points are one. A point stays where it is, so no path
+# moves by more than that.
+
+
+def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bools, Ints]:
+    """The vertices (N,) to keep, and how many points each path repeats (M,).
+
+    `vertices` (N, 3) of x, y, bulge, mm, path after path, `counts` (M,) of each. A vertex is kept
+    when it lies off the one kept before it; its bulge becomes, in place, that of the last vertex
+    on it, for a bulge belongs to what leaves. A closed path's repeated first point at its end
+    goes uncounted: it says "closed" once more.
+    """
+    first = np.cumsum(counts) - counts
+    filled = counts > 0
+    begins = np.zeros(len(vertices), dtype=np.bool_)
+    begins[first[filled]] = True
+    step = np.hypot(*np.diff(vertices[:, :2], axis=0, prepend=np.nan).T)
+    keep = begins | ~(step <= POSITION_EPS_MM)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    for path in np.unique(owner[~keep]).tolist():
+        rows = slice(int(first[path]), int(first[path] + counts[path]))
+        keep[rows] = _kept(vertices[rows])
+    repeated = np.bincount(owner[~keep], minlength=len(counts)).astype(np.int64)
+    _drop_closing(vertices, keep, owner, first, closed & filled)
+    return keep, repeated
+
+
+def encloses(vertices: Floats, owner: Ints, left: Ints) -> Bools:
+    """(M,) false for paths of two vertices (of `left` (M,)) without a bulge: there and back along
+    one line encloses nothing; it is that line, once. `owner` (N,) names each vertex's path."""
+    bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(left))
+    return np.asarray((left != 2) | (bent != 0.0))
+
+
+def _kept(path: Floats) -> Bools:
+    """The vertices of one path to keep, which take the bulges of those left out after them."""
+    keep = np.zeros(len(path), dtype=np.bool_)
+    last = -1
+    for row, (x, y, bulge) in enumerate(path.tolist()):
+        if last >= 0 and math.hypot(x - path[last, 0], y - path[last, 1]) <= POSITION_EPS_MM:
+            path[last, 2] = bulge
+        else:
+            keep[row] = True
+            last = row
+    return keep
+
+
+def _drop_closing(vertices: Floats, keep: Bools, owner: Ints, first: Ints, closed: Bools) -> None:
+    """Takes vertices at the end of closed paths out of `keep` that lie on their first one."""
+    waiting = closed.copy()
+    while waiting.any():
+        rows = np.flatnonzero(keep)
+        is_last = np.append(owner[rows][1:] != owner[rows][:-1], True) & waiting[owner[rows]]
+        last = rows[is_last]
+        begin = first[owner[last]]
+        apart = np.hypot(*(vertices[last, :2] - vertices[begin, :2]).T)
+        same = (apart <= POSITION_EPS_MM) & (last != begin)
+        keep[last[same]] = False
+        waiting[:] = False
+        waiting[owner[last[same]]] = True

@@ -17,8 +17,15 @@ from camtool.errors import DrawingError, GeometryError
 from camtool.geometry.chain import numbered
 from camtool.geometry.drawing import Skipped
 from camtool.geometry.measure import path_lengths
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polylines
-from camtool.geometry.repeats import encloses, without_repeats
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Bools,
+    Floats,
+    Ints,
+    Polylines,
+    encloses,
+    without_repeats,
+)
 from camtool.importers.piece import MAX_COORDINATE_MM, Piece
 
 DRAWN_TWICE = "is drawn twice"

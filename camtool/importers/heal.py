@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.geometry.chain import Chained, Kinds, chain, numbered
-from camtool.geometry.crossings import self_crossings_of
 from camtool.geometry.drawing import Gap, Healing
+from camtool.geometry.intersect import self_crossings_of
 from camtool.geometry.overlaps import SAME_LINE_MM, without_overlaps
 from camtool.geometry.polylines import POSITION_EPS_MM, Ints, Polylines
-from camtool.geometry.tiny import without_tiny
+from camtool.geometry.simplify import without_tiny
 from camtool.importers.clean import Cleaned
 from camtool.importers.options import ReadOptions
 from camtool.importers.piece import Piece
@@ -95,7 +95,7 @@ def _recognised(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]
     """The paths with arcs for chords on one circle, if that was asked for; how many arcs."""
     if not options.recognise_arcs:
         return lines, 0
-    from camtool.geometry.recognise import recognise_arcs
+    from camtool.geometry.simplify import recognise_arcs
 
     made = [recognise_arcs(path, options.tolerance_mm) for path in lines]
     return Polylines.of(path for path, _ in made), sum(count for _, count in made)

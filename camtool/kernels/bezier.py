@@ -2,7 +2,7 @@
 
 A curve is `pieces` (m, p + 1, 3) of control points x·w, y·w, w, joined end to end, and its
 parameter runs from 0 to m: the whole part says which piece, the rest where in it.
-`camtool.geometry.nodes` says the same for any curve, and the tests hold the two together;
+`camtool.geometry.fit` says the same for any curve, and the tests hold the two together;
 `tests/oracles/curves.py` measures both.
 """
 

@@ -8,7 +8,7 @@ or circle is
 
 because n − k q is k times the way from p to the centre. What makes it exact: for a curvature of 0
 it becomes the formula of the line, and no difference of large numbers is formed on the way there.
-The vectorised twins are camtool.geometry.frames, distance and measure.
+The vectorised twins are camtool.geometry.measure, distance and measure.
 """
 
 from __future__ import annotations

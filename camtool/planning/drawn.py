@@ -77,7 +77,7 @@ def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
     of = placed.off_mm[_vertices(placed.paths, step.chosen.source)]
     if not len(rows) or not of.any():
         return found
-    from camtool.geometry.offset.curves import Curves
+    from camtool.geometry.boxes import Curves
     from camtool.geometry.polylines import segment_rows
     from camtool.kernels.offset_near import curves_within, nearest_distances
 

@@ -16,7 +16,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, path_lengths, point_at, sample
-from camtool.geometry.nest import inside, nesting
+from camtool.geometry.nesting import inside, nesting
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Bools,

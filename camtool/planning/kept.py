@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from camtool.geometry.nest import nesting
+from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Bools, Floats, Ints, Polylines
 from camtool.planning.items import Step
 from camtool.planning.job import Operation

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from camtool.errors import OptionError
-from camtool.geometry.polylines import Floats, Ints, Polyline
-from camtool.geometry.transform import reverse, rolled
+from camtool.geometry.polylines import Floats, Ints, Polyline, reverse, rolled
 from camtool.planning.arcs import joints
 from camtool.planning.items import Contour, Item
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from camtool.geometry.nest import nesting
+from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polyline, Polylines
 from camtool.planning.items import Contour, Item, Run
 

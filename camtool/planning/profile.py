@@ -17,9 +17,15 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, point_at, signed_areas
-from camtool.geometry.nest import nesting
-from camtool.geometry.polylines import POSITION_EPS_MM, Ints, Polyline, Polylines, Segments
-from camtool.geometry.transform import reverse
+from camtool.geometry.nesting import nesting
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Ints,
+    Polyline,
+    Polylines,
+    Segments,
+    reverse,
+)
 from camtool.planning.arcs import joints
 from camtool.planning.items import Chosen, Contour, Setting, Work
 from camtool.planning.places import at_place, told_together, tool_name

@@ -15,12 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.geometry.boxes import Curves
 from camtool.geometry.distance import nearest
-from camtool.geometry.frames import Frames
-from camtool.geometry.measure import extents, point_at, segment_lengths, signed_areas
-from camtool.geometry.offset import offset_shape
-from camtool.geometry.offset.curves import Curves
-from camtool.geometry.offset.slices import merge_points
+from camtool.geometry.measure import Frames, extents, point_at, segment_lengths, signed_areas
+from camtool.geometry.nesting import regions
+from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Bools,
@@ -29,9 +28,8 @@ from camtool.geometry.polylines import (
     Polyline,
     Polylines,
     Segments,
+    reverse,
 )
-from camtool.geometry.regions import regions
-from camtool.geometry.transform import reverse
 from camtool.planning.contours.along import Along
 
 TOGETHER_MM = 5e-6

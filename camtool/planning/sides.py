@@ -24,7 +24,7 @@ from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_extents, point_at
-from camtool.geometry.nest import nesting
+from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Bools, Ints, Polyline, Polylines, Segments
 from camtool.patterns import matches
 from camtool.planning.job import Job, Operation

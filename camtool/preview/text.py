@@ -1,6 +1,6 @@
 """Labels as single strokes, so that a picture needs no font and looks alike everywhere.
 
-The letters are those of `camtool.geometry.strokes`; what that font lacks is shown as an empty box.
+The letters are those of `camtool.geometry.hershey`; what that font lacks is shown as an empty box.
 The true text always stays in the label's `<title>` and `aria-label`.
 """
 
@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from itertools import accumulate
 
-from camtool.geometry.strokes import BASELINE, BOX, CAP_UNITS, Glyph, glyph
+from camtool.geometry.hershey import BASELINE, BOX, CAP_UNITS, Glyph, glyph
 from camtool.preview.colours import INK
 from camtool.preview.svg import Look, PathData, element, one_line, title
 

@@ -17,8 +17,7 @@ import numpy as np
 
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.measure import point_at
-from camtool.geometry.offset import Slices, shape_stages
-from camtool.geometry.offset.way import Way
+from camtool.geometry.offset import Slices, Way, shape_stages
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.preview.render import render
 from camtool.preview.scene import Scene

@@ -11,7 +11,7 @@ import pytest
 
 from camtool.geometry.fit import BezierCurve, EllipseCurve, FunctionCurve, fit_curves
 from camtool.geometry.polylines import Polyline
-from camtool.geometry.recognise import recognise_arcs
+from camtool.geometry.simplify import recognise_arcs
 from tests.oracles.curves import fewest_chords
 from tests.oracles.recognise import explode
 

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from camtool.errors import GeometryError
 from camtool.geometry.chain import chain
 from camtool.geometry.measure import length, path_lengths, signed_area
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
-from camtool.geometry.transform import reverse
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, reverse
 from tests.strategies import contours, polylines
 
 GAP = 0.01

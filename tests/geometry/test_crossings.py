@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.boxes import touching_boxes
-from camtool.geometry.crossings import self_crossings_of
 from camtool.geometry.intersect import (
     NoIntersection,
     OneCrossing,
@@ -18,10 +17,18 @@ from camtool.geometry.intersect import (
     Touch,
     TwoMeetings,
     intersect_segments,
+    self_crossings_of,
 )
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import mirrored, reverse, rolled, rotated
+from camtool.geometry.polylines import (
+    Polyline,
+    Polylines,
+    Segments,
+    mirrored,
+    reverse,
+    rolled,
+    rotated,
+)
 from tests.strategies import contours, polylines
 
 

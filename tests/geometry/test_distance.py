@@ -10,8 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.distance import approach, nearest, path_distance, points_to_segments
-from camtool.geometry.polylines import Polyline, Segments
-from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from camtool.geometry.polylines import (
+    Polyline,
+    Segments,
+    mirrored,
+    moved,
+    reverse,
+    rolled,
+    rotated,
+    scaled,
+)
 from tests.oracles.geometry import dense_points, line_string, sagitta
 from tests.strategies import coordinates, polylines
 

@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 from camtool.errors import GeometryError
 from camtool.geometry.distance import approach
 from camtool.geometry.drawing import Branch, Drawing, Gap, Healing, Mark, SelfCrossing, Units
-from camtool.geometry.facts import drawing_extents, drawing_facts
-from camtool.geometry.features import (
+from camtool.geometry.facts import (
+    drawing_extents,
+    drawing_facts,
     narrowest_wall,
     shortest_segment,
     smallest_contour,
     smallest_radius,
 )
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import moved
+from camtool.geometry.polylines import Polyline, Polylines, Segments, moved
 from tests.drawings import drawing_of
 from tests.strategies import contours, polylines
 

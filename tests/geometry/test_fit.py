@@ -18,9 +18,9 @@ from camtool.geometry.fit import (
     FunctionCurve,
     SplineCurve,
     arc_vertices,
+    curve_nodes,
     fit_curve,
 )
-from camtool.geometry.nodes import curve_nodes
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from tests.drawings import drawing_of
 from tests.oracles import arcs

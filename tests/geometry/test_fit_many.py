@@ -13,10 +13,10 @@ from camtool.geometry.fit import (
     EllipseCurve,
     FunctionCurve,
     SplineCurve,
+    curve_nodes,
     fit_curve,
     fit_curves,
 )
-from camtool.geometry.nodes import curve_nodes
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.kernels.bezier import evaluate, points_at, speed
 from camtool.kernels.fit_limits import MAX_RADIUS_MM, SINGLE_TURN_RAD

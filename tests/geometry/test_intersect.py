@@ -9,7 +9,6 @@ import pytest
 import shapely
 
 from camtool.geometry.boxes import box_pairs
-from camtool.geometry.frames import Frames
 from camtool.geometry.intersect import (
     Crossings,
     Intersection,
@@ -23,7 +22,7 @@ from camtool.geometry.intersect import (
     intersect_segments,
     self_crossings,
 )
-from camtool.geometry.measure import point_at, segment_boxes
+from camtool.geometry.measure import Frames, point_at, segment_boxes
 from camtool.geometry.polylines import Floats, Polyline, Segments
 from tests.oracles.offset import chords, distance
 

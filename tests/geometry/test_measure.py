@@ -22,8 +22,17 @@ from camtool.geometry.measure import (
     signed_area,
     signed_areas,
 )
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from camtool.geometry.polylines import (
+    Polyline,
+    Polylines,
+    Segments,
+    mirrored,
+    moved,
+    reverse,
+    rolled,
+    rotated,
+    scaled,
+)
 from tests.oracles.geometry import chord_length, dense_points, polygon, sagitta
 from tests.strategies import contours, polylines
 

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 
-from camtool.geometry.boundary import Boundary
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import sample
-from camtool.geometry.medial import Trace, discs_at, medial_trace
+from camtool.geometry.medial import Boundary, Trace, discs_at, medial_trace
+from camtool.geometry.nesting import oriented, regions
 from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
-from camtool.geometry.regions import oriented, regions
 from camtool.kernels.discs import LENGTH, SWEEP, frame
 from camtool.planning.carving.pieces import with_level
 from tests.oracles import contours as shapes

@@ -8,9 +8,18 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapely import Point
 
-from camtool.geometry.nest import inside, nesting
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from camtool.geometry.nesting import inside, nesting
+from camtool.geometry.polylines import (
+    Polyline,
+    Polylines,
+    Segments,
+    mirrored,
+    moved,
+    reverse,
+    rolled,
+    rotated,
+    scaled,
+)
 from tests.oracles.geometry import polygon, sagitta
 from tests.strategies import contours, coordinates, polylines
 

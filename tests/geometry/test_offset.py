@@ -20,15 +20,24 @@ from camtool.geometry.measure import (
 from camtool.geometry.offset import (
     OffsetOptions,
     Way,
+    merge_points,
     offset,
     offset_open,
     offset_shape,
     shape_stages,
     stage_drawings,
 )
-from camtool.geometry.offset.slices import merge_points
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from camtool.geometry.polylines import (
+    Polyline,
+    Polylines,
+    Segments,
+    mirrored,
+    moved,
+    reverse,
+    rolled,
+    rotated,
+    scaled,
+)
 from tests.oracles.contours import (
     C_SHAPE,
     CIRCLE,

@@ -9,11 +9,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from camtool.geometry.frames import Frames
-from camtool.geometry.measure import length, point_at, signed_area
+from camtool.geometry.measure import Frames, length, point_at, signed_area
 from camtool.geometry.offset import offset
-from camtool.geometry.polylines import Polyline, Segments
-from camtool.geometry.transform import mirrored, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Segments, mirrored, reverse, rolled, rotated
 from tests.oracles.contours import RANDOM, is_simple
 from tests.oracles.offset import complaints, distance, distance_complaints
 

@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 
 from camtool.errors import GeometryError, OptionError
 from camtool.geometry.measure import path_lengths, signed_areas
+from camtool.geometry.nesting import oriented
 from camtool.geometry.offset import OffsetOptions, offset, offset_open, offset_shape
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.geometry.regions import oriented
-from camtool.geometry.transform import (
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
     lines_reversed,
     mirrored,
     moved,

@@ -4,8 +4,7 @@ from itertools import permutations
 
 import numpy as np
 
-from camtool.geometry.offset.slices import Slices
-from camtool.geometry.offset.stitch import trace_loops
+from camtool.geometry.offset import Slices, trace_loops
 from camtool.geometry.polylines import Segments
 
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import path_lengths, sample
 from camtool.geometry.overlaps import SAME_LINE_MM, Unlapped, without_overlaps
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import mirrored, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, mirrored, reverse, rotated
 
 WITHIN = SAME_LINE_MM
 QUARTER = math.tan(math.pi / 8.0)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
-from camtool.geometry.recognise import NOISE_MM, recognise_arcs, rounding_noise
+from camtool.geometry.simplify import NOISE_MM, recognise_arcs, rounding_noise
 from camtool.kernels.recognise import MAX_TURN_RAD, circle_of, find_runs
 from tests.oracles import arcs
 from tests.oracles.recognise import explode, least_squares_circle, turns_about

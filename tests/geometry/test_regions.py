@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
 from camtool.geometry.measure import signed_areas
+from camtool.geometry.nesting import oriented, regions
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import Polyline, Polylines
-from camtool.geometry.regions import oriented, regions
-from camtool.geometry.transform import moved, reverse, rolled, scaled
+from camtool.geometry.polylines import Polyline, Polylines, moved, reverse, rolled, scaled
 from tests.oracles.contours import CIRCLE, OBLONG, SQUARE, closed, comb, opened
 
 RINGS = [scaled(CIRCLE, k) for k in (4.0, 3.0, 2.0, 1.0)]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import sample, segment_lengths
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.tiny import without_tiny
+from camtool.geometry.simplify import without_tiny
 
 LIMIT = 0.01
 

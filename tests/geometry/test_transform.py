@@ -10,15 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import (
-    mirrored,
-    moved,
-    reverse,
-    rolled,
-    rotated,
-    scaled,
-)
+from camtool.geometry.polylines import Polyline, mirrored, moved, reverse, rolled, rotated, scaled
 from tests.oracles.geometry import dense_points
 from tests.strategies import polylines
 

@@ -160,9 +160,9 @@ def test_arcs_are_recognised_when_asked_after_loose_chords_were_joined(
         assert tolerance_mm == 0.002
         return path, 2
 
-    stand_in = ModuleType("camtool.geometry.recognise")
+    stand_in = ModuleType("camtool.geometry.simplify")
     stand_in.recognise_arcs = recognise_arcs  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "camtool.geometry.recognise", stand_in)
+    monkeypatch.setitem(sys.modules, "camtool.geometry.simplify", stand_in)
     lines = [piece(a, b) for a, b in itertools.pairwise(SQUARE)]
     assert put(*lines).healing.arcs_recognised == 0
     assert seen == []

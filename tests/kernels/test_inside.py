@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.geometry.nest import inside
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import Polylines, Segments
 from tests.oracles import inside as twin
 from tests.oracles.contours import CIRCLE, CRESCENT, FILLETED, KEYHOLE, RANDOM, SQUARE, comb

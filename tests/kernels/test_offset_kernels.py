@@ -7,13 +7,21 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camtool.geometry.boxes import Curves, curve_rows_of
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import crossings, self_crossings
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
-from camtool.geometry.offset import Way, offset, raw_offset, shape_stages
-from camtool.geometry.offset.curves import Curves, curve_rows_of
-from camtool.geometry.offset.slices import Slices, merge_points
-from camtool.geometry.offset.stitch import trace_loops, without_dead_ends, without_doubles
+from camtool.geometry.offset import (
+    Slices,
+    Way,
+    merge_points,
+    offset,
+    raw_offset,
+    shape_stages,
+    trace_loops,
+    without_dead_ends,
+    without_doubles,
+)
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels import offset_curves, offset_kites, offset_meet, offset_near
 from tests.oracles import offset_stages as twin
@@ -190,7 +198,7 @@ def test_depth_in_kites(seed: int, limit: float) -> None:
     d = float(rng.uniform(0.1, 3.0))
     raw = raw_offset(Polylines.of([p]), Way(d, limit))
     wanted = [shapely.Polygon(kite) for kite in kites([p], d, limit)]
-    from camtool.geometry.offset.near import Near
+    from camtool.geometry.offset import Near
 
     _, _, own, tree = Near.of(Segments.of(p), raw.kites).arrays
     assert len(own) == len(wanted)

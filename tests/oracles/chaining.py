@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.geometry.chain import CLASS_RATIO, SAME_TURN_RAD
 from camtool.geometry.measure import length, signed_area
-from camtool.geometry.pairs import CLASS_RATIO, SAME_TURN_RAD
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline
-from camtool.geometry.transform import reverse
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, reverse
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ from collections import defaultdict
 import numpy as np
 
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.frames import Frames
-from camtool.geometry.measure import point_at
-from camtool.geometry.offset.slices import Slices
+from camtool.geometry.measure import Frames, point_at
+from camtool.geometry.offset import Slices
 from camtool.geometry.polylines import Bools, Floats, Ints, Segments
 
 U_TURN_RAD = 1e-3

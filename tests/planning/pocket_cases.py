@@ -11,9 +11,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from camtool.geometry.distance import path_distance
-from camtool.geometry.polylines import Polyline, Polylines
-from camtool.geometry.regions import oriented
-from camtool.geometry.transform import moved, rotated, scaled
+from camtool.geometry.nesting import oriented
+from camtool.geometry.polylines import Polyline, Polylines, moved, rotated, scaled
 from camtool.planning.contours.levels import levels
 from camtool.planning.items import Chosen, Feeds, Run, Setting, Work
 from camtool.planning.job import Operation, Tool

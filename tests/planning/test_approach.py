@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import scaled
+from camtool.geometry.polylines import Polyline, scaled
 from camtool.machine.controllers import PathController, PicMmhController
 from camtool.machine.model import Machine, PlayCells, PlayMap
 from camtool.planning.items import Run

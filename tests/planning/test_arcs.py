@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, segment_lengths
-from camtool.geometry.polylines import Polyline, Segments
-from camtool.geometry.transform import reverse
+from camtool.geometry.polylines import Polyline, Segments, reverse
 from camtool.planning.arcs import Cut, joints
 from camtool.planning.arcs import cuts as cuts_of_run
 from tests.strategies import polylines

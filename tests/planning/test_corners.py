@@ -10,8 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.geometry.polylines import Polyline, Polylines
-from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from camtool.geometry.polylines import (
+    Polyline,
+    Polylines,
+    mirrored,
+    moved,
+    reverse,
+    rolled,
+    rotated,
+    scaled,
+)
 from camtool.planning.contours.corners import RELIEF_LEAST_MM, relieved
 from tests.oracles.arcs import chain_distances
 

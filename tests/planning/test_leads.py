@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.findings import Code
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import moved, reverse, rolled
+from camtool.geometry.polylines import Polyline, Polylines, Segments, moved, reverse, rolled
 from camtool.planning.contours.along import Along
 from camtool.planning.contours.leads import (
     LEAD_HALVINGS,

@@ -14,8 +14,7 @@ from camtool.errors import OptionError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Mark
 from camtool.geometry.measure import path_lengths
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import reverse
+from camtool.geometry.polylines import Polyline, reverse
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Lead, Operation, Tool, job_of
 from camtool.planning.plan import plan, planned

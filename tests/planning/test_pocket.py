@@ -15,8 +15,16 @@ from camtool.errors import OptionError
 from camtool.findings import Code, Severity
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import mirrored, moved, reverse, rotated, scaled
+from camtool.geometry.polylines import (
+    Polyline,
+    Polylines,
+    Segments,
+    mirrored,
+    moved,
+    reverse,
+    rotated,
+    scaled,
+)
 from camtool.planning.items import Fixed, Run
 from camtool.planning.job import Entry
 from camtool.planning.pockets.parts import parts_of

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, point_at, sample
-from camtool.geometry.polylines import Polyline, Segments
-from camtool.geometry.transform import moved, scaled
+from camtool.geometry.polylines import Polyline, Segments, moved, scaled
 from camtool.planning.contours.along import Along
 from camtool.planning.pockets.clip import outside_parts, scanned
 from camtool.planning.pockets.route import Rails, closest, route

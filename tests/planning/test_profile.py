@@ -15,8 +15,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import sample, signed_areas
-from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.geometry.transform import moved, reverse, scaled
+from camtool.geometry.polylines import Polyline, Polylines, Segments, moved, reverse, scaled
 from camtool.planning.choose import choose
 from camtool.planning.gouges import side_findings
 from camtool.planning.items import Contour, Feeds, Setting

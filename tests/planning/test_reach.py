@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
 from camtool.geometry.measure import signed_areas
-from camtool.geometry.polylines import Polyline, Polylines
-from camtool.geometry.transform import mirrored, reverse, rotated, scaled
+from camtool.geometry.polylines import Polyline, Polylines, mirrored, reverse, rotated, scaled
 from camtool.planning.reach import opened, unreached
 from tests.oracles import swept
 from tests.oracles.contours import (

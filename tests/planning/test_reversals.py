@@ -15,8 +15,16 @@ from hypothesis import strategies as st
 from camtool.findings import Code, Severity
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import Polyline, Segments
-from camtool.geometry.transform import mirrored, moved, reverse, rolled, rotated, scaled
+from camtool.geometry.polylines import (
+    Polyline,
+    Segments,
+    mirrored,
+    moved,
+    reverse,
+    rolled,
+    rotated,
+    scaled,
+)
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from camtool.findings import Code
 from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import mirrored, reverse, rolled, rotated, scaled
+from camtool.geometry.polylines import Polyline, mirrored, reverse, rolled, rotated, scaled
 from camtool.planning.contours.levels import levels
 from camtool.planning.items import Contour, Feeds, Run, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool

@@ -10,8 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, signed_area
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import reverse, rolled
+from camtool.geometry.polylines import Polyline, reverse, rolled
 from camtool.planning.contours.starts import START_SNAP_MM, with_starts
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from camtool.errors import OptionError
 from camtool.findings import Code
 from camtool.geometry.measure import length
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import reverse, rolled
+from camtool.geometry.polylines import Polyline, reverse, rolled
 from camtool.planning.contours.along import Along
 from camtool.planning.contours.tabs import raised, tabs_of
 from camtool.planning.items import Contour, Feeds, Setting

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import sample
-from camtool.geometry.polylines import Polyline, Polylines
-from camtool.geometry.transform import mirrored, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, mirrored, reverse, rotated
 from camtool.preview.strokes import Chain, chains_box, chains_of, path_data, strokes_of
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.svg_page import Arc, Line, pieces

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from camtool.errors import CamtoolError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import moved, scaled
+from camtool.geometry.polylines import Polyline, moved, scaled
 from camtool.pipeline import Judging, Posted, post_drawing, verify_program
 from camtool.planning.job import Job, Placement, job_of
 from camtool.toolpath.builder import ToolpathBuilder

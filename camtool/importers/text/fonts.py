@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from camtool.geometry import strokes
+from camtool.geometry import hershey
 from camtool.geometry.polylines import Floats
 from camtool.importers.dxf.frames import Unusable
 
@@ -142,28 +142,28 @@ def font_for(wanted: Wanted, mode: str) -> tuple[Font, str]:
 @lru_cache(maxsize=1)
 def stroke_font() -> Font:
     """Hershey's Roman simplex; it needs no font file."""
-    depth = max(y for stroke in _strokes("p") for _, y in stroke) - strokes.BASELINE
-    blank = strokes.BOX.advance / strokes.CAP_UNITS
-    return Font(strokes.NAME, False, _stroke_letter, depth / strokes.CAP_UNITS, blank, STROKE_EM)
+    depth = max(y for stroke in _strokes("p") for _, y in stroke) - hershey.BASELINE
+    blank = hershey.BOX.advance / hershey.CAP_UNITS
+    return Font(hershey.NAME, False, _stroke_letter, depth / hershey.CAP_UNITS, blank, STROKE_EM)
 
 
-def _strokes(character: str) -> strokes.Strokes:
-    glyph = strokes.glyph(character)
+def _strokes(character: str) -> hershey.Strokes:
+    glyph = hershey.glyph(character)
     return glyph.strokes if glyph else ()
 
 
 @lru_cache(maxsize=_LETTERS_KEPT)
 def _stroke_letter(character: str) -> Letter | None:
-    glyph = strokes.glyph(character)
+    glyph = hershey.glyph(character)
     if glyph is None:
         return None
     contours = []
     for stroke in glyph.strokes:
         points = np.array(stroke, dtype=np.float64)
-        points[:, 1] = strokes.BASELINE - points[:, 1]
-        points /= strokes.CAP_UNITS
+        points[:, 1] = hershey.BASELINE - points[:, 1]
+        points /= hershey.CAP_UNITS
         contours.append([points[k : k + 2] for k in range(len(points) - 1)])
-    return Letter.of(contours, glyph.advance / strokes.CAP_UNITS)
+    return Letter.of(contours, glyph.advance / hershey.CAP_UNITS)
 
 
 @dataclass(frozen=True, order=True)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.offset.slices import merge_points
+from camtool.geometry.offset import merge_points
 from camtool.geometry.polylines import Bools, Floats, Ints
 
 MEET_MM = 1e-4

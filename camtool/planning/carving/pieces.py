@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.boundary import Boundary
 from camtool.geometry.measure import signed_area
-from camtool.geometry.medial import HALVINGS, Trace, concatenated, discs_at, off_chord
+from camtool.geometry.medial import HALVINGS, Boundary, Trace, concatenated, discs_at, off_chord
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Polyline
 
 LEVEL_EPS_MM = 1e-9

@@ -30,14 +30,12 @@ import numpy as np
 from camtool.errors import GeometryError, OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.boxes import touching_boxes
-from camtool.geometry.crossings import MOST_PAIRS
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.intersect import meetings
+from camtool.geometry.intersect import MOST_PAIRS, meetings
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.medial import Trace, medial_trace
-from camtool.geometry.nest import nesting
+from camtool.geometry.nesting import nesting, regions
 from camtool.geometry.polylines import Floats, Polylines, Segments
-from camtool.geometry.regions import regions
 from camtool.planning.carving.graph import graph_of, lengths_of, walks, without_twigs
 from camtool.planning.carving.pieces import Band, floor_area, grooves, walls, with_level
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work

@@ -17,8 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from camtool.geometry.distance import nearest
-from camtool.geometry.frames import Frames, dot, turned
-from camtool.geometry.measure import point_at, segment_lengths
+from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turned
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polyline, Segments
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import point_at, segment_boxes
-from camtool.geometry.nest import inside
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Segments
 from camtool.planning.contours.along import Along
 from camtool.planning.contours.ramps import Knots, feeds_along, lifted

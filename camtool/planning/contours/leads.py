@@ -21,10 +21,9 @@ import numpy as np
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import nearest, paired_distances, points_to_segments
-from camtool.geometry.frames import Frames, dot
 from camtool.geometry.intersect import crossings
-from camtool.geometry.measure import point_at, signed_area
-from camtool.geometry.nest import inside
+from camtool.geometry.measure import Frames, dot, point_at, signed_area
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Bools,

@@ -6,7 +6,7 @@ import numpy as np
 
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import point_at, segment_lengths
-from camtool.geometry.nest import inside
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Bools,

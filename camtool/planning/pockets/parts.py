@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from camtool.geometry.measure import point_at, sample, signed_areas
-from camtool.geometry.nest import inside
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polylines, Segments
 
 POLE_SHARE = 0.01

@@ -22,10 +22,9 @@ from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.intersect import meetings, self_crossings
 from camtool.geometry.measure import extents, signed_areas
-from camtool.geometry.nest import nesting
+from camtool.geometry.nesting import nesting, oriented
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Floats, Polylines, Segments
-from camtool.geometry.regions import oriented
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.places import at_place, tool_name

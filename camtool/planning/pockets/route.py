@@ -16,7 +16,7 @@ import numpy as np
 from camtool.geometry.distance import nearest, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import point_at
-from camtool.geometry.nest import inside
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polylines, Segments
 from camtool.planning.contours.along import Along
 

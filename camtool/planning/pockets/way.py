@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats, Polyline
-from camtool.geometry.transform import reverse
+from camtool.geometry.polylines import Floats, Polyline, reverse
 from camtool.planning.contours.along import Along
 from camtool.planning.pockets.route import Rails, closest, route, tidy
 

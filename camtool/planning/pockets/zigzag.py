@@ -17,8 +17,7 @@ import numpy as np
 
 from camtool.geometry.measure import extents, point_at
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import Floats, Ints, Polylines, Segments
-from camtool.geometry.transform import rotated
+from camtool.geometry.polylines import Floats, Ints, Polylines, Segments, rotated
 from camtool.planning.pockets.clip import scanned
 from camtool.planning.pockets.parts import parts_of
 from camtool.planning.pockets.route import Rails

@@ -20,8 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import Polyline
-from camtool.geometry.transform import reverse
+from camtool.geometry.polylines import Polyline, reverse
 from camtool.machine.model import Machine
 from camtool.planning.items import Contour, Fixed, Item, Run
 from camtool.planning.job import Operation

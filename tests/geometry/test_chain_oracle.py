@@ -11,10 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.chain import Chained, Kinds, chain
-from camtool.geometry.crossings import self_crossings_of
+from camtool.geometry.intersect import self_crossings_of
 from camtool.geometry.measure import path_lengths, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
-from camtool.geometry.transform import mirrored, moved, reverse, rotated, scaled
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    mirrored,
+    moved,
+    reverse,
+    rotated,
+    scaled,
+)
 from camtool.kernels.neighbours import nearest_others
 from tests.oracles.chaining import chained, nearest_other
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from camtool.geometry.strokes import BASELINE, BOX, CAP_UNITS, glyph
+from camtool.geometry.hershey import BASELINE, BOX, CAP_UNITS, glyph
 
 
 def heights(letter: str) -> tuple[float, float]:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.errors import GeometryError
+from camtool.geometry.boxes import Curves
 from camtool.geometry.measure import path_extents, point_at, signed_areas
-from camtool.geometry.offset.curves import Curves
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Bools,
@@ -20,6 +21,7 @@ from camtool.geometry.polylines import (
     Ints,
     Polylines,
     Segments,
+    reverse,
 )
 
 
@@ -99,3 +101,42 @@ def _held(points: Floats, first_point: Ints, inner: Ints, ring: Segments) -> tup
     arrays = (curves.rows, ring.bulge, curves.tree)
     said = holds(points, first_point, arrays, inner, POSITION_EPS_MM)
     return inner[said == HELD], inner[said == ON_LINE]
+
+
+# Regions: closed paths by which of them holds which, outer ones CCW and their holes CW.
+
+
+def oriented(lines: Polylines) -> Polylines:
+    """The closed paths, in their order, so turned that what an odd number of them hold is left.
+
+    Paths held by none, by two, and so on run CCW, the others CW. Open paths: GeometryError.
+    """
+    return _oriented(lines, _nesting(lines))
+
+
+def regions(lines: Polylines) -> list[Polylines]:
+    """Each outer path (CCW) with the holes (CW) that are directly in it; in the order of paths.
+
+    An island in a hole is the outer path of a region of its own. Open paths: GeometryError.
+    """
+    nest = _nesting(lines)
+    turned = _oriented(lines, nest)
+    outer = np.flatnonzero(nest.depth % 2 == 0)
+    return [
+        turned.select([row, *np.flatnonzero((nest.parent == row) & (nest.depth % 2 == 1))])
+        for row in outer.tolist()
+    ]
+
+
+def _nesting(lines: Polylines) -> Nesting:
+    if not lines.closed.all():
+        where = f"path {np.argmin(lines.closed)}"
+        raise GeometryError("an open path has no inside", where=where, mend="close it")
+    return nesting(lines)
+
+
+def _oriented(lines: Polylines, nest: Nesting) -> Polylines:
+    ccw = signed_areas(lines) > 0.0
+    wanted = nest.depth % 2 == 0
+    paths = zip(lines, (ccw == wanted).tolist(), strict=True)
+    return Polylines.of([p if right else reverse(p) for p, right in paths])
