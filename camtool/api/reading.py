@@ -64,8 +64,8 @@ def read_drawing(
     DrawingError, and OptionError for a way of reading that cannot be. Source: docs/formats.md.
     """
     from camtool.importers.options import ReadOptions, Selection
+    from camtool.importers.pieces import colour_named
     from camtool.importers.read import read_drawing as read
-    from camtool.importers.select import colour_named
 
     settings: dict[str, Any] = {}
     if target is not None:
@@ -110,7 +110,7 @@ def as_drawing(
     drawing: DrawingRecord | str | Path, target: str | LoadedTarget | None, job: Job
 ) -> DrawingRecord:
     """The drawing, or what is in its file on the layers that the job's operations take."""
-    from camtool.importers.select import NoMatchError
+    from camtool.importers.pieces import NoMatchError
     from camtool.jobs.drawing import layers_of, read_to_scale, refuse_unmatched, unmatched
 
     if isinstance(drawing, DrawingRecord):

@@ -340,8 +340,8 @@ class DrawingFlags:
         the job that the drawing has not, unless flags restrict it.
         """
         from camtool.importers.options import ReadOptions, Selection
+        from camtool.importers.pieces import NoMatchError, colour_named
         from camtool.importers.read import content, read_bytes
-        from camtool.importers.select import NoMatchError, colour_named
         from camtool.jobs.drawing import layers_of, read_to_scale, refuse_unmatched, unmatched
 
         settings: dict[str, Any] = {}

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Protocol, cast
 
 from camtool.errors import DrawingError
+from camtool.importers.formats import find_format
 from camtool.importers.options import DEFAULTS, ReadOptions
-from camtool.importers.read_format import find_format
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
-from camtool.importers.select import NAMED, NoMatchError
+from camtool.importers.pieces import NAMED, NoMatchError
 from camtool.patterns import guess, matches
 
 if TYPE_CHECKING:

@@ -300,7 +300,7 @@ def layers(value: object) -> tuple[str, ...]:
 
 def colours(value: object) -> tuple[str, ...]:
     """Patterns of colours as drawings have them ("#rrggbb"); names and numbers are turned so."""
-    from camtool.importers.select import colour_named
+    from camtool.importers.pieces import colour_named
 
     if isinstance(value, list | tuple):
         value = [str(item) if type(item) is int else item for item in value]

@@ -19,7 +19,7 @@ from camtool.geometry.facts import drawing_facts
 from camtool.geometry.polylines import Polylines
 from camtool.importers.assemble import assemble
 from camtool.importers.options import ReadOptions
-from camtool.importers.piece import Piece
+from camtool.importers.pieces import Piece
 from camtool.importers.read import read_drawing
 
 pytestmark = pytest.mark.benchmark

@@ -11,10 +11,9 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.measure import signed_areas
-from camtool.importers.assemble import Piece, assemble
-from camtool.importers.clean import cleaned
+from camtool.importers.assemble import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM, Piece, assemble
+from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions
-from camtool.importers.told import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM
 
 MM = Units("mm", 1.0, "in a test")
 

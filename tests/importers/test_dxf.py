@@ -21,8 +21,8 @@ from camtool.geometry.curves import EllipseCurve, SplineCurve
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import signed_area
 from camtool.geometry.polylines import Segments
-from camtool.importers.dxf.blocks import MAX_INSERTED
 from camtool.importers.dxf.reader import read
+from camtool.importers.dxf.walk import MAX_INSERTED
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
 from tests.oracles import arcs

@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
-from camtool.importers.points import numpy_file as points_numpy
+from camtool.importers.points import tables as points_numpy
 from camtool.importers.points.reader import read
 from camtool.importers.read import read_bytes
 

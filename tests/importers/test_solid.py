@@ -18,11 +18,10 @@ from camtool.geometry.measure import extents, path_lengths
 from camtool.geometry.polylines import Segments
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes, read_drawing
-from camtool.importers.solid import process as solid_process
 from camtool.importers.solid import reader as solid
+from camtool.importers.solid import reader as solid_process
 from camtool.importers.solid import worker as solid_worker
-from camtool.importers.solid.process import outlined
-from camtool.importers.solid.units import step_unit
+from camtool.importers.solid.reader import outlined, step_unit
 
 b = pytest.importorskip("build123d")
 

@@ -13,14 +13,13 @@ from camtool.errors import DrawingError
 from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
+from camtool.importers import text as text_fonts
 from camtool.importers.dxf.reader import read as read_dxf
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
-from camtool.importers.svg import walk
+from camtool.importers.svg import reader
 from camtool.importers.svg.reader import read
-from camtool.importers.text import fonts as text_fonts
-from camtool.importers.text.fonts import Wanted, font_for
-from camtool.importers.text.layout import Look
-from tests.importers.test_text import MODES, OUTLINE_FONT, needs_font
+from camtool.importers.text import Look, Wanted, font_for
+from tests.importers.test_dxf_text import MODES, OUTLINE_FONT, needs_font
 from tests.oracles.svg_ink import ink
 
 FAMILY = "DejaVu Sans"
@@ -388,7 +387,7 @@ def test_weights_that_fonts_are_not_asked_for_are_told() -> None:
 
 
 def test_the_letters_of_a_file_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walk, "MAX_LETTERS", 100)
+    monkeypatch.setattr(reader, "MAX_LETTERS", 100)
     assert drawn("<text y='9'>AB</text>" * 50).used == {"text": 50}
     with pytest.raises(DrawingError, match=r"more than 100 letters.*--text skip"):
         drawn("<text y='9'>AB</text>" * 51)

@@ -1,26 +1,207 @@
-"""One DXF entity to paths in mm: lines and circles exact, all other curves fitted."""
+"""Where a DXF entity lies: the map from its world, or from the plane it is drawn in, to mm.
+
+DXF keeps flat entities in a coordinate system of their own (OCS: the arbitrary axis algorithm of
+the DXF reference, here ezdxf's), and blocks are placed by any affine map. `Frame` is that map,
+from the world of an entity to mm; `Plane` is what it makes of the plane that the entity lies in,
+seen from above.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from camtool.geometry.fit import EllipseCurve, arc_vertices, split_bulges
-from camtool.geometry.polylines import Floats, Segments
-from camtool.importers.dxf.frames import (
-    Frame,
-    Plane,
-    Shape,
-    Unusable,
-    fitted,
-    numbers,
-    require,
-    straight,
+from camtool.errors import DrawingError, GeometryError
+from camtool.geometry.fit import (
+    BezierCurve,
+    Curve,
+    EllipseCurve,
+    Fit,
+    SplineCurve,
+    arc_vertices,
+    fit_curve,
+    split_bulges,
 )
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
+from camtool.importers.pieces import MAX_COORDINATE_MM
+
+FLAT_TILT = 1e-4
+"""An entity that rises by more than this share of its width is not flat: seen from above its shape
+would change (by half the square of it, 5 nm on a metre)."""
+
+ROUND_SHARE = 1e-9
+"""Half axes that differ by less, or stand less askew, make a circle."""
+
+_UPWARDS = (0.0, 0.0, 1.0)
+
+
+class Unusable(Exception):
+    """The entity gives no path; the text says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """(x, y) ↦ origin + x·u + y·v, all (2,) in mm; `scale` is 0 unless circles stay circles.
+
+    `rise` (2,): how the origin moves for each unit of elevation.
+    """
+
+    u: Floats
+    v: Floats
+    origin: Floats
+    scale: float
+    sign: float
+    rise: Floats = field(default_factory=lambda: np.zeros(2))
+
+    @classmethod
+    def of(cls, u: Floats, v: Floats, origin: Floats, rise: Floats | None = None) -> Plane:
+        """From vectors (3,); Unusable when the plane is tilted or has no area."""
+        longest = max(math.hypot(*u), math.hypot(*v))
+        if not longest <= MAX_COORDINATE_MM:  # nor is NaN
+            raise Unusable("is larger than micrometres can tell")
+        if max(abs(u[2]), abs(v[2])) > FLAT_TILT * longest:
+            raise Unusable("lies in a tilted plane")
+        area = float(u[0] * v[1] - u[1] * v[0])
+        if abs(area) <= ROUND_SHARE * longest**2:
+            raise Unusable("is scaled to nothing")
+        lengths = math.hypot(u[0], u[1]), math.hypot(v[0], v[1])
+        askew = abs(u[0] * v[0] + u[1] * v[1]) / longest
+        is_round = max(abs(lengths[0] - lengths[1]), askew) <= ROUND_SHARE * longest
+        return cls(
+            u=u[:2],
+            v=v[:2],
+            origin=origin[:2],
+            scale=lengths[0] if is_round else 0.0,
+            sign=math.copysign(1.0, area),
+            rise=np.zeros(2) if rise is None else rise[:2],
+        )
+
+    @cached_property
+    def turn(self) -> float:
+        """The direction of u, rad."""
+        return math.atan2(float(self.u[1]), float(self.u[0]))
+
+    def at(self, elevation: float) -> Plane:
+        """The parallel plane at this elevation over the one here."""
+        if not elevation or not self.rise.any():
+            return self
+        origin = self.origin + elevation * self.rise
+        return Plane(self.u, self.v, origin, self.scale, self.sign, self.rise)
+
+    def points(self, local: Floats) -> Floats:
+        """Local (n, 2) to (n, 2) mm."""
+        return np.asarray(self.origin + local[:, :1] * self.u + local[:, 1:2] * self.v)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """World to mm: p ↦ p @ linear + offset, with linear (3, 3) and offset (3,)."""
+
+    linear: Floats
+    offset: Floats
+    _planes: dict[tuple[float, ...], Plane] = field(default_factory=dict, repr=False)
+
+    def placed(self, linear: Floats, offset: Floats) -> Frame:
+        """This frame behind another map."""
+        return Frame(linear @ self.linear, offset @ self.linear + self.offset)
+
+    def flat(self, points: Floats) -> Floats:
+        """Points (n, 3) as (n, 2) mm; Unusable when they rise."""
+        flat, is_flat = self.flat_each(points[None])
+        if not is_flat[0]:
+            raise Unusable("is not flat")
+        return np.asarray(flat[0])
+
+    def flat_each(self, points: Floats) -> tuple[Floats, Any]:
+        """Many entities' points (m, n, 3) as (m, n, 2) mm, and whether each is flat (m,)."""
+        placed = points @ self.linear + self.offset
+        width = np.ptp(placed[..., :2], axis=1).max(axis=1)
+        rise = np.ptp(placed[..., 2], axis=1)
+        return placed[..., :2], rise <= np.maximum(FLAT_TILT * width, POSITION_EPS_MM)
+
+    def plane(self, extrusion: Any, elevation: float) -> Plane:
+        """The plane of an OCS at this elevation; Unusable when it is tilted."""
+        normal = tuple(extrusion)
+        if normal not in self._planes:
+            self._planes[normal] = self._plane(normal)
+        return self._planes[normal].at(elevation)
+
+    def _plane(self, normal: tuple[float, ...]) -> Plane:
+        """The plane of an OCS through the world's origin."""
+        from ezdxf.math import OCS
+
+        if not numbers(normal).any():
+            raise Unusable("has an extrusion of 0")
+        axes = np.eye(3)
+        if normal != _UPWARDS:
+            ocs = OCS(normal)
+            axes = np.array(
+                [tuple(ocs.to_wcs(axis)) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+            )
+        u, v, up = axes @ self.linear
+        return Plane.of(u, v, self.offset, up)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """`vertices` (n, 3) mm and `off_mm` of a `Piece`; `lacks` names what was not applied."""
+
+    vertices: Floats
+    closed: bool
+    off_mm: Floats | None = None
+    lacks: str = ""
+
+    @classmethod
+    def of(cls, fit: Fit) -> Shape:
+        """The arcs that stand for a curve."""
+        return cls(fit.vertices, False, fit.off_mm)
+
+    def ring(self) -> Shape:
+        """The same closed, whose last vertex is its first one."""
+        off = None if self.off_mm is None else self.off_mm[:-1]
+        return Shape(self.vertices[:-1], True, off, self.lacks)
+
+
+def require(entity: Any, names: tuple[str, ...]) -> None:
+    """Unusable when the file does not say one of these attributes: ezdxf would make one up."""
+    for name in names:
+        if not entity.dxf.hasattr(name):
+            raise Unusable(f"lacks its {name.replace('_', ' ')}")
+
+
+def numbers(values: Any) -> Floats:
+    """Any numbers as an array; DrawingError when one of them is none."""
+    found = np.array(values if isinstance(values, list) else tuple(values), dtype=np.float64)
+    if not np.isfinite(found).all():
+        raise DrawingError(
+            "has a coordinate that is not a finite number", mend="delete it or draw it again"
+        )
+    return found
+
+
+def straight(points: Floats) -> Floats:
+    """Points (n, 2) as vertices (n, 3) of lines."""
+    return np.column_stack([points, np.zeros(len(points))])
+
+
+def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
+    """Arcs for a curve whose place and size these numbers tell."""
+    furthest = float(np.abs(size).max())
+    if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
+        raise DrawingError(
+            f"is {furthest:.6g} mm large or away, where micrometres are lost",
+            mend="move the drawing to its origin, or name its unit with --units",
+        )
+    return fit_curve(curve, tolerance_mm)
+
+
+# One DXF entity to paths in mm: lines and circles exact, all other curves fitted.
 
 __all__ = [
     "Frame",
@@ -204,3 +385,205 @@ def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Sh
             parts.append(np.array([[row[0], row[1], 0.0]]))
             off.append(np.zeros((1, 2)))
     return Shape(np.concatenate(parts), closed, np.concatenate(off))
+
+
+# SPLINE, HELIX and text of DXF drawings to paths in mm.
+#
+# A spline is read as the file writes it: knots and weights that do not belong to its control
+# points make it unusable, as a guess would be another curve.
+
+MAX_DEGREE = 25
+"""Splines of a higher degree are refused (CAD programs go to 10); the effort grows with it."""
+
+_LINE_POINTS = 2  # a Bézier of two control points is a line
+
+
+def spline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+    """SPLINE, and HELIX when it does not rise."""
+    control = numbers([tuple(point) for point in entity.control_points]).reshape(-1, 3)
+    if len(control):
+        knots, weights = numbers([*entity.knots]), numbers([*entity.weights])
+        degree = int(entity.dxf.degree)
+    else:
+        ends = [
+            tuple(numbers(entity.dxf.get(name)))
+            for name in ("start_tangent", "end_tangent")
+            if entity.dxf.hasattr(name)
+        ]
+        fit = numbers([tuple(point) for point in entity.fit_points]).reshape(-1, 3)
+        degree, knots, control = through(fit, ends, bool(entity.closed))
+        weights = np.empty(0)
+    return [spline_of(degree, knots, frame.flat(control), weights, tolerance_mm)]
+
+
+def through(
+    fit_points: Floats, tangents: list[tuple[float, ...]], closed: bool
+) -> tuple[int, Floats, Floats]:
+    """Degree, knots and control points (n, 3) of the spline that CAD programs draw through points.
+
+    `tangents` are those of both ends, or none. Unusable when there are too few points.
+    """
+    from ezdxf.math import fit_points_to_cad_cv
+
+    steps = np.hypot(*np.diff(fit_points[:, :2], axis=0).T)
+    points = fit_points[np.concatenate([[True], steps > 0.0])] if len(fit_points) else fit_points
+    if closed and len(points) > _LINE_POINTS and (points[0] != points[-1]).any():
+        points = np.vstack([points, points[:1]])
+    if len(points) < _LINE_POINTS:
+        raise Unusable("has no curve: too few points")
+    ends = tangents if len(tangents) == 2 and all(any(end) for end in tangents) else None
+    try:
+        tool = fit_points_to_cad_cv([tuple(row) for row in points.tolist()], ends)
+    except (ValueError, ArithmeticError, IndexError) as error:
+        raise Unusable("has no curve through its points") from error
+    control = numbers([tuple(point) for point in tool.control_points]).reshape(-1, 3)
+    return int(tool.degree), numbers([*tool.knots()]), control
+
+
+def spline_of(
+    degree: int, knots: Floats, control: Floats, weights: Floats, tolerance_mm: float
+) -> Shape:
+    """The spline of control points (n, 2) mm; no `weights` are equal ones. Unusable when these
+    do not belong together."""
+    if degree > MAX_DEGREE:
+        raise Unusable(f"has degree {degree}, at most {MAX_DEGREE} is read")
+    if not len(control):
+        raise Unusable("has no curve: no control points")
+    try:
+        curve = SplineCurve(degree, knots, control, weights if len(weights) else None)
+    except GeometryError as error:
+        raise Unusable(f"has no curve: {error.message}") from error
+    shape = Shape.of(fitted(curve, control, tolerance_mm))
+    ends = shape.vertices[[0, -1], :2]
+    closed = len(shape.vertices) > 2 and math.dist(*ends) <= POSITION_EPS_MM
+    return shape.ring() if closed else shape
+
+
+def outline(parts: list[Floats], closed: bool, frame: Frame, tolerance_mm: float) -> Shape:
+    """Béziers of 2 (a line), 3 or 4 control points (k, 3) in world coordinates, end to end."""
+    vertices: list[Floats] = []
+    off: list[Floats] = []
+    flat = frame.flat(np.concatenate([numbers(list(part)) for part in parts]))
+    counts = np.cumsum([len(part) for part in parts])
+    for control in np.split(flat, counts[:-1]):
+        if len(control) == _LINE_POINTS:
+            vertices.append(straight(control[:1]))
+            off.append(np.zeros((1, 2)))
+            continue
+        fit = fitted(BezierCurve(control), control, tolerance_mm)
+        count = max(len(fit.vertices) - 1, 1)
+        vertices.append(fit.vertices[:count])
+        off.append(fit.off_mm[:count])
+    vertices.append(straight(flat[-1:]))
+    off.append(np.zeros((1, 2)))
+    return Shape(np.concatenate(vertices), closed, np.concatenate(off))
+
+
+# HATCH, MPOLYGON, SOLID, TRACE and 3DFACE of DXF drawings: the outlines of areas, in mm.
+
+_TEXT_BOX = 8  # flag of a boundary path that keeps a hatch off a text
+_CORNERS = ("vtx0", "vtx1", "vtx2", "vtx3")
+_DRAWN_ORDER = (0, 1, 3, 2)  # SOLID and TRACE keep their corners in the order of the letter Z
+
+
+def hatch(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+    """The boundary paths of HATCH and MPOLYGON; edges of one path come as paths of their own.
+
+    A boundary that follows other entities of the drawing is left to them.
+    """
+    elevation = float(numbers(entity.dxf.elevation)[2])
+    plane = frame.plane(entity.dxf.extrusion, elevation)
+    paths = [path for path in entity.paths if not path.path_type_flags & _TEXT_BOX]
+    if not paths:
+        raise Unusable("has no outline")
+    own = [path for path in paths if not _follows(path, entity)]
+    if not own:
+        raise Unusable("has the outline of other entities, which are read")
+    shapes: list[Shape] = []
+    for path in own:
+        if hasattr(path, "edges"):
+            shapes.extend(_edge(edge, plane, tolerance_mm) for edge in path.edges)
+        else:
+            rows = numbers(path.vertices).reshape(-1, 3)
+            # Whether the file says so or not: the outline of an area is closed.
+            shapes.append(bulged(rows, True, plane, tolerance_mm))
+    return shapes
+
+
+def _follows(path: Any, entity: Any) -> bool:
+    """Whether entities that the drawing holds are the sources of this path."""
+    handles = path.source_boundary_objects
+    database = entity.doc.entitydb if entity.doc is not None else {}
+    if not (handles and entity.dxf.get("associative", 0)):
+        return False
+    return all(_stands_beside(database.get(handle), entity) for handle in handles)
+
+
+def _stands_beside(source: Any, entity: Any) -> bool:
+    """Whether `source` is a line or a curve of the same layout or block."""
+    return source is not None and source.dxf.get("owner") == entity.dxf.get("owner")
+
+
+def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> Shape:
+    """One edge of a boundary: line, arc, ellipse or spline."""
+    kind = edge.type.name
+    if kind == "LINE":
+        ends = numbers([tuple(edge.start)[:2], tuple(edge.end)[:2]])
+        return Shape(straight(plane.points(ends)), closed=False)
+    if kind == "SPLINE":
+        return _spline_edge(edge, plane, tolerance_mm)
+    x, y = numbers(edge.center).tolist()[:2]
+    if kind == "ARC":
+        radius, start, end = numbers((edge.radius, edge.start_angle, edge.end_angle)).tolist()
+        if radius <= 0.0:
+            raise Unusable(f"has an edge with a radius of {radius:g}")
+        sweep = whole_turn(math.radians(end - start))
+        return round_in(plane, (x, y, radius), math.radians(start), sweep, tolerance_mm)
+    major, ratio = numbers(edge.major_axis)[:2], float(numbers((edge.ratio,))[0])
+    start, end = numbers((edge.start_param, edge.end_param)).tolist()
+    local = np.array([[x, y], major, ratio * np.array([-major[1], major[0]])])
+    axes = np.vstack([plane.points(local[:1]), local[1:] @ np.array([plane.u, plane.v])])
+    return elliptic(axes, start, whole_turn(end - start), tolerance_mm)
+
+
+def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> Shape:
+    """A spline edge by its control points, or through its fit points."""
+    control = numbers([tuple(point)[:2] for point in edge.control_points]).reshape(-1, 2)
+    weights = numbers([*edge.weights])
+    if len(control):
+        degree, knots = int(edge.degree), numbers([*edge.knot_values])
+    else:
+        points = numbers([(*tuple(point)[:2], 0.0) for point in edge.fit_points]).reshape(-1, 3)
+        tangents = [edge.start_tangent, edge.end_tangent]
+        ends = [(*tuple(end)[:2], 0.0) for end in tangents if end is not None]
+        degree, knots, control = through(points, ends, closed=False)
+        weights = np.empty(0)
+    return spline_of(degree, knots, plane.points(control), weights, tolerance_mm)
+
+
+def solid(entity: Any, frame: Frame, _tolerance_mm: float) -> list[Shape]:
+    """SOLID and TRACE: the outline as it is filled, crossed over when its corners are."""
+    require(entity, _CORNERS[:3])
+    named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
+    corners = numbers([tuple(entity.dxf.get(name)) for name in named])
+    # A triangle repeats its last corner, or leaves it out.
+    is_triangle = len(corners) < len(_CORNERS) or (corners[2] == corners[3]).all()
+    local = corners[:3] if is_triangle else corners[list(_DRAWN_ORDER)]
+    plane = frame.plane(entity.dxf.extrusion, float(corners[0, 2]))
+    return [Shape(straight(plane.points(local)), closed=True)]
+
+
+def face(entity: Any, frame: Frame, _tolerance_mm: float) -> list[Shape]:
+    """3DFACE that is flat: its outline, or those of its edges that are not hidden."""
+    require(entity, _CORNERS[:3])
+    named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
+    corners = frame.flat(numbers([tuple(entity.dxf.get(name)) for name in named]))
+    hidden = int(entity.dxf.get("invisible_edges", 0))
+    if not hidden:
+        return [Shape(straight(corners), closed=True)]
+    edges = list(pairwise([*corners, corners[0]]))
+    # The last two corners of a triangle are one, and the edge between them is none.
+    shown = [edge for k, edge in enumerate(edges) if not hidden >> k & 1 and np.ptp(edge, 0).any()]
+    if not shown:
+        raise Unusable("has no edge that is shown")
+    return [Shape(straight(np.array(edge)), closed=False) for edge in shown]

@@ -17,21 +17,22 @@ from typing import Any
 import numpy as np
 
 from camtool.geometry.polylines import Floats
-from camtool.importers.dxf.frames import Unusable, require
 from camtool.importers.dxf.load import printable
-from camtool.importers.text.fonts import Wanted, font_for
-from camtool.importers.text.layout import (
+from camtool.importers.dxf.mtext import write_mtext
+from camtool.importers.dxf.shapes import Unusable, require
+from camtool.importers.text import (
     MAX_CHARACTERS,
     NUMBERED,
     Ink,
     Look,
     Rule,
+    Wanted,
     finite,
+    font_for,
     lacking,
     numbered,
     slant,
 )
-from camtool.importers.text.mtext import write_mtext
 
 _CARET = re.compile(r"\^([ @-_])")
 _CODE = re.compile(NUMBERED.pattern + "|%%([cdpkou%])", re.ASCII | re.IGNORECASE)

@@ -7,31 +7,38 @@ map lets them. All LINEs of one space or block are mapped at once: drawings have
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Mark
-from camtool.importers.dxf.blocks import MAX_INSERTED, BlockSizes, block_key, matrix, places
-from camtool.importers.dxf.frames import Frame, Shape, Unusable, numbers, require
-from camtool.importers.dxf.kinds import (
-    COMPOUNDS,
-    DIMENSION_SKIPPED,
-    DIMENSIONS,
-    OTHER,
-    READERS,
-    TEXTS,
-    WHY_UNUSED,
-    parts_of,
-    text_shapes,
-)
+from camtool.geometry.polylines import Floats
 from camtool.importers.dxf.load import printable
-from camtool.importers.dxf.looks import Look, Looks
+from camtool.importers.dxf.shapes import (
+    Frame,
+    Reader,
+    Shape,
+    Unusable,
+    arc,
+    circle,
+    ellipse,
+    face,
+    hatch,
+    line,
+    lwpolyline,
+    numbers,
+    outline,
+    polyline,
+    require,
+    solid,
+    spline,
+)
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
-from camtool.importers.piece import Piece
+from camtool.importers.pieces import Piece
 
 MAX_NESTING = 50
 """Blocks within blocks, at most."""
@@ -280,3 +287,284 @@ def _source(entity: Any, scope: Scope | None) -> str:
     if scope is not None and scope.source:
         return scope.source
     return f"{entity.dxftype()} {entity.dxf.handle}{scope.within if scope is not None else ''}"
+
+
+# What becomes of each kind of DXF entity: its reader, the parts it is made of, or why not.
+
+READERS: dict[str, Reader] = {
+    "3DFACE": face,
+    "ARC": arc,
+    "CIRCLE": circle,
+    "ELLIPSE": ellipse,
+    "HATCH": hatch,
+    "HELIX": spline,
+    "LINE": line,
+    "LWPOLYLINE": lwpolyline,
+    "MPOLYGON": hatch,
+    "POLYLINE": polyline,
+    "SOLID": solid,
+    "SPLINE": spline,
+    "TRACE": solid,
+}
+"""Kinds that have a shape of their own."""
+
+TEXTS = frozenset(("TEXT", "MTEXT", "ATTRIB", "ATTDEF"))
+"""Kinds that are read as the caller wants text."""
+
+DIMENSIONS = frozenset(
+    (
+        "DIMENSION",
+        "ARC_DIMENSION",
+        "LARGE_RADIAL_DIMENSION",
+        "LEADER",
+        "MLEADER",
+        "MULTILEADER",
+        "ACAD_TABLE",
+    )
+)
+"""Kinds that annotate; read when the caller wants dimensions."""
+
+COMPOUNDS = frozenset(("MLINE", "ACAD_PROXY_ENTITY"))
+"""Kinds that are read by the parts they are drawn with."""
+
+DIMENSION_SKIPPED = "is an annotation: read its lines with --dimensions"
+
+_SOLID = "is a 3D shape: export it as STEP"
+_PICTURE = "is a picture"
+_TEXT = "is text of a kind that camtool does not read: explode it first"
+_ENDLESS = "has no end"
+
+WHY_UNUSED = {
+    **dict.fromkeys(("SHAPE", "RTEXT", "ARCTEXT"), _TEXT),
+    **dict.fromkeys(("3DSOLID", "BODY", "REGION", "MESH"), _SOLID),
+    **dict.fromkeys(("SURFACE", "EXTRUDEDSURFACE", "LOFTEDSURFACE"), _SOLID),
+    **dict.fromkeys(("PLANESURFACE", "REVOLVEDSURFACE", "SWEPTSURFACE", "NURBSURFACE"), _SOLID),
+    **dict.fromkeys(("IMAGE", "WIPEOUT", "OLE2FRAME", "OLEFRAME"), _PICTURE),
+    **dict.fromkeys(("PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "PDFREFERENCE"), _PICTURE),
+    **dict.fromkeys(("XLINE", "RAY"), _ENDLESS),
+    "TOLERANCE": "is an annotation",
+    "VIEWPORT": "is a window of a layout",
+    "LIGHT": "is a light",
+    "SUN": "is a light",
+}
+OTHER = "is of a kind that camtool does not read"
+
+MAX_PARTS = 10_000
+"""So many parts may one entity be drawn with."""
+
+
+def parts_of(entity: Any) -> list[Any]:
+    """The entities that a dimension, leader, multiple line or proxy is drawn with.
+
+    Unusable when there are none. The points that define a dimension are no part of it, nor is the
+    filling between multiple lines.
+    """
+    left_out = {"POINT", "HATCH"} if entity.dxftype() == "MLINE" else {"POINT"}
+    parts: list[Any] = []
+    try:
+        for part in _virtual(entity):
+            if part.dxftype() not in left_out:
+                parts.append(part)
+            if len(parts) > MAX_PARTS:
+                break
+    # ezdxf draws these from data that nothing has checked.
+    except Exception as error:
+        raise Unusable("cannot be drawn: its data is damaged") from error
+    if len(parts) > MAX_PARTS:
+        raise Unusable(f"is drawn with more than {MAX_PARTS} parts")
+    if not parts:
+        raise Unusable("brings no lines with it")
+    return parts
+
+
+def _virtual(entity: Any) -> Iterable[Any]:
+    if hasattr(entity, "virtual_entities"):
+        found: Iterable[Any] = entity.virtual_entities()
+        return found
+    if hasattr(entity, "__virtual_entities__"):
+        return list(entity.__virtual_entities__())
+    return ()
+
+
+def text_shapes(
+    entity: Any, frame: Frame, tolerance_mm: float, mode: str
+) -> tuple[list[Shape], str]:
+    """The lines of a text in mm, and what was wanted and could not be had ("" otherwise)."""
+    from camtool.importers.dxf.text import text_strokes
+
+    text = text_strokes(entity, mode)
+    shapes = [
+        outline(contour.parts, contour.closed, frame, tolerance_mm)
+        for contour in text.contours
+        if contour.parts
+    ]
+    return shapes, text.lacks
+
+
+# Where the blocks of a DXF drawing stand, and how many entities that makes.
+#
+# The count comes first, from the sizes of the blocks alone: nested arrays can say more entities in
+# a kilobyte than anybody could draw.
+
+MAX_INSERTED = 100_000
+"""No drawing may grow by more entities than this through its blocks."""
+
+
+class BlockSizes:
+    """How many entities each block holds, blocks within counted in full."""
+
+    def __init__(self, blocks: Any) -> None:
+        self._blocks = blocks
+        self._sizes: dict[str, int] = {}
+
+    def inserted(self, insert: Any) -> int:
+        """Entities that an INSERT stands for, itself included; 1 when its block is missing."""
+        if not insert.dxf.hasattr("name"):
+            return 1
+        name = block_key(insert.dxf.name)
+        if name not in self._sizes:
+            self._sizes[name] = 0  # what a block that holds itself finds on its way round
+            block = self._blocks.get(insert.dxf.name)
+            self._sizes[name] = sum(
+                self.inserted(entity) if entity.dxftype() == "INSERT" else 1
+                for entity in block or ()
+            )
+        columns, rows = _array(insert)
+        return columns * rows * (1 + self._sizes[name])
+
+
+def matrix(insert: Any) -> Floats:
+    """The map (4, 4), for row vectors, of a block's entities to where its INSERT stands.
+
+    DrawingError for numbers that are not finite, Unusable when it has no plane.
+    """
+    dxf = insert.dxf
+    numbers = (*dxf.insert, *dxf.extrusion, dxf.rotation)
+    spacing, scales = (dxf.column_spacing, dxf.row_spacing), (dxf.xscale, dxf.yscale, dxf.zscale)
+    if not np.isfinite([*numbers, *spacing, *scales]).all():
+        raise DrawingError(
+            "has a number that is not finite", mend="delete it or insert the block again"
+        )
+    if not any(dxf.extrusion):
+        raise Unusable("has an extrusion of 0")
+    return np.array(tuple(insert.matrix44())).reshape(4, 4)
+
+
+def places(insert: Any) -> Iterator[Floats]:
+    """Where the members of an array stand relative to the first one, (3,) in world units.
+
+    The array turns with the INSERT, but its spacing is not scaled.
+    """
+    columns, rows = _array(insert)
+    dxf, ocs = insert.dxf, insert.ocs()
+    turn = np.radians(dxf.rotation)
+    along = np.array([np.cos(turn), np.sin(turn), 0.0]) * dxf.column_spacing
+    across = np.array([-np.sin(turn), np.cos(turn), 0.0]) * dxf.row_spacing
+    for row, column in product(range(rows), range(columns)):
+        yield np.array(tuple(ocs.to_wcs(tuple(column * along + row * across))))
+
+
+def block_key(name: Any) -> str:
+    """Names of blocks and layers are the same in any case."""
+    return str(name).casefold()
+
+
+def _array(insert: Any) -> tuple[int, int]:
+    """Columns and rows; without spacing all members stand on the first one."""
+    columns = max(int(insert.dxf.column_count), 1) if insert.dxf.column_spacing else 1
+    rows = max(int(insert.dxf.row_count), 1) if insert.dxf.row_spacing else 1
+    return columns, rows
+
+
+# Layer, colour and line type of DXF entities, with BYLAYER and BYBLOCK resolved.
+#
+# An entity in a block that lies on layer 0, or is coloured or dashed BYBLOCK, takes after the
+# INSERT, as in CAD.
+
+FOREGROUND = "#000000"
+"""White on black screens, black on paper: black here."""
+
+CONTINUOUS = "Continuous"
+"""The line type of layers that name none."""
+
+_BYBLOCK, _BYLAYER, _WHITE = 0, 256, 7
+
+
+@dataclass(frozen=True)
+class Look:
+    """What an entity is drawn with; `hidden` says why it is not shown ("" shown).
+
+    `frozen`: an INSERT on its layer shows nothing at all; on one that is merely off it still
+    shows what its block has on other layers.
+    """
+
+    layer: str = "0"
+    colour: str = FOREGROUND
+    line_type: str = CONTINUOUS
+    hidden: str = ""
+    frozen: bool = False
+
+
+@dataclass
+class Looks:
+    """The looks of all entities of a document, by what these say of themselves."""
+
+    layers: dict[str, Look]
+    _known: dict[tuple[Any, ...], Look] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, document: Any) -> Looks:
+        """With the layers of the document's table."""
+        return cls({block_key(layer.dxf.name): _layer(layer) for layer in document.layers})
+
+    def of_entity(self, said: dict[str, Any], block: Look | None) -> Look:
+        """The look of an entity that says these attributes, in a block placed with `block`."""
+        wanted = tuple(said.get(name) for name in ("layer", "color", "true_color", "linetype"))
+        key = (*wanted, block)
+        look = self._known.get(key)
+        if look is None:
+            look = self._known[key] = self._resolved(said, block or Look(), block is not None)
+        return look
+
+    def _resolved(self, said: dict[str, Any], block: Look, inside: bool) -> Look:
+        name = printable(str(said.get("layer") or "0"))
+        if inside and name == "0":
+            name = block.layer
+        on = self.layers.get(block_key(name), Look(name))
+        line_type = printable(str(said.get("linetype") or "BYLAYER"))
+        by = {"BYLAYER": on.line_type, "BYBLOCK": block.line_type}
+        return Look(
+            on.layer,
+            _colour(said.get("color"), said.get("true_color"), on.colour, block.colour),
+            by.get(line_type.upper(), line_type),
+            on.hidden,
+            on.frozen,
+        )
+
+
+def _layer(layer: Any) -> Look:
+    """The look that a layer gives."""
+    said = vars(layer.dxf)
+    name, frozen = printable(str(layer.dxf.name)), bool(layer.is_frozen())
+    state = "frozen" if frozen else "off" if layer.is_off() else ""
+    return Look(
+        name,
+        _colour(said.get("color"), said.get("true_color"), FOREGROUND, FOREGROUND),
+        printable(str(said.get("linetype", CONTINUOUS))),
+        f"layer {name} is {state}" if state else "",
+        frozen,
+    )
+
+
+def _colour(index: Any, true: Any, by_layer: str, by_block: str) -> str:
+    """ "#rrggbb" of a colour index or a true colour."""
+    from ezdxf.colors import aci2rgb
+
+    if true is not None:
+        return f"#{int(true) & 0xFFFFFF:06x}"
+    number = _BYLAYER if index is None else abs(int(index))
+    if number == _BYBLOCK:
+        return by_block
+    if number >= _BYLAYER:
+        return by_layer
+    return FOREGROUND if number == _WHITE else "#{:02x}{:02x}{:02x}".format(*aci2rgb(number))

@@ -19,11 +19,17 @@ from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.fit import split_bulges
 from camtool.importers.assemble import Piece, assemble
 from camtool.importers.options import ReadOptions
-from camtool.importers.points.json_file import parse_json
 from camtool.importers.points.matlab import is_matlab, parse_matlab
-from camtool.importers.points.numpy_file import NPY_START, ZIP_START, parse_npy, parse_npz
-from camtool.importers.points.stroke import Stroke, Table
-from camtool.importers.points.text import parse_lines
+from camtool.importers.points.tables import (
+    NPY_START,
+    ZIP_START,
+    Stroke,
+    Table,
+    parse_json,
+    parse_lines,
+    parse_npy,
+    parse_npz,
+)
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:

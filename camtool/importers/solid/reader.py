@@ -15,8 +15,14 @@ user: it is run only when the caller allows it.
 
 from __future__ import annotations
 
+import json
+import re
+import subprocess
+import sys
+import tempfile
 from collections import Counter
-from pathlib import PurePath
+from dataclasses import dataclass
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -26,10 +32,8 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.assemble import Piece, assemble
+from camtool.importers.formats import is_brep, is_step, text_head
 from camtool.importers.options import ReadOptions
-from camtool.importers.read_format import is_brep, is_step, text_head
-from camtool.importers.solid.process import outlined
-from camtool.importers.solid.units import FileUnit, script_unit, step_unit, unnamed_unit
 
 _AGAIN = "export it again as STEP (AP214 or AP242)"
 _STEP_END = b"END-ISO-10303-21"
@@ -141,3 +145,164 @@ def _chosen(found: dict[str, Any], scale: float, height: float | None) -> list[F
             unit="mm",
         )
     ]
+
+
+# Runs `worker` in a process of its own and takes over what it found.
+
+FILE_SECONDS = 60.0
+"""A STEP or BREP file may take so long, and SECONDS_PER_MB more for its size: damaged ones can
+keep OpenCASCADE busy for ever. Scripts may take their time."""
+
+SECONDS_PER_MB = 5.0
+"""See FILE_SECONDS; a sound file takes about one second for a megabyte."""
+
+CHATTER_BYTES = 1 << 16
+"""So much of what OpenCASCADE prints is looked through for complaints."""
+
+# -P: nothing that lies in the working directory is taken for a module.
+_START = (
+    "import json, sys; request = json.load(open(sys.argv[1], encoding='utf-8'));"
+    "sys.path[:] = request['path'];"
+    "from camtool.importers.solid.worker import main; main(request)"
+)
+_STDERR = 2
+_COLOURS = re.compile(r"\x1b\[[\d;]*m")
+
+
+def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
+    """What `worker.found` gives for these bytes, and a `complaint` of the reader or "".
+
+    DrawingError when the model is damaged; RuntimeError for a fault of camtool itself.
+    """
+    script = wanted["kind"] == "script"
+    with tempfile.TemporaryDirectory() as folder:
+        source, answer, chatter = (Path(folder, name) for name in ("source", "answer", "chatter"))
+        source.write_bytes(data)
+        request = wanted | {"source": str(source), "answer": str(answer), "path": sys.path}
+        asked = Path(folder, "request")
+        asked.write_text(json.dumps(request), encoding="utf-8")
+        with chatter.open("wb") as words:
+            seconds = None if script else FILE_SECONDS + SECONDS_PER_MB * len(data) / 1e6
+            code = _run(asked, _STDERR if script else words.fileno(), seconds, file)
+        result = _answer(answer, code, script, file)
+        with chatter.open("rb") as words:
+            said = words.read(CHATTER_BYTES).decode("utf-8", errors="replace")
+    if "error" in result:
+        error = result["error"]
+        raise DrawingError(error["message"], file=file, where=error["where"], mend=error["mend"])
+    if "fault" in result:
+        raise RuntimeError(result["fault"])
+    return result | {"complaint": _complaint(said)}
+
+
+def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
+    """The exit code of the worker, whose words go to this file descriptor."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _START, str(request)],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            timeout=seconds,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise DrawingError(
+            f"is not read after {error.timeout:.0f} s: it is damaged, or too much for OpenCASCADE",
+            file=file,
+            mend="simplify the model, or export it again",
+        ) from error
+    return done.returncode
+
+
+def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
+    """What the worker wrote; a worker that died without a word met a damaged file."""
+    if answer.exists():
+        result: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
+        return result
+    if script:
+        raise DrawingError(f"the script ended the interpreter (code {code})", file=file)
+    raise DrawingError(
+        "is damaged so badly that OpenCASCADE fails on it",
+        file=file,
+        mend="export it again as STEP (AP214 or AP242)",
+    )
+
+
+def _complaint(said: str) -> str:
+    """The first line in which OpenCASCADE speaks of an error, without its ornaments; else ""."""
+    for line in _COLOURS.sub("", said).splitlines():
+        if "ERR" in line or "FAIL" in line.upper():
+            return "".join(sign for sign in line if sign.isprintable()).strip(" *")
+    return ""
+
+
+# The unit of length of a solid model, and what `--units` makes of it.
+
+_CONTEXT = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([#\d,\s]*)\)")
+_ENTITY = re.compile(rb"#(\d+)\s*=\s*(\([^;]*LENGTH_UNIT[^;]*);")
+_NAMED = re.compile(rb"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'")
+_SI = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
+
+_MM = {
+    "millimetre": 1.0,
+    "centimetre": 10.0,
+    "metre": 1000.0,
+    "micrometre": 0.001,
+    "inch": 25.4,
+    "foot": 304.8,
+}
+_PREFIXES = {b"": "metre", b"MILLI": "millimetre", b"CENTI": "centimetre", b"MICRO": "micrometre"}
+_SPELLINGS = {"inches": "inch", "in": "inch", "feet": "foot", "ft": "foot"}
+
+
+@dataclass(frozen=True)
+class FileUnit:
+    """`mm` per unit of the file, which its reader has applied already; None: cannot be told."""
+
+    why: str
+    mm: float | None = 1.0
+
+    def scale(self, options: ReadOptions, file: str) -> float:
+        """By what lengths are to be multiplied, so that the caller's unit is the file's."""
+        if options.units is None:
+            return 1.0
+        if self.mm is None:
+            raise DrawingError(
+                "has no single unit that --units could replace", file=file, mend="leave it out"
+            )
+        return options.mm_per(options.units) / self.mm
+
+
+def unnamed_unit() -> FileUnit:
+    """BREP names none."""
+    return FileUnit("BREP names no unit; its makers count in mm")
+
+
+def script_unit() -> FileUnit:
+    """build123d's own."""
+    return FileUnit("build123d counts in mm")
+
+
+def step_unit(data: bytes) -> FileUnit:
+    """The one unit of length that all parts of a STEP file name; its reader gives mm."""
+    entities = {match[1]: match[2] for match in _ENTITY.finditer(data)}
+    names = {
+        _name(entities[number])
+        for context in _CONTEXT.finditer(data)
+        for number in re.findall(rb"#(\d+)", context[1])
+        if number in entities
+    }
+    name = names.pop() if len(names) == 1 else ""
+    if name not in _MM:
+        return FileUnit("named in the file, turned into mm by its reader", None)
+    return FileUnit(f"the file counts in {name}, turned into mm by its reader", _MM[name])
+
+
+def _name(entity: bytes) -> str:
+    named = _NAMED.search(entity)
+    if named is not None:
+        name = named[1].decode("ascii", errors="replace").strip().lower()
+        return _SPELLINGS.get(name, name)
+    si = _SI.search(entity)
+    return "" if si is None else _PREFIXES.get(si[1] or b"", "")

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from camtool.errors import CamtoolError, DrawingError, GeometryError
+from camtool.importers.solid.bodies import Body
 from camtool.importers.solid.outline import Outlines, outlines
-from camtool.importers.solid.shapes import Body
 
 _DAMAGED = "cannot be read: its structure is damaged"
 _AGAIN = "export it again as STEP (AP214 or AP242)"
@@ -64,10 +64,10 @@ def _is_of_kernel(error: Exception) -> bool:
 
 def _bodies(request: dict[str, Any]) -> list[Body]:
     if request["kind"] == "script":
-        from camtool.importers.solid.script import run_script
+        from camtool.importers.solid.bodies import run_script
 
         return run_script(Path(request["source"]).read_bytes(), request["file"])
-    from camtool.importers.solid.load import load_brep, load_step
+    from camtool.importers.solid.bodies import load_brep, load_step
 
     load = load_step if request["kind"] == "step" else load_brep
     bodies = load(request["source"])

@@ -15,7 +15,10 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Units
 from camtool.importers.options import DPI, ReadOptions
-from camtool.importers.svg.affine import (
+from camtool.importers.svg.css import declared
+from camtool.importers.svg.shapes import FONT_UNITS, split_length
+from camtool.importers.svg.style import FONT_PX
+from camtool.importers.svg.transform import (
     Affine,
     Box,
     parse_view_box,
@@ -23,9 +26,6 @@ from camtool.importers.svg.affine import (
     translation,
     view_box_map,
 )
-from camtool.importers.svg.css import declared
-from camtool.importers.svg.shapes import FONT_UNITS, split_length
-from camtool.importers.svg.style import FONT_PX
 from camtool.importers.svg.tree import Node
 
 

@@ -7,14 +7,36 @@ Source: Scalable Vector Graphics 1.1 and, where it says more, 2.
 
 from __future__ import annotations
 
-from camtool.errors import DrawingError
-from camtool.geometry.drawing import Drawing
-from camtool.importers.assemble import assemble
-from camtool.importers.options import ReadOptions
-from camtool.importers.svg.data import ready, writer_dpi
-from camtool.importers.svg.page import page_of
-from camtool.importers.svg.tree import parse_tree
-from camtool.importers.svg.walk import Walk
+import cmath
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camtool.errors import DrawingError, GeometryError
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.drawing import Drawing, Skipped
+from camtool.geometry.fit import BezierCurve, Curve, EllipseCurve, arc_vertices, fit_curve
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats
+from camtool.importers.assemble import assemble, font_findings
+from camtool.importers.dxf.shapes import Unusable
+from camtool.importers.options import TEXT_SKIPPED, ReadOptions
+from camtool.importers.pieces import MAX_COORDINATE_MM, Piece
+from camtool.importers.svg.page import Page, page_of
+from camtool.importers.svg.scope import Scope, frame_of, is_for_us, layer_in, own_transform
+from camtool.importers.svg.shapes import (
+    SHAPES,
+    Arc,
+    Bezier,
+    Lengths,
+    Lines,
+    Segment,
+    Subpath,
+    subpaths,
+)
+from camtool.importers.svg.style import LIMITS, Sheet, Style
+from camtool.importers.svg.transform import Affine, translation
+from camtool.importers.svg.tree import MAX_DEPTH, Node, parse_tree, ready, writer_dpi
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
@@ -38,3 +60,491 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         findings=[*page.findings, *walk.notes.findings()],
         options=options,
     )
+
+
+# The walk over an SVG document.
+#
+# Every element is visited with what its ancestors say (`Scope`): the map to mm, the style, the
+# layer, the size that percentages are of. Shapes become pieces, and texts when they are wanted;
+# what cannot be cut (images, hidden things) is counted. Layers are Inkscape's, else the groups
+# right under the root, else "0".
+#
+# Nothing is clipped: clip paths, masks and the frames of inner svg and symbol elements are counted
+# where they would hide something, and everything is drawn whole. Source: Scalable Vector Graphics
+# 1.1, chapters 5 (structure, use, symbol), 7 and 11.5 (visibility); SVG 2, 5.5 (use of an svg
+# element).
+
+MAX_USED = 50_000
+"""So many elements, curves and hundreds of corners may be drawn through `use`; a few nested ones
+could ask for billions."""
+
+MAX_USE_DEPTH = 20
+"""A `use` of a `use` of ...: deeper is a fault in the file."""
+
+MAX_LETTERS = 50_000
+"""So many letters are drawn, each of some dozens of arcs."""
+
+_CORNERS_A_UNIT = 100
+_GROUPS = ("g", "a", "svg", "switch", "use")
+_NOT_CUT = {
+    "flowRoot": "is flowed text: convert it to text or to paths",
+    "image": "is a picture of pixels",
+    "foreignObject": "is not SVG",
+    "video": "is no geometry",
+    "audio": "is no geometry",
+    "iframe": "is no geometry",
+    "canvas": "is no geometry",
+}
+_SILENT = (
+    "symbol", "clipPath", "mask", "pattern", "hatch", "marker", "linearGradient",
+    "radialGradient", "meshgradient", "filter", "style", "script", "title", "desc", "metadata",
+)  # fmt: skip
+"""Elements that draw nothing where they stand: they count where they are used."""
+
+_COUNTED = (*SHAPES, "text", "flowRoot", "image", "use")
+
+
+class Walk:
+    """Visits the tree and collects pieces and counts."""
+
+    def __init__(self, root: Node, page: Page, options: ReadOptions) -> None:
+        self.options = options
+        self.fitter = CurveFitter(options.tolerance_mm)
+        self.pieces: list[Piece] = []
+        self.notes = Notes()
+        self._root = root
+        self._page = page
+        self._sheet = Sheet(root)
+        self._by_use = 0
+        self._letters = 0
+        self._shapes: dict[Node, tuple[list[Subpath], str]] = {}
+        self._ids: dict[str, Node] = {}
+        for node in root.walk():
+            name = node.get("id")
+            if name:
+                self._ids.setdefault(name, node)
+
+    def run(self) -> None:
+        """The whole document; the root's size and viewBox are in the page already."""
+        root, page = self._root, self._page
+        style = self._sheet.style(root, Style())
+        if style.display == "none":
+            self._count(root, "is hidden (display: none)")
+            return
+        if root.get("transform") or style.transform:
+            self.notes.changed["transform of the page", "is not applied"] += 1
+        if self._sheet.left_out:
+            why = "of <style> not applied: other selectors or media"
+            self.notes.changed["rules", why] += self._sheet.left_out
+        self._limits(style, "page")
+        self._children(root, Scope(page.to_mm, style, page.viewport))
+
+    def _children(self, node: Node, scope: Scope) -> None:
+        """All children, one level deeper."""
+        inner = scope._replace(depth=scope.depth + 1)
+        for child in node.children:
+            self._visit(child, inner)
+
+    def _visit(self, node: Node, scope: Scope) -> None:
+        if scope.depth > MAX_DEPTH:
+            raise DrawingError(
+                f"is nested deeper than {MAX_DEPTH} elements, through use", where=node.label
+            )
+        if scope.uses:
+            self._spend(1, node)
+        tag = node.tag
+        if tag in _NOT_CUT:
+            self.notes.left_out[tag, _NOT_CUT[tag]] += 1
+        elif tag == "text" and self.options.text == "skip":
+            self.notes.left_out[tag, TEXT_SKIPPED] += 1
+        elif tag in SHAPES or tag in _GROUPS or tag == "text":
+            inner = self._entered(node, scope)
+            if inner is not None:
+                self._drawn(node, inner)
+        elif tag != "defs" and tag not in _SILENT:
+            self._count(node, "stands in an element that is not drawn")
+
+    def _drawn(self, node: Node, scope: Scope) -> None:
+        """A shape, or what is in a group."""
+        if node.tag in SHAPES:
+            self._shape(node, scope)
+        elif node.tag == "text":
+            self._text(node, scope)
+        elif node.tag == "use":
+            self._use(node, scope)
+        elif node.tag == "svg":
+            self._framed(node, node, scope)
+        elif node.tag == "switch":
+            for child in node.children:
+                if child.tag not in ("", "foreignObject") and is_for_us(child):
+                    self._visit(child, scope._replace(depth=scope.depth + 1))
+                    return
+        else:
+            self._children(node, scope)
+
+    def _entered(self, node: Node, scope: Scope) -> Scope | None:
+        """The scope inside the element; None, and its shapes counted, when it shows nothing."""
+        style = self._sheet.style(node, scope.style)
+        if style.display == "none":
+            self._count(node, "is hidden (display: none)")
+            return None
+        if not is_for_us(node):
+            self._count(node, "is for another language or program")
+            return None
+        to_mm = scope.to_mm
+        if style.transform or "transform" in node.attributes:
+            try:
+                own = own_transform(node, style, self._lengths(scope, style))
+                to_mm = (to_mm @ own).checked()
+            except DrawingError as error:
+                self._unreadable(node, error)
+                return None
+            if to_mm.determinant == 0.0:
+                self._count(node, "its transform leaves no area")
+                return None
+            if style.transform_box not in ("", "view-box"):
+                self.notes.changed["transform-box", "is not applied: about the origin"] += 1
+        self._limits(style, node.tag)
+        return scope._replace(to_mm=to_mm, style=style, layer=layer_in(node, scope))
+
+    def _limits(self, style: Style, name: str) -> None:
+        """Counts what would hide or add something."""
+        for limit in style.limits:
+            self.notes.changed[f"{limit} of {name}", LIMITS[limit]] += 1
+
+    def _shape(self, node: Node, scope: Scope) -> None:
+        """A shape's subpaths as pieces."""
+        style = scope.style
+        if style.visibility in ("hidden", "collapse"):
+            self.notes.left_out[node.tag, "is hidden (visibility)"] += 1
+            return
+        if not style.is_painted:
+            self.notes.left_out[node.tag, "has neither stroke nor fill"] += 1
+            return
+        try:
+            found, fault = self._subpaths(node, scope)
+        except DrawingError as error:
+            self.notes.fault(node.tag, "cannot be read", node, error)
+            return
+        if scope.uses:
+            self._spend(_cost(found), node)
+        try:
+            fitted = [self.fitter.vertices(one, scope.to_mm) for one in found]
+        except DrawingError as error:
+            self.notes.fault(node.tag, "cannot be drawn", node, error)
+            return
+        if fault:
+            what = "cut off where its data are wrong" if found else "cannot be read"
+            self.notes.fault(f"rest of {node.tag}" if found else node.tag, what, node, fault)
+        if not found:
+            if not fault:
+                self.notes.left_out[node.tag, "draws nothing"] += 1
+            return
+        self._take(found, fitted, node, scope)
+        self.notes.used[node.tag] += 1
+
+    def _take(self, found: list[Subpath], fitted: list[Fitted], node: Node, scope: Scope) -> None:
+        """Subpaths of an element, in mm, as pieces."""
+        style = scope.style
+        source = node.label + (f" by use {scope.uses[-1]}" if scope.uses else "")
+        for subpath, (vertices, off) in zip(found, fitted, strict=True):
+            self.pieces.append(
+                Piece(
+                    vertices,
+                    subpath.closed,
+                    scope.layer,
+                    style.colour,
+                    source,
+                    style.line_type,
+                    off,
+                )
+            )
+
+    def _text(self, node: Node, scope: Scope) -> None:
+        """The letters of a text as pieces, all or none."""
+        from camtool.importers.svg.text import text_of  # fonts: only where there is text
+
+        def lengths_of(style: Style) -> Lengths:
+            return self._lengths(scope, style)
+
+        try:
+            text = text_of(node, scope.style, self._sheet.style, lengths_of, self.options.text)
+        except Unusable as reason:
+            self.notes.left_out["text", str(reason)] += 1
+            return
+        except DrawingError as error:
+            self.notes.fault("text", "cannot be read", node, error)
+            return
+        self._letters += text.letters
+        if self._letters > MAX_LETTERS:
+            raise DrawingError(
+                f"texts have more than {MAX_LETTERS} letters",
+                where=node.label,
+                mend="leave text out (--text skip), or delete what is not cut",
+            )
+        if scope.uses:
+            self._spend(sum(_cost(run.subpaths) for run in text.runs), node)
+        try:
+            fitted = [
+                [self.fitter.vertices(one, scope.to_mm) for one in run.subpaths]
+                for run in text.runs
+            ]
+        except DrawingError as error:
+            self.notes.fault("text", "cannot be drawn", node, error)
+            return
+        drawn = False
+        for run, rows in zip(text.runs, fitted, strict=True):
+            self._take(run.subpaths, rows, node, scope._replace(style=run.style))
+            drawn |= bool(rows)
+        for why in text.unseen:
+            self.notes.left_out["part of a text" if drawn else "text", why] += 1
+        for weight in text.plainer:
+            what = f"font-weight {weight} of text"
+            self.notes.changed[what, "is not applied: 600 and more is bold"] += 1
+        for lacks in text.lacks:
+            self.notes.fonts[lacks] += 1
+        if drawn:
+            self.notes.used["text"] += 1
+        elif not text.unseen:
+            self.notes.left_out["text", "draws nothing"] += 1
+
+    def _subpaths(self, node: Node, scope: Scope) -> tuple[list[Subpath], str]:
+        """The shape in user units; paths that are used again are not parsed again."""
+        if not scope.uses or node.tag not in ("path", "polyline", "polygon"):
+            return subpaths(node, self._lengths(scope, scope.style))
+        if node not in self._shapes:
+            self._shapes[node] = subpaths(node, self._lengths(scope, scope.style))
+        return self._shapes[node]
+
+    def _use(self, node: Node, scope: Scope) -> None:
+        """The element that `use` names, drawn here."""
+        reference = node.get("href") or node.get("xlink:href")
+        name = reference[1:] if reference.startswith("#") else ""
+        target = self._ids.get(name)
+        if target is None:
+            outside = bool(reference) and not reference.startswith("#")
+            why = "refers to another file" if outside else "refers to nothing in the file"
+            self.notes.left_out["use", why] += 1
+            return
+        if name in scope.uses or len(scope.uses) >= MAX_USE_DEPTH:
+            raise DrawingError(f"use of {name!r} leads back to itself", where=node.label)
+        lengths = self._lengths(scope, scope.style)
+        try:
+            shift = translation(lengths.along(node, "x", "x"), lengths.along(node, "y", "y"))
+            to_mm = (scope.to_mm @ shift).checked()
+        except DrawingError as error:
+            self._unreadable(node, error)
+            return
+        uses = (*scope.uses, name)
+        inner = scope._replace(to_mm=to_mm, uses=uses, depth=scope.depth + 1)
+        if target.tag in ("symbol", "svg"):
+            self._spend(1, node)
+            entered = self._entered(target, inner)
+            if entered is not None:
+                self._framed(target, node, entered)
+        else:
+            self._visit(target, inner)
+
+    def _framed(self, node: Node, size: Node, scope: Scope) -> None:
+        """An inner svg or a symbol: `size` says how large (the element itself, or its use)."""
+        try:
+            frame = frame_of(node, size, scope, self._lengths(scope, scope.style))
+        except DrawingError as error:
+            self._unreadable(node, error)
+            return
+        if frame is None:
+            self._count(node, "its frame has no size")
+            return
+        first = len(self.pieces)
+        self._children(node, scope._replace(to_mm=frame.to_mm, viewport=frame.viewport))
+        if scope.style.overflow not in ("visible", "auto"):
+            count = sum(frame.is_left_by(piece.vertices[:, :2]) for piece in self.pieces[first:])
+            if count:
+                what = f"pieces reach out of the frame of {node.tag}s"
+                self.notes.changed[what, "which would hide them: they are drawn whole"] += count
+
+    def _lengths(self, scope: Scope, style: Style) -> Lengths:
+        return Lengths(self.options, scope.viewport, style.font_px)
+
+    def _unreadable(self, node: Node, error: DrawingError) -> None:
+        """Leaves out an element for a wrong number, and says how many shapes went with it."""
+        self.notes.fault(node.tag, "cannot be read", node, error)
+        for inner in node.walk():
+            if inner is not node and inner.tag in _COUNTED:
+                self.notes.left_out[inner.tag, f"stands in a {node.tag} that cannot be read"] += 1
+
+    def _count(self, node: Node, why: str) -> None:
+        """Counts what would have been drawn in and below an element that is left out."""
+        for inner in node.walk():
+            if inner.tag in _COUNTED:
+                self.notes.left_out[inner.tag, why] += 1
+
+    def _spend(self, cost: int, node: Node) -> None:
+        """Bounds what is drawn through use."""
+        self._by_use += cost
+        if self._by_use > MAX_USED:
+            raise DrawingError(
+                f"more than {MAX_USED} elements and curves are drawn through use",
+                where=node.label,
+            )
+
+
+def _cost(found: list[Subpath]) -> int:
+    """Curves, and hundreds of corners."""
+    segments = [segment for one in found for segment in one.segments]
+    corners = sum(len(segment.points) for segment in segments if isinstance(segment, Lines))
+    curves = sum(not isinstance(segment, Lines) for segment in segments)
+    return curves + corners // _CORNERS_A_UNIT
+
+
+# What the walk over an SVG document counts: used, left out, drawn otherwise than shown.
+
+
+@dataclass
+class Notes:
+    """Counts by kind and reason; of faults the first of each kind is told."""
+
+    used: Counter[str] = field(default_factory=Counter)
+    left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
+    changed: Counter[tuple[str, str]] = field(default_factory=Counter)
+    fonts: Counter[str] = field(default_factory=Counter)
+    _faults: Counter[tuple[str, str]] = field(default_factory=Counter)
+    _first: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def fault(self, kind: str, what: str, node: Node, fault: DrawingError | str) -> None:
+        """A node whose numbers are wrong: `what` was done with it ("cannot be read")."""
+        self._faults[kind, what] += 1
+        if (kind, what) not in self._first:
+            text = str(fault)
+            self._first[kind, what] = f"{node.label}: {text}"
+
+    def skipped(self) -> list[Skipped]:
+        """What was left out, kind by kind."""
+        faults = [
+            Skipped(kind, count, f"{what} ({self._first[kind, what]})")
+            for (kind, what), count in self._faults.items()
+        ]
+        return faults + [Skipped(kind, n, why) for (kind, why), n in self.left_out.items()]
+
+    def findings(self) -> list[Finding]:
+        """NOT_APPLIED for each thing that changes the look and was not done; what fonts lack."""
+        applied = [
+            Finding(Code.NOT_APPLIED, Severity.WARNING, f"{count} {what} {why}",
+                    measured=float(count))
+            for (what, why), count in self.changed.items()
+        ]  # fmt: skip
+        return applied + font_findings(self.fonts)
+
+
+# Subpaths in user units to vertices in mm: lines and circles exact, other curves fitted.
+#
+# An ellipse under an affine map is an ellipse. With its half axes u, v as complex numbers,
+#
+#     u·cos t + v·sin t = p·e^{it} + q·e^{−it},   p = (u − iv)/2,   q = (u + iv)/2,
+#
+# its longest and shortest half axes are |p| + |q| and ||p| − |q||; it is a circle when p or q is
+# 0: run through with t when q is, against it when p is.
+
+ROUND_EPS_MM = POSITION_EPS_MM
+"""An ellipse whose half axes differ by less is a circle."""
+
+
+MAX_CURVE_MM = 1e6
+"""A curve that reaches further is left out: its fit to micrometres would take millions of arcs."""
+
+
+Fitted = tuple[Floats, Floats | None]
+"""Vertices (n, 3), and `off_mm` (n, 2) of a `Piece` made of them."""
+
+
+class CurveFitter:
+    """Maps subpaths into mm; fits curves within one tolerance."""
+
+    def __init__(self, tolerance_mm: float) -> None:
+        self.tolerance_mm = tolerance_mm
+
+    def vertices(self, subpath: Subpath, to_mm: Affine) -> Fitted:
+        """(n, 3) x, y, bulge in mm, the last one the end, and how far the curves lie from them;
+        DrawingError when out of bounds."""
+        first = subpath.segments[0]
+        if len(subpath.segments) == 1 and isinstance(first, Lines):
+            points = np.concatenate([subpath.start[None, :], first.points])
+            return _in_reach(_straight(to_mm, points)), None
+        rows, off = [_straight(to_mm, subpath.start[None, :])], [np.zeros((1, 2))]
+        for segment in subpath.segments:
+            piece, apart = self._segment(rows[-1][-1, :2], segment, to_mm)
+            # The segment's first vertex is the last one so far; what leaves it goes there.
+            rows[-1][-1, 2] = piece[0, 2]
+            rows.append(piece[1:])
+            if apart is None:
+                off.append(np.zeros((len(piece) - 1, 2)))
+            else:
+                off[-1][-1] = apart[0]
+                off.append(apart[1:].copy())
+        return _in_reach(np.concatenate(rows)), np.concatenate(off)
+
+    def _segment(self, here: Floats, segment: Segment, to_mm: Affine) -> Fitted:
+        """(n, 3) from `here` (2,) mm to the segment's end, both exact."""
+        if isinstance(segment, Lines):
+            points = _straight(to_mm, segment.points)
+            return np.concatenate([[[here[0], here[1], 0.0]], points]), None
+        if isinstance(segment, Bezier):
+            control = np.concatenate([here[None, :], to_mm.points(segment.control)])
+            return self._fitted(BezierCurve(control), control)
+        ends = np.array([here, to_mm.points(segment.end[None, :])[0]])
+        centre = to_mm.points(segment.centre[None, :])[0]
+        u, v = to_mm.vectors(np.array([segment.u, segment.v]))
+        circle = _circle(centre, u, v, segment)
+        if circle is not None:
+            return _with_ends(circle, ends), None
+        curve = EllipseCurve(centre, u, v, segment.begin, segment.begin + segment.sweep)
+        bounds = np.array([centre, np.abs(u) + np.abs(v)])
+        vertices, off = self._fitted(curve, bounds)
+        return _with_ends(vertices, ends), off
+
+    def _fitted(self, curve: Curve, bounds: Floats) -> Fitted:
+        """Arcs for a curve whose size and place `bounds` (n, 2) tell."""
+        _in_reach(bounds, MAX_CURVE_MM)
+        try:
+            fit = fit_curve(curve, self.tolerance_mm)
+        except GeometryError as error:
+            raise DrawingError(f"a curve cannot be fitted: {error.message}") from error
+        if len(fit.vertices) > 1:
+            return fit.vertices, fit.off_mm
+        return np.repeat(fit.vertices, 2, axis=0), None
+
+
+def _straight(to_mm: Affine, points: Floats) -> Floats:
+    """(n, 3) of points (n, 2) mapped, without bulges."""
+    vertices = np.zeros((len(points), 3))
+    vertices[:, :2] = to_mm.points(points)
+    return vertices
+
+
+def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
+    """The same numbers; DrawingError when one is no place in a drawing."""
+    furthest = float(np.abs(vertices).max())
+    if not furthest <= limit_mm:
+        raise DrawingError(
+            f"it reaches {furthest:.6g} mm away, where micrometres are lost",
+            mend="name the unit with --units",
+        )
+    return vertices
+
+
+def _circle(centre: Floats, u: Floats, v: Floats, arc: Arc) -> Floats | None:
+    """The arc's vertices when its mapped ellipse is a circle, else None."""
+    u_axis, v_axis = complex(*u), complex(*v)
+    p, q = (u_axis - 1j * v_axis) / 2.0, (u_axis + 1j * v_axis) / 2.0
+    if 2.0 * min(abs(p), abs(q)) > ROUND_EPS_MM:
+        return None
+    if abs(q) <= abs(p):
+        return arc_vertices(centre, abs(p), cmath.phase(p) + arc.begin, arc.sweep)
+    return arc_vertices(centre, abs(q), cmath.phase(q) - arc.begin, -arc.sweep)
+
+
+def _with_ends(vertices: Floats, ends: Floats) -> Floats:
+    """The same with its first and last point set to `ends` (2, 2), which rounding moved."""
+    exact = vertices.copy()
+    exact[[0, -1], :2] = ends
+    return exact

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from camtool.importers.svg.affine import Affine
+import numpy as np
+
+from camtool.geometry.polylines import Floats
 from camtool.importers.svg.shapes import Lengths
 from camtool.importers.svg.style import Style
 from camtool.importers.svg.transform import (
+    Affine,
+    Box,
     about,
     parse_css_transform,
     parse_origin,
     parse_transform,
+    parse_view_box,
+    translation,
+    view_box_map,
 )
 from camtool.importers.svg.tree import Node
 
@@ -66,3 +74,57 @@ def layer_in(node: Node, scope: Scope) -> str:
     if scope.depth == 1 and not scope.uses:
         return node.get("id") or scope.layer
     return scope.layer
+
+
+# The frames of inner svg and symbol elements.
+#
+# Source: Scalable Vector Graphics 1.1, 5.1 (svg), 5.5 (symbol), 7.9 (new viewports); SVG 2, 5.5.
+
+FRAME_SHARE = 1e-6
+"""A piece that leaves a frame by no more of its size lies inside: rounding."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """`to_mm` from the units inside; `viewport` what % are of inside; `box` in the units outside,
+    whose map to mm is `outer`."""
+
+    to_mm: Affine
+    viewport: tuple[float, float]
+    box: Box
+    outer: Affine
+
+    def is_left_by(self, points: Floats) -> bool:
+        """Whether any of the points (n, 2) mm lies outside."""
+        if not (self.box.width and self.box.height and self.outer.determinant):
+            return False
+        places = self.outer.inverse.points(points)
+        low = np.array([self.box.x, self.box.y])
+        high = low + np.array([self.box.width, self.box.height])
+        slack = FRAME_SHARE * (self.box.width + self.box.height)
+        return bool((places < low - slack).any() or (places > high + slack).any())
+
+
+def frame_of(node: Node, size: Node, scope: Scope, lengths: Lengths) -> Frame | None:
+    """The frame of an inner svg or a symbol, None when nothing of it is to be seen; DrawingError.
+
+    `size`: the element that says how large, itself or the `use` that draws it. An svg that a `use`
+    draws keeps its place and the sizes that the `use` does not name.
+    """
+    own = node if node.tag == "svg" else None
+    x = lengths.along(own, "x", "x") if own else 0.0
+    y = lengths.along(own, "y", "y") if own else 0.0
+    sides: list[float] = []
+    whole = scope.viewport or (0.0, 0.0)
+    for name, axis, default in zip(("width", "height"), "xy", whole, strict=True):
+        kept = lengths.size(own, name, axis, default) if own else default
+        sides.append(lengths.size(size, name, axis, kept))
+    place = Box(x, y, *sides)
+    box = parse_view_box(node.get("viewBox"))
+    if box is None:
+        inner = (scope.to_mm @ translation(x, y)).checked()
+        return Frame(inner, (sides[0], sides[1]), place, scope.to_mm)
+    if not all(sides):
+        return None
+    inner = scope.to_mm @ view_box_map(box, place, node.get("preserveAspectRatio"))
+    return Frame(inner.checked(), (box.width, box.height), place, scope.to_mm)

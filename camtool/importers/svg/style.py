@@ -11,9 +11,9 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
-from camtool.importers.svg.affine import NUMBER
 from camtool.importers.svg.colours import parse_colour
 from camtool.importers.svg.css import Rules, declared
+from camtool.importers.svg.transform import NUMBER
 from camtool.importers.svg.tree import Node
 from camtool.units import MM_PER_UNIT
 

@@ -20,14 +20,12 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from camtool.geometry.polylines import Floats
-from camtool.importers.dxf.frames import Unusable
+from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.svg.scope import is_for_us
-from camtool.importers.svg.segments import Bezier, Lines, Segment, Subpath
-from camtool.importers.svg.shapes import Lengths
+from camtool.importers.svg.shapes import Bezier, Lengths, Lines, Segment, Subpath
 from camtool.importers.svg.style import Style
 from camtool.importers.svg.tree import Node
-from camtool.importers.text.fonts import Font, Wanted, font_for
-from camtool.importers.text.layout import MAX_CHARACTERS, Ink, Look, Rule, lacking
+from camtool.importers.text import MAX_CHARACTERS, Font, Ink, Look, Rule, Wanted, font_for, lacking
 
 MAX_FAMILIES = 8
 """So many families of a list are looked for."""

@@ -20,11 +20,10 @@ from camtool.geometry.drawing import Drawing, Mark, Skipped, Units
 from camtool.geometry.facts import drawing_facts
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline
-from camtool.importers.assemble import assemble
-from camtool.importers.clean import cleaned
+from camtool.importers.assemble import MAX_PLACES, assemble
+from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions, Selection
-from camtool.importers.piece import Piece
-from camtool.importers.told import MAX_PLACES
+from camtool.importers.pieces import Piece
 
 
 def piece(

@@ -110,7 +110,7 @@ def find_format(data: bytes, suffix: str, file: str) -> str:
 
 def _by_bytes(data: bytes, file: str) -> str | None:
     """The format whose first bytes these are; DrawingError for what is no drawing."""
-    from camtool.importers.points.numpy_file import NPY_START, is_npz
+    from camtool.importers.points.tables import NPY_START, is_npz
 
     if data.startswith(BINARY_DXF):
         return "dxf"

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 from camtool.findings import Code
 from camtool.geometry.polylines import Floats
-from camtool.importers.dxf.frames import Unusable
+from camtool.importers import text as text_fonts
+from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.dxf.text import TextShape, text_strokes
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
-from camtool.importers.text import fonts as text_fonts
-from camtool.importers.text.fonts import Wanted, font_for
+from camtool.importers.text import Wanted, font_for
 
 OUTLINE_FONT = "DejaVuSans.ttf"
 

@@ -6,8 +6,7 @@ import pytest
 from camtool.errors import DrawingError, OptionError
 from camtool.geometry.drawing import Skipped
 from camtool.importers.options import Selection
-from camtool.importers.piece import Piece
-from camtool.importers.select import colour_named, selected
+from camtool.importers.pieces import Piece, colour_named, selected
 
 LINE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
 PIECES = [

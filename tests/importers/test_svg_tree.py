@@ -13,8 +13,8 @@ from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
 from camtool.importers.svg import css as svg_css
-from camtool.importers.svg import data as svg_data
-from camtool.importers.svg import walk as svg_walk
+from camtool.importers.svg import reader as svg_walk
+from camtool.importers.svg import tree as svg_data
 from camtool.importers.svg.reader import read
 
 NAMES = (

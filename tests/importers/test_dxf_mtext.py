@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Floats
-from camtool.importers.dxf.frames import Unusable
+from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.dxf.text import TextShape, text_strokes
 
 PITCH = 5.0 / 3.0

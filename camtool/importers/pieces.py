@@ -1,21 +1,56 @@
-"""Which pieces of a drawing are read: by layer, colour and line type.
-
-A pattern has `*`, `?` and `[…]` and is the same in any case, as names in CAD are. A pattern that
-chooses nothing is an error that names what there is: a misspelt layer must not cut everything,
-or nothing.
-"""
+"""The piece that readers make of an entity."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 
 from camtool.errors import DrawingError, OptionError
 from camtool.geometry.drawing import Skipped
+from camtool.geometry.polylines import Floats
 from camtool.importers.options import Selection
-from camtool.importers.piece import Piece
 from camtool.patterns import guess, matches
+
+MAX_COORDINATE_MM = 1e9
+"""Beyond this doubles cannot tell positions apart that differ by POSITION_EPS_MM."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One entity: `vertices` (n, 3) of x, y, bulge in mm, and where it came from.
+
+    A closed piece may repeat its first point at its end. `source` begins with the kind of the
+    entity ("CIRCLE 2F", "path outline"). `line_type` as a DXF names it, "" elsewhere. `off_mm`
+    (n, 2): the largest and the rms distance of what is drawn from the segment that leaves each
+    vertex; None where the segments are what is drawn.
+    """
+
+    vertices: Floats
+    closed: bool
+    layer: str
+    colour: str
+    source: str
+    line_type: str = ""
+    off_mm: Floats | None = None
+
+    @property
+    def where(self) -> str:
+        """For messages: layer and source."""
+        return f"layer {self.layer}, {self.source}"
+
+    @property
+    def kind(self) -> str:
+        """The first word of the source."""
+        return self.source.partition(" ")[0]
+
+
+# Which pieces of a drawing are read: by layer, colour and line type.
+#
+# A pattern has `*`, `?` and `[…]` and is the same in any case, as names in CAD are. A pattern that
+# chooses nothing is an error that names what there is: a misspelt layer must not cut everything,
+# or nothing.
 
 NAMED = 12
 """So many names are listed when a pattern chooses none of them."""

@@ -1,0 +1,366 @@
+"""Pieces in columns: numbers checked, repeated points taken out, each piece kept once.
+
+Tolerance: POSITION_EPS_MM, below which two points are one; it decides what is a repeated point,
+what has no length, and what is drawn twice.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.errors import DrawingError, GeometryError
+from camtool.geometry.chain import Chained, Kinds, chain, numbered
+from camtool.geometry.drawing import Gap, Healing, Skipped
+from camtool.geometry.intersect import self_crossings_of
+from camtool.geometry.measure import path_lengths, point_at
+from camtool.geometry.overlaps import SAME_LINE_MM, without_overlaps
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Bools,
+    Floats,
+    Ints,
+    Polylines,
+    Segments,
+    encloses,
+    segment_rows,
+    without_repeats,
+)
+from camtool.geometry.simplify import without_tiny
+from camtool.importers.options import ReadOptions
+from camtool.importers.pieces import MAX_COORDINATE_MM, Piece
+
+DRAWN_TWICE = "is drawn twice"
+"""Why a piece went that is another one again."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaned:
+    """Paths, the piece that each came from (M,), and what was left out.
+
+    `duplicates` pieces of `duplicates_mm` were drawn twice.
+    """
+
+    lines: Polylines
+    piece: Ints
+    skipped: tuple[Skipped, ...] = ()
+    duplicates: int = 0
+    duplicates_mm: float = 0.0
+
+
+def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
+    """The pieces without repeated points, each drawn once, and the count of what went.
+
+    DrawingError when a number is not finite or beyond MAX_COORDINATE_MM, or a piece is no path.
+    """
+    if not pieces:
+        return Cleaned(Polylines.of([]), np.empty(0, dtype=np.int64))
+    vertices, counts = _columns(pieces, file)
+    closed = np.array([piece.closed for piece in pieces], dtype=np.bool_)
+    keep, repeated = without_repeats(vertices, counts, closed)
+    owner = np.repeat(np.arange(len(pieces)), counts)[keep]
+    vertices = vertices[keep]
+    left = np.bincount(owner, minlength=len(pieces))
+    long_enough = left >= 2
+    closed &= encloses(vertices, owner, left)
+    gone = _kinds(pieces, ~long_enough, "has no length")
+    points = _kinds(pieces, long_enough & (repeated > 0), "is repeated", repeated, "point of ")
+    rows = np.flatnonzero(long_enough)
+    chosen = [pieces[row] for row in rows.tolist()]
+    lines = _lines(vertices[long_enough[owner]], left[rows], closed[rows], chosen, file)
+    once = _drawn_once(lines, [(piece.layer, piece.colour) for piece in chosen])
+    twice = np.zeros(len(pieces), dtype=np.bool_)
+    twice[rows[~once]] = True
+    lengths = path_lengths(lines)
+    return Cleaned(
+        lines=lines.select(np.flatnonzero(once)),
+        piece=rows[once],
+        skipped=(*gone, *points, *_kinds(pieces, twice, DRAWN_TWICE)),
+        duplicates=int(np.count_nonzero(~once)),
+        duplicates_mm=float(lengths[~once].sum()),
+    )
+
+
+def is_placed(piece: Piece) -> bool:
+    """Whether every number of a piece is finite, and every point within MAX_COORDINATE_MM."""
+    vertices = piece.vertices
+    near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all()
+    return bool(near and np.isfinite(vertices).all())
+
+
+def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
+    """All vertices (N, 3) and how many each piece has; DrawingError when one is no position."""
+    counts = np.array([len(piece.vertices) for piece in pieces], dtype=np.int64)
+    vertices = np.concatenate([piece.vertices for piece in pieces]).astype(np.float64)
+    finite = np.asarray(np.isfinite(vertices).all(axis=1))
+    near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all(axis=1)
+    if (finite & near).all():
+        return vertices, counts
+    row = int(np.argmin(finite & near))
+    where = pieces[int(np.searchsorted(np.cumsum(counts), row, side="right"))].where
+    if not finite[row]:
+        raise DrawingError("a number is not finite", file=file, where=where)
+    raise DrawingError(
+        f"a point lies {np.abs(vertices[row, :2]).max():.6g} mm away, where micrometres are lost",
+        file=file,
+        where=where,
+        mend="move the drawing to its origin, or name its unit with --units",
+    )
+
+
+def _kinds(
+    pieces: Sequence[Piece],
+    chosen: Bools,
+    reason: str,
+    times: Ints | None = None,
+    before: str = "",
+) -> list[Skipped]:
+    """The chosen pieces counted by kind; `times` counts each so often."""
+    counts: Counter[str] = Counter()
+    for index in np.flatnonzero(chosen).tolist():
+        counts[pieces[index].kind] += 1 if times is None else int(times[index])
+    return [Skipped(before + kind, count, reason) for kind, count in counts.items()]
+
+
+def _lines(
+    vertices: Floats, counts: Ints, closed: Bools, pieces: Sequence[Piece], file: str
+) -> Polylines:
+    """The pieces as paths; a fault is named by its piece."""
+    try:
+        return Polylines(vertices, np.concatenate([[0], np.cumsum(counts)]), closed)
+    except GeometryError as error:
+        row = int(str(error.where).removeprefix("path ").partition(",")[0])
+        raise DrawingError(error.message, file=file, where=pieces[row].where) from error
+
+
+_Words = npt.NDArray[np.uint64]
+
+
+def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
+    """(M,) false for each path that is one before it again: same style, same segments.
+
+    Each segment is a number (`segment_numbers`); a path is the sum of its segments, the same from
+    any start. 64 bits: two different ones of
+    a million paths are taken for one with a chance of one in thirty million.
+    """
+    count = len(lines)
+    if not count:
+        return np.empty(0, dtype=np.bool_)
+    following = np.arange(1, len(lines.vertices) + 1)
+    following[lines.offsets[1:] - 1] = lines.offsets[:-1]
+    segment = segment_numbers(lines.vertices, lines.vertices[following])
+    segment[lines.offsets[1:][~lines.closed] - 1] = 0
+    kind = 2 * numbered(list(styles), count) + lines.closed
+    key = _mixed(np.add.reduceat(segment, lines.offsets[:-1]) + _mixed(kind.view(np.uint64)))
+    once = np.zeros(count, dtype=np.bool_)
+    once[np.unique(key, return_index=True)[1]] = True
+    return once
+
+
+def segment_numbers(begin: Floats, end: Floats) -> _Words:
+    """(K,) a number mixed from the rounded ends and the bulge of the segment between two vertices
+    (K, 3), the same in both directions."""
+    # Adding 0 makes −0 and 0 one.
+    grid = (np.round(begin / POSITION_EPS_MM) + 0.0).astype(np.int64).view(np.uint64)
+    ahead = (np.round(end[:, :2] / POSITION_EPS_MM) + 0.0).astype(np.int64).view(np.uint64)
+    bulge = grid[:, 2].view(np.int64)
+    point = _mixed(_mixed(grid[:, 0]) + grid[:, 1])
+    onward = _mixed(_mixed(ahead[:, 0]) + ahead[:, 1])
+    bend = np.where(onward < point, -bulge, bulge).view(np.uint64)
+    segment = _mixed(_mixed(np.minimum(point, onward)) + np.maximum(point, onward))
+    return _mixed(segment + bend)
+
+
+def _mixed(words: _Words) -> _Words:
+    """Numbers scattered over 64 bits (the finalizer of SplitMix64, Steele and others 2014)."""
+    word = words + np.uint64(0x9E3779B97F4A7C15)
+    word = (word ^ (word >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    word = (word ^ (word >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return word ^ (word >> np.uint64(31))
+
+
+# Cleaned pieces to contours: overlaps taken off, ends joined, arcs recognised, specks merged.
+#
+#     cleaned ──overlaps──▶ ──chain──▶ ──arcs (if asked)──▶ ──tiny──▶ contours, and a Healing
+#
+# Each stage is a function of camtool.geometry; here they are put in order and counted.
+
+TINY_SHARE = 0.5
+"""Segments up to this share of the tolerance are merged into their neighbours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Healed:
+    """Contours, the pieces that each is made of, the gaps, and what was mended."""
+
+    lines: Polylines
+    members: tuple[tuple[int, ...], ...]
+    closed_gaps: tuple[Gap, ...]
+    open_gaps: tuple[Gap, ...]
+    healing: Healing
+
+
+def gap_of(options: ReadOptions) -> float:
+    """Ends nearer than this are joined, mm; equal ends always are."""
+    return max(options.gap_mm, POSITION_EPS_MM) if options.chain_gaps else POSITION_EPS_MM
+
+
+def healed(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Healed:
+    """The contours of the cleaned pieces."""
+    chosen = [pieces[index] for index in clean.piece.tolist()]
+    places = [("" if options.across_layers else piece.layer, piece.colour) for piece in chosen]
+    within = min(SAME_LINE_MM, options.tolerance_mm)
+    single = without_overlaps(clean.lines, numbered(places, len(chosen)), within)
+    of = clean.piece[single.source]
+    chained = _chained(pieces, single.lines, of, options)
+    lines, arcs = _recognised(chained.lines, options)
+    merged = without_tiny(lines, TINY_SHARE * options.tolerance_mm)
+    members = _members(chained.members, of)
+    return Healed(
+        lines=merged.lines,
+        members=members,
+        closed_gaps=chained.closed_gaps,
+        open_gaps=chained.open_gaps,
+        healing=Healing(
+            duplicates=clean.duplicates,
+            duplicates_mm=clean.duplicates_mm,
+            overlaps=single.count,
+            overlaps_mm=single.length_mm,
+            tiny_merged=merged.count,
+            arcs_recognised=arcs,
+            branches=chained.branches,
+            crossings=self_crossings_of(merged.lines, [pieces[one[0]].layer for one in members]),
+        ),
+    )
+
+
+def _members(chains: tuple[tuple[int, ...], ...], of: Ints) -> tuple[tuple[int, ...], ...]:
+    """The pieces of each chain of paths, each once; `of` says which piece each path is from."""
+    if np.array_equal(of, np.arange(len(of))):
+        return chains
+    rows = of.tolist()
+    return tuple(tuple(dict.fromkeys(rows[index] for index in one)) for one in chains)
+
+
+def _chained(pieces: Sequence[Piece], lines: Polylines, of: Ints, options: ReadOptions) -> Chained:
+    """The paths joined, within their layers unless told otherwise."""
+    chosen = [pieces[index] for index in of.tolist()]
+    layers = [piece.layer for piece in chosen]
+    kinds = Kinds(
+        groups=None if options.across_layers else layers,
+        styles=[(piece.colour, piece.line_type) for piece in chosen],
+        layers=layers,
+    )
+    return chain(lines, gap_of(options), kinds=kinds)
+
+
+def _recognised(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]:
+    """The paths with arcs for chords on one circle, if that was asked for; how many arcs."""
+    if not options.recognise_arcs:
+        return lines, 0
+    from camtool.geometry.simplify import recognise_arcs
+
+    made = [recognise_arcs(path, options.tolerance_mm) for path in lines]
+    return Polylines.of(path for path, _ in made), sum(count for _, count in made)
+
+
+# How far the paths of a drawing lie from what was drawn: fitting and mending together, measured.
+#
+# Readers say how far their curves lie from the arcs of each piece. What became of the pieces is
+# measured, not followed through the stages that clean and mend, so that nothing can be left out:
+#
+#     pieces × paths ──same segments──▶ as the reader says
+#                    └─other ones─────▶ distances both ways, and what the reader says on top
+#
+# Distances are to true lines and arcs, from points along each segment (`PLACES`). Between lines
+# the ends have the largest one, between the chords of an arc and the arc their middles.
+
+PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Where on a segment its distance is measured."""
+
+
+def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
+    """(N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and the
+    segment that leaves each vertex of the paths made of them."""
+    found = np.zeros((len(lines.vertices), 2))
+    begin, end, said = _drawn(pieces)
+    if not len(begin) or not len(lines):
+        return found
+    made = Segments.of(lines)
+    rows = segment_rows(lines)
+    heads = lines.vertices[rows]
+    drawn_as, made_as = segment_numbers(begin, end), segment_numbers(heads, made.end)
+    order = np.argsort(drawn_as, kind="stable")
+    numbers, first = np.unique(drawn_as[order], return_index=True)
+    most = np.maximum.reduceat(said[order], first, axis=0)
+    at = np.minimum(np.searchsorted(numbers, made_as), len(numbers) - 1)
+    kept = numbers[at] == made_as
+    off = np.where(kept[:, None], most[at], 0.0)
+    gone = ~np.isin(drawn_as, made_as)
+    if gone.any() or not kept.all():
+        drawn = Segments.between(begin[:, :2], end[:, :2], begin[:, 2])
+        np.maximum(off, _changed(drawn, said, made, gone, ~kept), out=off)
+    found[rows] = off
+    return found
+
+
+def _drawn(pieces: Sequence[Piece]) -> tuple[Floats, Floats, Floats]:
+    """Both vertices (K, 3), (K, 3) of all segments of the pieces, and how far off they are said to
+    be (K, 2); without those that have no length."""
+    lasting = [piece for piece in pieces if len(piece.vertices)]
+    if not lasting:
+        return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2))
+    counts = np.array([len(piece.vertices) for piece in lasting])
+    vertices = np.concatenate([piece.vertices for piece in lasting]).astype(np.float64)
+    off = np.concatenate(
+        [
+            np.zeros((len(piece.vertices), 2)) if piece.off_mm is None else piece.off_mm
+            for piece in lasting
+        ]
+    )
+    last = np.cumsum(counts) - 1
+    following = np.arange(1, len(vertices) + 1)
+    following[last] = last - counts + 1
+    there = np.hypot(*(vertices[following] - vertices)[:, :2].T) > POSITION_EPS_MM
+    there[last[[not piece.closed for piece in lasting]]] = False
+    rows = np.flatnonzero(there)
+    return vertices[rows], vertices[following[rows]], off[rows]
+
+
+def _changed(drawn: Segments, said: Floats, made: Segments, gone: Bools, new: Bools) -> Floats:
+    """(K, 2) of the segments `made`: what `gone` of the drawn ones, and which of them are `new`,
+    tells of them, measured both ways."""
+    off = np.zeros((len(made), 2))
+    # What was drawn, to what is there now: the nearest of it, and what is about as near.
+    points, of = _samples(drawn, np.flatnonzero(gone))
+    apart, point, row = _near(points, made, 2.0)
+    np.maximum.at(off, row, apart[point, None] + said[of[point]])
+    # What is there now, to what was drawn.
+    points, of = _samples(made, np.flatnonzero(new))
+    apart, point, row = _near(points, drawn, 1.0)
+    np.maximum.at(off, of[point], apart[point, None] + said[row])
+    return off
+
+
+def _samples(segments: Segments, rows: Ints) -> tuple[Floats, Ints]:
+    """Points (P, 2) along the segments of these rows, and the row of each (P,)."""
+    row = np.repeat(rows, len(PLACES))
+    return point_at(segments, row, np.tile(PLACES, len(rows))), row
+
+
+def _near(points: Floats, segments: Segments, times: float) -> tuple[Floats, Ints, Ints]:
+    """(P,) how far the nearest segment is from each point; and pairs (J,), (J,) of a point and a
+    segment that is no farther from it than so many times that."""
+    from camtool.geometry.boxes import Curves
+    from camtool.kernels.offset_near import curves_within, nearest_distances
+
+    points = np.ascontiguousarray(points)
+    curves = Curves.of(segments)
+    apart = nearest_distances(points, curves.rows, curves.tree)
+    pairs = curves_within(points, times * apart + POSITION_EPS_MM, curves.rows, curves.tree)
+    # Two positions nearer than that are one.
+    return np.where(apart > POSITION_EPS_MM, apart, 0.0), pairs[:, 0], pairs[:, 1]

@@ -1,1 +1,0 @@
-"""Letters of drawings as curves: fonts, layout, and the codes of MTEXT."""
