@@ -36,9 +36,9 @@ from camtool.jobs.keys import (
     table_of,
     why_idle,
 )
+from camtool.jobs.tool_table import TableTool, read_tool_table
 from camtool.machine.loader import read_table
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
-from camtool.planning.tooltable import TableTool, read_tool_table
 
 OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
 """Keys of `[[operations]]`."""

@@ -10,10 +10,9 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from camtool.geometry.facts import drawing_extents
-from camtool.planning.choose import choose
 from camtool.planning.gouges import by_uncut
 from camtool.planning.place import place
-from camtool.planning.sides import Sides, runs_beside
+from camtool.planning.sides import Sides, choose, runs_beside
 
 if TYPE_CHECKING:
     from camtool.findings import Finding

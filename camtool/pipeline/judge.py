@@ -89,7 +89,7 @@ def post_drawing(
     """Plan, write, read back, simulate and judge; `check=False` leaves out the last two;
     `compensate` bends what is written against the machine's mechanics; `trace_points` of the
     slides' path are kept at most (None: as usual)."""
-    from camtool.planning.doubts import doubts
+    from camtool.planning.checks import doubts
     from camtool.planning.plan import planned
 
     plan = planned(drawing, job, target.machine)
@@ -108,7 +108,7 @@ def post_drawing(
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return Posted(wanted, program, decoded, None, findings)
-    from camtool.planning.kept import kept_of
+    from camtool.planning.drawn import kept_of
     from camtool.verify.case import TRACE_POINTS
     from camtool.verify.records import Planned
     from camtool.verify.report import certain
@@ -167,7 +167,7 @@ def verify_program(
     goal = Goal()
     kept: tuple[Kept, ...] = ()
     if drawing is not None:
-        from camtool.planning.kept import kept_of
+        from camtool.planning.drawn import kept_of
         from camtool.planning.plan import planned
 
         wanted, machine = job or Job(), target.machine
@@ -235,7 +235,7 @@ def convert_program(
 
 def _reported(step: Step) -> PlannedOperation:
     """How an operation cuts, for the report."""
-    from camtool.planning.doubts import IN_PASSES, deepest_pass
+    from camtool.planning.checks import IN_PASSES, deepest_pass
     from camtool.verify.records import PlannedOperation
 
     operation, setting = step.operation, step.setting

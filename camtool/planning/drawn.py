@@ -26,14 +26,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from camtool.geometry.measure import extents
-from camtool.geometry.polylines import Floats, Ints, Polylines, Segments
+from camtool.geometry.nesting import nesting
+from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
 from camtool.planning.items import Contour, Fixed, Item, Step
+from camtool.planning.job import Operation
+from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.wanted import Drawn
+from camtool.toolpath.wanted import Drawn, Kept
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.planning.carving.vcarve import Cone
+    from camtool.planning.carve import Cone
+
 
 PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
 """Where on a row it is asked which lines are nearest; its ends lie beside its neighbours' too."""
@@ -69,12 +73,12 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
 
 def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
     """(R, 2) how far what was drawn lies from the lines that the rows were planned along, mm."""
-    from camtool.planning.carving.vcarve import CARVE_TOLERANCE_MM
+    from camtool.planning.carve import CARVE_TOLERANCE_MM
 
     made = CARVE_TOLERANCE_MM if step.operation.kind == "vcarve" else 0.0
     found = np.full((len(rows), 2), made)
     lines = step.chosen.lines
-    of = placed.off_mm[_vertices(placed.paths, step.chosen.source)]
+    of = placed.off_mm[_vertex_rows(placed.paths, step.chosen.source)]
     if not len(rows) or not of.any():
         return found
     from camtool.geometry.boxes import Curves
@@ -91,7 +95,7 @@ def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
     return found + most
 
 
-def _vertices(lines: Polylines, chosen: Ints) -> Ints:
+def _vertex_rows(lines: Polylines, chosen: Ints) -> Ints:
     """The vertices of the chosen paths, in their order."""
     counts = np.diff(lines.offsets)[chosen]
     begin = lines.offsets[:-1][chosen]
@@ -141,7 +145,7 @@ def _boxes(item: Item, placed: Drawing) -> tuple[Floats, Floats]:
     else:
         points = np.concatenate([run.vertices[:, :3] for run in item.runs])
         if operation.kind == "vcarve":
-            from camtool.planning.carving.vcarve import Cone
+            from camtool.planning.carve import Cone
 
             return drawn, _carved(points, Cone.of(operation))
         centre = np.column_stack([points.min(axis=0), points.max(axis=0)])[:2]
@@ -168,3 +172,55 @@ def _carved(points: Floats, cone: Cone) -> Floats:
     return np.column_stack(
         [(points[:, :2] - reach).min(axis=0), (points[:, :2] + reach).max(axis=0)]
     )
+
+
+# What the runs of a plan must leave of the material, as the drawing has it.
+#
+# A profile leaves the part, a pocket and a carving what is outside of their region; engraving and
+# drilling leave nothing in particular. Where reliefs go into the corners of the part, they are
+# meant to, and nothing is said of that operation.
+
+
+def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:
+    """All runs of a plan, with what they must leave."""
+    return tuple(each for step in steps for each in _kept(step))
+
+
+def _kept(step: Step) -> Iterator[Kept]:
+    operation, chosen = step.operation, step.chosen
+    closed = np.flatnonzero(chosen.lines.closed)
+    nest = nesting(chosen.lines.select(closed.tolist()))
+    order = np.argsort(nest.depth, kind="stable")
+    rows, depth = closed[order], nest.depth[order]
+    if operation.kind in ("pocket", "vcarve"):
+        lines = chosen.lines.select(rows.tolist())
+        yield Kept(tuple(run.vertices for run in step.runs), lines, depth % 2 == 1, True)
+        return
+    beside = runs_beside(operation) and operation.corners == "none"
+    for level in _levels(operation, depth) if beside else ():
+        mine = rows[level]
+        lines, stays = chosen.lines.select(mine.tolist()), chosen.rim[mine]
+        # Beside a rim the rest of the stock is waste; beside a hole it is part.
+        for rim in (True, False):
+            names = {chosen.names[row] for row in mine[stays == rim].tolist()}
+            yield Kept(_contour_runs(step, names), lines, stays, not rim)
+    judged = {chosen.names[row] for row in rows.tolist()} if beside else set()
+    # Open contours are cut on their lines, wherever these are; other runs leave nothing either.
+    free = tuple(run.vertices for run in step.runs if run.name not in judged)
+    yield Kept(free, Polylines.of([]), np.empty(0, dtype=np.bool_), False)
+
+
+def _levels(operation: Operation, depth: Ints) -> Iterator[Bools]:
+    """Which closed contours make one region, of their depths of nesting. With the sides of the
+    nesting all do. Where the job names the side, a contour in another one is cut on that side
+    too, whatever the outer one keeps: those of each depth are a region of their own."""
+    if operation.side == "auto":
+        yield np.ones(len(depth), dtype=np.bool_)
+        return
+    for each in np.unique(depth).tolist():
+        yield depth == each
+
+
+def _contour_runs(step: Step, names: set[str]) -> tuple[Floats, ...]:
+    """The runs of a step that are contours of these names."""
+    return tuple(run.vertices for run in step.runs if run.name in names)

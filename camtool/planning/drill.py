@@ -19,9 +19,8 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import path_extents, sample
 from camtool.geometry.polylines import Bools, Floats, Polyline, Polylines, Segments
 from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
-from camtool.planning.job import Operation
-from camtool.planning.places import key_of, operation_name
-from camtool.planning.ranges import refuse_endless
+from camtool.planning.job import Operation, refuse_endless
+from camtool.planning.naming import key_of, operation_name
 
 ROUND_SHARE = 1e-3
 """A closed path is a circle when its points are off the mean radius by no more than this share

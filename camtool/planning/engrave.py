@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from camtool.errors import OptionError
 from camtool.planning.items import Chosen, Contour, Setting, Work
-from camtool.planning.places import key_of
+from camtool.planning.naming import key_of
 
 
 def engrave(chosen: Chosen, setting: Setting) -> Work:

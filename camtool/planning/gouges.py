@@ -28,7 +28,7 @@ from camtool.geometry.polylines import (
 )
 from camtool.planning.items import Chosen, Contour, Work
 from camtool.planning.job import Operation
-from camtool.planning.places import at_place, operation_name, told_together, tool_name
+from camtool.planning.naming import at_place, operation_name, told_together, tool_name
 from camtool.planning.sides import Sides, runs_beside
 
 GOUGE_TOLERANCE_MM = 1e-4

@@ -1,33 +1,207 @@
-"""The Job: what is to be cut and how, as far as the user says it.
-
-A job places the drawing (`Placement`), may say what the stock is (`Stock`), and lists operations
-in the order in which they are cut. An operation takes the paths of its layers and colours, and
-says how: the tool, where it runs, how deep, how it goes in and out. What is None is left to the
-machine. `job_of` makes the job of a single operation from flat settings, as flags give them.
-"""
+"""What the numbers and words of a job may be: OptionError with the mend for all others."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 from camtool.errors import OptionError
 from camtool.patterns import matches
-from camtool.planning.contradictions import (
-    refuse_entry,
-    refuse_operation,
-    refuse_placement,
-    refuse_tool,
-)
-from camtool.planning.ranges import (
-    FARTHEST_MM,
-    MOST_WIDE_MM,
-    above_zero,
-    all_above_zero,
-    at_least_zero,
-    finite,
-    one_of,
-)
+
+MOST = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "": 1e6}
+"""The most that a number of this unit may be, as in `camtool.machine.ranges`: 100 m, 167 m/s,
+eleven days; and a million of what has no unit."""
+
+LEAST = 1e-6
+"""The least that a number above 0 may be, of any unit: a nanometre."""
+
+MOST_WIDE_MM = 1000.0
+"""No tool is wider than a metre, and nothing more is left on a wall."""
+
+FARTHEST_MM = 1e9
+"""Places in a drawing lie no farther from its zero (a thousand kilometres: maps do)."""
+
+MOST_MOVES = 1_000_000
+"""Passes, pecks and laps that make more moves than this of a drawing are taken as a mistake: a
+program of some 25 MB."""
+
+
+def above_zero(name: str, value: float | None, unit: str, most: float | None = None) -> None:
+    """Refuse a number that is given (not None) and not above 0, or not plausible."""
+    if value is None:
+        return
+    if not (math.isfinite(value) and value > 0.0):
+        raise OptionError(
+            f"{_said(name, value, unit)} is not above 0",
+            mend=f"give a {name} above 0, or leave it out",
+        )
+    if value < LEAST:
+        raise OptionError(
+            f"{_said(name, value, unit)} is less than {LEAST:g}", mend=f"give a larger {name}"
+        )
+    _at_most(name, value, unit, most)
+
+
+def all_above_zero(name: str, values: Sequence[float], unit: str = "") -> None:
+    """Refuse numbers of which one is not above 0, or not plausible."""
+    for value in values:
+        above_zero(name, value, unit)
+
+
+def at_least_zero(name: str, value: float, unit: str, most: float | None = None) -> None:
+    """Refuse a number below 0, or not plausible."""
+    if not (math.isfinite(value) and value >= 0.0):
+        raise OptionError(
+            f"{_said(name, value, unit)} is not 0 or more",
+            mend=f"give a {name} of 0 or more",
+        )
+    _at_most(name, value, unit, most)
+
+
+def finite(name: str, value: float, unit: str, most: float | None = None) -> None:
+    """Refuse what is no number, or not plausible."""
+    if not math.isfinite(value):
+        raise OptionError(f"{_said(name, value, unit)} is no number", mend=f"give a {name}")
+    _at_most(name, abs(value), unit, most)
+
+
+def refuse_endless(moves: float, where: str, asked: str, mend: str) -> None:
+    """OptionError when so many moves are estimated to come of what was `asked`, such as
+    "10000 passes"."""
+    if moves > MOST_MOVES:
+        raise OptionError(
+            f"{asked} would make {moves:.3g} moves, more than {MOST_MOVES:,}",
+            where=where,
+            mend=mend,
+        )
+
+
+def _at_most(name: str, value: float, unit: str, most: float | None) -> None:
+    limit = MOST[unit] if most is None else most
+    if value > limit:
+        raise OptionError(
+            f"{_said(name, value, unit)} is more than {limit:g}", mend=f"give a smaller {name}"
+        )
+
+
+def _said(name: str, value: float, unit: str) -> str:
+    return f"{name} {value:g} {unit}".rstrip()
+
+
+def one_of(name: str, value: str, known: Sequence[str]) -> None:
+    """Refuse a word that is not known."""
+    if value not in known:
+        raise OptionError(f"unknown {name} {value!r}", mend=f"use one of {', '.join(known)}")
+
+
+# Settings of a job that are fine one by one and cannot be together: OptionError names the key.
+
+
+def refuse_tool(tool: Tool) -> None:
+    """Refuse a tip that is no cone, or as wide as its tool."""
+    angle = tool.tip_angle_rad
+    if angle is not None and not 0.0 < angle < math.pi:
+        raise OptionError(
+            f"tip angle {math.degrees(angle):g}° is not between 0 and 180°",
+            mend="give the full angle of the cone, such as 60deg",
+        )
+    if 0.0 < tool.diameter_mm <= tool.tip_diameter_mm:
+        raise OptionError(
+            f"the tip of {tool.tip_diameter_mm:g} mm is as wide as the tool",
+            where="key tip_diameter",
+            mend="give a smaller tip, or a wider tool",
+        )
+
+
+def refuse_entry(entry: Entry) -> None:
+    """Refuse a slope that is none."""
+    if not entry.angle_rad < 0.5 * math.pi:
+        raise OptionError(
+            f"ramp angle {math.degrees(entry.angle_rad):g}° is not below 90°",
+            mend="give a smaller angle, or plunge",
+        )
+
+
+def refuse_operation(operation: Operation) -> None:
+    """Refuse an operation whose settings contradict one another."""
+    depth, last = operation.depth_mm, operation.last_pass_mm
+    if depth is not None and last is not None and last > depth:
+        raise OptionError(
+            f"the last pass of {last:g} mm is deeper than the whole cut of {depth:g} mm",
+            where=f"{_named(operation)}key last_pass",
+            mend="give a smaller last pass, or a larger depth",
+        )
+    if operation.entry.kind == "helix" and operation.kind != "pocket":
+        raise OptionError(
+            f"a helix goes into pockets, not into what the kind {operation.kind} cuts",
+            where=f"{_named(operation)}key entry",
+            mend='use "ramp" or "plunge"',
+        )
+
+
+def refuse_placement(placement: Placement) -> None:
+    """Refuse a placement of numbers that are none, and of settings that contradict each other."""
+    if placement.fit_mm is not None:
+        _refuse_fit(placement.fit_mm)
+        if placement.scale != 1.0:
+            raise OptionError(
+                f"scale {placement.scale:g} and fit contradict each other",
+                where="key scale",
+                mend="give one of the two",
+            )
+    _refuse_beyond("pitch", placement.pitch_mm, -MOST["mm"], MOST["mm"])
+    if not isinstance(placement.origin, str):
+        _refuse_beyond("origin", placement.origin, -FARTHEST_MM, FARTHEST_MM)
+    for what, count, pitch in zip(
+        ("columns", "rows"), placement.copies, placement.pitch_mm, strict=True
+    ):
+        if count > 1 and pitch == 0.0:
+            raise OptionError(
+                f"{count} {what} of copies lie on one another",
+                where="key copies",
+                mend="give the pitch from one copy to the next",
+            )
+    if placement.copies == (1, 1) and any(placement.pitch_mm):
+        raise OptionError(
+            "a pitch, but no copies",
+            where="key pitch",
+            mend="give copies too, such as 3x2, or leave the pitch out",
+        )
+
+
+def _refuse_fit(fit_mm: tuple[float, float]) -> None:
+    _refuse_beyond("fit", fit_mm, 0.0, MOST["mm"])
+    if not any(fit_mm):
+        raise OptionError(
+            f"nothing fits into {fit_mm[0]:g} by {fit_mm[1]:g} mm",
+            where="key fit",
+            mend="give a width and a height above 0, or one of them and 0 for any",
+        )
+
+
+def _refuse_beyond(key: str, lengths: tuple[float, float], least: float, most: float) -> None:
+    """Refuse lengths that are none, or not plausible."""
+    for length in lengths:
+        if not least <= length <= most:
+            raise OptionError(
+                f"{length:g} mm is not between {least:g} and {most:g}",
+                where=f"key {key}",
+                mend="give lengths of a machine",
+            )
+
+
+def _named(operation: Operation) -> str:
+    return f"operation {operation.name!r}, " if operation.name else ""
+
+
+# The Job: what is to be cut and how, as far as the user says it.
+#
+# A job places the drawing (`Placement`), may say what the stock is (`Stock`), and lists operations
+# in the order in which they are cut. An operation takes the paths of its layers and colours, and
+# says how: the tool, where it runs, how deep, how it goes in and out. What is None is left to the
+# machine. `job_of` makes the job of a single operation from flat settings, as flags give them.
 
 KINDS = ("profile", "pocket", "engrave", "drill", "vcarve")
 """Kinds of operation."""

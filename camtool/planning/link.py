@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.planning.arcs import cuts
 from camtool.planning.items import Run
 from camtool.planning.job import Operation, Tool
+from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 

@@ -23,19 +23,17 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
-from camtool.planning.choose import choose
 from camtool.planning.items import Bridge, Chosen, Contour, Item, Run, Setting, Step, Work
-from camtool.planning.job import Job, Operation
+from camtool.planning.job import Job, Operation, refuse_endless
 from camtool.planning.link import Worked, link, settled
+from camtool.planning.naming import key_of
 from camtool.planning.place import SCALE_SHARE, collapsed, place
-from camtool.planning.places import key_of
-from camtool.planning.ranges import refuse_endless
 from camtool.planning.settings import safe_z_of, setting_of
-from camtool.planning.sides import Sides
+from camtool.planning.sides import Sides, choose
 from camtool.toolpath.moves import Toolpath
 
 if TYPE_CHECKING:
-    from camtool.planning.contours.leads import KeepOut
+    from camtool.planning.leads import KeepOut
 
 Point = tuple[float, float]
 HOME: Point = (0.0, 0.0)
@@ -89,7 +87,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     worked = [Worked(step.operation, step.runs) for step in steps]
     approaches = None
     if not undivided and (job.approach or job.minimise == "reversals"):
-        from camtool.planning.reversing.approach import Approaches
+        from camtool.planning.reversing import Approaches
 
         approaches = partial(Approaches, machine)
     builder = link(worked, safe_z_of(job, machine), approaches)
@@ -135,7 +133,7 @@ def work_of(chosen: Chosen, setting: Setting) -> Work:
 def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
     """Imported where it is used: carving needs more than engraving."""
     if kind == "pocket":
-        from camtool.planning.pockets.pocket import pocket
+        from camtool.planning.pocket import pocket
 
         return pocket
     if kind == "engrave":
@@ -147,7 +145,7 @@ def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
 
         return drill
     if kind == "vcarve":
-        from camtool.planning.carving.vcarve import vcarve
+        from camtool.planning.carve import vcarve
 
         return vcarve
     from camtool.planning.profile import profile
@@ -165,11 +163,17 @@ def _step(
 ) -> Step:
     """One operation from what it takes to its runs, for a tool that comes from the first point
     of its `way` and goes to the second (None: stays)."""
-    from camtool.planning.contours.runs import runs_of
-    from camtool.planning.contours.tabs import with_tabs
+    from camtool.planning.contours import runs_of
     from camtool.planning.gouges import side_findings
-    from camtool.planning.order import best_order, choices_of, chosen_path, drawn, travel_mm
-    from camtool.planning.precedence import must_precede
+    from camtool.planning.order import (
+        best_order,
+        choices_of,
+        chosen_path,
+        drawn,
+        must_precede,
+        travel_mm,
+    )
+    from camtool.planning.tabs import with_tabs
 
     chosen = choose(placed, setting.operation, sides)
     work = work_of(chosen, setting)
@@ -179,7 +183,7 @@ def _step(
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), *way)
     if job.minimise == "reversals":
-        from camtool.planning.reversing.reversals import fewer_reversals
+        from camtool.planning.reversing import fewer_reversals
 
         items, noticed = fewer_reversals(items, machine)
         findings += noticed
@@ -218,7 +222,7 @@ def _is_divided(job: Job, operation: Operation) -> bool:
     """Whether contours of the operation are cut as runs, against reversals."""
     if job.minimise != "reversals":
         return False
-    from camtool.planning.reversing.reversals import may_divide
+    from camtool.planning.reversing import may_divide
 
     return may_divide(operation)
 
@@ -228,7 +232,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
     bridges = [bridge for step in steps for bridge in step.bridges]
     if not bridges:
         return steps
-    from camtool.planning.contours.bridges import spared
+    from camtool.planning.tabs import spared
 
     made = []
     for step in steps:
@@ -265,7 +269,7 @@ def _refuse_endless(items: tuple[Item, ...], setting: Setting) -> None:
 def _walls(placed: Drawing, job: Job, operation: Operation) -> KeepOut:
     """The closed lines that ways to and from a contour must leave alone: those of the operation
     itself, and those that any operation makes walls of."""
-    from camtool.planning.contours.leads import KeepOut
+    from camtool.planning.leads import KeepOut
 
     makers = [each for each in job.operations if each.kind in ("profile", "pocket")]
     names = list(zip(placed.layers, placed.colours, strict=True))
@@ -282,7 +286,7 @@ def _with_starts(item: Item) -> Item:
     operation = item.setting.operation
     if operation.start == "nearest":
         return item
-    from camtool.planning.contours.starts import with_starts
+    from camtool.planning.contours import with_starts
 
     path, starts = with_starts(item.path, operation.start, operation.tool.radius_mm)
     return replace(item, path=path, starts=starts)

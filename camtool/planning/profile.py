@@ -26,9 +26,9 @@ from camtool.geometry.polylines import (
     Segments,
     reverse,
 )
-from camtool.planning.arcs import joints
 from camtool.planning.items import Chosen, Contour, Setting, Work
-from camtool.planning.places import at_place, told_together, tool_name
+from camtool.planning.naming import at_place, told_together, tool_name
+from camtool.planning.paths import joints
 from camtool.planning.sides import runs_beside
 
 ROOM_TOLERANCE_MM = 1e-4
@@ -107,7 +107,7 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
 
 def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> None:
     """Round a shape of these paths."""
-    from camtool.planning.uncut import unreached_findings
+    from camtool.planning.reach import unreached_findings
 
     lines = chosen.lines.select(of)
     ccw = signed_areas(lines) > 0.0
@@ -242,7 +242,7 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
 
 def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Finding]) -> _Line:
     """The line with reliefs at the sharp inner corners of the paths that it belongs to."""
-    from camtool.planning.contours.corners import relieved
+    from camtool.planning.reliefs import relieved
 
     tool, path = setting.operation.tool, line.path
     for k in line.of:

@@ -10,7 +10,7 @@ import numpy as np
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
-from camtool.planning.places import own_numbers
+from camtool.planning.naming import own_numbers
 from camtool.simulation.simulate import findings_of
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock

@@ -14,7 +14,7 @@ from camtool.geometry.medial import Boundary, Trace, discs_at, medial_trace
 from camtool.geometry.nesting import oriented, regions
 from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
 from camtool.kernels.discs import LENGTH, SWEEP, frame
-from camtool.planning.carving.pieces import with_level
+from camtool.planning.carve import with_level
 from tests.oracles import contours as shapes
 from tests.strategies import contours
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline
-from camtool.planning.contours.runs import runs_of as cut_of
+from camtool.planning.contours import runs_of as cut_of
 from camtool.planning.items import Contour, Run
 from tests.oracles.arcs import FLAT, centre_of
 

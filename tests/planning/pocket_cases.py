@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import path_distance
 from camtool.geometry.nesting import oriented
 from camtool.geometry.polylines import Polyline, Polylines, moved, rotated, scaled
-from camtool.planning.contours.levels import levels
 from camtool.planning.items import Chosen, Feeds, Run, Setting, Work
 from camtool.planning.job import Operation, Tool
-from camtool.planning.pockets.pocket import pocket
+from camtool.planning.pocket import pocket
+from camtool.planning.settings import levels
 from tests.oracles.contours import (
     CIRCLE,
     DUMBBELL,

@@ -15,7 +15,7 @@ from camtool.machine.registry import load_target
 from camtool.planning.items import Contour, Feeds, Item, Run, Setting
 from camtool.planning.job import Operation
 from camtool.planning.link import Worked, link
-from camtool.planning.reversing.approach import Approaches
+from camtool.planning.reversing import Approaches
 from camtool.toolpath.moves import Toolpath
 from camtool.verify.report import Report
 from camtool.verify.verify import verify

@@ -12,14 +12,14 @@ from camtool.geometry.polylines import Polyline, scaled
 from camtool.machine.controllers import PathController, PicMmhController
 from camtool.machine.model import Machine, PlayCells, PlayMap
 from camtool.planning.items import Run
-from camtool.planning.reversing.approach import (
+from camtool.planning.reversing import (
     APPROACH_MARGIN_MM,
     Approaches,
     approach_from,
     approach_mm,
+    residuals,
+    reversals_of,
 )
-from camtool.planning.reversing.residual import residuals
-from camtool.planning.reversing.reversals import reversals_of
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
 from camtool.simulation.simulate import simulate

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, segment_lengths
 from camtool.geometry.polylines import Polyline, Segments, reverse
-from camtool.planning.arcs import Cut, joints
-from camtool.planning.arcs import cuts as cuts_of_run
+from camtool.planning.paths import Cut, joints
+from camtool.planning.paths import cuts as cuts_of_run
 from tests.strategies import polylines
 
 

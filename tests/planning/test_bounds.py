@@ -3,9 +3,8 @@
 import pytest
 
 from camtool.errors import OptionError
-from camtool.planning.job import Tabs
+from camtool.planning.job import MOST_MOVES, Tabs, refuse_endless
 from camtool.planning.plan import plan
-from camtool.planning.ranges import MOST_MOVES, refuse_endless
 from tests.oracles.path_machine import path_machine
 from tests.planning.test_place import _box, drawing_of, job_of
 

@@ -13,9 +13,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
-from camtool.planning.compensating import compensated
-from camtool.planning.compensating.linear import motor_path
-from camtool.planning.compensating.stretch import Stretch, stretches
+from camtool.planning.compensating import Stretch, compensated, motor_path, stretches
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath

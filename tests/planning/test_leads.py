@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from camtool.findings import Code
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.polylines import Polyline, Polylines, Segments, moved, reverse, rolled
-from camtool.planning.contours.along import Along
-from camtool.planning.contours.leads import (
+from camtool.planning.items import Contour, Feeds, Setting
+from camtool.planning.job import Lead, Operation, Tool
+from camtool.planning.leads import (
     LEAD_HALVINGS,
     LEAD_SLACK_MM,
     KeepOut,
@@ -23,8 +24,7 @@ from camtool.planning.contours.leads import (
     runs_back,
     segments_near,
 )
-from camtool.planning.items import Contour, Feeds, Setting
-from camtool.planning.job import Lead, Operation, Tool
+from camtool.planning.paths import Along
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.oracles.runs import runs_of
 from tests.strategies import contours, open_contours, polylines

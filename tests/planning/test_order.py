@@ -19,9 +19,9 @@ from camtool.planning.order import (
     choices_of,
     chosen_path,
     drawn,
+    must_precede,
     travel_mm,
 )
-from camtool.planning.precedence import must_precede
 from tests.oracles import tours
 from tests.strategies import coordinates
 

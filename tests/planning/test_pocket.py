@@ -25,11 +25,10 @@ from camtool.geometry.polylines import (
     rotated,
     scaled,
 )
+from camtool.planning.clearing import Cell, Steps, parts_of, ring_cells
 from camtool.planning.items import Fixed, Run
 from camtool.planning.job import Entry
-from camtool.planning.pockets.parts import parts_of
-from camtool.planning.pockets.pocket import pocket
-from camtool.planning.pockets.rings import Cell, Steps, ring_cells
+from camtool.planning.pocket import pocket
 from tests.oracles import swept
 from tests.oracles.contours import CIRCLE, DUMBBELL, OBLONG, SLOT, SQUARE, closed, comb, star
 from tests.oracles.contours import opened as open_path

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, point_at, sample
 from camtool.geometry.polylines import Polyline, Segments, moved, scaled
-from camtool.planning.contours.along import Along
-from camtool.planning.pockets.clip import outside_parts, scanned
-from camtool.planning.pockets.route import Rails, closest, route
+from camtool.planning.clearing import Rails, closest, outside_parts, route, scanned
+from camtool.planning.paths import Along
 from tests.oracles.contours import CIRCLE, DUMBBELL, ELL, SQUARE
 from tests.oracles.contours import opened as open_path
 from tests.oracles.offset import chords, dense, distance, inside

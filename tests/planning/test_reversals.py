@@ -30,8 +30,8 @@ from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.items import Contour, Fixed, Item
 from camtool.planning.job import Entry, Lead, Tabs, job_of
-from camtool.planning.precedence import must_precede
-from camtool.planning.reversing.reversals import fewer_reversals, reversals_of
+from camtool.planning.order import must_precede
+from camtool.planning.reversing import fewer_reversals, reversals_of
 from tests.oracles.reversals import fewest_runs
 from tests.planning.reversal_parts import (
     PIC,

@@ -17,11 +17,10 @@ from camtool.geometry.polylines import Polyline, Polylines
 from camtool.importers.assemble import Piece, assemble
 from camtool.importers.options import ReadOptions, Selection
 from camtool.machine.model import Machine
-from camtool.planning.choose import choose
 from camtool.planning.items import Contour
 from camtool.planning.job import Job, Operation, Stock, Tool, job_of
 from camtool.planning.plan import planned
-from camtool.planning.sides import Sides
+from camtool.planning.sides import Sides, choose
 
 LAYERS = ("A", "B", "C", "D")
 D = 0.5

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.polylines import Polyline, reverse, rolled
-from camtool.planning.contours.starts import START_SNAP_MM, with_starts
+from camtool.planning.contours import START_SNAP_MM, with_starts
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours
 

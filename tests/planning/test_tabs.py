@@ -15,10 +15,10 @@ from camtool.errors import OptionError
 from camtool.findings import Code
 from camtool.geometry.measure import length
 from camtool.geometry.polylines import Polyline, reverse, rolled
-from camtool.planning.contours.along import Along
-from camtool.planning.contours.tabs import raised, tabs_of
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
+from camtool.planning.paths import Along
+from camtool.planning.tabs import raised, tabs_of
 from tests.oracles.runs import run_points, runs_of, steepest
 from tests.strategies import contours
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline
-from camtool.planning.pockets.zigzag import Scan, strokes_of, zigzag_ways
+from camtool.planning.clearing import Scan, strokes_of, zigzag_ways
 from tests.oracles.contours import CIRCLE, DUMBBELL, SQUARE
 from tests.oracles.swept import at_depth, complaints, gouges
 from tests.planning.pocket_cases import SHAPES, cross, region_of, runs_of, shapes, work_of

@@ -9,8 +9,8 @@ import shapely
 from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.machine.registry import load_target
+from camtool.planning.drawn import kept_of
 from camtool.planning.job import job_of
-from camtool.planning.kept import kept_of
 from camtool.planning.plan import planned
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath

@@ -32,8 +32,8 @@ import numpy as np
 
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
-from camtool.planning.contours.along import Along
 from camtool.planning.items import Feeds
+from camtool.planning.paths import Along
 
 Knots = list[tuple[float, float]]
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.planning.tooltable import WORDS, TableTool, read_tool_table
+from camtool.jobs.tool_table import WORDS, TableTool, read_tool_table
 
 TABLE = """\
 ; tools of the mill

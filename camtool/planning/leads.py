@@ -32,10 +32,10 @@ from camtool.geometry.polylines import (
     Polylines,
     Segments,
 )
-from camtool.planning.contours.along import Along, backwards
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
-from camtool.planning.places import at_place
+from camtool.planning.naming import at_place
+from camtool.planning.paths import Along, backwards
 
 LEAD_SLACK_MM = 1e-5
 """A lead may come nearer to wanted material than the tool's radius by this much."""

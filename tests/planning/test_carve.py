@@ -18,7 +18,7 @@ from camtool.findings import Code, Severity
 from camtool.geometry.distance import nearest
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.importers.read import read_drawing
-from camtool.planning.carving.vcarve import CARVE_TOLERANCE_MM, vcarve
+from camtool.planning.carve import CARVE_TOLERANCE_MM, vcarve
 from camtool.planning.items import Chosen, Feeds, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes

@@ -20,7 +20,7 @@ from camtool.geometry.polylines import (
     rotated,
     scaled,
 )
-from camtool.planning.contours.corners import RELIEF_LEAST_MM, relieved
+from camtool.planning.reliefs import RELIEF_LEAST_MM, relieved
 from tests.oracles.arcs import chain_distances
 
 R = 1.0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import length
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
-from camtool.planning.contours.along import Along, backwards
+from camtool.planning.paths import Along, backwards
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours, open_contours, polylines
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.planning.contours.levels import MOST_PASSES, carved_levels, levels
+from camtool.planning.settings import MOST_PASSES, carved_levels, levels
 
 depths = st.floats(1e-3, 100.0)
 shares = st.floats(0.02, 1.0)

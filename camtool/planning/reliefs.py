@@ -24,8 +24,8 @@ from camtool.errors import OptionError
 from camtool.geometry.distance import paired_distances, points_to_segments
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
-from camtool.planning.contours.along import Along
 from camtool.planning.job import CORNERS
+from camtool.planning.paths import Along
 
 RELIEF_LEAST_MM = 1e-3
 """A corner that the tool's edge misses by no more than this gets no relief."""

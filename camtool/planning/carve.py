@@ -1,0 +1,656 @@
+"""Carving with a V bit: the wider a place, the deeper the tip, so that both walls are cut at once.
+
+    closed paths ──nesting──▶ regions ──medial trace──▶ discs ──bands of radii──▶ grooves, walls
+                 ──graph──▶ walks ──depth by radius──▶ runs, one Fixed item per region
+
+With the half angle α of the bit and the radius r of its flat tip, a disc of radius ρ is cut at the
+surface when the tip is as deep as
+
+    depth = (ρ − r) / tan α.
+
+At convex corners ρ falls to 0 and the tip comes up to the surface, in the corner itself (a flat
+tip stops where it no longer fits). Where the depth of the operation or the width of the bit does
+not allow more, walls are cut at that depth, and the floor between them is left and reported: a
+pocket with a flat tool clears it.
+
+What is cut is right to `CARVE_TOLERANCE_MM`: all vertices lie on the medial axis or on the
+parallel curve, exact to rounding; lines and arcs between them leave the axis, sideways and in
+radius together, by no more than the tolerance; twigs that would reach no farther are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice, pairwise
+
+import numpy as np
+
+from camtool.errors import GeometryError, OptionError
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.boxes import touching_boxes
+from camtool.geometry.distance import points_to_segments
+from camtool.geometry.intersect import MOST_PAIRS, meetings
+from camtool.geometry.measure import segment_boxes, signed_area
+from camtool.geometry.medial import (
+    HALVINGS,
+    Boundary,
+    Trace,
+    concatenated,
+    discs_at,
+    medial_trace,
+    off_chord,
+)
+from camtool.geometry.nesting import nesting, regions
+from camtool.geometry.offset import merge_points
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Bools,
+    Floats,
+    Ints,
+    Polyline,
+    Polylines,
+    Segments,
+)
+from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
+from camtool.planning.job import Operation
+from camtool.planning.naming import key_of
+
+CROSSINGS_SHOWN = 3
+"""So many places where paths cross are named."""
+
+CARVE_TOLERANCE_MM = 5e-4
+"""A carved wall may be off its line by this much: half a micrometre."""
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A V bit: the tangent of its half angle, the radius of its flat tip, mm, and the largest
+    radius that it cuts at the surface, mm (inf: not known)."""
+
+    slope: float
+    tip_mm: float
+    widest_mm: float
+
+    @classmethod
+    def of(cls, operation: Operation) -> Cone:
+        """The V bit of an operation; OptionError when its tool is none."""
+        tool = operation.tool
+        if tool.kind != "v" or tool.tip_angle_rad is None:
+            raise OptionError(
+                "carving needs a V bit",
+                where=key_of(operation, "tool"),
+                mend='use a tool with kind = "v" and a tip_angle',
+            )
+        widest = tool.radius_mm or math.inf
+        return cls(math.tan(0.5 * tool.tip_angle_rad), 0.5 * tool.tip_diameter_mm, widest)
+
+    def radius_at(self, depth_mm: float) -> float:
+        """Radius of what is cut at the surface with the tip so deep."""
+        return min(self.tip_mm + depth_mm * self.slope, self.widest_mm)
+
+    def depth_of(self, rho: Floats) -> Floats:
+        """How deep the tip goes to cut these radii at the surface."""
+        return np.maximum(rho - self.tip_mm, 0.0) / self.slope
+
+
+@dataclass(frozen=True, eq=False)
+class _Region:
+    """A region to carve: its paths, its name, and the index of its outer path in the drawing."""
+
+    lines: Polylines
+    name: str
+    source: int
+
+
+def vcarve(chosen: Chosen, setting: Setting) -> Work:
+    """One Fixed item for each region: what an even-odd reading of the closed paths fills.
+
+    Where paths cross nobody knows what is filled: a finding of severity error, and no items.
+    OptionError for an open path and for a tool that is no V bit.
+    """
+    cone = Cone.of(setting.operation)
+    _refuse_open(chosen, setting.operation)
+    crossing = list(islice(_crossings(chosen), CROSSINGS_SHOWN))
+    if crossing:
+        return Work((), tuple(crossing))
+    items: list[Fixed] = []
+    findings: list[Finding] = []
+    for region in _regions(chosen):
+        try:
+            item, noticed = _carved(region, setting, cone)
+        except GeometryError as error:
+            return Work((), (_no_region(region, error),))
+        items.extend(item)
+        findings.extend(noticed)
+    return Work(tuple(items), tuple(findings))
+
+
+def _refuse_open(chosen: Chosen, operation: Operation) -> None:
+    if not chosen.lines.closed.all():
+        name = chosen.names[int(np.argmin(chosen.lines.closed))]
+        raise OptionError(
+            f"{name} is open and has no inside to carve",
+            where=key_of(operation, "kind"),
+            mend='close it, or take it with an operation of kind = "engrave"',
+        )
+
+
+def _crossings(chosen: Chosen) -> Iterator[Finding]:
+    """The places where paths cross themselves or each other."""
+    segments = Segments.of(chosen.lines)
+    rows, nothing = np.arange(len(segments)), np.zeros(len(segments), dtype=np.int64)
+    every = np.ones(len(segments), dtype=np.bool_)
+    boxes = segment_boxes(segments)
+    one, other = touching_boxes(boxes, nothing, rows, every, most=MOST_PAIRS)
+    if len(one) == 0:
+        return
+    meets, crosses = meetings(segments, one, other)
+    for row in np.flatnonzero(crosses).tolist():
+        a, b = (chosen.names[segments.path[i[row]]] for i in (meets.row_a, meets.row_b))
+        x, y = meets.point[row].tolist()
+        yield Finding(
+            Code.SELF_CROSSING,
+            Severity.ERROR,
+            f"{a} crosses {'itself' if a == b else b}: what is inside cannot be told; mend the"
+            " drawing, or carve without it",
+            where=_at(a, x, y),
+        )
+
+
+def _no_region(region: _Region, error: GeometryError) -> Finding:
+    return Finding(
+        Code.SELF_CROSSING,
+        Severity.ERROR,
+        f"{error.message}: what is inside cannot be carved; {error.mend}",
+        where=f"{region.name} at {error.where}",
+    )
+
+
+def _regions(chosen: Chosen) -> Iterator[_Region]:
+    outer = np.flatnonzero(nesting(chosen.lines).depth % 2 == 0)
+    for row, lines in zip(outer.tolist(), regions(chosen.lines), strict=True):
+        yield _Region(lines, chosen.names[row], int(chosen.source[row]))
+
+
+def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed], list[Finding]]:
+    """The item of one region, none if the tip fits nowhere, and what was noticed."""
+    boundary, trace = medial_trace(region.lines, CARVE_TOLERANCE_MM)
+    limits = [cone.tip_mm, *(cone.radius_at(-level) for level in setting.levels_mm)]
+    for limit in sorted(set(limits)):
+        trace = with_level(boundary, trace, limit)
+    # Walking a piece twice takes no longer than coming down from safe z does.
+    again = setting.safe_z_mm * setting.feeds.cut_mm_min / setting.feeds.plunge_mm_min
+    paths: list[Floats] = []
+    floor: list[Floats] = []
+    for low, high in pairwise(limits):
+        if high > low:
+            band = Band(low, high, CARVE_TOLERANCE_MM)
+            floor = walls(boundary, trace, high)
+            paths += _walks(trace, floor, band, again)
+    findings = [*_too_narrow(region, trace, cone), *_limited(region, trace, floor, limits[-1])]
+    runs = tuple(_run(path, setting, cone, region.name) for path in paths)
+    outline = region.lines[0]
+    item = Fixed(runs, setting, region.name, region.source, outline)
+    return [item] if runs else [], findings
+
+
+def _walks(trace: Trace, floor: list[Floats], band: Band, again_mm: float) -> list[Floats]:
+    """What is walked in one band: the grooves, the walls, and the middle of a round region."""
+    graph = without_twigs(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
+    middle = trace.discs[int(np.argmax(trace.rho))]
+    is_cut = band.low_mm < middle[2] <= band.high_mm
+    lonely = is_cut and _passed_by(graph.pieces, middle[:2]) > band.tolerance_mm
+    return [*walks(graph, again_mm), *([np.append(middle, 0.0)[None, :]] if lonely else [])]
+
+
+def _passed_by(pieces: list[Floats], point: Floats) -> float:
+    """How far in the plane pieces pass by a point, mm; inf if there are none."""
+    rows = [np.column_stack([piece[:-1], piece[1:, :2]]) for piece in pieces]
+    if not rows:
+        return math.inf
+    ends = np.concatenate(rows)
+    segments = Segments.between(ends[:, :2], ends[:, 4:], ends[:, 3])
+    return float(points_to_segments(point[None, :], segments).min())
+
+
+def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
+    """The run along a path (n, 4) of x, y, rho, bulge.
+
+    On a slope the tip goes down and up no faster than in a plunge.
+    """
+    z = 0.0 - cone.depth_of(path[:, 2])
+    vertices = np.column_stack([path[:, :2], z, path[:, 3]])
+    heights = np.abs(np.diff(z))
+    slope = np.hypot(lengths_of(path), heights)
+    feeds = setting.feeds
+    steep = feeds.plunge_mm_min * slope / np.where(heights > 0.0, heights, np.inf)
+    limit = np.where(heights > 0.0, steep, np.inf)
+    return Run(vertices, np.minimum(feeds.cut_mm_min, limit), feeds.plunge_mm_min, name)
+
+
+def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
+    """What a flat tip cannot enter: all of the region, or its corners and narrow places."""
+    from camtool.planning.reach import unreached
+
+    tip, widest = 2.0 * cone.tip_mm, 2.0 * float(trace.rho.max())
+    if widest <= tip:
+        yield Finding(
+            Code.CONTOUR_TOO_SMALL,
+            Severity.WARNING,
+            f"a flat tip of {tip:g} mm does not fit into this contour, which is {widest:.4g} mm"
+            " wide: it is not carved",
+            where=_at(region.name, *region.lines[0].start.tolist()),
+            measured=widest,
+            limit=tip,
+            unit="mm",
+        )
+        return
+    pieces = unreached(region.lines, cone.tip_mm)
+    if pieces:
+        area = sum(piece.area_mm2 for piece in pieces)
+        yield Finding(
+            Code.UNREACHED,
+            Severity.WARNING,
+            f"a flat tip of {tip:g} mm leaves {len(pieces)} corners or narrow places uncut,"
+            f" {area:.4g} mm² in all: use a bit with a smaller tip",
+            where=_at(region.name, *pieces[0].at_mm),
+            measured=area,
+            unit="mm2",
+        )
+
+
+def _limited(
+    region: _Region, trace: Trace, floor: list[Floats], limit_mm: float
+) -> Iterator[Finding]:
+    if floor:
+        row = int(np.argmax(trace.rho))
+        area = floor_area(floor)
+        yield Finding(
+            Code.DEPTH_LIMITED,
+            Severity.WARNING,
+            f"a floor of {area:.6g} mm² is left: up to {2.0 * trace.rho[row]:.4g} mm wide, bit and"
+            f" depth allow {2.0 * limit_mm:.4g} mm; clear it with a pocket and a flat tool",
+            where=_at(region.name, float(trace.x[row]), float(trace.y[row])),
+            measured=area,
+            unit="mm2",
+        )
+
+
+def _at(name: str, x: float, y: float) -> str:
+    return f"{name} at X {x:.4f} Y {y:.4f}"
+
+
+# The pieces of a carved region: where the tip of a V bit runs, at the radius that it cuts.
+#
+# A disc of radius ρ in the region is what a cone cuts at the surface when its tip is as deep as ρ
+# asks. `grooves` are stretches of the medial axis with low ≤ ρ ≤ high; where discs are larger than
+# `high`, the `walls` run beside the boundary at that distance. Together they are where the middle
+# of the largest disc allowed runs when it rolls along the boundary.
+
+LEVEL_EPS_MM = 1e-9
+"""A radius nearer than this to a limit is the limit: rounding, along walls that are parallel."""
+
+FIT_SHARE = 0.75
+"""Share of the tolerance for lines and arcs through samples of the axis; what lies between the
+samples takes less than the rest."""
+
+FEWEST_FOR_ARC = 5
+"""An arc is laid through three of at least so many samples."""
+
+LEAST_SWEEP_RAD = 1e-4
+"""What turns less is no arc: its centre would lie too far off to be counted with."""
+
+MOST_SWEEP_RAD = 2.0
+"""An arc of the axis that turns farther is divided."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Radii mm from `low` to `high`, what the pass before has left and what this one may cut; and
+    the tolerance, mm."""
+
+    low_mm: float
+    high_mm: float
+    tolerance_mm: float
+
+
+def with_level(boundary: Boundary, trace: Trace, level_mm: float) -> Trace:
+    """The trace with a row of exactly this radius wherever the radius passes it."""
+    near = np.abs(trace.rho - level_mm) <= LEVEL_EPS_MM
+    trace = _with_radius(trace, np.where(near, level_mm, trace.rho))
+    above = np.sign(trace.rho - level_mm)
+    same = trace.element[1:] == trace.element[:-1]
+    at = np.flatnonzero(same & (above[1:] * above[:-1] < 0.0))
+    guess = np.column_stack([trace.partner[at], trace.partner[at + 1]])
+    low, high = trace.t[at].copy(), trace.t[at + 1].copy()
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        rho = discs_at(boundary, trace.element[at], middle, guess).rho
+        is_low = np.sign(rho - level_mm) == above[at]
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+    found = discs_at(boundary, trace.element[at], low, guess)
+    both = concatenated([trace, _with_radius(found, np.full(len(at), level_mm))])
+    return both.rows(np.lexsort((both.t, both.element)))
+
+
+def _with_radius(trace: Trace, rho: Floats) -> Trace:
+    return Trace(trace.element, trace.t, trace.x, trace.y, rho, trace.partner, trace.u)
+
+
+def grooves(trace: Trace, band: Band) -> list[Floats]:
+    """Pieces (n, 4) of x, y, rho, bulge: the axis within the band, each stretch once; an arc
+    whose radius changes changes it evenly along its sweep.
+
+    `trace` has rows at both limits of the band.
+    """
+    rho = trace.rho
+    least, most = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
+    same = (trace.element[1:] == trace.element[:-1]) & (trace.partner[1:] == trace.partner[:-1])
+    # Every stretch is seen from both its sides: from the first one it is taken.
+    own = trace.element[1:] < trace.partner[1:]
+    wanted = same & own & (least >= band.low_mm) & (most <= band.high_mm) & (most > band.low_mm)
+    tolerance = FIT_SHARE * band.tolerance_mm
+    return [_fitted(trace.discs[i : j + 1], tolerance) for i, j in _stretches(trace, wanted)]
+
+
+def walls(boundary: Boundary, trace: Trace, high_mm: float) -> list[Floats]:
+    """Pieces (2, 4) of x, y, rho, bulge beside the boundary where discs are larger than high."""
+    rho = trace.rho
+    least, most = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
+    same = trace.element[1:] == trace.element[:-1]
+    wanted = same & (least >= high_mm) & (most > high_mm)
+    return [
+        _wall(boundary, int(trace.element[i]), (float(trace.t[i]), float(trace.t[j])), high_mm)
+        for i, j in _stretches(trace, wanted, partners=False)
+    ]
+
+
+def floor_area(pieces: list[Floats]) -> float:
+    """Area within the walls, mm²: they run round it with the floor on their left."""
+    total = 0.0
+    for piece in pieces:
+        (ax, ay, _, bulge), (bx, by, _, _) = piece.tolist()
+        total += 0.5 * (ax * by - ay * bx)
+        if bulge != 0.0 and math.hypot(bx - ax, by - ay) > POSITION_EPS_MM:
+            lens = Polyline(np.array([[ax, ay, bulge], [bx, by, 0.0]]), closed=True)
+            total += signed_area(lens)
+    return total
+
+
+def _stretches(trace: Trace, wanted: Bools, partners: bool = True) -> list[tuple[int, int]]:
+    """First and last rows of the runs of wanted gaps, within an element (and one partner)."""
+    joined = wanted[1:] & wanted[:-1] & (trace.element[2:] == trace.element[:-2])
+    if partners:
+        joined &= trace.partner[2:] == trace.partner[:-2]
+    first = np.flatnonzero(wanted & ~np.append(False, joined))
+    last = np.flatnonzero(wanted & ~np.append(joined, False))
+    return list(zip(first.tolist(), (last + 1).tolist(), strict=True))
+
+
+def _wall(
+    boundary: Boundary, element: int, part: tuple[float, float], distance_mm: float
+) -> Floats:
+    """What runs beside a part of an element: a line, or an arc of the same sweep."""
+    from camtool.kernels.discs import SWEEP, frame
+
+    rows = []
+    for t in part:
+        x, y, nx, ny = frame(boundary.table, element, t)
+        rows.append([x + distance_mm * nx, y + distance_mm * ny, distance_mm, 0.0])
+    rows[0][3] = float(np.tan(0.25 * (part[1] - part[0]) * boundary.table[element, SWEEP]))
+    return np.array(rows)
+
+
+def _fitted(discs: Floats, tolerance_mm: float) -> Floats:
+    """Lines and arcs through some of the discs (n, 3), all others within the tolerance."""
+    pieces, waiting = [], [(0, len(discs) - 1)]
+    while waiting:
+        i, j = waiting.pop()
+        bulge = _bulge(discs[i : j + 1], tolerance_mm)
+        if bulge is None:
+            middle = (i + j) // 2
+            waiting += [(middle, j), (i, middle)]
+        else:
+            pieces.append([*discs[i], bulge])
+    return np.array([*pieces, [*discs[-1], 0.0]])
+
+
+def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
+    """The bulge of the line (0) or arc that stands for these discs; None if neither does."""
+    inner = discs[1:-1]
+    begin, end = discs[:1], discs[-1:]
+    if len(inner) == 0 or off_chord(inner, begin, end).max() <= tolerance_mm:
+        return 0.0
+    if len(discs) < FEWEST_FOR_ARC:
+        return None
+    # The arc through begin, a point P and end turns by 2·(π − angle at P); bulge = tan(turn / 4).
+    middle = discs[len(discs) // 2, :2]
+    to_begin, to_end = begin[0, :2] - middle, end[0, :2] - middle
+    across = to_begin[0] * to_end[1] - to_begin[1] * to_end[0]
+    sweep = 2.0 * (np.pi - abs(np.arctan2(across, to_begin @ to_end)))
+    if not LEAST_SWEEP_RAD <= sweep <= MOST_SWEEP_RAD:
+        return None
+    bulge = float(np.copysign(np.tan(0.25 * sweep), -across))
+    return bulge if _off_arc(inner, begin[0], end[0], bulge) <= tolerance_mm else None
+
+
+def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
+    """How far discs lie from an arc along which the radius changes evenly with the sweep."""
+    chord = end[:2] - begin[:2]
+    turned = np.array([-chord[1], chord[0]])
+    centre = 0.5 * (begin[:2] + end[:2]) + (1.0 - bulge**2) / (4.0 * bulge) * turned
+    arm, first = inner[:, :2] - centre, begin[:2] - centre
+    angle = np.arctan2(first[0] * arm[:, 1] - first[1] * arm[:, 0], arm @ first)
+    part = np.clip(angle / (4.0 * np.arctan(bulge)), 0.0, 1.0)
+    radius = begin[2] + part * (end[2] - begin[2])
+    aside = np.abs(np.hypot(arm[:, 0], arm[:, 1]) - np.hypot(*first))
+    return float((aside + np.abs(inner[:, 2] - radius)).max())
+
+
+# Pieces of a carved region as a graph: twigs that cut nothing go, and the rest is walked.
+#
+#     pieces ──ends that meet──▶ graph ──twigs off──▶ graph ──as few walks as there can be──▶ walks
+#
+# A connected graph in which 2k places have an odd number of ends is walked in k walks (in one when
+# k is 0): it is joined by k jumps between near places to one closed walk, that is found piece by
+# piece (Hierholzer), and cut where the tool would jump. Short pieces between two such places are
+# walked twice instead, into a corner and back, which saves a jump each.
+
+MEET_MM = 1e-4
+"""Ends of pieces that are nearer than this meet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """P pieces between V places: `ends` (P, 2) rows of `places` (V, 3) of x, y, rho."""
+
+    pieces: list[Floats]
+    ends: Ints
+    places: Floats
+
+
+def graph_of(pieces: list[Floats]) -> Graph:
+    """The graph of pieces (n, 4) of x, y, rho, bulge; those that go nowhere are left out."""
+    pieces = [piece for piece in pieces if _extent(piece) > MEET_MM]
+    if not pieces:
+        return Graph([], np.empty((0, 2), dtype=np.int64), np.empty((0, 3)))
+    discs = np.concatenate([piece[[0, -1], :3] for piece in pieces])
+    place, _ = merge_points(discs[:, :2], MEET_MM)
+    first = np.unique(place, return_index=True)[1]
+    return Graph(pieces, place.reshape(-1, 2), discs[first])
+
+
+def _extent(piece: Floats) -> float:
+    """How far the piece leaves its start, by its points; above 0 for a full turn."""
+    return float(np.hypot(*(piece[1:, :2] - piece[0, :2]).T).max())
+
+
+def without_twigs(graph: Graph, tolerance_mm: float) -> Graph:
+    """The graph without its twigs whose discs reach no farther than the tolerance out of the disc
+    at the other end of the twig.
+
+    A disc (m, ρ) reaches |m − m'| + ρ − ρ' out of another one (m', ρ'); along a twig of several
+    pieces these add up at most.
+    """
+    degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
+    beyond = np.zeros(len(graph.places))
+    kept: Bools = np.ones(len(graph.pieces), dtype=np.bool_)
+    at_place = _pieces_at(graph)
+    waiting = sorted(np.flatnonzero(degree == 1).tolist(), key=lambda v: graph.places[v, 2])
+    while waiting:
+        leaf = waiting.pop(0)
+        row = next((row for row in at_place[leaf] if kept[row]), None)
+        if row is None:
+            continue
+        inner = int(graph.ends[row].sum()) - leaf
+        step = graph.places[leaf] - graph.places[inner]
+        out = beyond[leaf] + np.hypot(step[0], step[1]) + step[2]
+        if out > tolerance_mm:
+            continue
+        kept[row] = False
+        beyond[inner] = max(beyond[inner], out)
+        degree[inner] -= 1
+        if degree[inner] == 1:
+            waiting.append(inner)
+    rows = np.flatnonzero(kept)
+    return Graph([graph.pieces[row] for row in rows], graph.ends[rows], graph.places)
+
+
+def _pieces_at(graph: Graph) -> list[list[int]]:
+    """The pieces that end at each place; twice where both ends do."""
+    at_place: list[list[int]] = [[] for _ in range(len(graph.places))]
+    for row, (a, b) in enumerate(graph.ends.tolist()):
+        at_place[a].append(row)
+        at_place[b].append(row)
+    return at_place
+
+
+def walks(graph: Graph, again_mm: float) -> list[Floats]:
+    """All pieces, joined to as few walks (n, 4) of x, y, rho, bulge as possible.
+
+    Pieces up to `again_mm` long may be walked twice. A walk begins at that of its ends where the
+    disc is smaller.
+    """
+    graph = _doubled(graph, again_mm)
+    ends = np.concatenate([graph.ends, _jumps(graph)])
+    result = []
+    for circuit in _circuits(ends, len(graph.places)):
+        for rows in _cut(circuit, len(graph.pieces)):
+            walk = _joined([_turned(graph.pieces[row], back) for row, back in rows])
+            result.append(_turned(walk, walk[-1, 2] < walk[0, 2]))
+    return result
+
+
+def _doubled(graph: Graph, again_mm: float) -> Graph:
+    """The graph with a second one of each short piece between two places with an odd number of
+    ends; the shortest first, each place once."""
+    odd = np.bincount(graph.ends.ravel(), minlength=len(graph.places)) % 2 == 1
+    lengths = [float(lengths_of(piece).sum()) for piece in graph.pieces]
+    again = []
+    for row in sorted(range(len(lengths)), key=lambda row: (lengths[row], row)):
+        a, b = graph.ends[row].tolist()
+        if lengths[row] <= again_mm and a != b and odd[a] and odd[b]:
+            odd[[a, b]] = False
+            again.append(row)
+    pieces = [*graph.pieces, *(graph.pieces[row] for row in again)]
+    return Graph(pieces, np.concatenate([graph.ends, graph.ends[again]]), graph.places)
+
+
+def lengths_of(path: Floats) -> Floats:
+    """(n−1,) lengths in the plane of the lines and arcs of a path (n, 4)."""
+    chord = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    bulge = path[:-1, 3]
+    safe = np.where(bulge != 0.0, bulge, 1.0)
+    stretch = np.where(bulge != 0.0, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
+    return np.asarray(chord * stretch)
+
+
+def _jumps(graph: Graph) -> Ints:
+    """(k, 2) pairs of the places of one component that have an odd number of ends."""
+    degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
+    component = _components(graph)
+    odd = np.flatnonzero(degree % 2).tolist()
+    pairs = []
+    while odd:
+        one = odd.pop(0)
+        mates = [v for v in odd if component[v] == component[one]]
+        apart = graph.places[mates, :2] - graph.places[one, :2]
+        mate = mates[int(np.argmin((apart**2).sum(axis=1)))]
+        odd.remove(mate)
+        pairs.append((one, mate))
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _components(graph: Graph) -> list[int]:
+    """The component of each place."""
+    root = list(range(len(graph.places)))
+
+    def top(row: int) -> int:
+        while root[row] != row:
+            root[row] = root[root[row]]
+            row = root[row]
+        return row
+
+    for a, b in graph.ends.tolist():
+        one, other = top(a), top(b)
+        root[max(one, other)] = min(one, other)
+    return [top(row) for row in range(len(root))]
+
+
+def _circuits(ends: Ints, count: int) -> Iterator[list[tuple[int, bool]]]:
+    """Closed walks (row, backwards) over all edges, one for each component; all degrees even."""
+    edges: list[list[int]] = [[] for _ in range(count)]
+    for row, (a, b) in enumerate(ends.tolist()):
+        edges[a].append(row)
+        edges[b].append(row)
+    used = [False] * len(ends)
+    for start in range(count):
+        done: list[tuple[int, bool]] = []
+        stack: list[tuple[int, tuple[int, bool] | None]] = [(start, None)]
+        while stack:
+            place, came = stack[-1]
+            while edges[place] and used[edges[place][-1]]:
+                edges[place].pop()
+            if edges[place]:
+                row = edges[place].pop()
+                used[row] = True
+                a, b = ends[row].tolist()
+                stack.append((b, (row, False)) if a == place else (a, (row, True)))
+            else:
+                stack.pop()
+                if came is not None:
+                    done.append(came)
+        if done:
+            yield done[::-1]
+
+
+def _cut(circuit: list[tuple[int, bool]], count: int) -> list[list[tuple[int, bool]]]:
+    """The walks between the jumps (rows from `count` on) of a closed walk."""
+    first = next((i for i, (row, _) in enumerate(circuit) if row >= count), None)
+    if first is None:
+        return [circuit]
+    parts: list[list[tuple[int, bool]]] = [[]]
+    for row, back in circuit[first + 1 :] + circuit[:first]:
+        if row >= count:
+            parts.append([])
+        else:
+            parts[-1].append((row, back))
+    return [part for part in parts if part]
+
+
+def _turned(piece: Floats, back: bool) -> Floats:
+    """The piece run backwards: the bulges move to the other ends and change their sign."""
+    if not back:
+        return piece
+    turned = piece[::-1].copy()
+    turned[:-1, 3] = 0.0 - piece[-2::-1, 3]
+    turned[-1, 3] = 0.0
+    return turned
+
+
+def _joined(pieces: list[Floats]) -> Floats:
+    """Pieces that meet, one after the other, as one."""
+    rows = [piece[:-1] for piece in pieces]
+    return np.concatenate([*rows, pieces[-1][-1:]])

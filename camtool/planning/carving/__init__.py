@@ -1,1 +1,0 @@
-"""Carving with a V bit along the medial axis."""

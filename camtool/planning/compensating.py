@@ -1,0 +1,516 @@
+"""A toolpath bent beforehand, so that the slides come out where it was wanted (`compensated`).
+
+wanted ─linear─▶ as the motors must go: scale and squareness undone, arcs stay arcs
+       ─take up─▶ play taken up at reversals, and what the controller compensates wrongly
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import msgspec
+import numpy as np
+
+from camtool.errors import GeometryError
+from camtool.geometry.curves import EllipseCurve
+from camtool.geometry.fit import fit_curve
+from camtool.kernels.lattice import to_steps
+from camtool.machine.model import Axis, Machine, PlayCells
+from camtool.planning.reversing import Residual, residual
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Bent, Floats, Kind, Move, Toolpath
+
+__all__ = ["compensated"]
+
+
+# Both stages in their order.
+
+
+def compensated(toolpath: Toolpath, machine: Machine) -> Bent:
+    """`toolpath` bent against the scale, squareness and play of the machine, so that its slides
+    come out where `toolpath` says. Sources of the rows are kept; blocks are not.
+
+    What remains: at a reversal that the controller compensates by too much, half of the excess
+    (see `take_up`), and the random part of the mechanics.
+    """
+    motors = motor_path(toolpath, machine)
+    bent = taken_up(motors.toolpath, machine)
+    return Bent(bent.toolpath, motors.row[bent.row])
+
+
+# Scale and squareness undone: where the motors must go for the slides to be where wanted.
+#
+# A slide is where its motor is times s = `real_step_mm` / `coded_step_mm` of the axis, about part
+# zero, and Y leans by q (`camtool.simulation.mechanics`):
+#
+#     x = s_x m_x + s_y m_y tan q,  y = s_y m_y    so    m_y = y / s_y,  m_x = (x − y tan q) / s_x.
+#
+# An arc stays an arc where that changes its radius alike in all
+# directions, or by less than the machine's fit tolerance; else it becomes an ellipse, which is
+# fitted by arcs within that tolerance.
+
+
+def motor_matrix(machine: Machine) -> Floats:
+    """(3, 3): wanted mm to the mm that the motors must be sent to."""
+    square = np.eye(3)
+    square[0, 1] = -math.tan(machine.mechanics.squareness_rad)
+    return np.diag([axis.coded_step_mm / axis.real_step_mm for axis in machine.axes]) @ square
+
+
+def motor_path(toolpath: Toolpath, machine: Machine) -> Bent:
+    """The path of the motors for slides on `toolpath`; itself where both are as they should."""
+    matrix = motor_matrix(machine)
+    if np.array_equal(matrix, np.eye(3)):
+        return Bent(toolpath, np.arange(len(toolpath)))
+    return _Mapped(toolpath, matrix, machine.defaults.fit_tolerance_mm).bent()
+
+
+class _Mapped:
+    """One toolpath on its way through the matrix."""
+
+    def __init__(self, toolpath: Toolpath, matrix: Floats, tolerance_mm: float) -> None:
+        self._toolpath, self._matrix, self._tolerance_mm = toolpath, matrix, tolerance_mm
+        plane = matrix[:2, :2]
+        sizes = np.linalg.svd(plane, compute_uv=False)
+        self._unround = float(sizes[0] - sizes[-1])
+        self._scale = float(sizes.mean())
+        self._b = ToolpathBuilder(self._to(tuple(toolpath.start.tolist())))
+
+    def bent(self) -> Bent:
+        sweeps = self._toolpath.sweeps()
+        rows: list[int] = []
+        for move in self._toolpath:
+            self._b.source = move.source
+            end = self._to(move.end)
+            if move.kind == Kind.RAPID:
+                self._b.rapid(*end)
+            elif move.kind == Kind.LINE:
+                self._b.line(*end, feed=_feed_of(move))
+            elif move.kind in (Kind.ARC_CW, Kind.ARC_CCW):
+                self._arc(move, end, float(sweeps[move.index]))
+            else:
+                _event(self._b, move, self._toolpath)
+                self._b.moved_to(*end)
+            rows += [move.index] * (len(self._b) - len(rows))
+        return Bent(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
+
+    def _to(self, point: tuple[float, ...]) -> Point:
+        x, y, z = (self._matrix @ np.array(point)).tolist()
+        return x, y, z
+
+    def _arc(self, move: Move, end: Point, sweep: float) -> None:
+        if move.centre is None:
+            raise GeometryError("an arc without a centre", where=f"move {move.index}")
+        centre = np.array(move.centre)
+        spoke = np.array(move.start[:2]) - centre
+        radius = float(np.hypot(*spoke))
+        plane = self._matrix[:2, :2]
+        middle = plane @ centre
+        level = move.start[2] == move.end[2]
+        if radius * self._unround <= self._tolerance_mm or not level:
+            x, y = middle.tolist()
+            ccw = move.kind == Kind.ARC_CCW
+            self._b.arc(*end, centre=(x, y), ccw=ccw, feed=_feed_of(move))
+            return
+        angle = float(np.arctan2(spoke[1], spoke[0]))
+        axes = plane * radius
+        ellipse = EllipseCurve(middle, axes[:, 0], axes[:, 1], angle, angle + sweep)
+        vertices = fit_curve(ellipse, self._tolerance_mm).vertices
+        add_vertices(self._b, vertices, end, _feed_of(move))
+
+
+def add_vertices(builder: ToolpathBuilder, vertices: Floats, end: Point, feed: float) -> None:
+    """The lines and arcs between vertices (n, 3) x, y, bulge, the last of which is `end`."""
+    for (x0, y0, bulge), (x1, y1, _) in zip(
+        vertices[:-1].tolist(), [*vertices[1:-1].tolist(), list(end)], strict=True
+    ):
+        if bulge == 0.0:
+            builder.line(x1, y1, feed=feed)
+            continue
+        # Centre: off the middle of the chord by (1 − b²)/(4b) of it, to the left for b > 0.
+        share = (1.0 - bulge * bulge) / (4.0 * bulge)
+        centre = (
+            0.5 * (x0 + x1) - share * (y1 - y0),
+            0.5 * (y0 + y1) + share * (x1 - x0),
+        )
+        builder.arc(x1, y1, centre=centre, ccw=bulge > 0.0, feed=feed)
+
+
+def _feed_of(move: Move) -> float:
+    return float("nan") if move.feed is None else move.feed
+
+
+def _event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None:
+    """The same event; a message keeps its words."""
+    if move.kind == Kind.MESSAGE and move.value is not None:
+        builder.message(toolpath.texts[int(move.value)])
+    else:
+        builder.event(move.kind, move.value)
+
+
+# Play taken up at reversals, and what a controller compensates wrongly.
+#
+# Driven in the direction d = ±1 and engaged, a slide stands at an offset from where the controller
+# believes it to be (`camtool.planning.reversing`):
+#
+#     slide = position + e(d)        so a wanted x asks for the position x − e(d).
+#
+# When an axis reverses, that position jumps by e(−d) − e(d) =: J in the new direction d:
+#
+# - J > 0, less is compensated than the play: the axis goes on by J alone, a line on which the
+# slide does not move, and then along the path. Nothing is left over. - J < 0, the controller
+# compensates by r = −J too much: its first step back throws the slide r ahead. So the axis first
+# overshoots by `OVERSHOOT` · r, then makes one step back, which leaves the slide (1 − `OVERSHOOT`)
+# · r ahead, and holds until the path has come as far. With one half the largest error is r/2, at
+# the reversal only; without any of this it is r all the way back. An axis that still waits from
+# the reversal before stands out already, and overshoots by the rest. In the cut nothing does
+# better: the step throws the slide from one end of a length r to the other, wherever it is made,
+# and one of the two ends is r/2 or more off the place of the reversal.
+#
+# Where the play changes with the region of the table, e does too: a step towards d is taken alone,
+# one against it is waited for. Rapids and other moves in the air take up the play on their way. An
+# axis that does not move keeps what it has.
+
+OVERSHOOT = 0.5
+"""The share of what the controller compensates too much that an axis overshoots at a reversal."""
+
+STILL_STEPS = 0.5
+"""An axis that goes less than this much of a coded step does not move."""
+
+KICK_STEPS = 1.0
+"""The step back that makes the controller compensate, in coded steps."""
+
+AHEAD_MM = 1e-9
+"""Positions nearer than this are one."""
+
+
+@dataclass
+class _Drive:
+    """An axis on its way: where the controller stands, and in which direction ±1 it went last;
+    `residual` is that of the region that the tool is in."""
+
+    axis: Axis
+    residual: Residual
+    at: float
+    sense: int
+    step_mm: float
+
+    def asked(self, value: float, sense: int) -> float:
+        """The position that puts the slide on `value` when driven towards `sense`."""
+        return value - self.residual.error_mm(sense)
+
+    def sense_of(self, begin: float, end: float) -> int:
+        """The direction of a move; the last one where it does not move."""
+        way = end - begin
+        if abs(way) < STILL_STEPS * self.axis.coded_step_mm:
+            return self.sense
+        return 1 if way > 0.0 else -1
+
+    def free(self, begin: float, end: float) -> None:
+        """A move in the air to `end`: whatever direction takes the axis to where it is asked."""
+        for sense in (self.sense_of(begin, end), -self.sense_of(begin, end)):
+            to = self.asked(end, sense)
+            if (to - self.at) * sense > 0.0 or (sense == self.sense and to == self.at):
+                self.at, self.sense = to, sense
+                return
+
+
+def taken_up(toolpath: Toolpath, machine: Machine) -> Bent:
+    """The positions that a controller must be given for slides on `toolpath` (in motor mm); the
+    same toolpath where there is neither play nor compensation."""
+    regions = Regions(machine)
+    if not regions.matter:
+        return Bent(toolpath, np.arange(len(toolpath)))
+    return _TakenUp(toolpath, machine, regions).bent()
+
+
+class _TakenUp:
+    def __init__(self, toolpath: Toolpath, machine: Machine, regions: Regions) -> None:
+        self._toolpath, self._regions = toolpath, regions
+        self._home = machine.controller.machine_zero_mm
+        first = 1 if machine.controller.start_direction == "+" else -1
+        start = toolpath.start.tolist()
+        self._drives = [
+            _Drive(axis, residual, value, first, KICK_STEPS * _step_mm(axis))
+            for axis, residual, value in zip(
+                machine.axes, regions.residuals(start), start, strict=True
+            )
+        ]
+        self._b = ToolpathBuilder(self._place())
+
+    def bent(self) -> Bent:
+        rows: list[int] = []
+        sweeps = self._toolpath.sweeps()
+        for move in self._toolpath:
+            self._b.source = move.source
+            if move.kind == Kind.RAPID:
+                self._enter(move.end)
+                for drive, begin, end in zip(self._drives, move.start, move.end, strict=True):
+                    drive.free(begin, end)
+                self._b.rapid(*self._place())
+            elif move.kind in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
+                for stretch in stretches(move, float(sweeps[move.index])):
+                    for part in self._regions.parts(stretch):
+                        self._enter(part.at(0.5))
+                        self._cut(part, move)
+            else:
+                self._event(move)
+            rows += [move.index] * (len(self._b) - len(rows))
+        return Bent(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
+
+    def _enter(self, point: Point) -> None:
+        """From here on the play is that of the region around a point."""
+        for drive, found in zip(self._drives, self._regions.residuals(point), strict=True):
+            drive.residual = found
+
+    def _place(self) -> Point:
+        x, y, z = (drive.at for drive in self._drives)
+        return x, y, z
+
+    def _line(self, move: Move) -> None:
+        """To where the drives now stand, if that is elsewhere."""
+        if math.dist(self._b.position, self._place()) > AHEAD_MM:
+            self._b.line(*self._place(), feed=_feed(move))
+
+    def _cut(self, stretch: Stretch, move: Move) -> None:
+        """A stretch at a feed: take up, overshoot, hold, and follow."""
+        self._overshoot(stretch, move)
+        for drive, begin, end in zip(self._drives, stretch.begin, stretch.end, strict=True):
+            drive.sense = drive.sense_of(begin, end)
+            ask = drive.asked(begin, drive.sense)
+            if (ask - drive.at) * drive.sense > AHEAD_MM:
+                drive.at = ask
+        self._line(move)
+        shares = [self._joins(index, stretch) for index in range(3)]
+        low = 0.0
+        for high in sorted({share for share in shares if 0.0 < share < 1.0} | {1.0}):
+            self._follow(stretch.part(low, high), [share <= low for share in shares], move)
+            low = high
+
+    def _overshoot(self, stretch: Stretch, move: Move) -> None:
+        """Before a reversal that the controller compensates too much: out, and one step back."""
+        back = []
+        for drive, begin, end in zip(self._drives, stretch.begin, stretch.end, strict=True):
+            sense = drive.sense_of(begin, end)
+            excess = (drive.at - drive.asked(begin, sense)) * sense
+            if sense != drive.sense and excess > AHEAD_MM:
+                thrown = (drive.asked(begin, drive.sense) - drive.asked(begin, sense)) * sense
+                drive.at -= max(excess - (1.0 - OVERSHOOT) * thrown, 0.0) * sense
+                back.append((drive, sense))
+        if back:
+            self._line(move)
+            for drive, sense in back:
+                drive.at += drive.step_mm * sense
+                drive.sense = sense
+            self._line(move)
+
+    def _joins(self, index: int, stretch: Stretch) -> float:
+        """The share of the stretch from which on an axis follows it: 0 unless it stands ahead."""
+        drive = self._drives[index]
+        begin, end = stretch.begin[index], stretch.end[index]
+        ahead = (drive.at - drive.asked(begin, drive.sense)) * drive.sense
+        if ahead <= AHEAD_MM:
+            return 0.0
+        if ahead >= abs(end - begin):
+            return 1.0
+        return stretch.where(index, drive.at + drive.residual.error_mm(drive.sense))
+
+    def _follow(self, part: Stretch, follows: list[bool], move: Move) -> None:
+        """One part of a stretch, on which each axis either follows or holds."""
+        offsets = []
+        for drive, begin, end, moves in zip(
+            self._drives, part.begin, part.end, follows, strict=True
+        ):
+            offsets.append(drive.asked(0.0, drive.sense))
+            if moves and begin != end:
+                drive.at = drive.asked(end, drive.sense)
+        if part.centre is None or not (follows[0] and follows[1]):
+            self._line(move)
+            return
+        centre = (part.centre[0] + offsets[0], part.centre[1] + offsets[1])
+        ccw = move.kind == Kind.ARC_CCW
+        self._b.arc(*self._place(), centre=centre, ccw=ccw, feed=_feed(move))
+
+    def _event(self, move: Move) -> None:
+        homes = {Kind.HOME_XY: (0, 1), Kind.HOME_Z: (2,)}.get(move.kind, ())
+        if move.kind == Kind.MESSAGE and move.value is not None:
+            self._b.message(self._toolpath.texts[int(move.value)])
+        else:
+            self._b.event(move.kind, move.value)
+        for index in homes:
+            drive = self._drives[index]
+            if drive.at != self._home[index]:
+                drive.sense = 1 if self._home[index] > drive.at else -1
+            drive.at = self._home[index]
+        self._b.moved_to(*self._place())
+
+
+def _step_mm(axis: Axis) -> float:
+    """The least whole number of steps that a program can say."""
+    steps = to_steps(axis.resolution_mm or 0.0, axis.coded_step_mm)
+    return max(1.0, float(steps)) * axis.coded_step_mm
+
+
+def _feed(move: Move) -> float:
+    return math.nan if move.feed is None else move.feed
+
+
+# What play and compensation leave over in each region of the table, seen from the motors.
+#
+# A wanted path is cut at the edges of the regions. They belong to positions of the controller,
+# which are the wanted ones but for the play: near an edge the play of the neighbour may be taken.
+
+LEAST_SHARE = 1e-9
+"""An edge nearer than this share of a stretch to its end is that end."""
+
+
+class Regions:
+    """The residuals of a machine by place; play is divided by the scale, since the path is that
+    of the motors."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._cells: tuple[PlayCells | None, ...] = machine.play_map.used
+        self._zero = machine.controller.machine_zero_mm
+        self._plain = tuple(_residual(axis, machine, None) for axis in machine.axes)
+        self._by_cell: list[list[list[Residual]]] = [
+            [[_residual(axis, machine, play) for play in row] for row in one.play_mm]
+            if one is not None
+            else []
+            for axis, one in zip(machine.axes, self._cells, strict=True)
+        ]
+
+    @property
+    def matter(self) -> bool:
+        """Whether there is play or compensation anywhere."""
+        cells = [one for table in self._by_cell for row in table for one in row]
+        return any(one.matters for one in (*self._plain, *cells))
+
+    def residuals(self, point: Sequence[float]) -> tuple[Residual, ...]:
+        """(X, Y, Z) where the tool is at `point` mm."""
+        found = []
+        for axis, cells in enumerate(self._cells):
+            if cells is None:
+                found.append(self._plain[axis])
+                continue
+            column = bisect_right(cells.x_mm[1:-1], point[0] - self._zero[0])
+            row = bisect_right(cells.y_mm[1:-1], point[1] - self._zero[1])
+            found.append(self._by_cell[axis][row][column])
+        return tuple(found)
+
+    def parts(self, stretch: Stretch) -> Iterator[Stretch]:
+        """The stretch cut at the edges of all regions."""
+        shares = {0.0, 1.0}
+        for cells in self._cells:
+            if cells is None:
+                continue
+            for axis, edges in ((0, cells.x_mm), (1, cells.y_mm)):
+                low, high = sorted((stretch.begin[axis], stretch.end[axis]))
+                for edge in edges[1:-1]:
+                    value = edge + self._zero[axis]
+                    if low < value < high:
+                        share = stretch.where(axis, value)
+                        if LEAST_SHARE < share < 1.0 - LEAST_SHARE:
+                            shares.add(share)
+        if len(shares) == 2:
+            yield stretch
+            return
+        for begin, end in pairwise(sorted(shares)):
+            yield stretch.part(begin, end)
+
+
+def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
+    """Of an axis with this play, None: its own; compensation is whole steps."""
+    play = axis.backlash_mm if play_mm is None else play_mm
+    whole = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
+    at_motor = msgspec.structs.replace(
+        axis,
+        backlash_mm=play * axis.coded_step_mm / axis.real_step_mm,
+        compensation_mm=whole,
+    )
+    return residual(at_motor, machine.controller)
+
+
+# A stretch of a line or arc on which no axis turns back.
+
+Point = tuple[float, float, float]
+
+TURN_EPS_RAD = 1e-9
+"""A turning point nearer than this to an end of its arc is that end."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """From `begin` to `end` mm, straight, or about `centre` (x, y) with `sweep_rad`, CCW positive
+    and at most a quarter turn; Z in proportion to the way."""
+
+    begin: Point
+    end: Point
+    centre: tuple[float, float] | None = None
+    sweep_rad: float = 0.0
+
+    def at(self, share: float) -> Point:
+        """The point at this share (0 … 1) of the way; exact at the ends."""
+        if share <= 0.0:
+            return self.begin
+        if share >= 1.0:
+            return self.end
+        line = [a + share * (b - a) for a, b in zip(self.begin, self.end, strict=True)]
+        if self.centre is None:
+            return line[0], line[1], line[2]
+        (cx, cy), (x, y, _) = self.centre, self.begin
+        radius, back = math.hypot(x - cx, y - cy), math.hypot(self.end[0] - cx, self.end[1] - cy)
+        radius += share * (back - radius)
+        angle = math.atan2(y - cy, x - cx) + share * self.sweep_rad
+        return cx + radius * math.cos(angle), cy + radius * math.sin(angle), line[2]
+
+    def where(self, axis: int, value: float) -> float:
+        """The share of the way at which an axis that moves has this value; 0 or 1 beyond it.
+
+        On an arc the angle θ with c + r cos θ (sin θ for Y) = value; of its two solutions the one
+        within the sweep.
+        """
+        first, last = self.begin[axis], self.end[axis]
+        share = min(max((value - first) / (last - first), 0.0), 1.0)
+        if self.centre is None or axis == 2 or share in (0.0, 1.0):
+            return share
+        low, high = 0.0, 1.0  # the axis runs one way along the stretch: bisection cannot fail
+        rising = last > first
+        while high - low > np.finfo(np.float64).eps:
+            share = 0.5 * (low + high)
+            if share in (low, high):
+                break
+            if (self.at(share)[axis] < value) == rising:
+                low = share
+            else:
+                high = share
+        return high
+
+    def part(self, low: float, high: float) -> Stretch:
+        """The part between two shares of the way."""
+        return Stretch(self.at(low), self.at(high), self.centre, (high - low) * self.sweep_rad)
+
+
+def stretches(move: Move, sweep_rad: float) -> Iterator[Stretch]:
+    """A line as one stretch; an arc of this signed sweep cut where X or Y turns."""
+    if move.kind not in (Kind.ARC_CW, Kind.ARC_CCW) or move.centre is None:
+        yield Stretch(move.start, move.end)
+        return
+    whole = Stretch(move.start, move.end, move.centre, sweep_rad)
+    cx, cy = move.centre
+    sign = math.copysign(1.0, sweep_rad)
+    # Seen along the way the turning points are the next multiples of a quarter turn.
+    quarter = 0.5 * math.pi
+    ahead = sign * math.atan2(move.start[1] - cy, move.start[0] - cx)
+    turn = (math.floor(ahead / quarter) + 1.0) * quarter - ahead
+    shares = [0.0]
+    while turn < abs(sweep_rad) - TURN_EPS_RAD:
+        if turn > TURN_EPS_RAD:
+            shares.append(turn / abs(sweep_rad))
+        turn += quarter
+    shares.append(1.0)
+    for low, high in pairwise(shares):
+        yield whole.part(low, high)

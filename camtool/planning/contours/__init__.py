@@ -1,1 +1,0 @@
-"""A contour, its start chosen, as runs: passes, ramps, leads, tabs, starts, reliefs."""

@@ -1,1 +1,0 @@
-"""Pockets: rings or a zigzag, linked, entered, with what stays uncut told."""

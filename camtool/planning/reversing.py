@@ -1,0 +1,799 @@
+"""Fewer reversals while cutting: contours cut as runs in which no axis turns round.
+
+Each change of an axis's direction makes its slide cross the play, costs a compensation, and
+leaves an error where it happens. The PIC thesis saw parts fail above 16 of them (L3052-3057,
+L3207-3211) and saved them by machining in mirror halves (L2816-2841). So each contour is divided
+where an axis turns (`mirror`), the runs are cut in the directions that leave the smaller error,
+and every run is approached so that its axes are engaged (`approach`): all reversals happen in the
+air.
+
+A contour stays in one piece where the job asks for what only a whole one can have: leads, tabs,
+a ramp, a start by rule or by hand. Of the others of those, only the start is chosen. What cuts
+climb or conventionally keeps its direction, divided or not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import chain, pairwise
+
+import msgspec
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.distance import point_to_segment
+from camtool.geometry.measure import point_at, segment_lengths
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polyline, Segments, reverse
+from camtool.machine.controllers import Controller
+from camtool.machine.model import Axis, Machine, PlayCells
+from camtool.planning.items import Contour, Fixed, Item, Run
+from camtool.planning.job import Operation
+from camtool.units import UM_PER_MM
+
+LEAST_TURN_MM = 1e-6
+"""How far back an axis must come for a reversal, where no machine says how fine its steps are."""
+
+
+def reversals_of(cut: Polyline | Run, machine: Machine | None = None) -> tuple[int, int]:
+    """How often X and Y turn round between the first point of a path or run and its last one.
+
+    What comes back by less than half a step of the machine (`LEAST_TURN_MM` without one) is no
+    reversal; nor is the first motion, which an approach takes care of.
+    """
+    path = flat(cut.vertices) if isinstance(cut, Run) else cut
+    if path is None:
+        return 0, 0
+    parts = parts_of(path)
+    least = (LEAST_TURN_MM,) * 2
+    if machine is not None:
+        least = least_turn_mm(machine.axes.x), least_turn_mm(machine.axes.y)
+    x, y = (turns_of(parts.places[:, axis], path.closed, least[axis]) for axis in (0, 1))
+    return _within(x, parts), _within(y, parts)
+
+
+def _within(turns: Turns, parts: Parts) -> int:
+    """Turns of a way from the first place to the last: those at the start of a closed path are
+    no part of it."""
+    return int(((turns.first > 0) & (turns.last < len(parts))).sum())
+
+
+@dataclass
+class _Sums:
+    """Sums over all contours: runs, reversals while cutting, the greatest predicted error."""
+
+    runs: int = 0
+    reversals: int = 0
+    error_mm: float = 0.0
+
+    def add(self, runs: int, reversals: int, error_mm: float) -> None:
+        """One contour more."""
+        self.runs += runs
+        self.reversals += reversals
+        self.error_mm = max(self.error_mm, error_mm)
+
+
+@dataclass
+class _Counts:
+    """What changes; `whole`: why contours stayed in one piece, with the names of those."""
+
+    before: _Sums = field(default_factory=_Sums)
+    after: _Sums = field(default_factory=_Sums)
+    whole: dict[str, list[str]] = field(default_factory=dict)
+
+
+def fewer_reversals(
+    items: Sequence[Item], machine: Machine
+) -> tuple[tuple[Item, ...], tuple[Finding, ...]]:
+    """The items with contours replaced by runs that reverse no axis while cutting, in the order
+    of the contours, and what that changes; items of `Fixed` runs stay.
+
+    An axis without play and compensation may reverse as it likes. The runs of a contour together
+    are the contour: they meet exactly, keep its name, source and setting, and know the whole path
+    as their `outline`. `PLAY_NOT_KNOWN` when neither axis has any: nothing is changed then.
+    """
+    residual = residuals(machine)
+    if not any(each.matters for each in residual):
+        return tuple(items), (_no_play(machine),)
+    counts = _Counts()
+    found: list[Item] = []
+    for item in items:
+        if isinstance(item, Fixed):
+            found.append(item)
+        else:
+            found.extend(_runs_of(item, machine, residual, counts))
+    return tuple(found), tuple(_told(counts))
+
+
+def _runs_of(
+    contour: Contour, machine: Machine, residual: tuple[Residual, Residual], counts: _Counts
+) -> list[Item]:
+    parts = parts_of(contour.path)
+    turns = _turns(parts, machine, residual)
+    division = Division.of(parts, turns, residual, either_way=not _keeps_direction(contour))
+    closed, levels = contour.path.closed, len(contour.setting.levels_mm)
+    count, error_mm = len(turns[0]) + len(turns[1]), drawn_error_mm(division)
+    at_start = count - sum(_within(each, parts) for each in turns)
+    runs = 1 if closed or contour.reversible else levels
+    counts.before.add(runs, count * levels - at_start, error_mm)
+    reason = _stays_whole(contour.setting.operation)
+    if not count and (closed or reason):
+        counts.after.add(runs, 0, error_mm)
+        return [contour]
+    if not reason:
+        pieces = division.pieces()
+        counts.after.add(len(pieces) * levels, 0, max(piece.error_mm for piece in pieces))
+        return [
+            _part(contour, parts.stretch(piece.first, piece.last), piece.backward)
+            for piece in pieces
+        ]
+    counts.whole.setdefault(reason, []).append(contour.name)
+    if closed and contour.setting.operation.start == "nearest":
+        contour, at_start = _begun_at_turns(contour, parts, turns)
+    counts.after.add(runs, count * levels - at_start, error_mm)
+    return [contour]
+
+
+def _turns(
+    parts: Parts, machine: Machine, residual: tuple[Residual, Residual]
+) -> tuple[Turns, Turns]:
+    x, y = (
+        turns_of(parts.places[:, index], parts.path.closed, least_turn_mm(axis))
+        if residual[index].matters
+        else no_turns(len(parts))
+        for index, axis in enumerate((machine.axes.x, machine.axes.y))
+    )
+    return x, y
+
+
+def _keeps_direction(contour: Contour) -> bool:
+    """Whether the side on which the teeth cut was asked for, and there is a side."""
+    operation = contour.setting.operation
+    wide = operation.tool.diameter_mm > 0.0 and contour.material_left is not None
+    return operation.direction != "drawn" and wide
+
+
+def may_divide(operation: Operation) -> bool:
+    """Whether contours of this operation may be cut as several runs."""
+    return not _stays_whole(operation)
+
+
+def _stays_whole(operation: Operation) -> str:
+    """Why contours of this operation are not divided; "" when they may be."""
+    if operation.tabs is not None:
+        return "tabs are counted along whole contours"
+    if operation.lead_in.kind != "none" or operation.lead_out.kind != "none":
+        return "each run would need leads of its own"
+    if operation.entry.kind != "plunge":
+        return "the way down along the contour would reverse in each run"
+    if operation.start != "nearest":
+        return "the job says where contours start"
+    return ""
+
+
+def _part(contour: Contour, path: Polyline, backward: bool) -> Contour:
+    """A run of a contour; one that is the whole of an open contour keeps no other outline."""
+    left = contour.material_left
+    return replace(
+        contour,
+        path=reverse(path) if backward else path,
+        reversible=False,
+        starts=np.empty(0, dtype=np.int64),
+        material_left=left if left is None else left != backward,
+        outline=contour.path if contour.path.closed else contour.outline,
+    )
+
+
+def _begun_at_turns(
+    contour: Contour, parts: Parts, turns: tuple[Turns, Turns]
+) -> tuple[Contour, int]:
+    """The closed contour with only those starts at which the most turns happen in the air, and
+    how many do: two at most, one of X and one of Y."""
+    count = len(parts)
+    if len(contour.starts):
+        at = np.flatnonzero(parts.begin == 0.0)[contour.starts]
+    else:
+        ends = [np.append(each.first, each.last) for each in turns]
+        at = np.unique(np.concatenate(ends) % count)
+    if len(at) == 0:
+        return contour, 0
+    held = [
+        ((at[:, None] - each.first) % count <= each.last - each.first).any(axis=1)
+        for each in turns
+    ]
+    saved = held[0].astype(np.int64) + held[1]
+    best = saved == saved.max()
+    if len(contour.starts):
+        return replace(contour, starts=contour.starts[best]), int(saved.max())
+    path, starts = parts.with_vertices(at[best])
+    return replace(contour, path=path, starts=starts), int(saved.max())
+
+
+def _told(counts: _Counts) -> Iterator[Finding]:
+    before, after = counts.before, counts.after
+    if before.reversals:
+        yield Finding(
+            Code.REVERSALS_IN_AIR,
+            Severity.INFO,
+            f"{before.reversals} reversals while cutting become {after.reversals}: {before.runs}"
+            f" runs are cut as {after.runs}; what play leaves over is at most"
+            f" {after.error_mm * UM_PER_MM:.3g} µm, not {before.error_mm * UM_PER_MM:.3g} µm",
+            measured=float(after.reversals),
+            limit=float(before.reversals),
+        )
+    for reason, names in counts.whole.items():
+        yield Finding(
+            Code.REVERSALS_IN_AIR,
+            Severity.INFO,
+            f"{len(names)} contours that turn back are cut in one piece: {reason}",
+            where=names[0],
+            measured=float(len(names)),
+        )
+
+
+def _no_play(machine: Machine) -> Finding:
+    return Finding(
+        Code.PLAY_NOT_KNOWN,
+        Severity.WARNING,
+        f"{machine.target.name} has no play in X and Y, so that fewer reversals would gain"
+        " nothing: give it with --set axes.x.backlash_mm=...",
+        where="axes x, y",
+    )
+
+
+# A path divided into runs in which no axis turns round, each in the direction that errs less.
+#
+#     parts, turns ──▶ places where it may be divided ──▶ the cheapest division ──▶ pieces
+#
+# On the PIC machine a contour cut in one go showed errors that vanished when it was cut as two
+# halves, both from one point («maquinado en espejo», L2816-2841, L3200-3202): each half drives
+# each axis in one direction only, so that the play stays taken up. Here every contour becomes such
+# runs.
+#
+# Each turn of an axis must be divided somewhere on its stretch; one place may serve both axes (the
+# corner of a square). Only the ends of stretches need to be tried. Of all divisions the one with
+# the smallest greatest error is taken; then with the fewest runs; then that which drives the axes
+# in one direction throughout, as far as it can, so that the error is the same all over the part;
+# then with the smallest error over its length: two passes of dynamic programming along the path.
+
+ALIKE_MM = 1e-4
+"""Predicted errors that differ by less are alike: a tenth of a micrometre, below a step."""
+
+SAMPLES = 9
+"""So many points of each part are moved by the error, to see how far from the path they come: on
+a quarter of a circle the greatest distance is then found within 0.5 %."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """From place `first` to place `last` of the parts (beyond their number on a closed path), cut
+    from its end to its start when `backward`; its greatest predicted error, mm; how far off it is
+    for the axes driven in their worse direction, mm; its parts' errors times lengths, mm²."""
+
+    first: int
+    last: int
+    backward: bool
+    error_mm: float
+    spread_mm: float
+    weight_mm2: float
+
+
+@dataclass(frozen=True, eq=False)
+class Division:
+    """What a division is chosen by: the parts of a path, the turns of both axes along them, the
+    residual errors of both axes; `either_way`: pieces may be cut backward."""
+
+    parts: Parts
+    turns: tuple[Turns, Turns]
+    residual: tuple[Residual, Residual]
+    errors: Floats
+    lengths: Floats
+    either_way: bool
+
+    @classmethod
+    def of(
+        cls,
+        parts: Parts,
+        turns: tuple[Turns, Turns],
+        residual: tuple[Residual, Residual],
+        *,
+        either_way: bool,
+    ) -> Division:
+        """With the predicted errors of all parts."""
+        lengths = segment_lengths(parts.segments)
+        return cls(parts, turns, residual, part_errors(parts, residual), lengths, either_way)
+
+    def pieces(self) -> list[Piece]:
+        """The runs of the path in its order; together they are the path."""
+        if not self.parts.path.closed:
+            return _cheapest(self, 0)[1]
+        turns = [(t.first, t.last) for t in self.turns if len(t)]
+        if not turns:
+            return _cheapest(self, 0)[1]
+        first, last = (np.concatenate(column) for column in zip(*turns, strict=True))
+        shortest = int((last - first).argmin())
+        begins = _places(self, int(first[shortest]), int(last[shortest]))
+        return min((_cheapest(self, begin) for begin in begins), key=lambda each: each[0])[1]
+
+    def ways(self, first: int, last: int) -> list[Piece]:
+        """The piece between two places between which no axis turns round, in each way in which
+        it may be cut."""
+        ways = (1, -1) if self.either_way else (1,)
+        return [self._piece(first, last, way) for way in ways]
+
+    def _piece(self, first: int, last: int, way: int) -> Piece:
+        index = np.arange(first, last) % len(self.parts)
+        columns, spread_mm = [], 0.0
+        for turns, residual in zip(self.turns, self.residual, strict=True):
+            # An axis that stands still came in its better direction.
+            sense = way * int(np.sign(turns.sense[index].sum())) or residual.better
+            columns.append(int(sense > 0))
+            if sense != residual.better:
+                spread_mm += abs(residual.plus_mm - residual.minus_mm)
+        errors = self.errors[index, columns[0], columns[1]]
+        weight = float(errors @ self.lengths[index])
+        return Piece(first, last, way < 0, float(errors.max()), spread_mm, weight)
+
+
+def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
+    """(A, 2, 2) mm: how far each part comes from the path when X is driven towards −, + and Y
+    towards −, +: the points of the part, moved by the residual errors, to the part and to the
+    ones before and after it. (The path may pass nearer elsewhere, where it is as fine as the
+    errors.)"""
+    count, segments = len(parts), parts.segments
+    rows = np.repeat(np.arange(count), SAMPLES)
+    points = point_at(segments, rows, np.tile(np.linspace(0.0, 1.0, SAMPLES), count))
+    near = [rows, rows - 1, rows + 1]
+    near = [row % count if parts.path.closed else row.clip(0, count - 1) for row in near]
+    errors = np.zeros((count, 2, 2))
+    for i, x in enumerate((residual[0].minus_mm, residual[0].plus_mm)):
+        for j, y in enumerate((residual[1].minus_mm, residual[1].plus_mm)):
+            if x or y:
+                moved = points + np.array([x, y])
+                apart = np.min([point_to_segment(moved, segments[row]) for row in near], axis=0)
+                errors[:, i, j] = apart.reshape(count, SAMPLES).max(axis=1)
+    return errors
+
+
+def drawn_error_mm(division: Division) -> float:
+    """The greatest predicted error when the path is cut as it is drawn, in one go."""
+    columns = []
+    for axis, turns in enumerate(division.turns):
+        sense, better = turns.sense, division.residual[axis].better
+        # An axis that stands still stays where it was driven to last.
+        last = np.maximum.accumulate(np.where(sense != 0, np.arange(len(sense)), -1))
+        held = np.where(last >= 0, sense[last], better)
+        columns.append((held > 0).astype(np.int64))
+    rows = np.arange(len(division.parts))
+    return float(division.errors[rows, columns[0], columns[1]].max())
+
+
+Cost = tuple[int, float, float]
+"""Pieces, their spread, and their errors over their lengths, summed up."""
+
+
+def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[Piece]]:
+    """The best division of the way from place `begin` once around, or to the end, with its
+    greatest error in ALIKE_MM and its cost."""
+    places = _places(division, begin, begin + len(division.parts))
+    pieces = list(_possible(division, places))
+    greatest = [0.0] + [np.inf] * (len(places) - 1)
+    for i, j, piece in pieces:
+        greatest[j] = min(greatest[j], max(greatest[i], piece.error_mm))
+    best: list[Cost] = [(0, 0.0, 0.0)] + [(len(places), 0.0, 0.0)] * (len(places) - 1)
+    came: list[tuple[int, Piece] | None] = [None] * len(places)
+    for i, j, piece in pieces:
+        count, spread, weight = best[i]
+        cost = count + 1, spread + piece.spread_mm, weight + piece.weight_mm2
+        if piece.error_mm <= greatest[-1] + ALIKE_MM and cost < best[j]:
+            best[j], came[j] = cost, (i, piece)
+    return (round(greatest[-1] / ALIKE_MM), best[-1]), _traced(came)
+
+
+def _traced(came: Sequence[tuple[int, Piece] | None]) -> list[Piece]:
+    found: list[Piece] = []
+    step = came[-1]
+    while step is not None:
+        found.append(step[1])
+        step = came[step[0]]
+    return found[::-1]
+
+
+def _possible(division: Division, places: list[int]) -> Iterator[tuple[int, int, Piece]]:
+    """Pieces from place i to place j of `places` in all ways, in the order of i: each ends before,
+    or on, the first turn that lies ahead as a whole."""
+    reach = _reaches(division, np.array(places, dtype=np.int64))
+    for i, first in enumerate(places):
+        for j in range(i + 1, len(places)):
+            if places[j] > reach[i]:
+                break
+            for piece in division.ways(first, places[j]):
+                yield i, j, piece
+
+
+def _reaches(division: Division, places: Ints) -> Floats:
+    """(P,) the farthest place that no turn forbids to a piece from each of the places."""
+    count = len(division.parts)
+    laps = np.arange(3 if division.parts.path.closed else 1) * count
+    first = np.concatenate([(t.first + laps[:, None]).ravel() for t in division.turns])
+    last = np.concatenate([(t.last + laps[:, None]).ravel() for t in division.turns])
+    order = np.argsort(first, kind="stable")
+    # Of all turns that begin after a place, the one that ends first.
+    soonest = np.minimum.accumulate(np.append(last[order], np.inf)[::-1])[::-1]
+    return np.asarray(soonest[np.searchsorted(first[order], places, side="right")])
+
+
+def _places(division: Division, begin: int, end: int) -> list[int]:
+    """Where a path may be divided between two places, these too: the ends of all stretches, and
+    where an axis of an open path begins or ends to move."""
+    count, found = len(division.parts), {begin, end}
+    for turns in division.turns:
+        found.update(turns.first.tolist(), turns.last.tolist(), turns.moves or ())
+    if division.parts.path.closed:
+        found |= {place + count for place in found} | {place + 2 * count for place in found}
+    return sorted(place for place in found if begin <= place <= end)
+
+
+# Where an axis turns round on the way along a path.
+#
+#     path ──parts_of──▶ parts, each of one direction in x and one in y ──turns_of──▶ turns
+#
+# A part is a line, or an arc within one quadrant: arcs are split where their tangent lies along an
+# axis. Along each axis the way then is a list of values, and it turns at its highest and lowest
+# ones. What comes back by less than a least way is no turn: the controller may never see it.
+#
+# A turn is not a point but a stretch: a line across the axis lies on the extreme as a whole, and
+# whether it belongs to the way up or to the way down is free.
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """A path as A parts in its order: part i goes from place i to place i + 1 of `places`
+    (A+1, 2) mm (the last is the first when closed), and is the share `begin` to `end` (A,) of the
+    segment `row` (A,) of the path."""
+
+    path: Polyline
+    row: Ints
+    begin: Floats
+    end: Floats
+    places: Floats
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @cached_property
+    def segments(self) -> Segments:
+        """The parts as lines and arcs, A rows."""
+        sweep = Segments.of(self.path).sweep[self.row]
+        bulge = np.tan(0.25 * sweep * (self.end - self.begin))
+        return Segments.between(self.places[:-1], self.places[1:], bulge)
+
+    def stretch(self, first: int, last: int) -> Polyline:
+        """The open path from place `first` to place `last`; beyond A a closed path goes on.
+
+        Parts of one segment are one segment again.
+        """
+        index = np.arange(first, last) % len(self)
+        row, count = self.row[index], len(index)
+        fresh = np.ones(count, dtype=np.bool_)
+        fresh[1:] = (row[1:] != row[:-1]) | (self.begin[index[1:]] != self.end[index[:-1]])
+        head = np.flatnonzero(fresh)
+        tail = np.append(head[1:], count) - 1
+        share = self.end[index[tail]] - self.begin[index[head]]
+        bulge = np.append(_bulges(self.path, row[head], share), 0.0)
+        places = self.places[np.append(index[head], index[-1] + 1)]
+        return Polyline(np.column_stack([places, bulge]))
+
+    def with_vertices(self, at: Ints) -> tuple[Polyline, Ints]:
+        """The closed path with vertices at these places, and which of its vertices they are."""
+        keep = np.union1d(np.flatnonzero(self.begin == 0.0), at)
+        last = np.append(keep[1:], len(self)) - 1
+        bulge = _bulges(self.path, self.row[keep], self.end[last] - self.begin[keep])
+        path = Polyline(np.column_stack([self.places[keep], bulge]), closed=True)
+        return path, np.searchsorted(keep, at)
+
+
+def _bulges(path: Polyline, row: Ints, share: Floats) -> Floats:
+    """Bulges of these shares of segments; a whole one keeps its own to the last bit."""
+    bulge = path.vertices[row, 2]
+    return np.asarray(np.where(share == 1.0, bulge, np.tan(np.arctan(bulge) * share)))
+
+
+def parts_of(path: Polyline) -> Parts:
+    """The path with its arcs split where their tangents lie along an axis.
+
+    The tangent of an arc turns from  chord direction − sweep/2  to  chord direction + sweep/2;
+    it lies along an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at
+    most. No part is shorter than `POSITION_EPS_MM`.
+    """
+    segments = Segments.of(path)
+    quarter = 0.5 * np.pi
+    chord, sweep = segments.end - segments.start, segments.sweep
+    first = np.arctan2(chord[:, 1], chord[:, 0]) - 0.5 * sweep
+    lowest = np.ceil(np.minimum(first, first + sweep) / quarter)
+    tangents = (lowest[:, None] + np.arange(3.0)) * quarter
+    whole = np.where(segments.is_arc, sweep, 1.0)
+    share = (tangents - first[:, None]) / whole[:, None]
+    short = (POSITION_EPS_MM / segment_lengths(segments))[:, None]
+    inner = segments.is_arc[:, None] & (share > short) & (share < 1.0 - short)
+    arc, which = np.nonzero(inner)
+    row = np.concatenate([np.arange(len(segments)), arc])
+    begin = np.concatenate([np.zeros(len(segments)), share[arc, which]])
+    order = np.lexsort([begin, row])
+    row, begin = row[order], begin[order]
+    at_end = np.append(row[1:] != row[:-1], True)
+    end = np.where(at_end, 1.0, np.append(begin[1:], 1.0))
+    places = np.where((begin == 0.0)[:, None], segments.start[row], point_at(segments, row, begin))
+    return Parts(path, row, begin, end, np.concatenate([places, path.end[None, :]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """Turns of one axis along A parts.
+
+    `sense` (A,): the direction ±1 in which the axis is driven on each part; 0 on the stretches of
+    turns, before the first motion and after the last one. `first`, `last` (T,): the places at the
+    two ends of each turn's stretch; `last` goes on beyond A where the stretch of a closed path
+    holds its first place. `moves`: the places between which the axis of an open path moves at
+    all; None for a closed one, and where it never moves.
+    """
+
+    sense: Ints
+    first: Ints
+    last: Ints
+    moves: tuple[int, int] | None = None
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def no_turns(count: int) -> Turns:
+    """The turns of an axis that never moves, or does not matter, along `count` parts."""
+    none = np.empty(0, dtype=np.int64)
+    return Turns(np.zeros(count, dtype=np.int64), none, none)
+
+
+def turns_of(values: Floats, closed: bool, least_mm: float) -> Turns:
+    """Where `values` (A+1,), the way along one axis in mm, come back by `least_mm` or more."""
+    count = len(values) - 1
+    # A closed way is begun at its highest value, which is a turn if there are any.
+    begin = int(values[:-1].argmax()) if closed else 0
+    way = np.append(np.roll(values[:-1], -begin), values[begin]) if closed else values
+    values_mm = way.tolist()
+    knots = _knots(values_mm, least_mm)
+    if not knots:
+        return no_turns(count)
+    if closed:
+        knots[0], knots[-1] = 0, count
+    sense = np.zeros(count, dtype=np.int64)
+    for one, other in pairwise(knots):
+        sense[one:other] = 1 if way[other] > way[one] else -1
+    flats = [_flat(values_mm, knot, closed, least_mm) for knot in knots]
+    for low, high in flats:
+        sense[np.arange(low, high) % count] = 0
+    turning = np.array(flats[1:] if closed else flats[1:-1], dtype=np.int64).reshape(-1, 2)
+    if not closed:
+        return Turns(sense, turning[:, 0], turning[:, 1], (flats[0][1], flats[-1][0]))
+    turning += begin
+    turning -= np.where(turning[:, :1] >= count, count, 0)
+    return Turns(np.roll(sense, begin), turning[:, 0], turning[:, 1])
+
+
+def _knots(values: list[float], least_mm: float) -> list[int]:
+    """The places where the way begins, turns, and is furthest at last; [] when it is shorter than
+    `least_mm` throughout."""
+    low = high = far = way = 0
+    knots: list[int] = []
+    for place, value in enumerate(values):
+        if way == 0:
+            low = place if value < values[low] else low
+            high = place if value > values[high] else high
+            if values[high] - values[low] >= least_mm:
+                knots, far = [min(low, high)], place
+                way = 1 if place == high else -1
+        elif (value - values[far]) * way > 0.0:
+            far = place
+        elif (values[far] - value) * way >= least_mm:
+            knots.append(far)
+            far, way = place, -way
+    return [*knots, far] if knots else []
+
+
+def _flat(values: list[float], knot: int, closed: bool, least_mm: float) -> tuple[int, int]:
+    """The places before and after `knot` up to which the way stays within `least_mm` of it; those
+    of a closed way go on before 0 and beyond its end."""
+    count = len(values) - 1
+    low = high = knot
+    while (closed or low > 0) and abs(values[(low - 1) % count] - values[knot]) < least_mm:
+        low -= 1
+    while (closed or high < count) and abs(
+        values[(high + 1) % count if closed else high + 1] - values[knot]
+    ) < least_mm:
+        high += 1
+    return low, high
+
+
+# Where the tool comes from, so that no axis has play left in front of it when a cut begins.
+#
+# The tool goes down where it last moved to in XY. If each axis came there in the direction in
+# which the cut first drives it, and over more than its play, its slide is engaged from the first
+# step of the cut on, and the controller has nothing to compensate. An axis that the cut does not
+# drive comes in the direction that leaves the smaller error: always the same one, so that holes
+# and lines along the other axis keep their distances. All of this happens above the stock.
+
+APPROACH_MARGIN_MM = 0.05
+"""An approach is longer by this much than what compensation leaves of the play: the play is not
+the same all over a table (that of the PIC machine by 14 µm in X and 28 µm in Y, L2370-2373)."""
+
+REVERSAL_STEPS = 0.5
+"""An axis has turned round when it came back by this much of a coded step, as the simulation of
+controllers that follow paths has it."""
+
+Point = tuple[float, float]
+
+
+def approach_from(run: Run, machine: Machine) -> Point | None:
+    """Where the tool goes first (x, y) mm, at safe z, on its way to the first point of a run.
+
+    None where neither axis has play or compensation. The place lies beside the run, nearer than
+    the play and `APPROACH_MARGIN_MM` on each axis. Nothing keeps it within the travel: a nearer
+    one would not do, and the toolpath that holds it is checked as a whole.
+    """
+    return Approaches(machine)(run)
+
+
+class Approaches:
+    """`approach_from` for runs that are cut one after the other, with nothing between them but
+    the way up, across and down (a tool change needs a fresh one): an axis that still stands
+    engaged from the run before goes straight to the start. Play is the largest of all regions."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._drives = [
+            _Drive(axis, residual)
+            for axis, residual in zip(loosest(machine), residuals(machine), strict=True)
+        ]
+
+    def __call__(self, run: Run) -> Point | None:
+        """Where the tool goes first; None: straight to the first point of the run."""
+        path = flat(run.vertices)
+        places = run.vertices[:1, :2] if path is None else parts_of(path).places
+        x, y = (
+            drive.before(places[:, index].tolist()) for index, drive in enumerate(self._drives)
+        )
+        return None if (x, y) == (places[0, 0], places[0, 1]) else (x, y)
+
+
+class _Drive:
+    """One axis on its way: where it is, in which direction ±1 it moved last, and since where."""
+
+    def __init__(self, axis: Axis, residual: Residual) -> None:
+        self._residual = residual
+        self._least_mm, self._need_mm = least_turn_mm(axis), approach_mm(axis)
+        self._at = self._since = math.nan
+        self._sense = 0
+
+    def before(self, values: list[float]) -> float:
+        """Where the axis comes from to a run that takes it to these values, mm: their first one
+        when it comes from anywhere. It has cut the run then."""
+        start, sense = values[0], self._first_sense(values)
+        since = self._since if sense == self._sense else self._at
+        engaged = (start - self._at) * sense >= 0.0 and (start - since) * sense >= self._need_mm
+        come = start
+        if self._residual.matters and not engaged:
+            come = start - sense * self._need_mm
+        for value in (come, *values):
+            self._go(value)
+        return come
+
+    def _first_sense(self, values: list[float]) -> int:
+        """The direction in which a run first drives the axis; the better one when it does not."""
+        if len(values) == 1:
+            return self._residual.better
+        sense = turns_of(np.array(values), False, self._least_mm).sense
+        moving = np.flatnonzero(sense)
+        return int(sense[moving[0]]) if len(moving) else self._residual.better
+
+    def _go(self, value: float) -> None:
+        way = value - self._at
+        if not way * self._sense >= 0.0:
+            self._since, self._sense = self._at, 1 if way > 0.0 else -1
+        self._at = value
+
+
+def approach_mm(axis: Axis) -> float:
+    """How far an axis must be driven in one direction until its slide follows for certain: what
+    the controller's compensation leaves of the play, and the margin."""
+    return max(axis.backlash_mm - axis.compensation_mm, 0.0) + APPROACH_MARGIN_MM
+
+
+def least_turn_mm(axis: Axis) -> float:
+    """How far back an axis must go to turn round."""
+    return REVERSAL_STEPS * axis.coded_step_mm
+
+
+def flat(vertices: Floats) -> Polyline | None:
+    """A run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere there;
+    None when it stays at one place."""
+    kept: list[Floats] = []
+    for vertex in vertices[:, [0, 1, 3]]:
+        if kept and np.hypot(*(vertex[:2] - kept[-1][:2])) <= POSITION_EPS_MM:
+            kept.pop()  # the later one knows the bulge of the move that leads away
+        kept.append(vertex)
+    return Polyline(np.array(kept)) if len(kept) > 1 else None
+
+
+# What play and its compensation leave over: how far off the slides stand, by direction.
+#
+# An axis that has been driven in one direction for longer than its play stands at a fixed distance
+# from where the controller believes it to be. With the play operator of `camtool.kernels.play`,
+# low ≤ slide − motor ≤ high, and c added at each reversal from the direction engaged at first:
+#
+#     in the first direction:   motor = position,       in the other one:   motor = position ∓ c,
+#     driven towards +:         slide = motor + low,    towards −:          slide = motor + high.
+#
+# The difference of the two is |play − c|. Compensation as exact as the play would leave none; the
+# PIC machine's leaves 11.5 µm in X and 9.5 µm in Y (docs/decisions/0005-play.md).
+#
+# Where the play changes with the region of the table, an axis is taken with the one that leaves
+# most over: where a contour is divided then hangs on its shape alone, not on where it lies, and
+# what is told to be left over is left nowhere else.
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One axis: the error of its slide in mm when driven towards − and towards +; `matters`:
+    there is play or compensation; `better`: the direction ±1 of the smaller error (where both are
+    alike, the one in which the axis is engaged at first)."""
+
+    minus_mm: float
+    plus_mm: float
+    matters: bool
+    better: int
+
+    def error_mm(self, sense: int) -> float:
+        """The error when driven towards `sense` ±1."""
+        return self.plus_mm if sense > 0 else self.minus_mm
+
+
+def plays_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
+    """The play of an axis in every region of the table, mm."""
+    return (axis.backlash_mm,) if cells is None else tuple(chain.from_iterable(cells.play_mm))
+
+
+def loosest(machine: Machine) -> tuple[Axis, Axis]:
+    """X and Y with the largest play of all regions."""
+    x, y, _ = (
+        msgspec.structs.replace(axis, backlash_mm=max(plays_mm(axis, cells)))
+        for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
+    )
+    return x, y
+
+
+def residuals(machine: Machine) -> tuple[Residual, Residual]:
+    """X and Y of a machine, each in the region where compensation leaves most over."""
+    x, y, _ = (
+        max(
+            (
+                residual(msgspec.structs.replace(axis, backlash_mm=play), machine.controller)
+                for play in plays_mm(axis, cells)
+            ),
+            key=lambda one: abs(one.plus_mm - one.minus_mm),
+        )
+        for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
+    )
+    return x, y
+
+
+def residual(axis: Axis, controller: Controller) -> Residual:
+    """One axis of a machine with this controller."""
+    from camtool.kernels.play import play_limits
+
+    first = 1 if controller.start_direction == "+" else -1
+    low, high = play_limits(axis.backlash_mm, controller.start_play, first)
+    errors = {1: low, -1: high}
+    errors[-first] -= first * axis.compensation_mm
+    better = first if abs(errors[first]) <= abs(errors[-first]) else -first
+    matters = axis.backlash_mm > 0.0 or axis.compensation_mm > 0.0
+    return Residual(errors[-1], errors[1], matters, better)

@@ -1,1 +1,0 @@
-"""Fewer reversals while cutting: contours divided into runs, approached in the air."""
