@@ -95,12 +95,12 @@ __all__ = [
     "verify",
 ]
 
-_CALLED = ("preview", "verify")
+_CALLED = ("preview",)
 """Packages of this one that are called like the functions of the same name in `camtool.api`."""
 
 
 class _CalledPackage(ModuleType):
-    """A package that can be called: `camtool.verify(...)`, beside `camtool.verify.report`."""
+    """A package that can be called: `camtool.preview(...)`, beside `camtool.preview.draw`."""
 
     def __call__(self, *values: Any, **named: Any) -> Any:
         return self._function()(*values, **named)

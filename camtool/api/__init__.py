@@ -29,7 +29,7 @@ from camtool.results import (
     Verification,
 )
 from camtool.simulation.motion import Effects
-from camtool.verify.gates import Gates
+from camtool.verification.report import Gates
 
 __all__ = [
     "Calibration",

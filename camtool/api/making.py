@@ -15,7 +15,7 @@ from camtool.results import Converted, Posted, Toolpath, Verification, extended
 from camtool.toolpath.program import Program
 
 if TYPE_CHECKING:
-    from camtool.verify.gates import Gates
+    from camtool.verification.report import Gates
 
 
 def plan(

@@ -1,22 +1,172 @@
-"""Measurements of coupons in, the machine's numbers with their uncertainties out.
+"""Least squares with weights, and what the readings cannot tell.
 
-read_measurements   a file, checked                            measurements.py
-readings_of         each coupon as equations                   readings.py, model.py
-solve               least squares, and what cannot be told     solve.py
-calibrate           all of it, in the machine's own words      here
+    minimise  Σ ((measured_i − predicted_i(p)) / u_i)²
+
+by Gauss-Newton: each round solves the linear problem about the last values, and one is enough
+where the equations are linear, as all are but diagonals and circles. u_i is the standard
+uncertainty of a reading; where not all are known, all count alike. With A the weighted
+derivatives and s² = Σ residual² / (n − p),
+
+    covariance = s² (AᵀA)⁻¹,
+
+where s is not taken below 1 if the u_i are known: residuals that happen to be small make no
+reading better than its instrument.
+
+Parameters that the readings cannot tell are held at what the machine's file says: those that no
+reading depends on, and of those that only occur together the least wanted one, until the rest can
+be told. The null space of A shows which they are.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from camtool.calibration.measurements import Measurements
-from camtool.calibration.model import SQUARENESS, Model, Parameter, Reading
-from camtool.calibration.readings import readings_of
-from camtool.calibration.solve import OUTLIER_SIGMAS, Solution, solve
+from camtool.calibration.model import SQUARENESS, Floats, Model, Parameter, Reading, readings_of
 from camtool.errors import InputError
 from camtool.machine.model import Axis, Machine
+from camtool.units import UM_PER_MM
+
+Bools = npt.NDArray[np.bool_]
+
+ROUNDS = 50
+"""Rounds of Gauss-Newton at most; a handful is usual."""
+
+SETTLED = 1e-13
+"""It has settled when no parameter moves by more than this (of 1, of a mm, of a tangent)."""
+
+TOLD_APART = 1e-9
+"""Singular values below this part of the largest are zero: directions that no reading tells."""
+
+INVOLVED = 1e-6
+"""A parameter takes part in such a direction when its share is above this."""
+
+OUTLIER_SIGMAS = 3.0
+"""A reading whose residual is above so many of its standard deviations is named an outlier."""
+
+OUTLIER_FREEDOM = 4
+"""The other readings say that standard deviation when they are so many more than the parameters;
+fewer ones say it too badly, and the instrument's own uncertainty does."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A parameter that was not estimated, and why."""
+
+    parameter: Parameter
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """values (P,) of the parameters in the model's order, and their covariance (P, P): nan where
+    held, and where it is not known (as many readings as parameters, and no instrument's).
+    predicted, sigma (n,) mm: of the readings; sigma is that of a residual, nan where not known.
+    freedom: readings more than parameters. spread: s, in mm where the u_i are not known, else in
+    their units; nan without freedom."""
+
+    values: Floats
+    covariance: Floats
+    predicted: Floats
+    sigma: Floats
+    free: Bools
+    held: tuple[Held, ...]
+    freedom: int
+    spread: float
+
+    def uncertainty(self, columns: Sequence[int]) -> float:
+        """Standard uncertainty of the mean of some parameters; nan when not known."""
+        part = self.covariance[np.ix_(columns, columns)]
+        return float(np.sqrt(part.sum())) / len(columns)
+
+
+def solve(model: Model, start: Floats) -> Solution:
+    """The parameters that fit the model's readings best, from the values `start` (P,)."""
+    uncertain_mm = [reading.uncertainty_mm or np.nan for reading in model.readings]
+    known = bool(np.isfinite(uncertain_mm).all())
+    weights = 1.0 / np.array(uncertain_mm) if known else np.ones(len(uncertain_mm))
+    measured = np.array([reading.measured_mm for reading in model.readings])
+    values = start.copy()
+    free, held = _told_apart(model.parameters, model.slopes(values) * weights[:, None])
+    for _ in range(ROUNDS):
+        matrix = model.slopes(values)[:, free] * weights[:, None]
+        residual = (measured - model.predict(values)) * weights
+        change = np.linalg.lstsq(matrix, residual, rcond=None)[0]
+        values[free] += change
+        if not len(change) or np.abs(change).max() < SETTLED:
+            break
+    predicted = model.predict(values)
+    matrix = model.slopes(values)[:, free] * weights[:, None]
+    residual = (measured - predicted) * weights
+    freedom = len(measured) - int(free.sum())
+    spread = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
+    unit = np.fmax(spread, 1.0) if known else spread
+    inverse = np.linalg.pinv(matrix)
+    covariance = np.full((len(values), len(values)), np.nan)
+    covariance[np.ix_(free, free)] = unit**2 * inverse @ inverse.T
+    leverage = np.einsum("ij,ji->i", matrix, inverse)
+    sigma = _sigma(residual, leverage, freedom, known=known) / weights
+    return Solution(values, covariance, predicted, sigma, free, held, freedom, spread)
+
+
+def _sigma(residual: Floats, leverage: Floats, freedom: int, *, known: bool) -> Floats:
+    """(n,) standard deviation of each weighted residual, from what the other readings say.
+
+    Without reading i the sum of squares falls by r_i² / (1 − h_i), h the leverage. A reading
+    that alone determines a parameter (h = 1) has no residual to judge.
+    """
+    rest = np.clip(1.0 - leverage, 0.0, 1.0)
+    judged = rest > TOLD_APART
+    others = np.full(len(residual), 1.0 if known else np.nan)
+    if freedom - 1 >= OUTLIER_FREEDOM:
+        share = np.divide(residual**2, rest, out=np.zeros_like(rest), where=judged)
+        squares = np.clip(residual @ residual - share, 0.0, None)
+        others = np.fmax(np.sqrt(squares / (freedom - 1)), 1.0 if known else 0.0)
+    return np.where(judged, others * np.sqrt(rest), np.nan)
+
+
+def _told_apart(parameters: Sequence[Parameter], matrix: Floats) -> tuple[Bools, tuple[Held, ...]]:
+    """(P,) which parameters the readings tell, and the others with the reason."""
+    size = np.linalg.norm(matrix, axis=0)
+    free = size > 0.0
+    touched = free.copy()
+    while free.any():
+        index = np.flatnonzero(free)
+        _, singular, rows = np.linalg.svd(matrix[:, index] / size[index])
+        rank = int((singular > TOLD_APART * singular[0]).sum())
+        if rank == len(index):
+            break
+        together = index[np.abs(rows[rank:]).max(axis=0) > INVOLVED]
+        free[max(together, key=lambda column: (_wish(parameters[column]), column))] = False
+    held: list[Held] = []
+    for column in np.flatnonzero(~free).tolist():
+        why = "no reading depends on it"
+        if touched[column]:
+            parts = np.linalg.lstsq(matrix[:, free], matrix[:, column], rcond=None)[0]
+            shares = np.abs(parts) * size[free] > INVOLVED * size[column]
+            others = [str(parameters[other]) for other in np.flatnonzero(free)[shares].tolist()]
+            why = f"the readings cannot tell it from {' and '.join(others)}"
+        held.append(Held(parameters[column], why))
+    return free, tuple(held)
+
+
+def _wish(parameter: Parameter) -> int:
+    """The higher, the sooner a parameter is held: a step scale is mostly known already."""
+    return ("play", "squareness", "scale").index(parameter.what)
+
+
+# Measurements of coupons in, the machine's numbers with their uncertainties out.
+#
+# read_measurements   a file, checked                            measurements.py
+# readings_of         each coupon as equations                   readings.py, model.py
+# solve               least squares, and what cannot be told     solve.py
+# calibrate           all of it, in the machine's own words      here
 
 NONE_LEFT_SIGMAS = 3.0
 """A play below zero by no more than so many standard uncertainties, or than a step, is none;
@@ -207,3 +357,144 @@ def _norm(values: list[float]) -> float:
 
 def _sigmas(residual: float, sigma: float) -> float | None:
     return residual / sigma if math.isfinite(sigma) and sigma > 0.0 else None
+
+
+# A calibration as text and as JSON.
+
+
+def to_text(calibration: Calibration, machine: Machine) -> str:
+    """The numbers, what was not estimated, the residuals, what the controller should add."""
+    return "\n".join(_text(calibration, machine))
+
+
+def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
+    """The same as JSON has it; lengths in mm, residuals in µm, squareness in rad."""
+    return {
+        "target": calibration.target,
+        "file": calibration.file,
+        "freedom": calibration.freedom,
+        "spread_um": _um(calibration.spread_mm),
+        "instrument_um": _um(calibration.uncertainty_mm),
+        "estimates": [
+            {
+                "what": each.what,
+                "axis": each.axis,
+                "region": each.region,
+                "unit": _unit(each),
+                "before": each.before,
+                "value": each.value,
+                "uncertainty": each.uncertainty,
+                "readings": each.readings,
+            }
+            for each in calibration.estimates
+        ],
+        "not_estimated": [
+            {"name": each.name, "why": each.why} for each in calibration.not_estimated
+        ],
+        "compensation": [
+            {"axis": axis, "mm": mm, "steps": steps}
+            for axis, mm, steps in compensations(calibration, machine)
+        ],
+        "readings": [
+            {
+                "coupon": each.reading.coupon,
+                "name": each.reading.name,
+                "measured_mm": each.reading.measured_mm,
+                "predicted_mm": each.predicted_mm,
+                "residual_um": _um(each.residual_mm),
+                "sigmas": each.sigmas,
+                "outlier": each.outlier,
+                "source": each.reading.source,
+            }
+            for each in calibration.fitted
+        ],
+    }
+
+
+def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[str, float, int]]:
+    """(axis, mm, whole steps) that a controller would have to add at reversals to take up the
+    play that was found: B/k, in its own mm."""
+    for axis in ("x", "y", "z"):
+        play, step = calibration.estimate("play", axis), calibration.estimate("step", axis)
+        if play is not None:
+            said: Axis = getattr(machine.axes, axis)
+            steps = round(max(play.value, 0.0) / (step.value if step else said.real_step_mm))
+            yield axis, steps * said.coded_step_mm, steps
+
+
+def outliers(calibration: Calibration) -> list[str]:
+    """One line for each reading that stands out."""
+    return [
+        f"{each.reading.coupon}, {each.reading.name}: {each.residual_mm * UM_PER_MM:+.1f} µm off, "
+        f"{abs(each.sigmas or 0.0):.1f} standard deviations"
+        for each in calibration.fitted
+        if each.outlier
+    ]
+
+
+def _text(calibration: Calibration, machine: Machine) -> Iterator[str]:
+    rows = [_row(each) for each in calibration.estimates]
+    yield from _columns([("number", "before", "measured", "±", "unit", "readings"), *rows])
+    for unknown in calibration.not_estimated:
+        yield f"not estimated: {unknown.name}: {unknown.why}"
+    for axis, mm, steps in compensations(calibration, machine):
+        said: Axis = getattr(machine.axes, axis)
+        if said.compensation_mm > 0.0:
+            yield (
+                f"compensation of {axis} that takes up this play: {mm:.4f} mm, {steps} steps "
+                f"(the machine's file says {said.compensation_mm:g} mm)"
+            )
+    yield ""
+    yield from _columns(
+        [
+            ("coupon", "reading", "measured", "predicted", "residual", ""),
+            *map(_fit, calibration.fitted),
+        ]
+    )
+    yield ""
+    yield _spread(calibration)
+
+
+def _row(each: Estimate) -> tuple[str, ...]:
+    sure = "not known" if each.uncertainty is None else f"{each.uncertainty:.2g}"
+    before, value = f"{each.before:.6g}", f"{each.value:.6g}"
+    return each.name, before, value, sure, _unit(each), str(each.readings)
+
+
+def _fit(each: Fitted) -> tuple[str, ...]:
+    mark = "outlier" if each.outlier else ""
+    measured, predicted = f"{each.reading.measured_mm:.4f}", f"{each.predicted_mm:.4f}"
+    residual = f"{each.residual_mm * UM_PER_MM:+.1f} µm"
+    return each.reading.coupon, each.reading.name, measured, predicted, residual, mark
+
+
+def _spread(calibration: Calibration) -> str:
+    if calibration.spread_mm is None:
+        return "as many readings as numbers: nothing tells how well they fit"
+    text = (
+        f"residuals {calibration.spread_mm * UM_PER_MM:.1f} µm (standard deviation, "
+        f"{calibration.freedom} degrees of freedom)"
+    )
+    if calibration.uncertainty_mm is not None:
+        text += f"; instrument {calibration.uncertainty_mm * UM_PER_MM:.1f} µm"
+    return text
+
+
+def _unit(each: Estimate) -> str:
+    return "rad" if each.what == "squareness" else "mm"
+
+
+def _um(mm: float | None) -> float | None:
+    return None if mm is None else mm * UM_PER_MM
+
+
+def _columns(rows: list[tuple[str, ...]]) -> Iterator[str]:
+    """Rows of text, their columns under each other: the first left, numbers right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    text = {0, 1} if rows[0][1] == "reading" else {0}
+    for row in rows:
+        cells = [
+            cell.ljust(width) if column in text else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        yield "  ".join(cells).rstrip()

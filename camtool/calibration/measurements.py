@@ -1,28 +1,248 @@
-"""Measurements of coupons as their TOML file may say them, strictly: types, signs, sizes.
-
-    target = "pic-mmh"               # whose coupons they are
-    uncertainty_mm = 0.001           # standard uncertainty of each reading; left out: not known
-    compensation_mm = { x = 0.0 }    # added at reversals while cutting; left out: the machine's
-
-    [[lines]]                        # and [[squares]], [[circles]], [[steps]], [[closures]]
-    axis = "x"
-    ...
-
-A coupon may say its own `uncertainty_mm` and `compensation_mm`, and the `source` of its numbers.
-"""
+"""The kinds of coupon as a file of measurements may say them: types, signs, sizes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
+from msgspec import Meta
 
-from camtool.calibration.records import KINDS, MOST_TIMES, Added, Coupon, RegionsOf
 from camtool.errors import InputError, MachineError
 from camtool.machine.loader import convert, read_table
-from camtool.machine.ranges import Tolerance
+from camtool.machine.ranges import Length, Lost, Place, Reading, Tolerance
+
+Pair = tuple[Length, Length]
+Flat = Literal["x", "y"]
+Any3 = Literal["x", "y", "z"]
+
+_ZERO_IS_A_RESULT = ("shorter_by_mm", "gap_x_mm", "gap_y_mm")
+
+MOST_TIMES = 2.0
+"""A length that comes out more than so many times as long as its nominal one, or shorter than
+this part of it, is no measurement of it but a slip: a wrong unit, a lost digit."""
+
+
+class Added(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the controller added at each reversal while it cut, mm; None: as the machine says."""
+
+    x: Lost | None = None
+    y: Lost | None = None
+    z: Lost | None = None
+
+
+class Regions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The cells of the table in which the play of an axis was measured, as a machine's play map
+    has them: edges in table coordinates, `names[j][i]` the region of coupons in a cell."""
+
+    x_mm: tuple[Place, ...]
+    y_mm: tuple[Place, ...]
+    names: tuple[tuple[str, ...], ...]
+
+    @property
+    def every(self) -> frozenset[str]:
+        """The names of all cells."""
+        return frozenset(name for row in self.names for name in row)
+
+
+class RegionsOf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The cells of each axis, where there are any."""
+
+    x: Regions | None = None
+    y: Regions | None = None
+
+
+class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What every coupon may say beside its lengths; `region` names the part of the table that it
+    lies in."""
+
+    kind: ClassVar[str]
+    readings: ClassVar[tuple[str, ...]]
+    """The keys of what is measured on it."""
+
+    source: str = ""
+    region: str = ""
+    uncertainty_mm: Tolerance | None = None
+    compensation_mm: Added | None = None
+
+    @property
+    def axes(self) -> str:
+        """The axes whose play it may tell."""
+        return "xy"
+
+    @property
+    def measured(self) -> bool:
+        """Whether anything was: 0.0 is a reading that is still to be filled in, but where it is
+        a result like any other (`shorter_by_mm`, gaps)."""
+        for key in self.readings:
+            value = getattr(self, key)
+            readings = value if isinstance(value, tuple) else (value,)
+            if any(readings) or (value is not None and key in _ZERO_IS_A_RESULT):
+                return True
+        return False
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        """(key, measured, nominal) of each length that must be near a nominal one, mm."""
+        return iter(())
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        """(key, what is wrong, mend) of what the types cannot say."""
+        return iter(())
+
+
+class Lines(Coupon, frozen=True, kw_only=True):
+    """Two parallel lines along an axis, joined at one end. `first_mm` is the line that was cut
+    in +, `second_mm` the other one, or `shorter_by_mm` how much it falls short of the first."""
+
+    kind = "lines"
+    readings = ("first_mm", "second_mm", "shorter_by_mm")
+
+    axis: Flat
+    nominal_mm: Length
+    first_mm: Reading | None = None
+    second_mm: Reading | None = None
+    shorter_by_mm: Place | None = None
+
+    @property
+    def axes(self) -> str:
+        return self.axis
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        if self.first_mm:
+            yield "first_mm", self.first_mm, self.nominal_mm
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        if self.second_mm is not None and self.shorter_by_mm is not None:
+            yield "shorter_by_mm", "says what second_mm says", "leave one of them out"
+        for key, value in (("second_mm", self.second_mm), ("shorter_by_mm", self.shorter_by_mm)):
+            if value is not None and abs(value) > MOST_TIMES * self.nominal_mm:
+                yield key, f"is {value:g} on a line of {self.nominal_mm:g} mm", "write it in mm"
+
+
+class Square(Coupon, frozen=True, kw_only=True):
+    """A rectangle whose opposite edges were reached from opposite sides. `diagonals_mm`: from
+    the lower left to the upper right corner, and from the upper left to the lower right one."""
+
+    kind = "squares"
+    readings = ("dx_mm", "dy_mm", "diagonals_mm")
+
+    nominal_mm: Pair
+    dx_mm: Reading | None = None
+    dy_mm: Reading | None = None
+    diagonals_mm: tuple[Reading, Reading] | None = None
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        width, height = self.nominal_mm
+        if self.dx_mm:
+            yield "dx_mm", self.dx_mm, width
+        if self.dy_mm:
+            yield "dy_mm", self.dy_mm, height
+        for diagonal in filter(None, self.diagonals_mm or ()):
+            yield "diagonals_mm", diagonal, (width**2 + height**2) ** 0.5
+
+
+class Circle(Coupon, frozen=True, kw_only=True):
+    """A whole circle, cut `direction`. `diameters_mm` are those at `angles_deg` from the X axis
+    towards the Y axis, or evenly spread over half a turn from the X axis on."""
+
+    kind = "circles"
+    readings = ("diameters_mm",)
+
+    nominal_mm: Length
+    direction: Literal["cw", "ccw"]
+    diameters_mm: tuple[Reading, ...]
+    angles_deg: tuple[Annotated[float, Meta(ge=-360.0, le=360.0)], ...] | None = None
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """The angles of the diameters, degrees."""
+        count = len(self.diameters_mm)
+        return self.angles_deg or tuple(180.0 * k / count for k in range(count))
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        for diameter in filter(None, self.diameters_mm):
+            yield "diameters_mm", diameter, self.nominal_mm
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        if self.angles_deg is not None and len(self.angles_deg) != len(self.diameters_mm):
+            yield (
+                "angles_deg",
+                f"has {len(self.angles_deg)} angles for {len(self.diameters_mm)} diameters",
+                "give each diameter its angle, or leave it out for evenly spread ones",
+            )
+
+
+class Steps(Coupon, frozen=True, kw_only=True):
+    """A ruler: the places after moves of `nominal_mm` from a zero that was reached in +.
+    `forward_mm` were reached in + too, `backward_mm` in −, at the same nominal places, in a row
+    that lies `rows_apart_mm` to the + side of the first."""
+
+    kind = "steps"
+    readings = ("forward_mm", "backward_mm")
+
+    axis: Any3
+    nominal_mm: tuple[Length, ...]
+    forward_mm: tuple[Reading, ...] | None = None
+    backward_mm: tuple[Place, ...] | None = None
+    rows_apart_mm: Place = 0.0
+
+    @property
+    def axes(self) -> str:
+        return self.axis
+
+    def lengths(self) -> Iterator[tuple[str, float, float]]:
+        for measured, nominal in zip(self.forward_mm or (), self.nominal_mm, strict=False):
+            if measured:
+                yield "forward_mm", measured, nominal
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        for key, values in (("forward_mm", self.forward_mm), ("backward_mm", self.backward_mm)):
+            if values is not None and len(values) != len(self.nominal_mm):
+                yield (
+                    key,
+                    f"has {len(values)} readings for {len(self.nominal_mm)} nominal places",
+                    "give one for each; 0.0 is one not taken",
+                )
+            for value in values or ():
+                if abs(value) > MOST_TIMES * max(self.nominal_mm):
+                    yield key, f"{value:g} is far beyond the ruler", "write it in mm"
+
+
+class Closure(Coupon, frozen=True, kw_only=True):
+    """A contour that should close, begun in + on both axes and ended in −: how far its end lies
+    from its start, mm, positive towards +. `nominal_mm` is its size, against slips."""
+
+    kind = "closures"
+    readings = ("gap_x_mm", "gap_y_mm")
+
+    nominal_mm: Pair
+    gap_x_mm: Place | None = None
+    gap_y_mm: Place | None = None
+
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        gaps = (("gap_x_mm", self.gap_x_mm), ("gap_y_mm", self.gap_y_mm))
+        for (key, gap), size in zip(gaps, self.nominal_mm, strict=True):
+            if gap is not None and abs(gap) > size:
+                yield key, f"is {gap:g} on a contour of {size:g} mm", "write it in mm"
+
+
+KINDS: tuple[type[Coupon], ...] = (Lines, Square, Circle, Steps, Closure)
+"""The tables of a file, in order."""
+
+
+# Measurements of coupons as their TOML file may say them, strictly: types, signs, sizes.
+#
+#     target = "pic-mmh"               # whose coupons they are
+#     uncertainty_mm = 0.001           # standard uncertainty of each reading; left out: not known
+#     compensation_mm = { x = 0.0 }    # added at reversals while cutting; left out: the machine's
+#
+#     [[lines]]                        # and [[squares]], [[circles]], [[steps]], [[closures]]
+#     axis = "x"
+#     ...
+#
+# A coupon may say its own `uncertainty_mm` and `compensation_mm`, and the `source` of its numbers.
 
 
 class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.pipeline import Posted
     from camtool.planning.job import Job
-    from camtool.verify.gates import Gates
+    from camtool.verification.report import Gates
 
 REMARKS = 20
 """So many findings of a drawing come back from its worker; there may be a hundred thousand."""

@@ -35,9 +35,9 @@ def calibrate(
     written, with the uncertainty and the source of each number behind it.
     """
     from camtool.calibration.calibrate import calibrate as estimated
-    from camtool.calibration.machinefile import machine_file
+    from camtool.calibration.calibrate import outliers, to_data, to_text
+    from camtool.calibration.machine_file import machine_file
     from camtool.calibration.measurements import read_measurements
-    from camtool.calibration.report import outliers, to_data, to_text
     from camtool.cli.messages import say, show_text
     from camtool.cli.options import MachineFlags
     from camtool.plain import one_line, to_json

@@ -88,9 +88,8 @@ def coupon(
 
     Cut them: camtool post coupon.dxf --kind engrave --start longest-line --gap 0.
     """
-    from camtool.calibration import drawings
-    from camtool.calibration.coupons import sheet
-    from camtool.calibration.skeleton import skeleton
+    from camtool.calibration import coupons
+    from camtool.calibration.coupons import sheet, skeleton
     from camtool.cli.messages import say
 
     output = output or "coupon.dxf"
@@ -101,7 +100,7 @@ def coupon(
         check_new(measurements)
     known = machine.load().machine if machine.name() is not None else None
     made = sheet(cast("Kind", kind), size or _travel(known), regions, known)
-    draw = drawings.svg if output.lower().endswith(".svg") else drawings.dxf
+    draw = coupons.svg if output.lower().endswith(".svg") else coupons.dxf
     files = {output: draw(made)}
     if measurements is not None:
         files[measurements] = skeleton(made, known).encode()

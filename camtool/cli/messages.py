@@ -21,7 +21,7 @@ from camtool.plain import one_line
 if TYPE_CHECKING:
     from camtool.errors import CamtoolError
     from camtool.findings import Finding
-    from camtool.verify.contrast import ContrastRow
+    from camtool.verification.contrast import ContrastRow
 
 
 COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from camtool.pipeline import Judging, Way
     from camtool.planning.job import Job
     from camtool.simulation.motion import Effects
-    from camtool.verify.gates import Gates
+    from camtool.verification.report import Gates
 
 
 GENERAL = "Options"
@@ -254,7 +254,7 @@ class GateFlags:
         """The limits; None when there are none."""
         if not self.given:
             return None
-        from camtool.verify.gates import Gates
+        from camtool.verification.report import Gates
 
         return Gates(self.max_error, self.max_reversals, self.max_time)
 

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from camtool.cli.picture_options import Painter
     from camtool.findings import Finding
     from camtool.machine.registry import LoadedTarget
-    from camtool.verify.page import Page, Setup
-    from camtool.verify.report import Report
+    from camtool.verification.report import Page, Report, Setup
 
 Flags = tuple[tuple[str, str], ...]
 EMBEDDED = "picture.svg"
@@ -117,13 +116,11 @@ def report_files(
     name: str, subject: Subject, picture: Painter, *, preview: str | None
 ) -> dict[str, bytes]:
     """The page of this name, and the picture beside it where it has one of its own."""
-    from camtool.verify.html import html
-    from camtool.verify.markdown import markdown
-    from camtool.verify.page import to_json
+    from camtool.verification.report import html, markdown, page_json
 
     suffix = PurePath(name).suffix.lower()
     if name != STDOUT and suffix == ".json":
-        return {name: to_json(_page(subject, ())).encode()}
+        return {name: page_json(_page(subject, ())).encode()}
     if name != STDOUT and suffix == ".html":
         pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
         shown = tuple((caption, _held(data)) for caption, data in pictures)
@@ -147,8 +144,7 @@ def _from(page_name: str, picture_name: str) -> str:
 
 def _page(subject: Subject, pictures: tuple[tuple[str, str], ...]) -> Page:
     from camtool.plain import one_line
-    from camtool.verify.page import Page
-    from camtool.verify.report import reported
+    from camtool.verification.report import Page, reported
 
     findings = reported(subject.findings)
     return Page(one_line(subject.title), subject.report, findings, _setup(subject), pictures)
@@ -156,7 +152,7 @@ def _page(subject: Subject, pictures: tuple[tuple[str, str], ...]) -> Page:
 
 def _setup(subject: Subject) -> Setup:
     from camtool.machine.registry import changed_values, machine_digest
-    from camtool.verify.page import Changed, Setup
+    from camtool.verification.report import Changed, Setup
 
     machine, program = subject.target.machine, subject.program
     return Setup(

@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job
     from camtool.preview.scene import Scene
     from camtool.toolpath.moves import Toolpath
-    from camtool.verify.verify import Verification
+    from camtool.verification.verify import Verification
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def judged(file: str, case: Case, wishes: Wishes) -> int:
 def compared(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
     """The table of all ways to run a program, and their picture; the exit code."""
     from camtool.pipeline import compare_picture, compare_program
-    from camtool.verify.contrast import row_of, table, to_json
+    from camtool.verification.contrast import row_of, table, to_json
 
     data, name = read_bytes(file), shown(file)
     variants = compare_program(data, ways, source=name, drawing=case.drawing, job=case.job)

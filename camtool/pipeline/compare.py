@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job
     from camtool.preview.overlay import Floats, Overlay
     from camtool.toolpath.moves import Toolpath
-    from camtool.verify.contrast import Variant
+    from camtool.verification.contrast import Variant
 
 WINDOW_STEPS = 30.0
 """The picture shows so many steps of the coarser axis to each side of the worst place ..."""
@@ -49,7 +49,7 @@ def compare_program(
     job: Job | None = None,
 ) -> list[Variant]:
     """The program read and judged each way; raises as `verify_program` does."""
-    from camtool.verify.contrast import Variant
+    from camtool.verification.contrast import Variant
 
     variants = []
     for way in ways:
@@ -70,8 +70,8 @@ def compare_picture(
     from camtool.preview.overlay import Overlay
     from camtool.simulation.motion import ALL, Options
     from camtool.simulation.simulate import model_of, simulate
-    from camtool.verify.contrast import strokes_within, worst_place
-    from camtool.verify.cuts import cut_moves
+    from camtool.verification.contrast import strokes_within, worst_place
+    from camtool.verification.cuts import cut_moves
 
     commanded = all(way.judging.interpolator is not None for way in ways)
     first = ways[0].target
@@ -99,7 +99,7 @@ def _window(wanted: Toolpath, variants: Sequence[Variant]) -> Floats:
     import numpy as np
 
     from camtool.toolpath.moves import toolpath_extents
-    from camtool.verify.contrast import worst_place
+    from camtool.verification.contrast import worst_place
 
     step = max(
         max(variant.machine.axes.x.coded_step_mm, variant.machine.axes.y.coded_step_mm)

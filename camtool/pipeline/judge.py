@@ -21,12 +21,11 @@ if TYPE_CHECKING:
     from camtool.toolpath.moves import Bent, Toolpath
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import Kept
-    from camtool.verify.asked import Asked
-    from camtool.verify.case import Cone
-    from camtool.verify.cuts import Bools
-    from camtool.verify.gates import Gates
-    from camtool.verify.records import Before, PlannedOperation
-    from camtool.verify.verify import Verification, VerifyOptions
+    from camtool.verification.case import Cone
+    from camtool.verification.conformance import Asked
+    from camtool.verification.cuts import Bools
+    from camtool.verification.report import Before, Gates, PlannedOperation
+    from camtool.verification.verify import Verification, VerifyOptions
 
 
 @dataclass(frozen=True)
@@ -109,10 +108,9 @@ def post_drawing(
     if not check:
         return Posted(wanted, program, decoded, None, findings)
     from camtool.planning.drawn import kept_of
-    from camtool.verify.case import TRACE_POINTS
-    from camtool.verify.records import Planned
-    from camtool.verify.report import certain
-    from camtool.verify.verify import VerifyOptions
+    from camtool.verification.case import TRACE_POINTS
+    from camtool.verification.report import Planned, certain
+    from camtool.verification.verify import VerifyOptions
 
     plain = _plainly(drawing, job, target, compensate=compensate)
     # Runs that never turn back are judged by the whole contours that they are parts of.
@@ -159,8 +157,8 @@ def verify_program(
     with `job` when there is one. ProgramError names file, block and column."""
     from camtool.planning.job import Job
     from camtool.simulation.motion import ALL
-    from camtool.verify.case import TRACE_POINTS, WORST_LISTED
-    from camtool.verify.verify import VerifyOptions
+    from camtool.verification.case import TRACE_POINTS, WORST_LISTED
+    from camtool.verification.verify import VerifyOptions
 
     judging = judging or Judging()
     decoded = read_program(data, target, source)
@@ -209,7 +207,7 @@ def convert_program(
     and column.
     """
     from camtool.toolpath.lower import at_feed, carried_over, within_feeds
-    from camtool.verify.verify import VerifyOptions
+    from camtool.verification.verify import VerifyOptions
 
     decoded = read_program(data, source, file)
     same = source.machine.target.dialect == target.machine.target.dialect
@@ -236,7 +234,7 @@ def convert_program(
 def _reported(step: Step) -> PlannedOperation:
     """How an operation cuts, for the report."""
     from camtool.planning.checks import IN_PASSES, deepest_pass
-    from camtool.verify.records import PlannedOperation
+    from camtool.verification.report import PlannedOperation
 
     operation, setting = step.operation, step.setting
     in_passes = operation.kind in IN_PASSES
@@ -257,7 +255,7 @@ def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, .
     """What exceeds the limits."""
     if gates is None:
         return ()
-    from camtool.verify.gates import gate_findings
+    from camtool.verification.report import gate_findings
 
     return tuple(gate_findings(verification.report, gates))
 
@@ -284,7 +282,7 @@ def _plainly(
 
 def _before(plain: Posted | None) -> Before | None:
     """Its figures, for the report."""
-    from camtool.verify.records import Before
+    from camtool.verification.report import Before
 
     if plain is None:
         return None
@@ -313,7 +311,7 @@ def tool_mm(job: Job) -> float | None:
 
 def cone_of(job: Job) -> Cone | None:
     """The shape of the V bit that all operations cut with; None for other tools, and several."""
-    from camtool.verify.case import Cone
+    from camtool.verification.case import Cone
 
     tools = [operation.tool for operation in job.operations]
     shapes = {(tool.kind, tool.tip_angle_rad, tool.tip_diameter_mm) for tool in tools}
@@ -327,7 +325,7 @@ def _judged(
     data: bytes, decoded: Toolpath, target: LoadedTarget, goal: Goal, options: VerifyOptions
 ) -> Verification:
     """Simulated, and compared with what was wanted and drawn."""
-    from camtool.verify.verify import verify
+    from camtool.verification.verify import verify
 
     line_bytes = getattr(target.post, "line_bytes", None)
     sent = len(data) if line_bytes is None else line_bytes(data, target.machine)
@@ -350,7 +348,7 @@ def _asked(job: Job, target: LoadedTarget, planned: Toolpath, sent: Bent | None)
     """What the job asks for, in moves as the dialect would say them; None where it asks for what
     cannot be made, which is said already. `sent` is `planned` bent against the mechanics."""
     from camtool.planning.settings import safe_z_of
-    from camtool.verify.asked import Asked
+    from camtool.verification.conformance import Asked
 
     if worst(planned.findings) >= Severity.ERROR:
         return None

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from camtool.preview.viewer.run import Run
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing
-    from camtool.verify.verify import Verification
+    from camtool.verification.verify import Verification
 
 
 def picture(
@@ -114,7 +114,7 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
     import numpy as np
 
     from camtool.preview.rounds import Round
-    from camtool.verify.ballbar import Pairs, both_ways
+    from camtool.verification.circles import Pairs, both_ways
 
     seen = verification.circles
     pairs = Pairs([one.circle for one in seen])

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from camtool.preview.viewer.run import Line, Run, Table, Worst
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing
-    from camtool.verify.report import Report
-    from camtool.verify.verify import Verification
+    from camtool.verification.report import Report
+    from camtool.verification.verify import Verification
 
 LINES_SHOWN = 200
 """A table of the viewer has no more lines than this; the JSON report has them all."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from camtool.calibration.calibrate import Calibration as CalibrationRecord
 from camtool.results.picture import Shown
-from camtool.verify.contrast import ContrastRow, row_of, table
+from camtool.verification.contrast import ContrastRow, row_of, table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.pipeline import Way
     from camtool.preview.overlay import Overlay
-    from camtool.verify.contrast import Variant
-    from camtool.verify.verify import Verification as VerificationRecord
+    from camtool.verification.contrast import Variant
+    from camtool.verification.verify import Verification as VerificationRecord
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,12 +69,12 @@ class Calibration(CalibrationRecord):
     def machine_file(self) -> str:
         """TOML text that `load_target(..., machine=FILE)` reads: the numbers that were found over
         what was known, each with its uncertainty and its source behind it."""
-        from camtool.calibration.machinefile import machine_file
+        from camtool.calibration.machine_file import machine_file
 
         return machine_file(self, self.measurements, self.machine, dict(self.extends))
 
     def __str__(self) -> str:
-        from camtool.calibration.report import to_text
+        from camtool.calibration.calibrate import to_text
 
         return to_text(self, self.machine)
 

@@ -12,7 +12,7 @@ from camtool.pipeline.judge import Posted as PostedRecord
 from camtool.results.picture import Shown
 from camtool.toolpath.moves import Kind
 from camtool.toolpath.moves import Toolpath as ToolpathRecord
-from camtool.verify.verify import Verification as VerificationRecord
+from camtool.verification.verify import Verification as VerificationRecord
 
 if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
@@ -69,7 +69,7 @@ class Toolpath(Shown, ToolpathRecord):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verification(Shown, VerificationRecord):
-    """The verdict on a program (`camtool.verify.verify.Verification`): `report` holds the
+    """The verdict on a program (`camtool.verification.verify.Verification`): `report` holds the
     figures, `findings` what is to be said. `decoded` is the toolpath that the controller makes of
     the program `data`; it was held against `drawing`, planned with `job`, where there is one."""
 

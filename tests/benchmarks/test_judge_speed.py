@@ -21,7 +21,7 @@ from camtool.simulation.motion import Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.verify.verify import Verification, verify
+from camtool.verification.verify import Verification, verify
 from tests.oracles.dense_moves import pic_mmh
 
 pytestmark = pytest.mark.benchmark
@@ -114,8 +114,8 @@ def test_judging_is_as_fast_as_c(tmp_path: Path) -> None:
 
 def test_chunks_are_judged_too() -> None:
     """What other controllers get: their samples, judged; without making them."""
-    from camtool.verify.case import Case, VerifyOptions
-    from camtool.verify.verify import judge
+    from camtool.verification.case import Case, VerifyOptions
+    from camtool.verification.verify import judge
 
     machine, toolpath = pic_mmh(), circles()
     chunks = list(simulate(toolpath, machine, Options()))

@@ -11,7 +11,7 @@ import pytest
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.moves import Toolpath
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles.path_machine import path_machine
 from tests.planning.test_place import _box, drawing_of
 

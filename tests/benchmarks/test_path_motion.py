@@ -20,7 +20,7 @@ from camtool.toolpath.lower import (
     xy_then_z,
 )
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles.dense_moves import cut
 from tests.oracles.path_machine import both, path_machine
 

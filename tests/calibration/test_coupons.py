@@ -13,11 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.calibration.coupons import KINDS, Kind, Sheet, sheet
+from camtool.calibration.coupons import KINDS, Kind, Sheet, dxf, sheet, skeleton, svg
 from camtool.calibration.coupons import Path as Line
-from camtool.calibration.drawings import dxf, svg
 from camtool.calibration.measurements import read_measurements
-from camtool.calibration.skeleton import skeleton
 from camtool.errors import InputError, OptionError
 from camtool.geometry.measure import extents, path_lengths
 from camtool.importers.read import read_drawing

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from camtool.calibration.calibrate import Calibration, calibrate
-from camtool.calibration.coupons import Sheet, sheet
-from camtool.calibration.drawings import dxf
-from camtool.calibration.measurements import Measurements
-from camtool.calibration.records import Added, Lines, Regions, RegionsOf
+from camtool.calibration.coupons import Sheet, dxf, sheet
+from camtool.calibration.measurements import Added, Lines, Measurements, Regions, RegionsOf
 from camtool.importers.read import read_drawing
 from camtool.machine.registry import LoadedTarget, load_target
 from camtool.pipeline import post_drawing

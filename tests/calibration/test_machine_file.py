@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from camtool.calibration.calibrate import Calibration, calibrate
-from camtool.calibration.machinefile import machine_file
+from camtool.calibration.machine_file import machine_file
 from camtool.calibration.measurements import read_measurements
 from camtool.machine.loader import read_table
 from camtool.machine.model import Machine

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.coupons import KINDS, Kind, Sheet, sheet
-from camtool.calibration.measurements import Measurements
-from camtool.calibration.records import (
+from camtool.calibration.measurements import (
     Added,
     Circle,
     Coupon,
     Lines,
+    Measurements,
     RegionsOf,
     Square,
     Steps,

@@ -123,7 +123,7 @@ def test_the_two_lines_of_the_parallel_port_machine() -> None:
     assert all(each.uncertainty is None for each in result.estimates)
     assert result.spread_mm is None
     # 348 and 161 steps (L1172): of 1.88 µm, which is what a step really moves (L622).
-    from camtool.calibration.report import compensations
+    from camtool.calibration.calibrate import compensations
 
     machine = load_target("flashcut").machine
     steps = {axis: count for axis, _, count in compensations(result, machine)}

@@ -108,7 +108,7 @@ def test_what_exceeds_a_limit_is_red(coloured: None, capsys: pytest.CaptureFixtu
 def test_the_best_way_is_green_and_an_endless_one_red(
     coloured: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from camtool.verify.contrast import ContrastRow, table
+    from camtool.verification.contrast import ContrastRow, table
 
     rows = [
         ContrastRow(name, 1.0, 1.0, total, 1.0, None, 1, 1, endless, 1.0)

@@ -10,10 +10,18 @@ from xml.etree import ElementTree
 import pytest
 
 from camtool.findings import Code, Finding, Severity
-from camtool.verify.html import ROWS_SHOWN, html
-from camtool.verify.markdown import PAGE_BYTES, markdown, plain
-from camtool.verify.page import Changed, Page, Setup, to_json
-from camtool.verify.report import reported
+from camtool.verification.report import (
+    HTML_ROWS,
+    PAGE_BYTES,
+    Changed,
+    Page,
+    Setup,
+    html,
+    markdown,
+    markdown_words,
+    page_json,
+    reported,
+)
 from tests.cli.conftest import Run
 
 SQUARE = (
@@ -211,7 +219,7 @@ def test_sly_names_are_words_in_markdown() -> None:
 
 
 def test_a_row_stays_one_row() -> None:
-    assert plain("a|b\nc") == "a\\|b\\\\nc"
+    assert markdown_words("a|b\nc") == "a\\|b\\\\nc"
     rows = [line for line in markdown(sly_page()).splitlines() if line.startswith("| machine | ")]
     (row,) = rows
     assert len(re.findall(r"(?<!\\)\|", row)) == 3
@@ -222,8 +230,8 @@ def test_a_page_of_ten_thousand_findings_fits() -> None:
     text = markdown(page)
     assert len(text.encode()) <= PAGE_BYTES + 100
     assert "and 9950 more findings" in text
-    assert f"and {10_000 - ROWS_SHOWN} more findings" in html(page)
-    assert len(json.loads(to_json(page))["findings"]) == 10_000
+    assert f"and {10_000 - HTML_ROWS} more findings" in html(page)
+    assert len(json.loads(page_json(page))["findings"]) == 10_000
 
 
 def test_a_page_that_is_too_long_says_so() -> None:

@@ -15,7 +15,7 @@ if sys.argv[1] == "its own":
     compiled.OWN_COMPILERS_FOR = ()
 assert compiled.own_compilers() == (sys.argv[1] == "ours")
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles.dense_moves import circle, pic_mmh, square
 part = circle(square(ToolpathBuilder(), 1.0, 1.0, 0.5), 4.0, 4.0, 0.7)
 print(verify(part.finish(), pic_mmh()).report.to_json())

@@ -13,8 +13,7 @@ from camtool_postprocessors.pic_mmh import dialect as pic_mmh
 from camtool_postprocessors.valcnc import dialect as valcnc
 from msgspec import inspect as known
 
-from camtool.calibration.measurements import _Head
-from camtool.calibration.records import KINDS
+from camtool.calibration.measurements import KINDS, _Head
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
 

@@ -3,7 +3,7 @@
 from camtool.findings import Code
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.verify.verify import Case, Verification, VerifyOptions, judge
+from camtool.verification.verify import Case, Verification, VerifyOptions, judge
 from tests.oracles.dense_moves import (
     circle,
     cut,

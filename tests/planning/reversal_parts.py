@@ -17,8 +17,8 @@ from camtool.planning.job import Operation
 from camtool.planning.link import Worked, link
 from camtool.planning.reversing import Approaches
 from camtool.toolpath.moves import Toolpath
-from camtool.verify.report import Report
-from camtool.verify.verify import verify
+from camtool.verification.report import Report
+from camtool.verification.verify import verify
 
 DEPTH_MM = 0.02
 PIC = load_target("pic-mmh")

@@ -23,7 +23,7 @@ from camtool.planning.reversing import (
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
 from camtool.simulation.simulate import simulate
-from camtool.verify.cuts import cut_moves
+from camtool.verification.cuts import cut_moves
 from tests.planning.reversal_parts import run_of, square, toolpath, with_play
 from tests.strategies import contours, open_contours
 

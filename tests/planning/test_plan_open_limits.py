@@ -10,7 +10,7 @@ from camtool.planning.items import Feeds
 from camtool.planning.job import Job, Operation, job_of
 from camtool.planning.plan import plan
 from camtool.planning.settings import feeds_of, lowered_feeds
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.drawings import drawing_of
 from tests.oracles.path_machine import path_machine
 

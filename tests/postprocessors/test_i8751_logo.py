@@ -8,7 +8,7 @@ from camtool.importers.read import read_drawing
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.moves import Move
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles.corte_recto import walk
 from tests.postprocessors.i8751_machines import ROOT, STEP_MM, loaded
 

@@ -15,7 +15,7 @@ from camtool.simulation.simulate import findings_of, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles import arc_ends
 from tests.oracles import pic_mmh_program as oracle
 from tests.oracles.motion_rows import RowMotion, each_row, rows_of

@@ -13,7 +13,7 @@ from camtool.preview.options import Options
 from camtool.preview.rounds import Round
 from camtool.preview.scene import Scene
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles import svg_page
 from tests.oracles.dense_moves import pic_mmh
 from tests.oracles.png import decode

@@ -11,7 +11,7 @@ from camtool.machine.model import Machine
 from camtool.simulation import IDEAL, Options, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles import motion_rows
 from tests.oracles.motion_rows import RowMotion
 from tests.oracles.pic_mmh_run import LiteralRun

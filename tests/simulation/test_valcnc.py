@@ -15,7 +15,7 @@ from camtool.simulation.motion import IDEAL, Effects, Options
 from camtool.simulation.simulate import model_of, simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verify.verify import verify
+from camtool.verification.verify import verify
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.oracles.valcnc_run import Valcnc, table_8
 

@@ -18,7 +18,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, job_of
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.moves import Toolpath
-from camtool.verify.report import Report
+from camtool.verification.report import Report
 from tests.oracles.motion_rows import RowMotion, rows_of
 
 ROOT = Path(__file__).parents[2]

@@ -17,7 +17,7 @@ from camtool.pipeline import Judging, verify_program
 from camtool.simulation.motion import IDEAL, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verify.report import Report
+from camtool.verification.report import Report
 from tests.oracles.motion_rows import rows_of
 from tests.validation.page import check
 

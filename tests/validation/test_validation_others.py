@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from camtool.calibration.calibrate import calibrate
-from camtool.calibration.measurements import Measurements, read_measurements
-from camtool.calibration.records import Steps
+from camtool.calibration.measurements import Measurements, Steps, read_measurements
 from camtool.importers.read import read_drawing
 from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing

@@ -1,0 +1,147 @@
+"""The machine file that a calibration makes: it extends the target, as `--machine` reads it.
+
+What the user's own machine file said stays; numbers that were measured take their place, each
+with its uncertainty and its source behind it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from camtool.calibration.calibrate import Calibration, Estimate
+from camtool.calibration.measurements import Measurements, Regions
+from camtool.machine.model import Machine
+
+Table = dict[str, Any]
+
+WITHIN_UNCERTAINTY = 0.02
+"""Numbers are written to this part of their uncertainty."""
+
+DIGITS = 9
+"""Significant digits of numbers whose uncertainty is not known."""
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def machine_file(
+    calibration: Calibration, measurements: Measurements, machine: Machine, own: Table
+) -> str:
+    """TOML text. `machine` is the one that was measured, as its files said; `own` is the table of
+    the user's file, or one that only says what it `extends`."""
+    said: Table = json.loads(json.dumps(own))  # a copy, tables and all
+    notes: dict[str, str] = {}
+    for axis in ("x", "y", "z"):
+        for what, key in (("step", "real_step_mm"), ("play", "backlash_mm")):
+            estimate = calibration.estimate(what, axis)
+            if estimate is not None:
+                _set(said, f"axes.{axis}.{key}", _rounded(estimate))
+                notes[f"axes.{axis}.{key}"] = _note(estimate, calibration)
+    squareness = calibration.estimate("squareness")
+    if squareness is not None:
+        _set(said, "mechanics.squareness_rad", _rounded(squareness))
+        notes["mechanics.squareness_rad"] = _note(squareness, calibration)
+    _set_map(said, notes, calibration, measurements, machine)
+    head = (
+        f"# {machine.target.name}, calibrated from {_plain(calibration.file)}.",
+        "# ± is the standard uncertainty.",
+        "",
+    )
+    return "\n".join([*head, *_lines(said, (), notes)]) + "\n"
+
+
+def _set_map(
+    said: Table,
+    notes: dict[str, str],
+    calibration: Calibration,
+    measurements: Measurements,
+    machine: Machine,
+) -> None:
+    """The play by region where all cells were told; an older map of an axis whose play was
+    measured as a whole no longer holds."""
+    for axis in ("x", "y"):
+        cells: Regions | None = getattr(measurements.regions, axis)
+        whole = calibration.estimate("play", axis)
+        if cells is not None and whole is not None:
+            plays = {name: calibration.estimate("play", axis, name) for name in cells.every}
+            rows = [[_rounded(plays[name]) for name in row] for row in cells.names]
+            _set(said, "play_map.use", True)
+            _set(said, f"play_map.{axis}.x_mm", list(cells.x_mm))
+            _set(said, f"play_map.{axis}.y_mm", list(cells.y_mm))
+            _set(said, f"play_map.{axis}.play_mm", rows)
+            worst = max(
+                filter(None, (each.uncertainty for each in plays.values() if each)), default=None
+            )
+            notes[f"play_map.{axis}.play_mm"] = f"{_within(worst)}, {_plain(calibration.file)}"
+        elif whole is not None and machine.play_map.use and getattr(machine.play_map, axis):
+            _set(said, "play_map.use", False)
+            notes["play_map.use"] = f"the play of {axis} was measured as a whole since"
+
+
+def _rounded(estimate: Estimate | None) -> float:
+    """The value, to a small part of its uncertainty; a play that is none is 0."""
+    assert estimate is not None
+    value = max(estimate.value, 0.0) if estimate.what != "squareness" else estimate.value
+    if estimate.uncertainty:
+        decimals = math.ceil(-math.log10(WITHIN_UNCERTAINTY * estimate.uncertainty))
+        return round(value, decimals) + 0.0
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _note(estimate: Estimate, calibration: Calibration) -> str:
+    readings = f"{estimate.readings} reading{'s' if estimate.readings != 1 else ''}"
+    return (
+        f"{_within(estimate.uncertainty)}, {readings} of {_plain(calibration.file)}; "
+        f"{estimate.before:.6g} before"
+    )
+
+
+def _within(uncertainty: float | None) -> str:
+    return "uncertainty not known" if uncertainty is None else f"± {uncertainty:.2g}"
+
+
+def _plain(file: str) -> str:
+    """A file's name as part of a comment: without its folder, one line whatever it holds."""
+    return "".join(char if char.isprintable() else "?" for char in Path(file).name)
+
+
+def _set(table: Table, key: str, value: Any) -> None:
+    *tables, name = key.split(".")
+    for each in tables:
+        table = table.setdefault(each, {})
+    table[name] = value
+
+
+def _lines(
+    table: Mapping[str, Any], path: tuple[str, ...], notes: Mapping[str, str]
+) -> Iterator[str]:
+    """A table as TOML, its plain values before the tables within it."""
+    values = {key: value for key, value in table.items() if not isinstance(value, dict)}
+    if path and (values or not table):
+        yield ""
+        yield f"[{'.'.join(map(_key, path))}]"
+    for key, value in values.items():
+        note = notes.get(".".join((*path, key)))
+        yield f"{_key(key)} = {_value(value)}" + (f"    # {note}" if note else "")
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _lines(value, (*path, key), notes)
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _value(name)
+
+
+def _value(value: Any) -> str:
+    """A value of a machine file as TOML: text, numbers, truth, and rows of them."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value)

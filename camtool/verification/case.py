@@ -1,0 +1,130 @@
+"""What is to be judged, how, and with which tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from camtool.geometry.drawing import Drawing
+from camtool.machine.controllers import Interpolator
+from camtool.machine.model import Machine
+from camtool.simulation.motion import ALL, Effects, Options
+from camtool.toolpath.moves import Bent, Toolpath
+from camtool.toolpath.wanted import Kept
+from camtool.verification.conformance import Asked
+
+COVERAGE_MM = 0.005
+"""A move is missing, or extra, when farther than this from all moves of the other side ..."""
+
+COVERAGE_STEPS = 4.0
+"""... or than so many steps of the coarser axis, where that is more ..."""
+
+COVERAGE_RESOLUTIONS = 1.5
+"""... or than so many resolutions of a dialect that is coarser than the steps: vertices are off
+by up to 0.71 of them, and starts that a machine cannot reach by up to 1.41."""
+
+DEPTH_FITS = 2.0
+"""Heights may differ by as much as coverage allows, by so many steps of Z, or by so many fit
+tolerances, where that is more: slopes of machines without slopes are steps that high."""
+
+SAMPLE_MM = 0.01
+"""Spacing of the points on decoded and wanted moves that are compared with each other."""
+
+TRACE_POINTS = 20_000
+"""Points of the slides' path that are kept for pictures."""
+
+
+WORST_LISTED = 10
+"""So many moves with the largest errors are in a report, unless more are asked for."""
+
+
+@dataclass(frozen=True)
+class Cone:
+    """The shape of a V bit: the radius of its flat tip, mm, and the tangent of half its angle."""
+
+    tip_mm: float
+    slope: float
+
+
+@dataclass(frozen=True)
+class VerifyOptions:
+    """How to judge, and what the report says of the program.
+
+    `interpolator` None: as the machine does. `effects`: the parts of the mechanics that act.
+    `worst`: so many moves with the largest errors are listed. `size_bytes` is that of the file,
+    `line_bytes` of what goes over the line to the machine. `blocks` None: counted from the decoded
+    toolpath where it was read. `coverage_mm` None: `COVERAGE_MM`, `COVERAGE_STEPS` or
+    `COVERAGE_RESOLUTIONS`, and `stray_mm`, by which the dialect may leave the wanted path on
+    purpose. `tool_diameter_mm`: rapids below the stock top may run where the tool
+    has cleared the way before; None, when nobody knows it: nowhere. `cone`: the tool is a V bit,
+    that is so wide at its top only. `kept`: what is cut by whom, and what must stay; () where
+    nobody knows.
+    """
+
+    interpolator: Interpolator | None = None
+    effects: Effects = ALL
+    tool_diameter_mm: float | None = None
+    cone: Cone | None = None
+    kept: tuple[Kept, ...] = ()
+    source: str = ""
+    size_bytes: int | None = None
+    line_bytes: int | None = None
+    blocks: int | None = None
+    coverage_mm: float | None = None
+    stray_mm: float = 0.0
+    sample_mm: float = SAMPLE_MM
+    trace_points: int = TRACE_POINTS
+    worst: int = WORST_LISTED
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is to be judged. `sent`: what the program should say, where it is not `wanted` itself
+    but bent against the mechanics. `asked`: what the job asks for besides, and how the dialect
+    would say it. `said`: what the program was written from, where that is known: its contours
+    must run the same way round."""
+
+    decoded: Toolpath
+    machine: Machine
+    wanted: Toolpath | None
+    drawing: Drawing | None
+    options: VerifyOptions
+    sent: Bent | None = None
+    asked: Asked | None = None
+    said: Toolpath | None = None
+
+    @property
+    def simulation(self) -> Options:
+        """How to simulate it."""
+        return Options(interpolator=self.options.interpolator, effects=self.options.effects)
+
+    @property
+    def step_mm(self) -> float:
+        """The finer coded step of X and Y."""
+        return min(self.machine.axes.x.coded_step_mm, self.machine.axes.y.coded_step_mm)
+
+    @property
+    def spacing_mm(self) -> float:
+        """How far apart the samples of the motion are, about."""
+        from camtool.simulation.simulate import model_of
+
+        return model_of(self.machine).spacing_mm(self.decoded, self.machine)
+
+    @property
+    def coverage_mm(self) -> float:
+        """How far moves of one side may be from those of the other."""
+        if self.options.coverage_mm is not None:
+            return self.options.coverage_mm
+        axes = (self.machine.axes.x, self.machine.axes.y)
+        coarse = max(axis.coded_step_mm for axis in axes)
+        said = max(axis.resolution_mm or 0.0 for axis in axes)
+        least = max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * said)
+        return least + self.options.stray_mm
+
+    @property
+    def depth_mm(self) -> float:
+        """How far heights of one side may be from those of the other."""
+        z, fit_mm = self.machine.axes.z, self.machine.defaults.fit_tolerance_mm
+        steps = max(
+            COVERAGE_STEPS * z.coded_step_mm, COVERAGE_RESOLUTIONS * (z.resolution_mm or 0)
+        )
+        return max(self.coverage_mm, steps, DEPTH_FITS * fit_mm)

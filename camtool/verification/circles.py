@@ -1,0 +1,335 @@
+"""Full circles of a toolpath, and the figures of ISO 230-4 for what became of them.
+
+About a programmed circle (centre c, radius R) the slides are seen as radii over the angle, kept
+in bins of half a degree (`camtool.kernels.circle_bins`): of each bin the points with the least and
+the largest radius and the mean point. Memory is that of the bins, however many steps there are.
+
+    F max, F min = largest, least |p − c| − R           (radial error, programmed centre)
+    G            = largest − least |p − c'|              (circular error)
+    D            = mean of |p − c| − R over the bins     (mean radial error)
+
+c' is the centre of the circle that fits the bins' mean points best by least squares of the radial
+distances; each bin counts alike, as the angle does for a ball-bar. With the centres e apart, the
+extreme of a bin is found about c and taken about c': that is wrong by no more than
+e · 2π/720, 0.9 % of e.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.geometry.polylines import Floats, Ints
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verification.cuts import CutMoves
+
+FIT_ROUNDS = 30
+"""The least-squares centre converges in about four rounds; more than this many are not tried."""
+
+FIT_END_MM = 1e-9
+"""The least-squares centre is found when it moves by less than this."""
+
+FEWEST_BINS = 3
+"""A circle has three unknowns."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A full circle of a toolpath: centre (x, y) mm, radius mm, direction, first and last row."""
+
+    centre_mm: tuple[float, float]
+    radius_mm: float
+    ccw: bool
+    z_mm: float
+    first_row: int
+    last_row: int
+
+
+@dataclass(frozen=True)
+class CircleFigures:
+    """What became of a circle, mm; NaN where the slides left fewer than three angles, G also where
+    they did not go round the programmed centre: as with play that comes near to the radius."""
+
+    circular_mm: float
+    radial_max_mm: float
+    radial_min_mm: float
+    radial_mean_mm: float
+
+
+UNSEEN = CircleFigures(math.nan, math.nan, math.nan, math.nan)
+"""Figures of a circle that nothing followed."""
+
+
+def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
+    """Runs of consecutive level arcs that cut about one centre, one way round, and make a full
+    turn; of those that lie below each other (passes, or a helix and its last turn) the deepest.
+
+    `gap_mm` is how far centres and radii may differ, and how much of the way round may lack (a
+    post may leave a rest that a line mends).
+    """
+    toolpath = cuts.toolpath
+    level = toolpath.starts[:, 2] == toolpath.end[:, 2]
+    arcs = np.flatnonzero(toolpath.is_arc & cuts.is_cut & level)
+    if len(arcs) == 0:
+        return []
+    spoke = toolpath.starts[arcs, :2] - toolpath.centre[arcs]
+    radius = np.hypot(spoke[:, 0], spoke[:, 1])
+    breaks = (
+        (np.diff(arcs) != 1)
+        | (np.diff(cuts.contour[arcs]) != 0)
+        | (np.diff(toolpath.kind[arcs]) != 0)
+        | (np.abs(np.diff(toolpath.centre[arcs], axis=0)).max(axis=1) > gap_mm)
+        | (np.abs(np.diff(radius)) > gap_mm)
+    )
+    first = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+    last = np.concatenate([first[1:], [len(arcs)]]) - 1
+    way = np.abs(np.add.reduceat(toolpath.sweeps()[arcs], first)) * radius[first]
+    full = np.flatnonzero(way >= 2.0 * np.pi * radius[first] - gap_mm)
+    return _deepest(
+        [
+            _circle(toolpath, arcs[first[run] : last[run] + 1], float(radius[first[run]]))
+            for run in full
+        ],
+        gap_mm,
+    )
+
+
+def _deepest(circles: list[Circle], gap_mm: float) -> list[Circle]:
+    """Of circles one below the other the deepest, of equals all, in their order."""
+    lowest: dict[tuple[object, ...], float] = {}
+    keys = []
+    for circle in circles:
+        numbers = (*circle.centre_mm, circle.radius_mm)
+        key = (circle.ccw, *(round(number / gap_mm) for number in numbers))
+        lowest[key] = min(lowest.get(key, math.inf), circle.z_mm)
+        keys.append(key)
+    return [
+        circle for circle, key in zip(circles, keys, strict=True) if circle.z_mm == lowest[key]
+    ]
+
+
+def _circle(toolpath: Toolpath, run: Ints, radius: float) -> Circle:
+    row = int(run[0])
+    return Circle(
+        centre_mm=(float(toolpath.centre[row, 0]), float(toolpath.centre[row, 1])),
+        radius_mm=radius,
+        ccw=bool(toolpath.kind[row] == Kind.ARC_CCW),
+        z_mm=float(toolpath.end[row, 2]),
+        first_row=row,
+        last_row=int(run[-1]),
+    )
+
+
+def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
+    """G, F max, F min and D of the bins (720, 9) of `camtool.kernels.circle_bins`."""
+    seen = bins[bins[:, 0] > 0.0]
+    if len(seen) < FEWEST_BINS:
+        return UNSEEN
+    mean = mean_points(seen)
+    return CircleFigures(
+        circular_mm=circular_error(seen),
+        radial_max_mm=math.sqrt(seen[:, 6].max()) - radius_mm,
+        radial_min_mm=math.sqrt(seen[:, 3].min()) - radius_mm,
+        radial_mean_mm=float(np.hypot(mean[:, 0], mean[:, 1]).mean()) - radius_mm,
+    )
+
+
+def mean_points(seen: Floats) -> Floats:
+    """(J, 2) about the programmed centre, of bins (J, 9) that are not empty."""
+    return np.asarray(seen[:, 1:3] / seen[:, :1])
+
+
+def circular_error(seen: Floats) -> float:
+    """G of bins (J, 9) that are not empty, J ≥ 1; NaN where they do not go round the centre."""
+    mean = mean_points(seen)
+    if not _surrounds(mean):
+        return math.nan
+    centre = least_squares_centre(mean)
+    inner, outer = seen[:, 4:6] - centre, seen[:, 7:9] - centre
+    return float(np.hypot(*outer.T).max() - np.hypot(*inner.T).min())
+
+
+def _surrounds(points: Floats) -> bool:
+    """Whether points (J, 2) lie on all sides of the origin: none of the angles between them, as
+    seen from there, is half a turn."""
+    angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
+    return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)
+
+
+def least_squares_centre(points: Floats) -> Floats:
+    """Centre (2,) of the circle with the least sum of squared radial distances to points (J, 2).
+
+    Gauss-Newton from the origin: with d = |p − c| and u = (p − c)/d, the residual d − R changes by
+    −u·δc − δR, so each round solves the 3 × 3 normal equations of [u, 1] (δc, R) = d.
+    The origin must lie inside the points.
+    """
+    centre = np.zeros(2)
+    for _ in range(FIT_ROUNDS):
+        spoke = points - centre
+        distance = np.hypot(spoke[:, 0], spoke[:, 1])
+        if not distance.all():
+            break
+        u, v = (spoke / distance[:, None]).T
+        normal = np.array(
+            [
+                [(u * u).sum(), (u * v).sum(), u.sum()],
+                [(u * v).sum(), (v * v).sum(), v.sum()],
+                [u.sum(), v.sum(), float(len(u))],
+            ]
+        )
+        right = np.array([(u * distance).sum(), (v * distance).sum(), distance.sum()])
+        move = np.linalg.lstsq(normal, right, rcond=None)[0][:2]
+        centre = centre + move
+        if np.hypot(move[0], move[1]) < FIT_END_MM:
+            break
+    return centre
+
+
+# What a ball-bar would show of a circle: reversals, and both ways round together.
+#
+# At 0° and 180° X turns, at 90° and 270° Y does. What an axis does wrong at its reversal lies
+# along the radius there. Of the mean radii of the bins of half a degree
+# (`camtool.kernels.circle_bins`):
+#
+# - the step at such a place is the radius behind it (in the direction of travel) less that before
+#   it, each taken there from a straight line through the bins of its side;
+# - the spike is what sticks out beyond both sides, outwards (+) or inwards;
+# - the reversal value B of an axis is estimated from the whole circle: a slide that stands off by
+#   ±B/2 depending on the direction of its axis changes the radius at the angle t by
+#   ∓B/2 |cos t| (X) or |sin t| (Y), so the radii are fitted by least squares with
+#
+#       r = c + e_x cos t + e_y sin t + (B_x/2) d_x |cos t| + (B_y/2) d_y |sin t|,
+#
+#   d = −1 where the axis goes towards the place where it stands farthest out, +1 behind it.
+
+QUADRANTS_DEG = (0, 90, 180, 270)
+"""Where an axis turns: X, Y, X, Y."""
+
+NEAR_BINS, FAR_BINS = 3, 15
+"""A step is seen between 1.5° and 7.5° to either side, a spike within 1.5°."""
+
+SAME_SHARE = 1e-3
+"""Circles whose centres and radii differ by less than this share of the radius are one circle
+cut twice."""
+
+
+@dataclass(frozen=True)
+class Reversing:
+    """mm: `step` and `spike` at 0°, 90°, 180°, 270°; `value` B of X and Y. NaN where the slides
+    left too few bins."""
+
+    step: tuple[float, float, float, float]
+    spike: tuple[float, float, float, float]
+    value: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class BothWays:
+    """A circle that was cut both ways round, mm: bi-directional circular error G(b) and mean
+    bi-directional radial error D."""
+
+    circle: Circle
+    circular_mm: float
+    radial_mean_mm: float
+
+
+def reversing(bins: Floats, ccw: bool) -> Reversing:
+    """The reversals of one circle from its bins (B, 9) about the programmed centre."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = bins[:, 1:3] / bins[:, :1]
+        least, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
+    # The mean of points along an arc of angle w lies at sin(w/2)/(w/2) of the radius.
+    half = np.pi / len(bins)
+    radius = np.hypot(mean[:, 0], mean[:, 1]) * (half / math.sin(half))
+    steps, spikes = [], []
+    for degrees in QUADRANTS_DEG:
+        at = degrees * len(bins) // 360
+        step, spike = _at(radius, least, largest, at, 1 if ccw else -1)
+        steps.append(step)
+        spikes.append(spike)
+    return Reversing(
+        (steps[0], steps[1], steps[2], steps[3]),
+        (spikes[0], spikes[1], spikes[2], spikes[3]),
+        _values(radius, ccw),
+    )
+
+
+def _at(radius: Floats, least: Floats, largest: Floats, at: int, way: int) -> tuple[float, float]:
+    """Step and spike at the edge below bin `at`; `way` +1 for growing angles."""
+    count = len(radius)
+    away = np.arange(NEAR_BINS, FAR_BINS) + 0.5
+    behind = radius[(at + np.arange(NEAR_BINS, FAR_BINS)) % count]
+    below = radius[(at - 1 - np.arange(NEAR_BINS, FAR_BINS)) % count]
+    if not (np.isfinite(behind).all() and np.isfinite(below).all()):
+        return math.nan, math.nan
+    high, low = (float(np.polyfit(away, side, 1)[1]) for side in (behind, below))
+    near = np.arange(at - NEAR_BINS, at + NEAR_BINS) % count
+    seen = np.isfinite(largest[near])
+    out = float(largest[near][seen].max(initial=-math.inf)) - max(high, low)
+    into = min(high, low) - float(least[near][seen].min(initial=math.inf))
+    return way * (high - low), max(out, 0.0) if out >= into else -max(into, 0.0)
+
+
+def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
+    """B of X and of Y by least squares; NaN when less than half of the circle is there."""
+    angle = (np.arange(len(radius)) + 0.5) * (2.0 * np.pi / len(radius))
+    seen = np.isfinite(radius)
+    if seen.sum() < len(radius) // 2:
+        return math.nan, math.nan
+    cos, sin = np.cos(angle[seen]), np.sin(angle[seen])
+    turn = 1.0 if ccw else -1.0
+    # Growing angles leave 0° with sin > 0, and 90° with cos < 0.
+    x = turn * np.sign(sin) * cos
+    y = -turn * np.sign(cos) * sin
+    table = np.column_stack([np.ones(len(cos)), cos, sin, 0.5 * x, 0.5 * y])
+    found = np.linalg.lstsq(table, radius[seen], rcond=None)[0]
+    return float(found[3]), float(found[4])
+
+
+class Pairs:
+    """The circles that are cut clockwise and counterclockwise about one centre. Only their bins
+    are kept, and only until the second of them is done."""
+
+    def __init__(self, circles: Sequence[Circle]) -> None:
+        """Each takes the first free partner: as many pairs as there are of the rarer way."""
+        self._circles = circles
+        self._partner: dict[int, int] = {}
+        self._waiting: dict[int, Floats] = {}
+        if not circles:
+            return
+        table = np.array([(*one.centre_mm, one.radius_mm) for one in circles])
+        free = np.array([not one.ccw for one in circles])
+        for first, one in enumerate(circles):
+            if one.ccw and free.any():
+                apart = np.abs(table - table[first]).max(axis=1)
+                for second in np.flatnonzero(free & (apart <= SAME_SHARE * one.radius_mm))[:1]:
+                    free[second] = False
+                    self._partner[first], self._partner[int(second)] = int(second), first
+
+    def partner(self, circle: int) -> int | None:
+        """The other circle of its pair; None where it has none."""
+        return self._partner.get(circle)
+
+    def add(self, circle: int, bins: Floats) -> list[BothWays]:
+        """Take the bins of a circle; what it and its partner make when that is done already."""
+        partner = self._partner.get(circle)
+        if partner is None:
+            return []
+        if partner not in self._waiting:
+            self._waiting[circle] = bins.copy()
+            return []
+        return [
+            both_ways(self._circles[circle], np.concatenate([self._waiting.pop(partner), bins]))
+        ]
+
+
+def both_ways(circle: Circle, bins: Floats) -> BothWays:
+    """The figures of a circle from the bins (2 B, 9) of both ways round; NaN without points."""
+    seen = bins[bins[:, 0] > 0.0]
+    if len(seen) == 0:
+        return BothWays(circle, math.nan, math.nan)
+    about = np.hypot(*mean_points(seen).T).mean()
+    return BothWays(circle, circular_error(seen), float(about) - circle.radius_mm)

@@ -1,0 +1,651 @@
+"""Is a program what its job asks for? Moves as programmed, before any controller or mechanics.
+
+    drawing, job, flags ─plan, write, read─▶ written     the moves that camtool would ask for
+    program ─read─▶ decoded                              the moves that it asks for
+
+A move that both hold, number for number, is as asked. Any other one must lie where `written` or
+the wanted toolpath cuts, and the other way round, within the resolution of the dialect: what a
+dialect makes of the wanted path (chords, ends on its grid, stairs) is in `written`, so no room is
+left for it. Order and starts are free. Where moves of both lie on each other, the way round, the
+feed, the spindle and the tool must be the same too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.measure import point_at
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.verification.coverage import (
+    Compared,
+    Holes,
+    Limits,
+    and_more,
+    at_point,
+    block_name,
+    compared,
+    contours_drilled,
+    hole_findings,
+    holes_of,
+    other_way,
+    round_trips,
+    turned,
+)
+from camtool.verification.cuts import Bools, CutMoves, cut_moves, is_flat
+from camtool.verification.matching import nearest_at_height
+from camtool.verification.nearest import Target
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What came of it: findings of `place` and of the other `settings`; of how many `moves`
+    (those that cut) so many `alike` are those of `written`; the farthest `off_mm` of the rest
+    from what was asked (0 where there is no rest)."""
+
+    place: tuple[Finding, ...] = ()
+    settings: tuple[Finding, ...] = ()
+    moves: int = 0
+    alike: int = 0
+    off_mm: float = 0.0
+
+
+def hold(decoded: Toolpath, asked: Asked, *, flat_cuts: bool, sample_mm: float) -> Held:
+    """Hold the moves of a program against those that were asked for."""
+    mine = Side.of(decoded, flat_cuts=flat_cuts)
+    count = len(mine.cuts.rows)
+    if _same(decoded, asked.written):
+        return Held(moves=count, alike=count)
+    other = Side.of(asked.written, flat_cuts=flat_cuts)
+    wanted = Side.of(asked.wanted, flat_cuts=flat_cuts)
+    alike = Alike.of(mine.toolpath, other.toolpath)
+    place = hold_place(mine, other, wanted, alike, asked, sample_mm)
+    settings = hold_settings(mine, other, alike, place.pairs, asked)
+    return Held(
+        place=place.findings,
+        settings=settings,
+        moves=count,
+        alike=int((alike.in_written & mine.cuts.is_cut).sum()),
+        off_mm=place.off_mm,
+    )
+
+
+def _same(one: Toolpath, other: Toolpath) -> bool:
+    """Whether two toolpaths are equal, row for row."""
+    names = ("kind", "end", "centre", "feed", "value", "start", "mode")
+    return one.modes == other.modes and all(
+        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in names
+    )
+
+
+# What a job asks of a program, and the two sides that are compared: decoded and written.
+
+LIMIT_UNITS = 1.5
+"""Moves may be so many units of the dialect apart: ends are rounded by up to 0.71 of them, and
+centres of arcs on top."""
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a program is held against.
+
+    `written`: the moves of the program that camtool would write, as its dialect decodes them;
+    `wanted`: what that was written from. `unit_mm`, `unit_z_mm`: the finest difference of places
+    that the dialect can say. `feed_said` (M,): the written rows whose feed the job names; a feed
+    is the same within half of `feed_unit_mm_min`. `safe_z_mm`: the height of rapids,
+    `safe_z_said` where the job names it.
+    """
+
+    written: Toolpath
+    wanted: Toolpath
+    unit_mm: float
+    unit_z_mm: float
+    feed_said: Bools
+    feed_unit_mm_min: float
+    safe_z_mm: float
+    safe_z_said: bool
+
+    @property
+    def limits_mm(self) -> tuple[float, float]:
+        """How far apart moves may be in XY, and in height."""
+        return LIMIT_UNITS * self.unit_mm, LIMIT_UNITS * self.unit_z_mm
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One of the toolpaths that are compared, with what is asked of it again and again."""
+
+    toolpath: Toolpath
+    cuts: CutMoves
+
+    @classmethod
+    def of(cls, toolpath: Toolpath, *, flat_cuts: bool) -> Side:
+        """The toolpath with its cutting moves; `flat_cuts` as `camtool.verification.cuts` says."""
+        running = toolpath.first(toolpath.running)
+        return cls(running, cut_moves(running, flat_cuts=flat_cuts))
+
+    @cached_property
+    def target(self) -> Target:
+        """The cutting moves, to be searched."""
+        return Target(self.cuts)
+
+    @cached_property
+    def holes(self) -> Holes:
+        """What it drills."""
+        return holes_of(self.toolpath)
+
+    @cached_property
+    def plunges(self) -> Bools:
+        """(N,) feeds straight down that end below the stock top."""
+        start, end = self.toolpath.starts, self.toolpath.end
+        still = (start[:, :2] == end[:, :2]).all(axis=1) & ~self.toolpath.is_arc
+        deep = (end[:, 2] < start[:, 2]) & (end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
+        return np.asarray(self.toolpath.is_feed & still & deep)
+
+
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """Numbers (N,) of the moves of two sides: the same where kind, start, end and centre are."""
+
+    decoded: Ints
+    written: Ints
+
+    @classmethod
+    def of(cls, decoded: Toolpath, written: Toolpath) -> Alike:
+        """Places are the same when they are within rounding (POSITION_EPS_MM)."""
+        both = np.concatenate([_numbers(decoded), _numbers(written)])
+        number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
+        return cls(number[: len(decoded)], number[len(decoded) :])
+
+    @property
+    def in_written(self) -> Bools:
+        """(N,) decoded moves that `written` holds too."""
+        return np.isin(self.decoded, self.written)
+
+    @property
+    def in_decoded(self) -> Bools:
+        """(M,) written moves that `decoded` holds too."""
+        return np.isin(self.written, self.decoded)
+
+
+def _numbers(toolpath: Toolpath) -> Ints:
+    """(N, 9) kind and places, in whole numbers."""
+    centre = np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0)
+    places = np.concatenate([toolpath.starts, toolpath.end, centre], axis=1)
+    whole = np.rint(places / POSITION_EPS_MM).astype(np.int64)
+    return np.concatenate([toolpath.kind[:, None], whole], axis=1)
+
+
+# Where a program cuts, against where it was asked to cut, at the resolution of its dialect.
+#
+# Moves that both sides hold need no looking at. All others are sampled. A sample of the program
+# must lie near a written or a wanted move at its height; a sample of the written program near a
+# decoded move, or what it was written from must. The way round is compared wherever moves of both
+# sides lie on each other.
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Findings; the farthest that any cut is from what was asked, mm; `pairs` (P, 2): decoded
+    rows that are not alike, each with a written row that it lies on and runs along."""
+
+    findings: tuple[Finding, ...]
+    off_mm: float
+    pairs: Ints
+
+
+def hold_place(
+    mine: Side, other: Side, wanted: Side, alike: Alike, asked: Asked, sample_mm: float
+) -> Place:
+    """Compare `mine`, the decoded side, with `other`, the written one, both ways."""
+    limits = asked.limits_mm
+    drilled, other_stand = contours_drilled(mine.cuts, other.holes, limits)
+    undrilled, mine_stand = contours_drilled(other.cuts, mine.holes, limits)
+    there = compared(mine.cuts, ~alike.in_written, other.target, limits, sample_mm)
+    back = compared(other.cuts, ~alike.in_decoded, mine.target, limits, sample_mm)
+    _also_near(there, wanted.target, limits)
+    _also_behind(back, wanted.target, mine.target, limits)
+    trips = round_trips(other.cuts, limits[0])
+    written = other.target.contour
+    turns = turned(there, trips[written[there.move]], limits)
+    turns_back = turned(back, trips[written[back.samples.segment[back.point]]], limits)
+    findings = (
+        *_beside(back, undrilled, limits, Code.CONTOUR_MISSING),
+        *_beside(there, drilled, limits, Code.EXTRA_CUT),
+        *hole_findings(mine.holes, other.holes, limits, (mine_stand, other_stand)),
+        *_plunges(mine, (other, wanted), alike, limits),
+        *_again(mine, other, alike, limits),
+        *(other_way(there, turns) if len(turns) else other_way(back, turns_back)),
+    )
+    return Place(findings, max(there.off_mm, back.off_mm), there.rows_along())
+
+
+def _also_near(there: Compared, wanted: Target, limits: Limits) -> None:
+    """What is near a wanted move is as asked, though the writer would have said it otherwise."""
+    rest = np.flatnonzero(np.isinf(there.distance))
+    point, _, distance = wanted.within(there.samples.points[rest], there.samples.z[rest], limits)
+    np.minimum.at(there.distance, rest[point], distance)
+
+
+def _also_behind(back: Compared, wanted: Target, decoded: Target, limits: Limits) -> None:
+    """What was written is there as well where the program cuts what it was written from."""
+    rest = np.flatnonzero(np.isinf(back.distance))
+    part = back.samples.of(rest)
+    found, wrong_depth = nearest_at_height(part, None, wanted, limits)
+    known = np.flatnonzero((found.segment >= 0) & ~wrong_depth)
+    rest, move = rest[known], found.segment[known]
+    share = wanted.table.shares(part.points[known], move)
+    begin, end = wanted.cuts.ends_z[move].T
+    places = point_at(wanted.cuts.segments, move, share)
+    point, _, distance = decoded.within(places, begin + share * (end - begin), limits)
+    np.minimum.at(back.distance, rest[point], distance)
+
+
+def _beside(found: Compared, drilled: Bools, limits: Limits, code: Code) -> Iterator[Finding]:
+    """One finding for each contour of which a part lies where the other side cuts nothing; but
+    for contours that a hole stands for, and slopes that are hardly below the stock top."""
+    cuts, samples = found.cuts, found.samples
+    contour = cuts.contour[found.rows]
+    judged = ~cuts.slopes[samples.segment] | (samples.z < STOCK_TOP_MM - limits[1])
+    bad = np.flatnonzero(np.isinf(found.distance) & judged & ~drilled[contour])
+    if len(bad) == 0:
+        return
+    near, wrong_depth = nearest_at_height(samples.of(bad), None, Target(found.others), limits)
+    order = np.lexsort((bad, -near.distance, contour[bad]))
+    listed = order[np.flatnonzero(np.diff(contour[bad][order], prepend=-1))]
+    for number, worst in enumerate(listed.tolist()):
+        sample, nearest = int(bad[worst]), int(near.segment[worst])
+        extra, known = code == Code.EXTRA_CUT, nearest >= 0
+        one, which = (cuts, samples.segment[sample]) if extra else (found.others, nearest)
+        at, more = at_point(samples.points[sample]), and_more(number, len(listed), "contours")
+        block = block_name(one.toolpath, int(one.segments.path[which])) if extra or known else ""
+        yield Finding(
+            code,
+            Severity.ERROR,
+            _words(code, near.distance[worst], wrong_depth=bool(wrong_depth[worst])) + more,
+            where=f"{block} near {at}".strip(),
+            measured=float(near.distance[worst]) if known else None,
+            limit=limits[0],
+            unit="mm",
+        )
+        if more:
+            return
+
+
+def _words(code: Code, distance: float, *, wrong_depth: bool) -> str:
+    extra = code == Code.EXTRA_CUT
+    if not np.isfinite(distance):
+        return "nothing was asked to be cut" if extra else "the program cuts nothing"
+    if wrong_depth:
+        return (
+            "a cut is at another depth than was asked"
+            if extra
+            else "what was asked is cut at another depth"
+        )
+    far = f"{distance:.4f} mm"
+    return (
+        f"a cut lies {far} beside what was asked" if extra else f"cut {far} beside what was asked"
+    )
+
+
+def _plunges(
+    mine: Side, others: tuple[Side, Side], alike: Alike, limits: Limits
+) -> Iterator[Finding]:
+    """EXTRA_CUT for feeds straight down to where nothing was asked to be cut; holes, which are
+    compared as such, are left out."""
+    import shapely
+
+    toolpath = mine.toolpath
+    rows = np.flatnonzero(mine.plunges & ~alike.in_written)
+    rows = rows[~_on(toolpath.end[rows, :2], mine.holes.at)]
+    fine = np.zeros(len(rows), dtype=np.bool_)
+    for other in others:
+        ends = toolpath.end[rows]
+        fine[other.target.within(ends[:, :2], ends[:, 2], limits)[0]] = True
+        deep = other.toolpath.end[other.plunges]
+        tree = shapely.STRtree(shapely.points(deep[:, :2]))
+        places = shapely.points(ends[:, :2])
+        one, plunge = tree.query(places, predicate="dwithin", distance=limits[0])
+        fine[one[deep[plunge, 2] <= ends[one, 2] + limits[1]]] = True
+    bad = rows[~fine]
+    for number, row in enumerate(bad.tolist()):
+        more = and_more(number, len(bad), "plunges")
+        yield Finding(
+            Code.EXTRA_CUT,
+            Severity.ERROR,
+            f"a plunge to {toolpath.end[row, 2]:.3f} mm was not asked for{more}",
+            where=f"{block_name(toolpath, row)} at {at_point(toolpath.end[row])}",
+            measured=float(toolpath.end[row, 2]),
+            unit="mm",
+        )
+        if more:
+            return
+
+
+def _on(points: Floats, places: Floats) -> Bools:
+    """(J,) which points (J, 2) are one of the places (K, 2)."""
+    known = {tuple(place) for place in np.rint(places / POSITION_EPS_MM).astype(int).tolist()}
+    mine = np.rint(points / POSITION_EPS_MM).astype(int).tolist()
+    return np.array([tuple(point) in known for point in mine], dtype=np.bool_)
+
+
+def _again(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Finding]:
+    """EXTRA_CUT for whole moves that are cut more often than was asked."""
+    cutting = np.flatnonzero(mine.cuts.is_cut)
+    number, first, counts = np.unique(
+        alike.decoded[cutting], return_index=True, return_counts=True
+    )
+    asked = np.bincount(
+        alike.written[other.cuts.is_cut], minlength=int(number.max(initial=-1)) + 1
+    )[number]
+    more_often = np.flatnonzero((counts > 1) & (counts > asked))
+    rows = cutting[first[more_often]]
+    segment = mine.cuts.first[rows]
+    half = np.full(len(rows), 0.5)
+    middle = point_at(mine.cuts.segments, segment, half)
+    z = mine.cuts.ends_z[segment].mean(axis=1)
+    point, move, _ = other.target.within(middle, z, limits)
+    moves = np.column_stack([point, other.cuts.segments.path[move]])
+    lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
+    bad = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
+    for rank, place in enumerate(bad.tolist()):
+        row, more = int(rows[place]), and_more(rank, len(bad), "moves")
+        times, limit = int(counts[more_often][place]), max(int(lie[place]), 1)
+        yield Finding(
+            Code.EXTRA_CUT,
+            Severity.ERROR,
+            f"a move is cut {times} times, asked for {limit} times{more}",
+            where=f"{block_name(mine.toolpath, row)} near {at_point(middle[place])}",
+            measured=float(times),
+            limit=float(limit),
+            unit="times",
+        )
+        if more:
+            return
+
+
+# Feeds, spindle, tool, dwells, clearance and end of a program, against what was asked for.
+
+FEED_SHARE = 0.5
+"""A feed is another one when it is off by more than this part of the dialect's unit of feeds."""
+
+DWELL_S = 0.0005
+"""A dwell that is shorter by less is as long."""
+
+OFF = 0.0
+"""Stands for a spindle that does not turn, and for no tool."""
+
+
+def hold_settings(
+    mine: Side, other: Side, alike: Alike, pairs: Ints, asked: Asked
+) -> tuple[Finding, ...]:
+    """Compare how moves are made; `pairs` (P, 2) are rows of both sides that lie on each other
+    besides those that are alike."""
+    both = _Both.of(mine, other, alike, pairs)
+    return (
+        *_feeds(both, asked),
+        *_spindle(both),
+        *_tools(both),
+        *_corners(both),
+        *_dwells(mine.toolpath, other.toolpath, asked),
+        *_clearance(mine, other, alike, asked),
+        *_end(mine.toolpath, other.toolpath, asked),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Both:
+    """Rows (R,) of the decoded side that feed into the stock, and pairs (P, 2) of such a row with
+    a written row that it may be compared with."""
+
+    decoded: Toolpath
+    written: Toolpath
+    rows: Ints
+    pairs: Ints
+
+    @classmethod
+    def of(cls, mine: Side, other: Side, alike: Alike, pairs: Ints) -> _Both:
+        """The pairs that are given, all rows that are alike, and plunges that are not with every
+        written plunge."""
+        at_work, there = mine.cuts.is_cut | mine.plunges, other.cuts.is_cut | other.plunges
+        rows, written = np.flatnonzero(at_work), np.flatnonzero(there)
+        # Of written rows that are alike in every way one is enough.
+        states = np.column_stack([alike.written, *_settings(other.toolpath)])[written]
+        written = written[np.unique(states, axis=0, return_index=True)[1]]
+        order = written[np.argsort(alike.written[written], kind="stable")]
+        number = alike.written[order]
+        low = np.searchsorted(number, alike.decoded[rows], side="left")
+        high = np.searchsorted(number, alike.decoded[rows], side="right")
+        count = high - low
+        begin = np.repeat(low - (np.cumsum(count) - count), count)
+        same = np.column_stack([np.repeat(rows, count), order[begin + np.arange(count.sum())]])
+        lone = rows[(count == 0) & mine.plunges[rows]]
+        plunges = written[other.plunges[written]]
+        feeds = plunges[np.unique(other.toolpath.feed[plunges], return_index=True)[1]]
+        entered = np.column_stack([np.repeat(lone, len(feeds)), np.tile(feeds, len(lone))])
+        return cls(mine.toolpath, other.toolpath, rows, np.concatenate([same, pairs, entered]))
+
+    def unlike(self, same: Bools) -> tuple[Ints, Ints]:
+        """Rows none of whose pairs is the `same` (P,), and for each the written row of one."""
+        fine = np.zeros(len(self.decoded), dtype=np.bool_)
+        fine[self.pairs[same, 0]] = True
+        rows, first = np.unique(self.pairs[:, 0], return_index=True)
+        bad = ~fine[rows]
+        return rows[bad], self.pairs[first[bad], 1]
+
+
+def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats]:
+    """(N,) each: feed, turns of the spindle (CCW negative, OFF where it does not turn), tool."""
+    kind = toolpath.kind
+    turning = np.where(kind == Kind.SPINDLE_CCW, -toolpath.value, toolpath.value)
+    spindle = (kind >= Kind.SPINDLE_CW) & (kind <= Kind.SPINDLE_OFF)
+    turns = _since(spindle, np.where(kind == Kind.SPINDLE_OFF, OFF, turning))
+    return toolpath.feed, turns, _since(kind == Kind.TOOL_CHANGE, toolpath.value)
+
+
+def _since(said: Bools, values: Floats) -> Floats:
+    """(N,) the last value that was said up to each row, OFF before the first."""
+    last = np.maximum.accumulate(np.where(said, np.arange(len(said)), -1))
+    return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), OFF)
+
+
+def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
+    """FEED_DIFFERS: an error for feeds that the job names; those that it leaves to the machine
+    are told."""
+    is_, wanted = both.decoded.feed[both.pairs[:, 0]], both.written.feed[both.pairs[:, 1]]
+    off = np.abs(is_ - wanted) > FEED_SHARE * asked.feed_unit_mm_min
+    rows, of = both.unlike(~off)
+    said = asked.feed_said[of]
+    for severity, which in ((Severity.ERROR, said), (Severity.WARNING, ~said)):
+        if which.any():
+            row, feed = int(rows[which][0]), float(both.written.feed[of][which][0])
+            found = float(both.decoded.feed[row])
+            named = "asked for" if severity == Severity.ERROR else "the machine's own"
+            yield Finding(
+                Code.FEED_DIFFERS,
+                severity,
+                f"{_moves(int(which.sum()))} at another feed: {found:g} mm/min, where {feed:g} is "
+                + named,
+                where=block_name(both.decoded, row),
+                measured=found,
+                limit=feed,
+                unit="mm_min",
+            )
+
+
+def _spindle(both: _Both) -> Iterator[Finding]:
+    """SPINDLE_DIFFERS: an error where the job has the spindle turn, else told."""
+    is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
+    rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
+    asked = wanted[of] != OFF
+    for severity, which in ((Severity.ERROR, asked), (Severity.INFO, ~asked)):
+        if which.any():
+            row, limit = int(rows[which][0]), float(wanted[of][which][0])
+            named = "asked for" if severity == Severity.ERROR else "nobody asked for it"
+            words = f"{_turning(float(is_[row]))}, where {_turning(limit)} is"
+            yield Finding(
+                Code.SPINDLE_DIFFERS,
+                severity,
+                f"{_moves(int(which.sum()))} with {words} {named}",
+                where=block_name(both.decoded, row),
+                measured=float(is_[row]),
+                limit=limit,
+                unit="rev_min",
+            )
+
+
+def _turning(turns: float) -> str:
+    if turns == OFF:
+        return "the spindle off"
+    return f"the spindle at {abs(turns):g} rev/min {'CW' if turns > OFF else 'CCW'}"
+
+
+def _tools(both: _Both) -> Iterator[Finding]:
+    """SETTING_DIFFERS for cuts with another tool than the program of the job has in then."""
+    is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
+    rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
+    asked = wanted[of] != OFF
+    for severity, which in ((Severity.ERROR, asked), (Severity.INFO, ~asked)):
+        if which.any():
+            row, limit = int(rows[which][0]), float(wanted[of][which][0])
+            wished = f"tool {limit:g} is asked for" if limit != OFF else "no tool is asked for"
+            yield Finding(
+                Code.SETTING_DIFFERS,
+                severity,
+                f"{_moves(int(which.sum()))} with tool {is_[row]:g}, where {wished}",
+                where=block_name(both.decoded, row),
+                measured=float(is_[row]),
+                limit=limit,
+            )
+
+
+def _corners(both: _Both) -> Iterator[Finding]:
+    """SETTING_DIFFERS for moves whose corners may be rounded farther than the written program
+    lets the controller round them; what says nothing leaves them to the machine."""
+    is_, wanted = _rooms(both.decoded), _rooms(both.written)
+    looser = is_[both.pairs[:, 0]] > wanted[both.pairs[:, 1]]
+    rows, of = both.unlike(~looser)
+    if len(rows):
+        row, limit = int(rows[0]), float(wanted[of][0])
+        room = "as far as the moves allow" if np.isinf(is_[row]) else f"within {is_[row]:g} mm"
+        yield Finding(
+            Code.SETTING_DIFFERS,
+            Severity.ERROR,
+            f"{_moves(len(rows))} with corners rounded {room}, where "
+            + (f"{limit:g} mm is asked for" if limit else "none is to be rounded"),
+            where=block_name(both.decoded, row),
+            measured=float(is_[row]) if np.isfinite(is_[row]) else None,
+            limit=limit,
+            unit="mm",
+        )
+
+
+def _rooms(toolpath: Toolpath) -> Floats:
+    """(N,) mm by which the corner behind each row may be rounded, or lines merged; NaN where the
+    program leaves that to the machine."""
+    rooms = [
+        max(mode.tolerance_mm or np.inf, mode.merging_mm) if mode.corners == "blend" else 0.0
+        for mode in toolpath.modes
+    ]
+    return np.array([*rooms, np.nan])[toolpath.mode]
+
+
+def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
+    """SETTING_DIFFERS for places where the tool does not wait as long as was asked."""
+    wanted, found = (np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded))
+    limits = np.array([asked.limits_mm[0], asked.limits_mm[0], asked.limits_mm[1]])
+    short = []
+    for row in wanted.tolist():
+        here = (np.abs(decoded.end[found] - written.end[row]) <= limits).all(axis=1)
+        waited = float(decoded.value[found[here]].sum())
+        if waited < float(written.value[row]) - DWELL_S:
+            short.append((row, waited))
+    if short:
+        row, waited = short[0]
+        yield Finding(
+            Code.SETTING_DIFFERS,
+            Severity.ERROR,
+            f"the tool waits {waited:g} s, where {written.value[row]:g} s are asked for; "
+            f"at {len(short)} places",
+            where=f"at {at_point(written.end[row])}",
+            measured=waited,
+            limit=float(written.value[row]),
+            unit="s",
+        )
+
+
+def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[Finding]:
+    """CLEARANCE_LOW for rapids in XY lower than asked, but for those that were asked for."""
+    toolpath = mine.toolpath
+    if is_flat(other.toolpath):
+        return
+    start, end = toolpath.starts, toolpath.end
+    goes = (toolpath.kind == Kind.RAPID) & (start[:, :2] != end[:, :2]).any(axis=1)
+    low = np.minimum(start[:, 2], end[:, 2])
+    # Where the machine stands when the program begins is nobody's rapid.
+    rising = (start[:, 2] == toolpath.start[2]) & (np.cumsum(toolpath.is_motion) == 1)
+    low = np.where(rising, end[:, 2], low)
+    least = asked.safe_z_mm - asked.limits_mm[1]
+    bad = np.flatnonzero(goes & ~alike.in_written & (low < least))
+    if len(bad) == 0:
+        return
+    row = int(bad[np.argmin(low[bad])])
+    whose = "asked for" if asked.safe_z_said else "the machine's own"
+    yield Finding(
+        Code.CLEARANCE_LOW,
+        _gravity(float(low[row]), asked),
+        f"{len(bad)} rapids run lower than Z {asked.safe_z_mm:g} mm, {whose}: down to "
+        f"Z {low[row]:g} mm",
+        where=f"{block_name(toolpath, row)} near {at_point(end[row])}",
+        measured=float(low[row]),
+        limit=asked.safe_z_mm,
+        unit="mm",
+    )
+
+
+def _gravity(low_mm: float, asked: Asked) -> Severity:
+    """An error on the stock, and wherever the job names the height of rapids."""
+    touching = low_mm <= STOCK_TOP_MM + asked.limits_mm[1]
+    return Severity.ERROR if touching or asked.safe_z_said else Severity.WARNING
+
+
+def _end(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
+    """END_DIFFERS for a program without its end, or whose tool ends lower than was asked."""
+    if (written.kind == Kind.END).any() and not (decoded.kind == Kind.END).any():
+        yield Finding(
+            Code.END_DIFFERS,
+            Severity.ERROR,
+            "the program has no end: no block says that it is over",
+            where=block_name(decoded, len(decoded) - 1) if len(decoded) else "",
+        )
+    last, goal = _last(decoded), _last(written)
+    if last[2] < min(goal[2], asked.safe_z_mm) - asked.limits_mm[1]:
+        yield Finding(
+            Code.END_DIFFERS,
+            _gravity(float(last[2]), asked),
+            f"the tool ends at Z {last[2]:g} mm, where Z {goal[2]:g} mm is asked for",
+            where=f"at {at_point(last)}",
+            measured=float(last[2]),
+            limit=float(goal[2]),
+            unit="mm",
+        )
+    elif np.hypot(*(last - goal)[:2]) > asked.limits_mm[0]:
+        yield Finding(
+            Code.END_DIFFERS,
+            Severity.INFO,
+            f"the tool ends at {at_point(last)}; camtool would end at {at_point(goal)}",
+        )
+
+
+def _last(toolpath: Toolpath) -> Floats:
+    return toolpath.end[-1] if len(toolpath) else toolpath.start
+
+
+def _moves(count: int) -> str:
+    return f"{count} moves run" if count != 1 else "1 move runs"

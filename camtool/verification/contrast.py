@@ -1,0 +1,139 @@
+"""The same program judged several ways, side by side: interpolators, play, any machine value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from camtool.machine.model import Machine
+from camtool.plain import to_json as json_text
+from camtool.simulation.motion import Chunk, Floats
+from camtool.verification.cuts import Bools
+from camtool.verification.report import Report, clock
+from camtool.verification.verify import Verification
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """One way to run the program: what it is called, the machine, and the verdict."""
+
+    name: str
+    machine: Machine
+    verification: Verification
+
+
+class ContrastRow(msgspec.Struct, frozen=True):
+    """One line of the table; µm, s. `circular_um`: the largest G of its circles. `endless`:
+    arcs whose stop test is never met."""
+
+    name: str
+    interpolation_max_um: float | None
+    mechanics_max_um: float | None
+    total_max_um: float | None
+    total_rms_um: float | None
+    circular_um: float | None
+    iterations: int
+    reversals_cutting: int
+    endless: int
+    time_s: float
+
+
+def row_of(name: str, report: Report) -> ContrastRow:
+    """What the table says of one report."""
+    error, cutting = report.error_um, report.reversals.cutting
+    circular = [circle.G_um for circle in report.circles if circle.G_um is not None]
+    return ContrastRow(
+        name=name,
+        interpolation_max_um=error.interpolation.max,
+        mechanics_max_um=error.mechanics.max,
+        total_max_um=error.total.max,
+        total_rms_um=error.total.rms,
+        circular_um=max(circular, default=None),
+        iterations=report.steps.iterations,
+        reversals_cutting=cutting.x + cutting.y,
+        endless=sum(finding.code == "ARC_MISSES_END" for finding in report.findings),
+        time_s=report.time_s,
+    )
+
+
+_HEADS = ("interp.", "mechanics", "total", "rms", "G", "iterations", "reversals", "endless")
+
+
+def table(rows: Sequence[ContrastRow]) -> str:
+    """The rows as aligned text, errors in µm."""
+    cells: list[tuple[str, ...]] = [("µm", *_HEADS, "time")]
+    cells += [
+        (
+            row.name,
+            *map(_um, (row.interpolation_max_um, row.mechanics_max_um, row.total_max_um)),
+            *map(_um, (row.total_rms_um, row.circular_um)),
+            *map(str, (row.iterations, row.reversals_cutting, row.endless)),
+            clock(row.time_s),
+        )
+        for row in rows
+    ]
+    widths = [max(len(line[column]) for line in cells) for column in range(len(cells[0]))]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in cells
+    )
+
+
+def to_json(rows: Sequence[ContrastRow]) -> str:
+    """The rows as indented JSON with a newline at its end."""
+    return json_text(list(rows))
+
+
+def worst_place(variants: Sequence[Variant]) -> tuple[float, float]:
+    """Where in XY (mm) the largest error of all lies; part zero when nothing cuts."""
+    best, place = -1.0, (0.0, 0.0)
+    for variant in variants:
+        trace = variant.verification.trace
+        error = np.where(trace.cutting, trace.error_mm, -1.0)
+        index = int(error.argmax())
+        if float(error[index]) > best:
+            best = float(error[index])
+            place = (float(trace.points[index, 0]), float(trace.points[index, 1]))
+    return place
+
+
+MOST_SHOWN = 40_000
+"""So many samples of each variant are drawn at most: what comes after is left out."""
+
+
+def strokes_within(
+    chunks: Iterable[Chunk], cutting: Bools, window: Floats, *, commanded: bool
+) -> list[Floats]:
+    """The cutting samples in the window [[xmin, xmax], [ymin, ymax]] mm, as runs (n, 2) that
+    follow each other: slides, or `commanded` positions."""
+    strokes: list[Floats] = []
+    shown, before = 0, np.empty((0, 2))
+    open_end = False
+    for chunk in chunks:
+        points = (chunk.commanded if commanded else chunk.slide)[:, :2]
+        inside = ((points >= window[:, 0]) & (points <= window[:, 1])).all(axis=1)
+        inside &= cutting[chunk.row]
+        which = np.flatnonzero(inside)[: MOST_SHOWN - shown]
+        line = np.concatenate([before, points])  # each run begins where the slide came from
+        for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1) if len(which) else []:
+            first, end = int(run[0]) + len(before), int(run[-1]) + len(before) + 1
+            if open_end and run[0] == 0:
+                strokes[-1] = np.concatenate([strokes[-1], line[first:end]])
+            else:
+                strokes.append(line[max(first - 1, 0) : end])
+        shown += len(which)
+        if len(points):
+            open_end, before = bool(inside[-1]), points[-1:]
+        if shown >= MOST_SHOWN:
+            break
+    return strokes
+
+
+def _um(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"

@@ -1,0 +1,324 @@
+"""Which moves of a toolpath cut, as lines and arcs, and the contours that they form.
+
+The rule (`cutting_rows`): a row cuts when it is a feed move (LINE, ARC) that moves in XY and
+begins or ends below the stock top, z < 0. Air moves and plunges straight down are left out. A
+toolpath that never moves in Z (a bare drawing program, z ≥ 0 all along) holds no such row; when
+nothing better is known, `flat_cuts=True` makes all its feed moves in XY cut.
+
+A contour is a stay of the tool in the stock: consecutive cutting rows, with events, rows that move
+nowhere and feeds straight down or up between them (the steps from one pass to the next, the sides
+of tabs). A rapid, an air move or homing ends it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
+
+Bools = npt.NDArray[np.bool_]
+
+FEWEST_SAMPLES = 4
+"""Each line and arc is sampled in at least so many parts: short moves must not slip through."""
+
+MOST_SAMPLES = 200_000
+"""Long programs are sampled more coarsely, so that about so many points come together."""
+
+
+@dataclass(frozen=True, eq=False)
+class CutMoves:
+    """The cutting moves of `toolpath` (N rows) as K segments, in order.
+
+    Arcs run about the programmed centre with the radius of their start; above 180° they are two
+    segments. `segments.path` (K,) is the toolpath row; row r owns segments
+    first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) numbers the contours from 0, −1 where
+    nothing is cut. `ends_z` (K, 2) mm: heights of the segment's start and end, between which it
+    rises or sinks evenly.
+    """
+
+    toolpath: Toolpath
+    segments: Segments
+    first: Ints
+    contour: Ints
+    ends_z: Floats
+
+    @property
+    def z(self) -> Floats:
+        """(K, 2) mm: lowest and highest point of each segment."""
+        return np.sort(self.ends_z, axis=1)
+
+    @property
+    def slopes(self) -> Bools:
+        """(K,) true where a segment rises or sinks."""
+        return np.asarray(self.ends_z[:, 0] != self.ends_z[:, 1])
+
+    @property
+    def rows(self) -> Ints:
+        """Toolpath rows that cut, ascending."""
+        return np.flatnonzero(self.contour >= 0)
+
+    @property
+    def is_cut(self) -> Bools:
+        """(N,) true where the row cuts."""
+        return np.asarray(self.contour >= 0)
+
+    @property
+    def contour_count(self) -> int:
+        """How many contours."""
+        return int(self.contour.max(initial=-1)) + 1
+
+    def contour_ends(self) -> tuple[Ints, Ints]:
+        """First and last row of each contour (C,), (C,)."""
+        rows = self.rows
+        change = np.flatnonzero(np.diff(self.contour[rows]))
+        begin = rows[np.concatenate([[0], change + 1])] if len(rows) else rows
+        finish = rows[np.concatenate([change, [len(rows) - 1]])] if len(rows) else rows
+        return begin, finish
+
+    def closed(self, gap_mm: float) -> Bools:
+        """(C,) true where a contour ends within gap_mm of its start."""
+        begin, finish = self.contour_ends()
+        gap = self.toolpath.end[finish, :2] - self.toolpath.starts[begin, :2]
+        return np.asarray(np.hypot(gap[:, 0], gap[:, 1]) <= gap_mm)
+
+
+def moved_lengths(toolpath: Toolpath) -> Floats:
+    """(N,) mm of way in XY that each row asks for; 0 for events.
+
+    An arc's is its start radius times its sweep.
+    """
+    starts = toolpath.starts
+    straight = toolpath.end[:, :2] - starts[:, :2]
+    spoke = starts[:, :2] - toolpath.centre
+    round_way = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
+    length = np.where(toolpath.is_arc, round_way, np.hypot(straight[:, 0], straight[:, 1]))
+    return np.where(toolpath.is_motion, length, 0.0)
+
+
+def is_flat(toolpath: Toolpath) -> bool:
+    """True when the toolpath never moves in Z."""
+    return bool(np.all(toolpath.end[:, 2] == toolpath.start[2]))
+
+
+def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool) -> Bools:
+    """(N,) true for the rows that cut, by the rule of this module; none behind the END."""
+    running = np.cumsum(toolpath.kind == Kind.END) == 0
+    moves = running & toolpath.is_feed & (moved_lengths(toolpath) > POSITION_EPS_MM)
+    if flat_cuts and is_flat(toolpath):
+        return np.asarray(moves)
+    lowest = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
+    return np.asarray(moves & (lowest < STOCK_TOP_MM - POSITION_EPS_MM))
+
+
+def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
+    """The cutting moves of a toolpath as segments; `flat_cuts` as the module says."""
+    cutting = cutting_rows(toolpath, flat_cuts=flat_cuts)
+    rows = np.flatnonzero(cutting)
+    sweep = toolpath.sweeps()[rows]
+    parts = np.where(np.abs(sweep) > np.pi, 2, 1)
+    first = np.zeros(len(toolpath) + 1, dtype=np.int64)
+    first[rows + 1] = parts
+    segments = _segments(toolpath, rows, sweep, parts)
+    contour = _contours(toolpath, cutting)
+    return CutMoves(toolpath, segments, np.cumsum(first), contour, _heights(toolpath, rows, parts))
+
+
+def _heights(toolpath: Toolpath, rows: Ints, parts: Ints) -> Floats:
+    """(K, 2) mm: heights at the ends of the equal parts of each row."""
+    row = np.repeat(rows, parts)
+    part = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
+    begin, end = toolpath.starts[row, 2], toolpath.end[row, 2]
+    of = np.repeat(parts, parts)
+    ends = (
+        begin[:, None] + (end - begin)[:, None] * np.column_stack([part, part + 1]) / of[:, None]
+    )
+    return np.asarray(np.where((begin == end)[:, None], begin[:, None], ends))
+
+
+def _segments(toolpath: Toolpath, rows: Ints, sweep: Floats, parts: Ints) -> Segments:
+    """One segment per part of each row; the points between parts lie on the start's radius."""
+    row = np.repeat(rows, parts)
+    part = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
+    turn = np.repeat(sweep / parts, parts)
+    begin, end = toolpath.starts[row, :2], toolpath.end[row, :2]
+    centre = toolpath.centre[row]
+    is_arc = toolpath.is_arc[row]
+    here = np.where((is_arc & (part > 0))[:, None], _turned(begin, centre, part * turn), begin)
+    there = np.where(is_arc[:, None], _turned(begin, centre, (part + 1) * turn), end)
+    return Segments.between(here, there, np.tan(0.25 * turn), row)
+
+
+def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
+    """Points (J, 2) turned about their centres (J, 2) by angles (J,) rad."""
+    spoke = points - centre
+    cos, sin = np.cos(angle), np.sin(angle)
+    x = centre[:, 0] + cos * spoke[:, 0] - sin * spoke[:, 1]
+    y = centre[:, 1] + sin * spoke[:, 0] + cos * spoke[:, 1]
+    return np.column_stack([x, y])
+
+
+def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
+    """(N,) contour of each row: a new one begins where the tool left the stock in between."""
+    starts = toolpath.starts
+    rise = np.abs(toolpath.end[:, 2] - starts[:, 2]) if len(toolpath) else np.empty(0)
+    flat = moved_lengths(toolpath) > POSITION_EPS_MM
+    moves = toolpath.is_motion & (flat | (rise > 0.0))
+    homes = (toolpath.kind == Kind.HOME_XY) | (toolpath.kind == Kind.HOME_Z)
+    low = np.minimum(starts[:, 2], toolpath.end[:, 2]) < STOCK_TOP_MM - POSITION_EPS_MM
+    sinks = toolpath.is_feed & ~flat & low
+    breaks = np.cumsum((moves | homes) & ~cutting & ~sinks)
+    contour = np.full(len(toolpath), -1, dtype=np.int64)
+    contour[cutting] = np.unique(breaks[cutting], return_inverse=True)[1]
+    return contour
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points (S, 2) mm on the segments `segment` (S,) of some CutMoves, ends included, at the
+    part `share` (S,) of their length, and their heights `z` (S,) mm."""
+
+    points: Floats
+    segment: Ints
+    z: Floats
+    share: Floats
+
+    def of(self, which: Ints) -> Samples:
+        """Some of them."""
+        return Samples(self.points[which], self.segment[which], self.z[which], self.share[which])
+
+
+def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> Samples:
+    """Points on the true lines and arcs (on these segments `only`), about spacing_mm apart
+    (coarser when they would exceed `MOST_SAMPLES`, but never fewer than `FEWEST_SAMPLES` parts of
+    a segment)."""
+    from camtool.geometry.measure import point_at, segment_lengths
+
+    which = np.arange(len(cuts.segments)) if only is None else only
+    lengths = segment_lengths(cuts.segments[which])
+    spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
+    parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), FEWEST_SAMPLES)
+    owner = np.repeat(np.arange(len(parts)), parts + 1)
+    within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
+    share, segment = within / parts[owner], which[owner]
+    begin, end = cuts.ends_z[segment].T
+    # On the level exactly: rounding must not make slopes of flat moves.
+    z = np.where(begin == end, begin, begin + share * (end - begin))
+    return Samples(point_at(cuts.segments, segment, share), segment, z, share)
+
+
+# The closed loop that each contour comes down to: what sizes and closure are measured on.
+#
+# A contour is a stay of the tool in the stock: it may come in on a lead or down a ramp, go round
+# in several passes, overlap its start, and leave on a lead again. Its loop is the last of its
+# longest closed parts: the final pass of a profile, the outermost way of a pocket. A level contour
+# that ends where it starts is its own loop. There-and-back is none: a loop holds an area.
+
+AS_LONG = 0.98
+"""A loop of at least this part of the longest one's length is as good, if it comes later."""
+
+NO_LOOP = -1
+"""First and last row of a contour without a loop."""
+
+
+def loops(cuts: CutMoves, gap_mm: float) -> Ints:
+    """(C, 2) first and last row of the loop of each contour, NO_LOOP where it has none; ends
+    within `gap_mm` of each other are one."""
+    begin, finish = cuts.contour_ends()
+    found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
+    whole = cuts.closed(gap_mm) & _level(cuts)
+    found[whole] = np.column_stack([begin, finish])[whole]
+    rest = np.flatnonzero(~whole)
+    if len(rest):
+        way = _Way(cuts)
+        rows = cuts.rows
+        offsets = np.searchsorted(cuts.contour[rows], np.arange(len(begin) + 1))
+        for contour in rest.tolist():
+            mine = rows[offsets[contour] : offsets[contour + 1]]
+            found[contour] = way.longest_loop(mine, gap_mm)
+    return found
+
+
+def of_loops(cuts: CutMoves, found: Ints) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(N,) true for the cutting rows that belong to the loop of their contour."""
+    rows = np.arange(len(cuts.contour))
+    first, last = np.append(found, [[NO_LOOP, NO_LOOP]], axis=0)[cuts.contour].T
+    return np.asarray(cuts.is_cut & (first >= 0) & (rows >= first) & (rows <= last))
+
+
+def _level(cuts: CutMoves) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(C,) true for contours at one height."""
+    contour = cuts.contour[cuts.segments.path]
+    low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)
+    np.minimum.at(low, contour, cuts.z[:, 0])
+    np.maximum.at(high, contour, cuts.z[:, 1])
+    return np.asarray(low == high)
+
+
+class _Way:
+    """The moves of a toolpath one after the other: how long, and what area lies beside them."""
+
+    def __init__(self, cuts: CutMoves) -> None:
+        toolpath = cuts.toolpath
+        self._begin, self._end = toolpath.starts[:, :2], toolpath.end[:, :2]
+        self._length = np.where(cuts.is_cut, moved_lengths(toolpath), 0.0)
+        # Green: the area beside a move is half the cross product of its ends, and for an arc
+        # (r²/2)(t − sin t) of its segment on top.
+        (ax, ay), (bx, by) = self._begin.T, self._end.T
+        sweep = toolpath.sweeps()
+        spoke = self._begin - toolpath.centre
+        square = np.where(toolpath.is_arc, (spoke**2).sum(axis=1), 0.0)
+        self._area = 0.5 * (ax * by - ay * bx) + 0.5 * square * (sweep - np.sin(sweep))
+
+    def longest_loop(self, rows: Ints, gap_mm: float) -> tuple[int, int]:
+        """First and last of the cutting rows (R,) of one contour that make its loop."""
+        places = np.concatenate([self._begin[rows[:1]], self._end[rows]])
+        length = np.concatenate([[0.0], np.cumsum(self._length[rows])]).tolist()
+        area = np.concatenate([[0.0], np.cumsum(self._area[rows])]).tolist()
+        best, most = (NO_LOOP, NO_LOOP), 0.0
+        for low, high in _returns(places, gap_mm):
+            long = length[high] - length[low]
+            (ax, ay), (bx, by) = places[high], places[low]
+            around = area[high] - area[low] + 0.5 * (ax * by - ay * bx)
+            if long >= AS_LONG * most and abs(around) > gap_mm * gap_mm:
+                best = (int(rows[low]), int(rows[high - 1]))
+                most = max(most, long)
+        return best
+
+
+def _returns(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
+    """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it.
+
+    Places lie in square cells as wide as the gap. The latest place before another one in each of
+    the nine cells about it is looked at, and what lies before that only where it is too far away:
+    a thousand passes over one place are not compared each with each.
+    """
+    count = len(places)
+    cell = np.floor(places / gap_mm).astype(np.int64)
+    cell -= cell.min(axis=0) - 1
+    wide = int(cell[:, 1].max()) + 2
+    known, rank = np.unique(cell[:, 0] * wide + cell[:, 1], return_inverse=True)
+    # Sorted by cells, and within a cell by number.
+    sorted_ = np.sort(rank.reshape(-1) * count + np.arange(count))
+    latest = np.full(count, -1, dtype=np.int64)
+    for beside in (-wide, 0, wide):
+        for above in (-1, 0, 1):
+            wanted = known[rank.reshape(-1)] + beside + above
+            there = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
+            rows = np.flatnonzero(known[there] == wanted)
+            at = np.searchsorted(sorted_, there[rows] * count + rows) - 1
+            while len(rows):
+                near_cell, before = np.divmod(sorted_[at], count)
+                inside = (at >= 0) & (near_cell == there[rows]) & (before > latest[rows])
+                rows, at, before = rows[inside], at[inside], before[inside]
+                off = places[before] - places[rows]
+                near = np.hypot(off[:, 0], off[:, 1]) <= gap_mm
+                latest[rows[near]] = before[near]
+                rows, at = rows[~near], at[~near] - 1
+    later = np.flatnonzero(latest >= 0)
+    yield from zip(latest[later].tolist(), later.tolist(), strict=True)

@@ -1,0 +1,252 @@
+"""Which wanted contour and which wanted circle each decoded row belongs to.
+
+Contours may overlap or share ends, so the nearest move of a point says little. A decoded contour
+belongs to the wanted contour that is nearest to most of its samples and covers all of them within
+the tolerance; when that one does not cover it, to the next by that count (`MOST_TRIES` are tried).
+A contour that no single wanted one covers (a foreign program may run several in one go, or too
+much) is taken row by row: a row belongs where all of its inner samples are nearest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.verification.circles import Circle
+from camtool.verification.cuts import Bools, CutMoves, Samples
+from camtool.verification.nearest import ANY_CONTOUR, Found, Groups, Target, ranges, run_offsets
+
+MOST_TRIES = 4
+"""So many wanted contours are tried for a decoded one."""
+
+LEAST_MM = 1e-6
+"""What is nearer than this at its height is found even when no distance is allowed."""
+
+SAMPLES_PER_GROUP = 64
+"""So many neighbouring samples share one search for near moves, unless moves lie close."""
+
+GAPS_PER_GROUP = 4.0
+"""A search reaches along so many gaps between moves: its box holds about their square."""
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """What each of the N decoded rows belongs to, in the moves that it is compared with.
+
+    `row` (N,) the wanted row nearest to its middle, −1 for rows that do not cut; `contour` (N,)
+    likewise; `only` (N,) that contour when the slides may be compared with it alone, else
+    ANY_CONTOUR; `circle` (N,) index of the full circle that the row follows, −1. `off_mm` (N, 2):
+    how far what was drawn lies from the wanted rows that it is near (`Drawn.off_mm`), at most.
+    """
+
+    row: Ints
+    contour: Ints
+    only: Ints
+    circle: Ints
+    off_mm: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """The wanted moves, their full circles, how far a decoded contour may be from its own in XY,
+    and how far in height."""
+
+    target: Target
+    circles: list[Circle]
+    limit_mm: float
+    depth_mm: float
+
+
+def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
+    """Each row belongs to itself: for programs with nothing to compare them with."""
+    count = len(cuts.contour)
+    row = np.where(cuts.is_cut, np.arange(count), -1)
+    circle = _circle_of_row(circles, count)
+    return Match(row, cuts.contour, cuts.contour, circle, np.zeros((count, 2)))
+
+
+def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
+    """What belongs to a row of a bent toolpath belongs to the wanted row that it is there for:
+    `of` (S,) of each bent row. Contours may have become several by bending, circles too."""
+    known = match.row >= 0
+    row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
+    contour = np.where(known, goal.target.cuts.contour[np.maximum(row, 0)], -1)
+    circle = _circle_of_row(goal.circles, len(goal.target.cuts.contour))
+    off = np.where(known[:, None], _off(goal)[np.maximum(row, 0)], 0.0)
+    return replace(
+        match,
+        row=row,
+        off_mm=_beside(off, contour),
+        contour=contour,
+        only=np.where(match.only == ANY_CONTOUR, ANY_CONTOUR, contour),
+        circle=np.where(known, circle[np.maximum(row, 0)], -1),
+    )
+
+
+def nearest_at_height(
+    samples: Samples, choice: Ints | None, target: Target, limits_mm: tuple[float, float]
+) -> tuple[Found, Bools]:
+    """The nearest move of the target for each sample at its own height; where none is near there,
+    the nearest at any height, and true (S,) if that one is near.
+
+    `choice` (S,): the contour to compare with, the same all along a segment, and what is not near
+    on it is not found at all; None: any. `limits_mm`: how far "near" is in XY, and in height.
+    """
+    limit_mm, depth_mm = limits_mm
+    near_mm = max(limit_mm, LEAST_MM)
+    found, wrong_depth = _nothing(len(samples.points)), np.zeros(len(samples.points), np.bool_)
+    if len(samples.points) == 0:
+        return found, wrong_depth
+    every, together = np.arange(len(samples.points)), _samples_per_group(samples, target)
+    for levels in (True, False):
+        rest = every[np.isinf(found.distance)]
+        if len(rest) == 0:
+            break
+        offsets = run_offsets(samples.segment[rest], together)
+        first, z = rest[offsets[:-1]], samples.z[rest]
+        count = len(first)
+        contour = np.full(count, ANY_CONTOUR) if choice is None else choice[first]
+        groups = Groups(
+            offsets,
+            np.full(count, limit_mm),
+            contour,
+            np.tile([-np.inf, np.inf], (count, 1)),
+            # All moves between here and a far one of the chosen contour would be looked at.
+            most_mm=math.inf if choice is None else near_mm,
+        )
+        if levels:
+            low = np.minimum.reduceat(z, offsets[:-1]) - depth_mm
+            high = np.maximum.reduceat(z, offsets[:-1]) + depth_mm
+            heights = np.column_stack([low, high])
+            groups = replace(groups, z=heights, height=z, window_mm=depth_mm, most_mm=near_mm)
+        near = target.nearest(samples.points[rest], groups)
+        found.distance[rest], found.segment[rest] = near.distance, near.segment
+        if not levels:
+            wrong_depth[rest] = near.distance <= limit_mm
+    return found, wrong_depth
+
+
+def _samples_per_group(samples: Samples, target: Target) -> int:
+    """How many samples of a segment share one search, so that its box holds few moves; only time
+    depends on it."""
+    steps = np.hypot(*np.diff(samples.points, axis=0).T)[np.diff(samples.segment) == 0]
+    spacing = max(float(steps.mean()) if len(steps) else 0.0, POSITION_EPS_MM)
+    return int(np.clip(GAPS_PER_GROUP * target.gap_mm / spacing, 1.0, SAMPLES_PER_GROUP))
+
+
+def _nothing(count: int) -> Found:
+    return Found(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
+
+
+def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -> Ints:
+    """(S,) the wanted contour that the sample's decoded contour belongs to, ANY_CONTOUR where
+    there is none. `found` is then the nearest move of that contour: changed in place."""
+    wanted = goal.target
+    mine = cuts.contour[cuts.segments.path[samples.segment]]
+    belongs = np.full(len(mine), ANY_CONTOUR, dtype=np.int64)
+    if len(mine) == 0 or len(wanted.contour) == 0:
+        return belongs
+    begin = run_offsets(mine, len(mine))
+    for candidate in _candidates(mine, wanted.contour[found.segment]):
+        open_ = np.flatnonzero((belongs[begin[:-1]] == ANY_CONTOUR) & (candidate >= 0))
+        if len(open_) == 0:
+            break
+        which = ranges(begin[open_], np.diff(begin)[open_])
+        choice = np.repeat(candidate[open_], np.diff(begin)[open_])
+        near, _ = nearest_at_height(
+            samples.of(which), choice, wanted, (goal.limit_mm, goal.depth_mm)
+        )
+        starts = np.cumsum(np.diff(begin)[open_]) - np.diff(begin)[open_]
+        fits = np.maximum.reduceat(near.distance, starts) <= goal.limit_mm
+        fitting = np.repeat(fits, np.diff(begin)[open_])
+        taken = which[fitting]
+        belongs[taken] = choice[fitting]
+        found.distance[taken] = near.distance[fitting]
+        found.segment[taken] = near.segment[fitting]
+    return belongs
+
+
+def _candidates(mine: Ints, nearest: Ints) -> list[Ints]:
+    """For each try (C,): the wanted contour with the most samples, the next …; −1 when no more.
+
+    `mine` (S,) is the decoded contour of each sample (ascending), `nearest` (S,) the wanted one.
+    """
+    pairs, votes = np.unique(np.column_stack([mine, nearest]), axis=0, return_counts=True)
+    order = np.lexsort((pairs[:, 1], -votes, pairs[:, 0]))
+    contour, choice = pairs[order].T
+    offsets = run_offsets(contour, len(contour))
+    rank = np.arange(len(contour)) - np.repeat(offsets[:-1], np.diff(offsets))
+    tries = []
+    for number in range(min(MOST_TRIES, int(rank.max()) + 1)):
+        column = np.full(len(offsets) - 1, -1, dtype=np.int64)
+        here = rank == number
+        column[np.repeat(np.arange(len(column)), np.diff(offsets))[here]] = choice[here]
+        tries.append(column)
+    return tries
+
+
+def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, goal: Goal) -> Match:
+    """What each row of `cuts` belongs to, its samples taken together; `belongs` (S,) and `found`
+    as `match_contours` leaves them."""
+    wanted, count = goal.target, len(cuts.contour)
+    rows = cuts.segments.path[samples.segment]
+    match = Match(
+        row=np.full(count, -1, dtype=np.int64),
+        contour=np.full(count, -1, dtype=np.int64),
+        only=np.full(count, ANY_CONTOUR, dtype=np.int64),
+        circle=np.full(count, -1, dtype=np.int64),
+        off_mm=np.zeros((count, 2)),
+    )
+    if len(rows) == 0 or len(wanted.contour) == 0:
+        return match
+    offsets = run_offsets(rows, len(rows))
+    begin, row = offsets[:-1], rows[offsets[:-1]]
+    middle = begin + np.diff(offsets) // 2
+    nearest = wanted.contour[found.segment]
+    circle = _circle_of_row(goal.circles, len(wanted.cuts.contour))[
+        wanted.cuts.segments.path[found.segment]
+    ]
+    match.row[row] = wanted.cuts.segments.path[found.segment[middle]]
+    known = belongs[begin] != ANY_CONTOUR
+    match.contour[row] = np.where(known, belongs[begin], nearest[middle])
+    match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))
+    match.circle[row] = _unanimous(circle, offsets)
+    followed = wanted.cuts.segments.path[found.segment]
+    match.off_mm[row] = np.maximum.reduceat(_off(goal)[followed], begin, axis=0)
+    return replace(match, off_mm=_beside(match.off_mm, match.contour))
+
+
+def _off(goal: Goal) -> Floats:
+    """(W, 2) mm: how far what was drawn lies from the wanted rows; 0 where nobody knows."""
+    wanted = goal.target.cuts.toolpath
+    return np.zeros((len(wanted), 2)) if wanted.drawn is None else wanted.drawn.off_mm
+
+
+def _beside(off_mm: Floats, contour: Ints) -> Floats:
+    """The largest of each row (N, 2) and its neighbours in its contour: slides lag behind."""
+    rows = np.flatnonzero(contour >= 0)
+    most = off_mm.copy()
+    same = contour[rows[1:]] == contour[rows[:-1]]
+    before, after = rows[:-1][same], rows[1:][same]
+    most[before] = np.maximum(most[before], off_mm[after])
+    most[after] = np.maximum(most[after], off_mm[before])
+    return most
+
+
+def _unanimous(values: Ints, offsets: Ints) -> Ints:
+    """(R,) the value of all samples between the ends of each run (at its ends a row touches its
+    neighbours), −1 where they differ."""
+    inner = np.column_stack([offsets[:-1] + 1, offsets[1:] - 1]).ravel()
+    low = np.minimum.reduceat(values, inner)[::2]
+    high = np.maximum.reduceat(values, inner)[::2]
+    return np.where(low == high, low, -1)
+
+
+def _circle_of_row(circles: list[Circle], count: int) -> Ints:
+    of_row = np.full(count, -1, dtype=np.int64)
+    for index, circle in enumerate(circles):
+        of_row[circle.first_row : circle.last_row + 1] = index
+    return of_row

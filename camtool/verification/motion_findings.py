@@ -1,0 +1,205 @@
+"""Findings about the motion: arcs that never end, travel, reversals, play, no motion at all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.polylines import Floats
+from camtool.machine.model import Machine
+from camtool.planning.naming import own_numbers
+from camtool.simulation.simulate import findings_of
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
+from camtool.units import UM_PER_MM
+from camtool.verification.case import Case
+from camtool.verification.coverage import and_more, at_point, block_name, holes_of
+from camtool.verification.cuts import CutMoves
+from camtool.verification.figures import RowFigures, Tally, missed_ends
+
+AXES = "XYZ"
+CLEARED_COVERAGES = 2.0
+"""A rapid may stick out of what is cleared by so many tolerances of the coverage: it and the cuts
+beside it are rounded each on its own."""
+
+TRAVEL_EPS_MM = 1e-6
+"""A span may exceed the travel by this much, by rounding alone."""
+
+
+def motion_findings(
+    cuts: CutMoves, case: Case, tally: Tally, extents: Floats, rows: RowFigures
+) -> tuple[Finding, ...]:
+    """All findings that need the motion or the machine; `extents` (3, 2) mm of the toolpath."""
+    decoded, machine = cuts.toolpath, case.machine
+    return (
+        *_endless_arcs(decoded, machine, tally),
+        *findings_of(case.decoded, machine, case.simulation),
+        *_missed_ends(decoded, case, tally, rows),
+        *_out_of_travel(machine, extents),
+        *_rapids_in_stock(decoded, case),
+        *_many_reversals(machine, tally, cuts),
+        *_nothing_moves(cuts),
+        *_homing(decoded, machine),
+        *_unknown_play(machine, tally),
+    )
+
+
+def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator[Finding]:
+    coded = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
+    for number, (row, place) in enumerate(tally.gave_up.items()):
+        more = and_more(number, len(tally.gave_up), "arcs")
+        missed = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
+        noun = "arc" if decoded.is_arc[row] else "move"
+        apart = f", passing it {missed:.1f} steps away" if math.isfinite(missed) else ""
+        yield Finding(
+            Code.ARC_MISSES_END,
+            Severity.ERROR,
+            f"the {noun} does not stop at its end{apart}: the real machine would run on{more}",
+            where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
+            measured=float(missed) if math.isfinite(missed) else None,
+            limit=0.0,
+            unit="steps",
+        )
+        if more:
+            return
+
+
+def _missed_ends(held: Toolpath, case: Case, tally: Tally, rows: RowFigures) -> Iterator[Finding]:
+    """Moves that end beside their programmed ends, but for arcs that never end; a remark when
+    all are within what the part is compared by, and what the program itself lets corners be
+    rounded by (G64 P, Q)."""
+    axes = case.machine.axes
+    steps_mm = axes.x.coded_step_mm, axes.y.coded_step_mm
+    missed = missed_ends(rows, held, steps_mm, without=tuple(tally.gave_up))
+    if missed.count == 0:
+        return
+    asked = (mode.tolerance_mm + mode.merging_mm for mode in held.modes if mode.tolerance_mm)
+    meant_mm = case.coverage_mm + max(asked, default=0.0)
+    yield Finding(
+        Code.END_NOT_REACHED,
+        Severity.WARNING if missed.most_mm > meant_mm else Severity.INFO,
+        f"the controller leaves {missed.count} moves beside their ends, "
+        f"up to {missed.most_mm * UM_PER_MM:.2f} µm",
+        where=f"{block_name(held, missed.row)}, end {at_point(held.end[missed.row])}",
+        measured=missed.most_mm * UM_PER_MM,
+        limit=0.0,
+        unit="um",
+    )
+
+
+def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
+    for name, axis, (low, high) in zip(AXES, machine.axes, extents, strict=True):
+        span = float(high - low)
+        if axis.travel_mm is not None and span > axis.travel_mm + TRAVEL_EPS_MM:
+            yield Finding(
+                Code.OUT_OF_TRAVEL,
+                Severity.ERROR,
+                f"the program spans {span:.3f} mm of {name}, the axis has {axis.travel_mm:g} mm: "
+                + own_numbers(machine, [f"axes.{name.lower()}.travel_mm={math.ceil(span)}"]),
+                where=f"axis {name}, {low:.3f} to {high:.3f} mm",
+                measured=span,
+                limit=axis.travel_mm,
+                unit="mm",
+            )
+
+
+def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
+    found = _through_stock(decoded, case)
+    for number, one in enumerate(found):
+        more = and_more(number, len(found), "rapids")
+        yield Finding(
+            Code.RAPID_IN_STOCK,
+            Severity.ERROR,
+            f"a rapid runs through the stock, {-one.z_mm:.3f} mm below its top{more}",
+            where=f"{block_name(decoded, one.row)} near {at_point(one.at_mm)}",
+            measured=one.z_mm,
+            limit=0.0,
+            unit="mm",
+        )
+        if more:
+            return
+
+
+def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
+    """Rapids through what the tool has not cleared; of a tool that nobody knows all that go along
+    below the stock top, or straight down to where no feed has been."""
+    diameter = case.options.tool_diameter_mm
+    if diameter is not None:
+        radius = np.full(len(decoded), 0.5 * diameter)
+        tolerance = max(CLEARED_MM, CLEARED_COVERAGES * case.coverage_mm)
+        return rapids_through_stock(decoded, Reach(radius, radius), tolerance)
+    low = np.minimum(decoded.starts[:, 2], decoded.end[:, 2])
+    return [
+        Through(row, float(low[row]), (float(decoded.end[row, 0]), float(decoded.end[row, 1])))
+        for row in low_rapids(decoded)
+    ]
+
+
+def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:
+    """Too many for the part's size: each leaves an error that does not grow with the part."""
+    count, limit = int(tally.cutting_reversals[:2].sum()), machine.limits.max_reversals
+    if limit is None or count <= limit:
+        return
+    small_mm, size_mm = machine.limits.small_part_mm, _size_mm(cuts)
+    if small_mm is not None and size_mm > small_mm:
+        return
+    yield Finding(
+        Code.MANY_REVERSALS,
+        Severity.WARNING,
+        f"X and Y reverse {count} times while cutting a part of {size_mm:.3g} mm; small parts "
+        f"were seen to fail above {limit}",
+        measured=float(count),
+        limit=float(limit),
+        unit="reversals",
+    )
+
+
+def _size_mm(cuts: CutMoves) -> float:
+    """The larger side of the box around the ends of all cuts."""
+    if not len(cuts.rows):
+        return 0.0
+    toolpath = cuts.toolpath
+    ends = np.concatenate([toolpath.starts[cuts.rows, :2], toolpath.end[cuts.rows, :2]])
+    return float(np.ptp(ends, axis=0).max())
+
+
+def _nothing_moves(cuts: CutMoves) -> Iterator[Finding]:
+    decoded = cuts.toolpath
+    homes = np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z))
+    still = np.all(decoded.end == decoded.starts) if len(decoded) else True
+    if bool(still) and not decoded.is_arc.any() and not homes.any():
+        message = "the program moves nothing"
+    elif len(cuts.rows) == 0 and len(holes_of(decoded)) == 0:
+        message = "the program cuts nothing: no feed move goes along below the stock top"
+    else:
+        return
+    yield Finding(Code.NO_MOTION, Severity.WARNING, message)
+
+
+def _homing(decoded: Toolpath, machine: Machine) -> Iterator[Finding]:
+    rows = np.flatnonzero(np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z)))
+    if len(rows):
+        zero = ", ".join(f"{value:g}" for value in machine.controller.machine_zero_mm)
+        yield Finding(
+            Code.RETURN_TO_MACHINE_ZERO,
+            Severity.INFO,
+            f"the program returns to machine zero, which is taken to lie at ({zero}) mm from part "
+            "zero (controller.machine_zero_mm)",
+            where=block_name(decoded, int(rows[0])),
+        )
+
+
+def _unknown_play(machine: Machine, tally: Tally) -> Iterator[Finding]:
+    given = zip(AXES, machine.axes, machine.play_map.used, tally.steps, strict=True)
+    for name, axis, cells, steps in given:
+        known = cells is not None or axis.backlash_mm > 0.0 or axis.compensation_mm > 0.0
+        if steps and not known:
+            yield Finding(
+                Code.PLAY_NOT_KNOWN,
+                Severity.INFO,
+                f"the machine file gives {name} no play: its error is predicted as if it had none",
+                where=f"axis {name}",
+            )

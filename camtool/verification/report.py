@@ -1,0 +1,1011 @@
+"""The parts of a Report as records; their keys are stable (see `camtool.verification.report`).
+
+Nothing here is NaN or infinite: what is not known is None.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from html import escape
+from typing import Any
+from urllib.parse import quote
+
+import msgspec
+
+from camtool.findings import Code, Finding, Severity
+from camtool.plain import one_line, to_json
+from camtool.units import UM_PER_MM
+
+
+class MaxRms(msgspec.Struct, frozen=True):
+    """Maximum and root of the mean square; None where nothing was measured."""
+
+    max: float | None = None
+    rms: float | None = None
+
+
+class ErrorFigures(msgspec.Struct, frozen=True):
+    """Maximum, root of the mean square, 95th percentile (within 0.5 %), and mean with sign: to
+    the left of the way counts +."""
+
+    max: float | None = None
+    rms: float | None = None
+    p95: float | None = None
+    mean: float | None = None
+
+
+class InterpolationFigures(msgspec.Struct, frozen=True):
+    """µm; `lines_steps` and `arcs_steps` are the maxima over the finer coded step of X and Y."""
+
+    max: float | None = None
+    rms: float | None = None
+    p95: float | None = None
+    lines_max: float | None = None
+    arcs_max: float | None = None
+    lines_steps: float | None = None
+    arcs_steps: float | None = None
+
+
+class Errors(msgspec.Struct, frozen=True):
+    """Predicted errors by source, µm.
+
+    fit: what was drawn to the lines and arcs that stand for it, at the part's size: curves, and
+    all that was joined, merged, recognised or left out on reading; None where no drawing is
+    known. rounding: moves as the controller holds them (the dialect's digits and whole steps) to
+    the wanted ones. interpolation: commanded positions to the moves as held. mechanics: slides to
+    commanded positions. total: slides to the wanted moves and the fit there on top, so never less
+    than their distance to what was drawn; to the moves as held where nothing was wanted. Its mean
+    is without the fit. depth_max: heights of the slide to those of the moves as held, while
+    cutting."""
+
+    fit: MaxRms = MaxRms()
+    rounding: MaxRms = MaxRms()
+    interpolation: InterpolationFigures = InterpolationFigures()
+    mechanics: MaxRms = MaxRms()
+    total: ErrorFigures = ErrorFigures()
+    depth_max: float | None = None
+
+
+class ExtentsMm(msgspec.Struct, frozen=True):
+    """[lowest, highest] of the programmed path, mm."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    z: tuple[float, float]
+
+
+class Steps(msgspec.Struct, frozen=True):
+    """Steps of each axis, and iterations of the interpolator."""
+
+    x: int
+    y: int
+    z: int
+    iterations: int
+
+
+class AxisCounts(msgspec.Struct, frozen=True):
+    """One count per axis."""
+
+    x: int
+    y: int
+    z: int
+
+
+class Reversals(msgspec.Struct, frozen=True):
+    """Reversals of each axis in all, and of these while cutting and otherwise."""
+
+    x: int
+    y: int
+    z: int
+    cutting: AxisCounts
+    air: AxisCounts
+
+
+class TimeSplit(msgspec.Struct, frozen=True):
+    """Where the time goes, s. `compensation` is a part of `cutting` and `air`: what the controller
+    issues at reversals; `link` is what the line that the program comes down adds."""
+
+    cutting: float
+    air: float
+    dwell: float
+    compensation: float = 0.0
+    link: float = 0.0
+
+
+class Dimension(msgspec.Struct, frozen=True):
+    """A size of the cut edge, nominally as drawn; of the tool centre's path where no drawing is
+    known (`of`: "edge", "centre"). error_percent > 0 when it comes out too large. Of a contour in
+    several passes the deepest and last one counts, without leads and ramps."""
+
+    name: str
+    nominal_mm: float
+    predicted_mm: float
+    error_percent: float | None
+    of: str = "centre"
+
+
+class CircleReport(msgspec.Struct, frozen=True):
+    """A full circle: G, F max and F min as ISO 230-4 defines them; D is the mean of r − R. A
+    circle in several passes, or at the end of a helix, is reported once: its deepest level turn.
+    `step_um` and `spike_um` at 0°, 90°, 180° and 270°, where X, Y, X, Y turn, and B the reversal
+    values of X and Y: see `camtool.verification.circles`. All are about the programmed circle;
+    `fit_um`: how far what was drawn lies from that at most.
+    """
+
+    centre_mm: tuple[float, float]
+    radius_mm: float
+    G_um: float | None
+    Fmax_um: float | None
+    Fmin_um: float | None
+    D_um: float | None
+    direction: str
+    z_mm: float
+    step_um: tuple[float | None, ...] = ()
+    spike_um: tuple[float | None, ...] = ()
+    B_um: tuple[float | None, ...] = ()
+    fit_um: float | None = None
+
+
+class BothWaysReport(msgspec.Struct, frozen=True):
+    """A circle that is cut both ways round: bi-directional circular error G(b) and mean
+    bi-directional radial error D (ISO 230-4)."""
+
+    centre_mm: tuple[float, float]
+    radius_mm: float
+    Gb_um: float | None
+    D_um: float | None
+
+
+class ContourReport(msgspec.Struct, frozen=True):
+    """The total error of one contour, µm, and where it is largest; its largest errors by source;
+    `block` from 1, None when no program was read."""
+
+    name: str
+    max_um: float
+    rms_um: float
+    mean_um: float
+    at_mm: tuple[float, float]
+    block: int | None
+    interpolation_um: float
+    mechanics_um: float
+    fit_um: float | None = None
+
+
+class WorstReport(msgspec.Struct, frozen=True):
+    """A move with a large error: `block` and `move` from 1, and its largest errors by source."""
+
+    block: int | None
+    move: int
+    at_mm: tuple[float, float]
+    total_um: float
+    interpolation_um: float | None
+    mechanics_um: float | None
+    source: str
+    fit_um: float | None = None
+
+
+class UnreachedReport(msgspec.Struct, frozen=True):
+    """How many moves the controller leaves beside their programmed ends, and how far at most."""
+
+    moves: int
+    max_um: float
+
+
+class ShapeReport(msgspec.Struct, frozen=True):
+    """What a round tool cuts away beside the wanted shape, and what stays of it, seen from above:
+    areas, and how deep they reach."""
+
+    tool_diameter_mm: float
+    overcut_mm2: float
+    overcut_um: float
+    undercut_mm2: float
+    undercut_um: float
+
+
+class AskedReport(msgspec.Struct, frozen=True):
+    """Moves as programmed against those that the job asks for: how many cut, how many of these
+    are the very moves that camtool would write, how far the others are from what was asked at
+    most, and how far they may be."""
+
+    moves: int
+    alike: int
+    off_um: float
+    limit_um: float
+
+
+class FindingReport(msgspec.Struct, frozen=True):
+    """A finding, by the names of its code and severity."""
+
+    code: str
+    severity: str
+    message: str
+    where: str
+    measured: float | None = None
+    limit: float | None = None
+    unit: str = ""
+
+
+class PlannedOperation(msgspec.Struct, frozen=True):
+    """How an operation cuts; feeds in mm/min. `spindle_rpm` is None where nobody says a speed;
+    `passes` and the depth of the deepest one are of those kinds that have any."""
+
+    name: str
+    kind: str
+    tool_diameter_mm: float
+    spindle_rpm: float | None
+    feed_mm_min: float
+    plunge_mm_min: float
+    depth_mm: float
+    passes: int | None = None
+    deepest_pass_mm: float | None = None
+
+
+class Planned(msgspec.Struct, frozen=True):
+    """What planning gained: how far rapids go in XY, mm, with everything in the order and from
+    the starts in which it was drawn, and as it was put into order; and how the operations cut."""
+
+    rapid_drawn_mm: float
+    rapid_mm: float
+    operations: tuple[PlannedOperation, ...] = ()
+
+
+class Before(msgspec.Struct, frozen=True):
+    """The same job without `--minimise reversals`, `--approach` and `--compensate`: reversals of
+    X and Y, the largest predicted error, the time. Null where that job could not be made."""
+
+    reversals_cutting: int | None = None
+    reversals_air: int | None = None
+    total_max_um: float | None = None
+    time_s: float | None = None
+
+
+# The Report: what `camtool verify` says, as a record, JSON, text and Markdown.
+#
+# The keys are stable: they may grow, they are never renamed (a test holds the list). No value is
+# NaN or infinite: what is not known is null. Numbers are rounded to `DECIMALS` places, far below
+# anything that a machine shows, so that the same job gives the same bytes on every computer.
+
+DECIMALS = 6
+"""Decimal places of all numbers of the report (mm, µm, s, per cent)."""
+
+
+class Report(msgspec.Struct, frozen=True):
+    """Everything that a verification found. `blocks`, `bytes` None when no program was given.
+    `against`: "drawing" where errors are those to what was drawn, "program" where no drawing is
+    known, and they are those to the program's own moves, or to another program's."""
+
+    target: str
+    source: str
+    moves: int
+    blocks: int | None
+    bytes: int | None
+    extents_mm: ExtentsMm
+    time_s: float
+    steps: Steps
+    reversals: Reversals
+    error_um: Errors
+    closure_um: float | None
+    dimensions: tuple[Dimension, ...]
+    circles: tuple[CircleReport, ...]
+    findings: tuple[FindingReport, ...]
+    contours: int
+    time_split_s: TimeSplit
+    interpolator: str
+    camtool_version: str
+    planned: Planned | None = None
+    before: Before | None = None
+    contour_errors: tuple[ContourReport, ...] = ()
+    bidirectional: tuple[BothWaysReport, ...] = ()
+    unreached: UnreachedReport | None = None
+    shape: ShapeReport | None = None
+    worst: tuple[WorstReport, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    asked: AskedReport | None = None
+    against: str = "program"
+
+    def to_json(self) -> str:
+        """Indented JSON with keys in the order of the record, and a newline at the end."""
+        return to_json(self)
+
+    def to_text(self, *, findings: bool = True) -> str:
+        """A summary of a few lines for a terminal; `findings=False` leaves these out."""
+
+        return report_text(self, findings=findings)
+
+    def worst_text(self) -> str:
+        """The moves with the largest errors, one to a line, "" when nothing is cut."""
+
+        return worst_text(self)
+
+    def to_markdown(self) -> str:
+        """The report as Markdown, for a pull request or a job's record."""
+
+        return markdown(page_of(self))
+
+    def notes(self) -> tuple[str, ...]:
+        """Two or three short lines to set beside a picture."""
+
+        return report_notes(self)
+
+    def with_findings(self, findings: Iterable[Finding]) -> Report:
+        """The same report with these findings."""
+        return msgspec.structs.replace(self, findings=reported(findings))
+
+
+def reported(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
+    """Findings for the report, in their order, each once."""
+    return tuple(
+        FindingReport(
+            code=finding.code.name,
+            severity=finding.severity.name.lower(),
+            message=finding.message,
+            where=finding.where,
+            measured=number(finding.measured),
+            limit=number(finding.limit),
+            unit=finding.unit,
+        )
+        for finding in dict.fromkeys(findings)
+    )
+
+
+def number(value: float | None, scale: float = 1.0) -> float | None:
+    """`value` · scale rounded for the report; None for what is not finite. No −0."""
+    if value is None or not math.isfinite(value):
+        return None
+    return round(float(value) * scale, DECIMALS) + 0.0
+
+
+def certain(value: float) -> float:
+    """A number that is always known, rounded for the report."""
+    return round(float(value), DECIMALS) + 0.0
+
+
+# Limits that a pipeline sets on a report: what exceeds one is a finding, and exit code 1.
+
+
+@dataclass(frozen=True)
+class Gates:
+    """The largest total error (mm), reversals of X and Y while cutting, and time (s) that are
+    allowed; None: any."""
+
+    error_mm: float | None = None
+    reversals: int | None = None
+    time_s: float | None = None
+
+
+def gate_findings(report: Report, gates: Gates) -> Iterator[Finding]:
+    """An ABOVE_GATE for each limit that the report exceeds, or that it cannot be held against."""
+    if gates.error_mm is not None:
+        yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
+    count = report.reversals.cutting.x + report.reversals.cutting.y
+    if gates.reversals is not None and count > gates.reversals:
+        words = f"X and Y reverse {count} times while cutting; {gates.reversals} are allowed"
+        yield _above_gate(
+            words, "--max-reversals", float(count), float(gates.reversals), "reversals"
+        )
+    if gates.time_s is not None and report.time_s > gates.time_s:
+        words = f"the program takes {clock(report.time_s)}; {clock(gates.time_s)} is allowed"
+        yield _above_gate(words, "--max-time", report.time_s, gates.time_s, "s")
+
+
+def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
+    if found_um is None:
+        words = "no error is known, since nothing was compared: the limit cannot be kept"
+        yield _above_gate(words, "--max-error", None, limit_um, "um")
+    elif found_um > limit_um:
+        words = f"the predicted error is {found_um:.2f} µm at most; {limit_um:.2f} µm is allowed"
+        yield _above_gate(words, "--max-error", found_um, limit_um, "um")
+
+
+def _above_gate(words: str, flag: str, measured: float | None, limit: float, unit: str) -> Finding:
+    return Finding(Code.ABOVE_GATE, Severity.ERROR, words, flag, measured, limit, unit)
+
+
+# A Report in words: for the terminal and for the margin of a picture.
+#
+# Its tables stand in `camtool.verification.report`, its pages in `markdown` and `html` beside it.
+
+MOST_OPERATIONS = 6
+"""So many operations are told one by one."""
+
+
+def clock(seconds: float) -> str:
+    """Seconds as h:mm:ss, rounded to the second.
+
+    >>> clock(3725.4)
+    '1:02:05'
+    """
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+
+
+def report_text(report: Report, *, findings: bool) -> str:
+    """The summary that `camtool post` and `camtool verify` print, without a final newline."""
+    lines = [one_line(f"{name:<10} {value}") for name, value in facts(report)]
+    if findings:
+        lines += [_finding_line(report, index) for index in range(len(report.findings))]
+    return "\n".join(lines)
+
+
+def report_notes(report: Report) -> tuple[str, ...]:
+    """Target and time, reversals, predicted error."""
+    total = report.error_um.total
+    return (
+        f"{report.target}: {clock(report.time_s)} h, {_cutting_reversals(report)} reversals",
+        f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{to_what(report)}",
+    )
+
+
+def facts(report: Report) -> Iterator[tuple[str, str]]:
+    """(name, value) of each line of the summary."""
+    steps, extents = report.steps, report.extents_mm
+    how = report.interpolator
+    if how in ("dsm", "dda", "stairs"):
+        how = f"arcs by {how}"
+    elif how == "path":
+        how = "followed exactly"
+    yield "target", f"{report.target} ({how})"
+    if report.dimensions:
+        x, y = report.dimensions[:2]
+        shown = f"error {percent(x.error_percent)}, {percent(y.error_percent)}"
+        what = "" if x.of == "edge" else " of the tool's centre"
+        yield "size", f"{x.nominal_mm:.3f} × {y.nominal_mm:.3f} mm{what}; predicted {shown}"
+    spans = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
+    yield "travel", ", ".join(f"{axis} {mm(low)} to {mm(high)}" for axis, (low, high) in spans)
+    program = f"{report.contours} contours, {report.moves} moves"
+    if report.blocks is not None:
+        program += f", {report.blocks} blocks"
+    if report.bytes is not None:
+        program += f", {report.bytes} bytes"
+    yield "program", program
+    split = report.time_split_s
+    parts = [f"cutting {clock(split.cutting)}"]
+    if split.link:
+        parts.append(f"line {clock(split.link)}")
+    yield "time", f"{clock(report.time_s)} ({', '.join(parts)})"
+    yield "steps", f"X {steps.x}, Y {steps.y}, Z {steps.z}"
+    total, cutting = report.reversals, report.reversals.cutting
+    yield (
+        "reversals",
+        f"X {total.x}, Y {total.y}, Z {total.z} (while cutting X {cutting.x}, Y {cutting.y})",
+    )
+    if report.planned is not None:
+        yield from (("cut", line) for line in _operation_words(report.planned.operations))
+        far, drawn = report.planned.rapid_mm, report.planned.rapid_drawn_mm
+        yield "rapids", f"{mm(far)} mm in XY (as drawn {mm(drawn)} mm)"
+    if report.before is not None:
+        yield "before", _before_words(report)
+    if report.asked is not None:
+        yield "as asked", _asked_words(report.asked)
+    error = report.error_um.total
+    yield (
+        "error",
+        f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}{to_what(report)}",
+    )
+    yield "by source", _error_sources(report)
+    if report.error_um.depth_max:
+        yield "depth", f"{um(report.error_um.depth_max)} µm off at most"
+    if report.closure_um is not None:
+        yield "closure", f"{report.closure_um:.2f} µm"
+    if report.unreached is not None and report.unreached.moves:
+        far = report.unreached.max_um
+        yield "ends", f"{report.unreached.moves} moves end elsewhere, up to {far:.2f} µm away"
+    if report.shape is not None:
+        yield "shape", _shape_words(report.shape)
+
+
+def _asked_words(asked: AskedReport) -> str:
+    """How many moves are the very ones that were asked for."""
+    if asked.alike == asked.moves:
+        return f"all {asked.moves} cutting moves are those that camtool writes"
+    return (
+        f"{asked.alike} of {asked.moves} cutting moves are those that camtool writes, the others"
+        f" up to {asked.off_um:.2f} µm off ({asked.limit_um:.2f} µm allowed)"
+    )
+
+
+def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
+    """Tool, spindle, feeds, depth and passes of the operations, one to a line."""
+    for each in operations[:MOST_OPERATIONS]:
+        name = one_line(each.name or each.kind)
+        tool = f"tool {each.tool_diameter_mm:g} mm" if each.tool_diameter_mm else "no tool width"
+        speed = "no spindle speed" if each.spindle_rpm is None else f"spindle {each.spindle_rpm:g}"
+        passes = "" if each.passes is None else f" in {each.passes} pass"
+        if each.passes is not None and each.passes > 1:
+            passes += f"es of {each.deepest_pass_mm:.4g} at most"
+        yield (
+            f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g}, plunge {each.plunge_mm_min:g}"
+            f" mm/min, {each.depth_mm:.4g} mm deep{passes}"
+        )
+    if len(operations) > MOST_OPERATIONS:
+        yield f"and {len(operations) - MOST_OPERATIONS} operations more"
+
+
+def to_what(report: Report) -> str:
+    """What errors are measured to, where that is not what was drawn."""
+    return "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
+
+
+def _shape_words(shape: ShapeReport) -> str:
+    """Over- and undercut of a round tool."""
+    over = f"overcut {shape.overcut_um:.2f} µm deep, {shape.overcut_mm2:.4f} mm²"
+    under = f"undercut {shape.undercut_um:.2f} µm, {shape.undercut_mm2:.4f} mm²"
+    return f"{over}; {under} (tool {shape.tool_diameter_mm:g} mm)"
+
+
+def worst_text(report: Report) -> str:
+    """The moves with the largest errors, one to a line; µm."""
+    lines = [
+        f"{named(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
+        f" {um(item.interpolation_um)}, mechanics {um(item.mechanics_um)}"
+        f"  near ({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f}) mm"
+        + (f"  {one_line(item.source)}" if item.source else "")
+        for item in report.worst
+    ]
+    return "\n".join(lines)
+
+
+def named(block: int | None, move: int) -> str:
+    """A move by its block, or by its own number where there are no blocks."""
+    return f"block {block}" if block is not None else f"move {move}"
+
+
+def _before_words(report: Report) -> str:
+    """What the same job would be without what was done against reversals and play."""
+    before = report.before
+    if before is None or before.time_s is None:
+        return "not known: the job cannot be cut the plain way"
+    error, time = f"{um(before.total_max_um)} µm", clock(before.time_s)
+    return (
+        f"{before.reversals_cutting} reversals while cutting, {before.reversals_air} in the air,"
+        f" error {error}, time {time}"
+    )
+
+
+def _error_sources(report: Report) -> str:
+    error = report.error_um
+    figures = {
+        "fit": error.fit.max,
+        "rounding": error.rounding.max,
+        "interpolation": error.interpolation.max,
+        "mechanics": error.mechanics.max,
+    }
+    return ", ".join(f"{name} {um(most)}" for name, most in figures.items()) + " µm"
+
+
+def _finding_line(report: Report, index: int) -> str:
+    item = report.findings[index]
+    place = f" [{item.where}]" if item.where else ""
+    return one_line(f"{item.severity} {item.code}{place}: {item.message}")
+
+
+def _cutting_reversals(report: Report) -> int:
+    return report.reversals.cutting.x + report.reversals.cutting.y
+
+
+def um(value: float | None) -> str:
+    """Micrometres to two decimals, a dash for what is not known."""
+    return "–" if value is None else f"{value:.2f}"
+
+
+def mm(value: float) -> str:
+    """Millimetres to three decimals."""
+    return f"{value:.3f}".replace("-", "−")
+
+
+def percent(value: float | None) -> str:
+    """Per cent with its sign, a dash for what is not known."""
+    return "–" if value is None else f"{value:+.2f} %".replace("-", "−")
+
+
+# What a page about a program says, before it becomes Markdown, HTML or JSON.
+#
+# A page is made of nothing but its inputs: no time, no place, no order of a hash, so that the same
+# job gives the same bytes.
+
+NAME_SHOWN = 200
+"""A cell or a finding's words are shortened to so many characters on a page; JSON has them all."""
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A value of the machine that is not its target's own: by `--machine` or `--set`."""
+
+    key: str
+    value: str
+    was: str
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The machine and what was asked for: digests (SHA-256, hex) of all the machine's values and
+    of the program, the values that differ from the target's own, and the flags that were given."""
+
+    machine: str
+    machine_sha256: str
+    program_sha256: str | None = None
+    changed: tuple[Changed, ...] = ()
+    flags: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page: `report` is None where nothing could be judged, and then `findings` say why.
+    `pictures` are (caption, address): a file beside the page, or a data address."""
+
+    title: str
+    report: Report | None
+    findings: tuple[FindingReport, ...]
+    setup: Setup | None = None
+    pictures: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """In one word whether the program may be cut."""
+        grave = {finding.severity for finding in self.findings}
+        return next((word for word in ("error", "warning") if word in grave), "fine")
+
+
+def page_of(report: Report) -> Page:
+    """The page of a report alone."""
+    return Page(report.source or report.target, report, report.findings)
+
+
+def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
+    """(name, value) of the machine and the settings, in their order."""
+    digests = [("machine", f"{setup.machine}, digest {setup.machine_sha256}")]
+    if setup.program_sha256 is not None:
+        digests.append(("program", f"digest {setup.program_sha256}"))
+    changed = [
+        (item.key, f"{item.value} (the target's own: {item.was})") for item in setup.changed
+    ]
+    return (*digests, *changed, *setup.flags)
+
+
+def shortened(words: str) -> str:
+    """Words that do not fill a page."""
+    return words if len(words) <= NAME_SHOWN else words[: NAME_SHOWN - 1] + "…"
+
+
+def page_json(page: Page) -> str:
+    """The report's own keys, with `title`, `verdict` and `setup` before them; indented.
+
+    Where nothing could be judged, `findings` are all that follows."""
+    import msgspec
+
+    from camtool.plain import to_json as json_text
+
+    body: dict[str, Any] = {"title": page.title, "verdict": page.verdict}
+    body["setup"] = None if page.setup is None else asdict(page.setup)
+    if page.report is not None:
+        body |= msgspec.to_builtins(page.report)
+    body["findings"] = msgspec.to_builtins(page.findings, builtin_types=(FindingReport,))
+    return json_text(body)
+
+
+# The tables of a Report as rows of words, for Markdown and HTML alike.
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table: `noun` names what its rows are, `words` how many of its first columns hold words
+    (the rest are numbers). Cells are words of any kind, not yet escaped."""
+
+    noun: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int = 1
+
+
+def sheets(report: Report) -> Iterator[Sheet]:
+    """Errors by source, dimensions, circles, contours and worst moves; none that is empty."""
+    every = (
+        _error_sheet(report),
+        _dimension_sheet(report),
+        _circle_sheet(report),
+        _both_ways_sheet(report),
+        _contour_sheet(report),
+        _worst_sheet(report),
+    )
+    return (sheet for sheet in every if sheet.rows)
+
+
+def _error_sheet(report: Report) -> Sheet:
+    error = report.error_um
+    named_figures = {
+        "fit": (error.fit.max, error.fit.rms, None),
+        "rounding": (error.rounding.max, error.rounding.rms, None),
+        "interpolation": (
+            error.interpolation.max,
+            error.interpolation.rms,
+            error.interpolation.p95,
+        ),
+        "mechanics": (error.mechanics.max, error.mechanics.rms, None),
+        "total": (error.total.max, error.total.rms, error.total.p95),
+    }
+    rows = tuple((name, *map(um, figures)) for name, figures in named_figures.items())
+    return Sheet("sources", ("error by source", "max µm", "rms µm", "p95 µm"), rows)
+
+
+def _dimension_sheet(report: Report) -> Sheet:
+    heads = ("dimension", "nominal mm", "predicted mm", "error")
+    rows = tuple(
+        (
+            item.name,
+            f"{item.nominal_mm:.4f}",
+            f"{item.predicted_mm:.4f}",
+            percent(item.error_percent),
+        )
+        for item in report.dimensions
+    )
+    return Sheet("dimensions", heads, rows)
+
+
+def _circle_sheet(report: Report) -> Sheet:
+    heads = ("circle at mm", "way", "radius mm", "G µm", "Fmax µm", "Fmin µm", "D µm", "fit µm")
+    rows = tuple(
+        (
+            _at(item.centre_mm),
+            item.direction,
+            f"{item.radius_mm:.4f}",
+            *map(um, (item.G_um, item.Fmax_um, item.Fmin_um, item.D_um, item.fit_um)),
+        )
+        for item in report.circles
+    )
+    return Sheet("circles", heads, rows, words=2)
+
+
+def _both_ways_sheet(report: Report) -> Sheet:
+    heads = ("circle both ways round, at mm", "radius mm", "G(b) µm", "D µm")
+    rows = tuple(
+        (_at(item.centre_mm), f"{item.radius_mm:.4f}", um(item.Gb_um), um(item.D_um))
+        for item in report.bidirectional
+    )
+    return Sheet("circles", heads, rows)
+
+
+def _contour_sheet(report: Report) -> Sheet:
+    """The contours, those with the largest errors first."""
+    heads = (
+        "contour",
+        "where",
+        "max µm",
+        "rms µm",
+        "mean µm",
+        "fit µm",
+        "interpolation µm",
+        "mechanics µm",
+    )
+    rows = tuple(
+        (
+            item.name,
+            _at(item.at_mm),
+            um(item.max_um),
+            um(item.rms_um),
+            um(item.mean_um),
+            um(item.fit_um),
+            um(item.interpolation_um),
+            um(item.mechanics_um),
+        )
+        for item in sorted(report.contour_errors, key=lambda item: -item.max_um)
+    )
+    return Sheet("contours", heads, rows, words=2)
+
+
+def _worst_sheet(report: Report) -> Sheet:
+    heads = (
+        "worst moves",
+        "where",
+        "drawn as",
+        "error µm",
+        "fit µm",
+        "interpolation µm",
+        "mechanics µm",
+    )
+    rows = tuple(
+        (
+            named(item.block, item.move),
+            _at(item.at_mm),
+            item.source,
+            um(item.total_um),
+            um(item.fit_um),
+            um(item.interpolation_um),
+            um(item.mechanics_um),
+        )
+        for item in report.worst
+    )
+    return Sheet("moves", heads, rows, words=3)
+
+
+def _at(at_mm: tuple[float, float]) -> str:
+    return f"({at_mm[0]:.3f}, {at_mm[1]:.3f})"
+
+
+# A page as Markdown that fits the summary of a pipeline's job or a comment of a pull request.
+#
+# Names come from drawings: whatever they hold, they are words here, neither mark-up nor a link, a
+# picture, a mention or a formula.
+
+MARKDOWN_ROWS = 12
+"""So many rows of each table go into Markdown; JSON holds them all."""
+
+MARKDOWN_FINDINGS = 50
+"""So many findings go into Markdown, the gravest first; JSON holds them all."""
+
+PAGE_BYTES = 65_000
+"""A page ends before it is longer: a comment on GitHub holds 65,536 characters, and a job's
+summary 1 MiB, so that sixteen pages fit one."""
+
+_MARKS = frozenset("\\`*_[]<>|#~$&!")
+_BROKEN = {"@": "@<!-- -->", "://": ":<!-- -->//", "www.": "www<!-- -->."}
+_GRAVEST_FIRST = {"error": 0, "warning": 1}
+
+
+def markdown(page: Page) -> str:
+    """The page, at most PAGE_BYTES long; a line at its end says so where something is left out."""
+    kept: list[str] = []
+    room = PAGE_BYTES
+    for line in _markdown_lines(page):
+        room -= len(line.encode(errors="replace")) + 1
+        if room < 0:
+            kept += ["", "*The rest is left out: the page would be too long.*"]
+            break
+        kept.append(line)
+    return "\n".join(kept).rstrip() + "\n"
+
+
+def markdown_words(words: str) -> str:
+    """One line that Markdown takes as words, and not too many of them."""
+    line = shortened(one_line(words))
+    escaped = "".join("\\" + sign if sign in _MARKS else sign for sign in line)
+    for mark, broken in _BROKEN.items():
+        escaped = escaped.replace(mark, broken)
+    return escaped
+
+
+def _markdown_lines(page: Page) -> Iterator[str]:
+    yield f"# {markdown_words(page.title)}"
+    yield ""
+    if page.report is not None:
+        yield from (f"- **{name}:** {markdown_words(value)}" for name, value in facts(page.report))
+        yield ""
+    for caption, address in page.pictures:
+        yield f"![{markdown_words(caption)}]({quote(address, errors='surrogateescape')})"
+        yield ""
+    yield from _markdown_findings(page)
+    if page.report is not None:
+        for sheet in sheets(page.report):
+            yield from _markdown_table(sheet)
+    if page.setup is not None:
+        yield "| machine and settings | |"
+        yield "|---|---|"
+        yield from (
+            f"| {markdown_words(name)} | {markdown_words(value)} |"
+            for name, value in setup_rows(page.setup)
+        )
+        yield ""
+    if page.report is not None:
+        yield from (f"- assumed: {markdown_words(words)}" for words in page.report.assumptions)
+
+
+def _markdown_findings(page: Page) -> Iterator[str]:
+    ordered = sorted(page.findings, key=lambda item: _GRAVEST_FIRST.get(item.severity, 2))
+    for item in ordered[:MARKDOWN_FINDINGS]:
+        place = f" ({markdown_words(item.where)})" if item.where else ""
+        yield f"- {item.severity} `{item.code}`{place}: {markdown_words(item.message)}"
+    if len(ordered) > MARKDOWN_FINDINGS:
+        yield f"- and {len(ordered) - MARKDOWN_FINDINGS} more findings in the JSON report"
+    if ordered:
+        yield ""
+
+
+def _markdown_table(sheet: Sheet) -> Iterator[str]:
+    numbers = len(sheet.heads) - sheet.words
+    yield f"| {' | '.join(sheet.heads)} |"
+    yield "|" + "---|" * sheet.words + "---:|" * numbers
+    for row in sheet.rows[:MARKDOWN_ROWS]:
+        yield f"| {' | '.join(map(markdown_words, row))} |"
+    if len(sheet.rows) > MARKDOWN_ROWS:
+        yield ""
+        yield f"and {len(sheet.rows) - MARKDOWN_ROWS} more {sheet.noun} in the JSON report"
+    yield ""
+
+
+# A page as one HTML file that needs nothing else: no scripts, no network, nothing to fetch.
+#
+# Its pictures are data addresses, so that whatever an SVG holds can neither run nor load anything,
+# and its policy forbids both besides.
+
+HTML_ROWS = 500
+"""So many rows of each table and so many findings go into a page of HTML; JSON holds them all."""
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+
+_STYLE = """
+:root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
+body { margin: 2rem auto; max-width: 62rem; padding: 0 1rem; overflow-wrap: anywhere; }
+table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums; }
+th, td { border-bottom: 1px solid #8886; padding: .2rem .7rem; text-align: left;
+  vertical-align: top; }
+td.number, th.number { text-align: right; }
+img { max-width: 100%; height: auto; background: #fff; }
+figure { margin: 1rem 0; } figcaption { opacity: .7; }
+.error { color: #c5221f; } .warning { color: #a56300; } .fine { color: #2c7a32; }
+@media (prefers-color-scheme: dark) {
+  .error { color: #ff8a80; } .warning { color: #ffc266; } .fine { color: #8fd694; } }
+@media print { body { margin: 0; max-width: none; } }
+"""
+
+
+def html(page: Page) -> str:
+    """The page as a whole HTML document."""
+    return "\n".join(_html_lines(page)) + "\n"
+
+
+def _safe(text: str) -> str:
+    return escape(shortened(one_line(text)), quote=True)
+
+
+def _html_lines(page: Page) -> Iterator[str]:
+    title = _safe(page.title)
+    yield '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">'
+    yield f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+    yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    yield f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>"
+    yield f'<h1>{title} <small class="{page.verdict}">{page.verdict}</small></h1>'
+    if page.report is not None:
+        yield from _html_pairs(tuple(facts(page.report)))
+    for caption, address in page.pictures:
+        yield f'<figure><img src="{escape(address, quote=True)}" alt="{_safe(caption)}">'
+        yield f"<figcaption>{_safe(caption)}</figcaption></figure>"
+    yield from _html_findings(page)
+    if page.report is not None:
+        for sheet in sheets(page.report):
+            yield from _html_table(sheet)
+    if page.setup is not None:
+        yield "<h2>Machine and settings</h2>"
+        yield from _html_pairs(setup_rows(page.setup))
+    if page.report is not None and page.report.assumptions:
+        yield "<h2>Assumptions</h2>\n<ul>"
+        yield from (f"<li>{_safe(words)}</li>" for words in page.report.assumptions)
+        yield "</ul>"
+    yield "</body>\n</html>"
+
+
+def _html_pairs(rows: tuple[tuple[str, str], ...]) -> Iterator[str]:
+    yield "<table>"
+    for name, value in rows:
+        yield f'<tr><th scope="row">{_safe(name)}</th><td>{_safe(value)}</td></tr>'
+    yield "</table>"
+
+
+def _html_findings(page: Page) -> Iterator[str]:
+    if not page.findings:
+        return
+    yield "<h2>Findings</h2>\n<ul>"
+    for item in page.findings[:HTML_ROWS]:
+        place = f" ({_safe(item.where)})" if item.where else ""
+        head = f'<span class="{_safe(item.severity)}">{_safe(item.severity)}</span>'
+        yield f"<li>{head} <code>{_safe(item.code)}</code>{place}: {_safe(item.message)}</li>"
+    yield "</ul>"
+    yield from _html_more(len(page.findings), "findings")
+
+
+def _html_table(sheet: Sheet) -> Iterator[str]:
+    kinds = ["" if n < sheet.words else ' class="number"' for n in range(len(sheet.heads))]
+    heads = zip(kinds, sheet.heads, strict=True)
+    yield "<table>\n<thead><tr>"
+    yield "".join(f'<th scope="col"{kind}>{_safe(head)}</th>' for kind, head in heads)
+    yield "</tr></thead>\n<tbody>"
+    for row in sheet.rows[:HTML_ROWS]:
+        cells = zip(kinds, row, strict=True)
+        yield f"<tr>{''.join(f'<td{kind}>{_safe(cell)}</td>' for kind, cell in cells)}</tr>"
+    yield "</tbody>\n</table>"
+    yield from _html_more(len(sheet.rows), sheet.noun)
+
+
+def _html_more(count: int, noun: str) -> Iterator[str]:
+    if count > HTML_ROWS:
+        yield f"<p>and {count - HTML_ROWS} more {noun} in the JSON report</p>"

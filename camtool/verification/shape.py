@@ -1,0 +1,342 @@
+"""The shape that a tool makes against the one that it should make, seen from above.
+
+What is cut away at the surface is what the tool's cross-section there covers on its way: a disc
+of its diameter, or, of a V bit, the larger the deeper its tip is. Overcut is what is cut away
+beside the wanted, undercut what stays of it; each has an area and a depth, how far its farthest
+point lies from the other shape. Wanted is what the tool covers on the wanted path, but for what
+must stay (`Kept`): where a plan itself cuts beyond a drawn wall, that is overcut, however well it
+is followed, and an error that is found (`OVERCUT`).
+
+Arcs are chords here, and so are the discs' edges: both shapes with the same tolerance, so that
+depths are wrong by two of it at most; what is not deeper than that is nothing. All depths of a
+job are seen as one. The predicted path is the thinned one of the trace, which must have points
+enough for its arcs (`points_wanted`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from camtool.findings import Code, Finding, Severity
+from camtool.geometry.measure import point_at
+from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.wanted import Kept
+from camtool.verification.case import Cone, VerifyOptions
+from camtool.verification.cuts import CutMoves, moved_lengths
+from camtool.verification.slides import Trace
+
+SHAPE_TOLERANCE_MM = 5e-4
+"""How far chords may be from their arcs, at most ..."""
+
+TOLERANCE_SHARE = 2e-3
+"""... and at most this share of the tool's radius."""
+
+FEWEST_QUARTER = 8
+"""A quarter of the tool's edge is so many chords at least."""
+
+KEPT_SHARE = 0.25
+"""Chords of what must stay are nearer to their arcs than those of cuts, by this part."""
+
+KEPT_SLACK_MM = 1e-3
+"""What must stay counts as thinner by a micrometre: carvings and tight slots are as exact."""
+
+DEPTH_SPACING_MM = 0.02
+"""How deep a strip is, is looked at in places no farther apart than this ..."""
+
+MOST_PLACES = 20_000
+"""... but in about so many of them at most."""
+
+OVERCUT_MM = 0.005
+"""A plan that goes beyond the drawing by more than this is in error."""
+
+MOST_MOVES = 10_000
+"""Programs of more cutting moves get no shape: to sweep them takes longer than all the rest ..."""
+
+MOST_POINTS = 200_000
+"""... and none whose path needs more points than this to be true."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The machined shape against the wanted one, mm and mm²; `tolerance_mm` of its chords."""
+
+    diameter_mm: float
+    overcut_mm2: float
+    overcut_mm: float
+    undercut_mm2: float
+    undercut_mm: float
+    tolerance_mm: float
+
+
+@dataclass(frozen=True)
+class Cutter:
+    """A tool as seen from above: its diameter, and of a V bit its cone."""
+
+    diameter_mm: float
+    cone: Cone | None = None
+
+    @property
+    def tolerance_mm(self) -> float:
+        """How far chords may be from their arcs."""
+        return min(SHAPE_TOLERANCE_MM, TOLERANCE_SHARE * 0.5 * self.diameter_mm)
+
+    def radius_mm(self, z: Floats) -> Floats:
+        """(J,) how wide it cuts at the surface with its tip at these heights."""
+        most = 0.5 * self.diameter_mm
+        if self.cone is None:
+            return np.full(len(z), most)
+        wide = self.cone.tip_mm - np.minimum(z, 0.0) * self.cone.slope
+        return np.where(z < 0.0, np.minimum(wide, most), 0.0)
+
+    @property
+    def quarter(self) -> int:
+        """So many chords are a quarter of its edge."""
+        sagitta = max(1.0 - self.tolerance_mm / (0.5 * self.diameter_mm), 0.0)
+        return max(FEWEST_QUARTER, math.ceil(0.25 * math.pi / math.acos(sagitta)))
+
+
+def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
+    """The tool that these moves are judged with; a V bit of which nobody knows how wide it is at
+    its top is as wide as it must be. None when there is no tool, or none of any width."""
+    diameter = options.tool_diameter_mm or 0.0
+    if not diameter and options.cone is not None and len(cuts.ends_z):
+        depth = max(-float(cuts.ends_z.min()), 0.0)
+        diameter = 2.0 * (options.cone.tip_mm + depth * options.cone.slope)
+    return Cutter(diameter, options.cone) if diameter else None
+
+
+def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
+    """How many points a trace of these moves must have for the shape of a tool; None when that is
+    too much work, or no tool.
+
+    Chords of s mm leave an arc of radius r by s²/(8 r), so s ≤ √(8 r tolerance) of the smallest
+    arc will do; a trace has a point every 2 way / points mm, twice as far apart at most, and one
+    at the end of each move.
+    """
+    arcs = decoded.segments.is_arc
+    if cutter is None or len(decoded.rows) > MOST_MOVES:
+        return None
+    points = 2 * len(decoded.toolpath)
+    if arcs.any():
+        least = float(decoded.segments.radius[arcs].min())
+        chord = math.sqrt(8.0 * least * cutter.tolerance_mm)
+        way = float(moved_lengths(decoded.toolpath).sum())
+        points += math.ceil(4.0 * way / chord)
+    return points if points <= MOST_POINTS else None
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What a tool should cut away, a region of shapely's; how far the wanted path itself takes it
+    into what must stay, mm, and where."""
+
+    cutter: Cutter
+    region: Any
+    beyond_mm: float
+    at_mm: tuple[float, float]
+
+
+def wanted_shape(cuts: CutMoves, cutter: Cutter, kept: Sequence[Kept] = ()) -> Wanted | None:
+    """What the tool covers along the wanted moves; where it is known what must stay, along the
+    runs that must leave it, without that. None when nothing is cut."""
+    import shapely
+
+    if not kept:
+        lines = _chords(cuts.segments, cuts.ends_z, cutter.tolerance_mm)
+        region = _swept(lines, cutter)
+        return None if region is None else Wanted(cutter, region, 0.0, (0.0, 0.0))
+    left, taken = [], []
+    for each in kept:
+        lines = _chords(*_moves(each, cutter), cutter.tolerance_mm)
+        region = _swept(lines, cutter)
+        if region is None:
+            continue
+        solid = _solid(each, region, cutter.tolerance_mm)
+        into = shapely.intersection(region, solid)
+        left.append(region if into.is_empty else shapely.difference(region, solid))
+        taken.append(into)
+    if not left:
+        return None
+    asked = left[0] if len(left) == 1 else shapely.union_all(left)
+    # What one may not take, another may.
+    _, depth, at = _beyond(shapely.union_all(taken), asked, cutter.tolerance_mm)
+    return Wanted(cutter, asked, depth, at)
+
+
+def overcut_findings(wanted: Wanted | None, said: Collection[Code]) -> Iterator[Finding]:
+    """A plan that cuts beyond the walls of its drawing, unless that is said already."""
+    if wanted is None or wanted.beyond_mm <= OVERCUT_MM or Code.GOUGE in said:
+        return
+    x, y = wanted.at_mm
+    yield Finding(
+        Code.OVERCUT,
+        Severity.ERROR,
+        f"the cut itself goes {wanted.beyond_mm:.4g} mm beyond what is drawn",
+        where=f"near ({x:.3f}, {y:.3f}) mm",
+        measured=wanted.beyond_mm,
+        limit=OVERCUT_MM,
+        unit="mm",
+    )
+
+
+def machined_shape(trace: Trace, toolpath: Toolpath, wanted: Wanted) -> Shape | None:
+    """What the tool makes along the trace of a toolpath against what it should make; None when it
+    cuts nothing."""
+    cutter, tolerance = wanted.cutter, wanted.cutter.tolerance_mm
+    made = _swept(_runs(trace, toolpath, cutter), cutter)
+    if made is None:
+        return None
+    over_mm2, over_mm, _ = _beyond(made, wanted.region, tolerance)
+    under_mm2, under_mm, _ = _beyond(wanted.region, made, tolerance)
+    return Shape(cutter.diameter_mm, over_mm2, over_mm, under_mm2, under_mm, tolerance)
+
+
+def _beyond(one: Any, other: Any, tolerance: float) -> tuple[float, float, tuple[float, float]]:
+    """Area (mm²) of `one` outside of `other`, how far it reaches (mm) and where; 0 within
+    chords."""
+    import shapely
+
+    rest = shapely.difference(one, other)
+    if rest.is_empty:
+        return 0.0, 0.0, (0.0, 0.0)
+    # Between its corners a strip may be wider than at them.
+    dense = shapely.segmentize(rest, max(rest.length / MOST_PLACES, DEPTH_SPACING_MM))
+    places = shapely.get_coordinates(dense)
+    nowhere = (0.0, 0.0)
+    if len(shapely.get_coordinates(shapely.boundary(other))) == 0:
+        return float(rest.area), math.inf, nowhere
+    tree = shapely.STRtree(_pieces(other))
+    shapely.prepare(other)  # which newer shapely does by itself
+    places = places[~shapely.intersects_xy(other, *places.T)]
+    points = shapely.points(places)
+    (row, _), distance = tree.query_nearest(points, return_distance=True, all_matches=False)
+    depth = float(distance.max(initial=0.0))
+    if depth <= 2.0 * tolerance:
+        return 0.0, 0.0, nowhere
+    x, y = places[row[int(distance.argmax())]].tolist()
+    return float(rest.area), depth, (x, y)
+
+
+def _pieces(region: Any) -> Any:
+    """The edges of a region's boundary, one by one."""
+    import shapely
+
+    rings = shapely.get_rings(shapely.get_parts(region))
+    found = []
+    for ring in rings:
+        points = shapely.get_coordinates(ring)
+        found.append(shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)))
+    return np.concatenate(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Chords: points (P, 2) with their heights (P,), and the line (P,) that each belongs to."""
+
+    points: Floats
+    z: Floats
+    line: Ints
+
+
+def _swept(lines: _Lines, cutter: Cutter) -> Any:
+    """What the tool covers at the surface along lines; None along nothing.
+
+    Between two near points of a V bit's way the radius changes evenly: it covers the hull of the
+    discs at both.
+    """
+    import shapely
+
+    starts = np.flatnonzero(lines.line[1:] == lines.line[:-1])
+    if len(starts) == 0:
+        return None
+    if cutter.cone is None:
+        every = shapely.multilinestrings(shapely.linestrings(lines.points, indices=lines.line))
+        return shapely.buffer(every, 0.5 * cutter.diameter_mm, quad_segs=cutter.quarter)
+    radius = np.maximum(cutter.radius_mm(lines.z), POSITION_EPS_MM)
+    discs = shapely.buffer(shapely.points(lines.points), radius, quad_segs=cutter.quarter)
+    pairs = np.stack([discs[starts], discs[starts + 1]], axis=1)
+    return shapely.union_all(shapely.convex_hull(shapely.geometrycollections(pairs)))
+
+
+def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
+    """The cutting stretches of a trace as lines, straightened within the tolerance; those of a V
+    bit row by row, as its height changes evenly along each."""
+    import shapely
+
+    which = np.flatnonzero(trace.cutting)
+    ends = np.diff(which) > 1
+    if cutter.cone is not None:
+        ends |= np.diff(trace.row[which]) != 0
+    points: list[Floats] = []
+    heights: list[Floats] = []
+    line: list[Ints] = []
+    for run in np.split(which, np.flatnonzero(ends) + 1) if len(which) else ():
+        begin = max(int(run[0]) - 1, 0)  # the slides come from there
+        some = trace.points[begin : int(run[-1]) + 1]
+        if len(some) < 2:
+            continue
+        row = int(trace.row[run[0]])
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(some, axis=0).T))])
+        share = way / way[-1] if way[-1] > 0.0 else np.zeros(len(way))
+        low, high = toolpath.starts[row, 2], toolpath.end[row, 2]
+        solid = np.column_stack([some, low + share * (high - low)])
+        flat = shapely.simplify(shapely.linestrings(solid), 0.5 * cutter.tolerance_mm)
+        kept = shapely.get_coordinates(flat, include_z=True)
+        points.append(kept[:, :2])
+        heights.append(kept[:, 2])
+        line.append(np.full(len(kept), len(line)))
+    if not points:
+        return _Lines(np.empty((0, 2)), np.empty(0), np.empty(0, dtype=np.int64))
+    return _Lines(np.concatenate(points), np.concatenate(heights), np.concatenate(line))
+
+
+def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
+    """The moves of runs that cut, and the heights (K, 2) of their ends; each once, where the tool
+    is as wide at every height."""
+    rows = [np.hstack([run[:-1], run[1:]]) for run in kept.runs]
+    moves = np.concatenate([np.empty((0, 8)), *rows])
+    lowest = np.minimum(moves[:, 2], moves[:, 6])
+    far = np.hypot(moves[:, 4] - moves[:, 0], moves[:, 5] - moves[:, 1]) > POSITION_EPS_MM
+    moves = moves[far & (lowest < STOCK_TOP_MM)]
+    if cutter.cone is None:
+        _, first = np.unique(moves[:, [0, 1, 3, 4, 5]], axis=0, return_index=True)
+        moves = moves[np.sort(first)]
+    return Segments.between(moves[:, :2], moves[:, 4:6], moves[:, 3]), moves[:, [2, 6]]
+
+
+def _solid(kept: Kept, swept: Any, tolerance: float) -> Any:
+    """What must stay, a hair smaller than drawn, about a region."""
+    import shapely
+
+    low_x, low_y, high_x, high_y = shapely.bounds(swept).tolist()
+    wide = (high_x - low_x) + (high_y - low_y)
+    box = shapely.box(low_x - wide, low_y - wide, high_x + wide, high_y + wide)
+    region = box if kept.beyond else shapely.Polygon()
+    for path, stays in zip(kept.lines, kept.stays.tolist(), strict=True):
+        segments = Segments.of(path)
+        ring = _chords(segments, np.zeros((len(segments), 2)), KEPT_SHARE * tolerance)
+        area = shapely.make_valid(shapely.Polygon(ring.points))
+        region = shapely.union(region, area) if stays else shapely.difference(region, area)
+    return shapely.buffer(region, -KEPT_SLACK_MM)
+
+
+def _chords(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:
+    """Lines and arcs, with the heights (K, 2) of their ends, as lines of chords."""
+    radius = np.where(segments.is_arc, segments.radius, 1.0)
+    most = 2.0 * np.arccos(np.clip(1.0 - tolerance / np.maximum(radius, tolerance), -1.0, 1.0))
+    parts = np.where(segments.is_arc, np.ceil(np.abs(segments.sweep) / most), 1.0)
+    parts = np.maximum(parts, 1.0).astype(np.int64)
+    segment = np.repeat(np.arange(len(parts)), parts + 1)
+    share = (np.arange(len(segment)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)) / (
+        parts[segment]
+    )
+    points: Floats = point_at(segments, segment, share)
+    low, high = ends_z[segment].T
+    return _Lines(points, low + share * (high - low), segment)

@@ -1,0 +1,378 @@
+"""One pass over the motion: the errors of interpolation and mechanics, and what the part becomes.
+
+The compiled judge (`camtool.kernels.judge`) takes the samples, from chunks or from a controller
+that is run on the way, and fills columns of the rows; this module sets its task and reads what it
+found. Circles are closed as soon as their last row is done, so that bins are there only for those
+that are under way. Memory grows with the rows of the program, not with the steps.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from camtool.errors import ProgramError
+from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import Floats, Ints
+from camtool.simulation.motion import Chunk, still_ledger
+from camtool.simulation.simulate import StepsOnTheWay
+from camtool.toolpath.moves import Toolpath
+from camtool.verification.circles import (
+    UNSEEN,
+    BothWays,
+    Circle,
+    CircleFigures,
+    Pairs,
+    Reversing,
+    circle_figures,
+    reversing,
+)
+from camtool.verification.cuts import Bools, CutMoves, moved_lengths
+from camtool.verification.figures import Figure, RowFigures, add_ledger, empty_columns, row_figures
+from camtool.verification.matching import Goal, Match
+from camtool.verification.nearest import ANY_CONTOUR, Target, run_peaks
+
+if TYPE_CHECKING:
+    from camtool.kernels.judge import Sums, Task
+
+
+BINS_KEPT = 64
+"""The bins of so many circles are kept for pictures, 52 kB each."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeenCircle:
+    """A circle and what became of it, with its bins (720, 9) about the programmed centre."""
+
+    circle: Circle
+    figures: CircleFigures
+    reversing: Reversing
+    bins: Floats
+
+
+class SlidePass:
+    """Takes the motion in order; its figures hold after `finish`."""
+
+    def __init__(self, decoded: Target, goal: Goal, match: Match, trace: TraceSize) -> None:
+        self.circles = goal.circles
+        self.circle_figures: list[CircleFigures] = [UNSEEN] * len(goal.circles)
+        self.reversing: list[Reversing | None] = [None] * len(goal.circles)
+        self.both_ways: list[BothWays] = []
+        self.bins: dict[int, Floats] = {}
+        self._pairs = Pairs(goal.circles)
+        self._cuts = decoded.cuts
+        self._ledger = still_ledger(np.arange(len(match.contour)))
+        self._first, self._last = _rows_of_circles(match.circle, len(goal.circles))
+        self._slot = _slots(self._first, self._last)
+        seen = np.flatnonzero(self._last >= 0)
+        self._closing = seen[np.argsort(self._last[seen], kind="stable")].tolist()
+        self._task = _task(decoded, goal, match, self._slot)
+        slots = int(self._slot.max(initial=-1)) + 1
+        self._sums = _sums(len(match.contour), slots, len(self._task.moves.table), trace)
+        self._start, self._most = trace.start, trace.most
+
+    def add(self, chunk: Chunk) -> None:
+        """The next samples of the program."""
+        from camtool.kernels.judge import judge_samples
+
+        add_ledger(self._ledger, chunk.ledger)
+        if len(chunk.row) == 0:
+            return
+        bounds = self._bounds(int(chunk.row[0]), int(chunk.row[-1]) + 1)
+        cuts = np.searchsorted(chunk.row, bounds)
+        for (low, high), row in zip(pairwise(cuts.tolist()), bounds[:-1], strict=True):
+            self._close(row)
+            lost = judge_samples(
+                np.ascontiguousarray(chunk.row[low:high]),
+                np.ascontiguousarray(chunk.commanded[low:high]),
+                np.ascontiguousarray(chunk.slide[low:high]),
+                self._task,
+                self._sums,
+            )
+            if lost >= 0:
+                raise self._lost(int(chunk.row[low + lost]))
+
+    def _lost(self, row: int) -> ProgramError:
+        block = int(self._cuts.toolpath.block[row])
+        return ProgramError(
+            "the slides would leave every machine",
+            where=f"move {row}" if block < 0 else f"block {block + 1}",
+            mend="check its numbers, and the coded and real steps of the axes",
+        )
+
+    def run(self, steps: StepsOnTheWay) -> None:
+        """All rows of a controller that is run on the way."""
+        for low, high in pairwise(self._bounds(0, steps.rows)):
+            self._close(low)
+            add_ledger(self._ledger, steps.judge(low, high, self._task, self._sums))
+
+    def finish(self) -> None:
+        """No more motion will come: close the circles."""
+        self._close(len(self._ledger.row))
+
+    def _bounds(self, low: int, high: int) -> list[int]:
+        """Rows from low to high at which circles must be closed first, both ends included."""
+        inner = sorted({int(self._last[circle]) + 1 for circle in self._closing})
+        return [low, *(row for row in inner if low < row < high), high]
+
+    def _close(self, row: int) -> None:
+        """Take the figures of the circles that end before a row, and free their bins."""
+        while self._closing and self._last[self._closing[0]] < row:
+            circle = self._closing.pop(0)
+            bins = self._sums.bins[self._slot[circle]]
+            one = self.circles[circle]
+            self.circle_figures[circle] = circle_figures(bins, one.radius_mm)
+            self.reversing[circle] = reversing(bins, one.ccw)
+            self.both_ways += self._pairs.add(circle, bins)
+            if len(self.bins) < BINS_KEPT:
+                self.bins[circle] = bins.copy()
+            from camtool.kernels.circle_bins import empty_bins
+
+            bins[:] = empty_bins(1)[0]
+
+    def seen(self) -> tuple[SeenCircle, ...]:
+        """The circles that were gone round, in their order, as far as they are kept."""
+        return tuple(
+            SeenCircle(self.circles[circle], self.circle_figures[circle], found, self.bins[circle])
+            for circle in sorted(self.bins)
+            if (found := self.reversing[circle]) is not None
+        )
+
+    @property
+    def rows(self) -> RowFigures:
+        """What became of each row."""
+        return row_figures(self._sums.rows, self._cuts.is_cut, self._ledger)
+
+    def trace(self) -> Trace:
+        """The slides' path, thinned."""
+        return trace_of(self._sums, self._start, self._cuts.is_cut, self._most)
+
+    def interpolation(self) -> Figure:
+        """Interpolation over all samples that cut."""
+        rows = self.rows
+        judged = np.where(self._cuts.is_cut, rows.samples, 0)
+        return Figure.of_rows(
+            rows.interpolation, rows.interpolation_squares, judged, self._sums.histograms[0]
+        )
+
+    def mechanics(self) -> Figure:
+        """Mechanics over all samples that cut; without a percentile."""
+        rows = self.rows
+        judged = np.where(self._cuts.is_cut, rows.samples, 0)
+        return Figure.of_rows(rows.mechanics, rows.mechanics_squares, judged, None)
+
+    def total(self) -> Figure:
+        """The total over all samples that have one."""
+        rows = self.rows
+        return Figure.of_rows(rows.total, rows.total_squares, rows.known, self._sums.histograms[1])
+
+
+def largest(errors: Floats, which: Bools) -> float:
+    """The largest of the errors (N,) that are picked and known, mm; NaN without any."""
+    picked = errors[which & np.isfinite(errors)]
+    return float(picked.max()) if len(picked) else math.nan
+
+
+def _task(decoded: Target, goal: Goal, match: Match, slot: Ints) -> Task:
+    from camtool.kernels.circle_bins import bin_directions
+    from camtool.kernels.judge import Task
+    from camtool.kernels.move_tree import move_tree
+    from camtool.kernels.near_moves import Moves
+
+    own = move_table(decoded.cuts)
+    wanted = own if goal.target is decoded else move_table(goal.target.cuts)
+    return Task(
+        own=own.moves,
+        moves=Moves(wanted.moves, wanted.heights, *move_tree(wanted.boxes)),
+        rows=np.column_stack(
+            [own.of_row, wanted.ranges(match.only), match.circle, slot[match.circle]]
+            if len(slot)
+            else [own.of_row, wanted.ranges(match.only), match.circle, match.circle]
+        ),
+        window=_heights(decoded, goal.depth_mm),
+        off=np.ascontiguousarray(match.off_mm[:, 0]),
+        centre=np.array([circle.centre_mm for circle in goal.circles]).reshape(-1, 2),
+        directions=bin_directions(),
+    )
+
+
+def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
+    from camtool.kernels.circle_bins import empty_bins
+    from camtool.kernels.error_bins import BINS
+    from camtool.kernels.judge import Sums
+    from camtool.kernels.near_moves import no_list
+    from camtool.kernels.thin_trace import new_pen
+
+    room = 2 * trace.most + rows
+    return Sums(
+        rows=empty_columns(rows),
+        histograms=np.zeros((2, 4 * BINS), dtype=np.int64),
+        bins=empty_bins(slots),
+        trace=np.empty((room + rows + 1, 4)),
+        pen=new_pen(trace.stride, room),
+        near=no_list(moves),
+    )
+
+
+def _heights(decoded: Target, depth_mm: float) -> Floats:
+    """(N, 2) mm: between which heights each row is compared."""
+    toolpath = decoded.cuts.toolpath
+    ends = np.column_stack([toolpath.starts[:, 2], toolpath.end[:, 2]])
+    return np.asarray(np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]))
+
+
+def _rows_of_circles(circle: Ints, count: int) -> tuple[Ints, Ints]:
+    """(count,), (count,) first and last row (N,) that belong to each circle; last −1: none."""
+    first = np.full(count, len(circle), dtype=np.int64)
+    last = np.full(count, -1, dtype=np.int64)
+    rows = np.flatnonzero(circle >= 0)
+    np.minimum.at(first, circle[rows], rows)
+    np.maximum.at(last, circle[rows], rows)
+    return first, last
+
+
+def _slots(first: Ints, last: Ints) -> Ints:
+    """(C,) bins for each circle: other ones than those of circles whose rows overlap its own."""
+    slot = np.full(len(first), -1, dtype=np.int64)
+    busy: list[tuple[int, int]] = []
+    free: list[int] = []
+    for circle in _in_order(first, last):
+        while busy and busy[0][0] < first[circle]:
+            heapq.heappush(free, heapq.heappop(busy)[1])
+        slot[circle] = heapq.heappop(free) if free else len(busy)
+        heapq.heappush(busy, (int(last[circle]), int(slot[circle])))
+    return slot
+
+
+def _in_order(first: Ints, last: Ints) -> Iterator[int]:
+    seen = np.flatnonzero(last >= 0)
+    yield from seen[np.argsort(first[seen], kind="stable")].tolist()
+
+
+# Cutting moves as the columns that the compiled judge reads: one move for each row that cuts.
+
+
+@dataclass(frozen=True, eq=False)
+class MoveTable:
+    """The J rows of a toolpath that cut: `moves` (J, 16) of `camtool.kernels.move_errors`,
+    `boxes` (J, 4), `heights` (J, 2) mm, `contour` (J,) ascending, `of_row` (N,) the index of each
+    row or −1."""
+
+    moves: Floats
+    boxes: Floats
+    heights: Floats
+    contour: Ints
+    of_row: Ints
+
+    def ranges(self, only: Ints) -> Ints:
+        """(R, 2) first and last (not included) index of the contours `only` (R,), or of all."""
+        low = np.searchsorted(self.contour, only, side="left")
+        high = np.searchsorted(self.contour, only, side="right")
+        every = only == ANY_CONTOUR
+        low, high = np.where(every, 0, low), np.where(every, len(self.contour), high)
+        return np.ascontiguousarray(np.column_stack([low, high]))
+
+
+def move_table(cuts: CutMoves) -> MoveTable:
+    """The columns of the moves that cut."""
+    from camtool.kernels import move_errors as at
+
+    rows, segments = cuts.rows, cuts.segments
+    first, last = cuts.first[rows], cuts.first[rows + 1] - 1
+    start, end = segments.start[first], segments.end[last]
+    is_arc, centre = segments.is_arc[first], segments.centre[first]
+    sweep = np.abs(segments.sweep[first]) * (last - first + 1)
+    turn = np.where(segments.bulge[first] < 0.0, -1.0, 1.0)
+    way = end - start
+    square = (way**2).sum(axis=1)
+    toolpath = cuts.toolpath
+    closed = (toolpath.starts[rows, :2] == toolpath.end[rows, :2]).all(axis=1)
+    moves = np.zeros((len(rows), at.COLUMNS))
+    moves[:, [at.AX, at.AY]], moves[:, [at.BX, at.BY]] = start, end
+    moves[:, [at.DX, at.DY]] = way
+    moves[:, at.OVER] = 1.0 / np.where(square > 0.0, square, 1.0)
+    moves[:, at.TURN] = turn
+    arcs = np.flatnonzero(is_arc)
+    moves[arcs, at.RADIUS] = segments.radius[first[arcs]]
+    spokes = centre, turn[:, None] * (start - centre), turn[:, None] * (end - centre)
+    for x, y, place in zip((at.CX, at.UX, at.VX), (at.CY, at.UY, at.VY), spokes, strict=True):
+        moves[arcs, x], moves[arcs, y] = place[arcs].T
+    moves[arcs, at.WIDE] = np.where(closed, at.FULL, (sweep > np.pi).astype(float))[arcs]
+    boxes = segment_boxes(segments)
+    low = np.minimum(boxes[first, :2], boxes[last, :2])
+    high = np.maximum(boxes[first, 2:], boxes[last, 2:])
+    z = cuts.z
+    heights = np.column_stack(
+        [np.minimum(z[first, 0], z[last, 0]), np.maximum(z[first, 1], z[last, 1])]
+    )
+    of_row = np.full(len(cuts.contour), -1, dtype=np.int64)
+    of_row[rows] = np.arange(len(rows))
+    return MoveTable(
+        moves, np.concatenate([low, high], axis=1), heights, cuts.contour[rows], of_row
+    )
+
+
+# The path of the slides, thinned for pictures: bounded, with row ends and error peaks kept.
+#
+# Of every `stride` samples of a row the judge keeps the one with the largest error, and each row's
+# last (`camtool.kernels.thin_trace`).
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Points (T, 2) mm of the slides in order, `error_mm` (T,) against what was wanted (0 where
+    nothing is cut), `row` (T,) of the decoded toolpath, `cutting` (T,)."""
+
+    points: Floats
+    error_mm: Floats
+    row: Ints
+    cutting: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class TraceSize:
+    """Where the slides begin (1, 2) mm, of how many samples of a row one is kept, and how many
+    points there may be in the end."""
+
+    start: Floats
+    stride: int
+    most: int
+
+
+def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
+    """A stride for samples about `spacing_mm` apart, so that about half of `most` come of it."""
+    rise = np.abs(decoded.end[:, 2] - decoded.starts[:, 2]) if len(decoded) else np.zeros(0)
+    expected = float((moved_lengths(decoded) + rise).sum()) / spacing_mm
+    stride = max(1, int(np.ceil(2.0 * expected / most)))
+    return TraceSize(decoded.start[None, :2], stride, most)
+
+
+def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
+    """What the judge kept, and the start (1, 2) mm before it; of what is more than `most` points
+    (more rows than points) the peaks again. `cutting` (N,) tells the rows that cut."""
+    from camtool.kernels.thin_trace import WRITTEN, unwritten
+
+    written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)
+    kept = np.concatenate([sums.trace[:written], held])
+    row, count = kept[:, 3].astype(np.int64), len(kept)
+    whole = Trace(
+        np.concatenate([start, kept[:, :2]]),
+        np.concatenate([[0.0], kept[:, 2]]),
+        np.concatenate([[0], row]),
+        np.concatenate([[False], cutting[row]]),
+    )
+    if count + 1 <= most:
+        return whole
+    longest = -(-(count + 1) // most)
+    offsets = np.append(np.arange(0, count + 1, longest), count + 1)
+    return _picked(whole, run_peaks(whole.error_mm, offsets))
+
+
+def _picked(part: Trace, which: Ints) -> Trace:
+    return Trace(part.points[which], part.error_mm[which], part.row[which], part.cutting[which])

@@ -1,0 +1,527 @@
+"""How deep the tool really goes: play, scale and scatter of Z.
+
+Z runs one way within each row and ends where the program says, so what becomes of it follows from
+the ends of the rows alone, whatever the controller does in between.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+
+from camtool import __version__
+from camtool.findings import Finding
+from camtool.geometry.drawing import Drawing
+from camtool.geometry.polylines import Floats
+from camtool.machine.model import Machine
+from camtool.simulation.motion import Chunk
+from camtool.simulation.simulate import (
+    StepsOnTheWay,
+    check_options,
+    model_of,
+    simulate,
+    steps_on_the_way,
+)
+from camtool.toolpath.moves import Bent, Toolpath, toolpath_extents
+from camtool.units import UM_PER_MM
+from camtool.verification import report as record
+from camtool.verification.case import Case, VerifyOptions
+from camtool.verification.circles import UNSEEN, full_circles
+from camtool.verification.conformance import Asked, Held, hold
+from camtool.verification.coverage import (
+    Coverage,
+    Drilled,
+    contours_drilled,
+    cover,
+    cut_other_way,
+    hole_findings,
+    holes_of,
+)
+from camtool.verification.cuts import CutMoves, cut_moves, is_flat, moved_lengths
+from camtool.verification.dimensions import RowSlides, closure_mm, places_between, sizes
+from camtool.verification.figures import (
+    Figure,
+    RowFigures,
+    Tally,
+    contour_figures,
+    contour_name,
+    mean_error_mm,
+    missed_ends,
+    tally_of,
+    worst_rows,
+)
+from camtool.verification.matching import Goal, carried_match, own_match
+from camtool.verification.motion_findings import motion_findings
+from camtool.verification.nearest import Target
+from camtool.verification.report import Before, Planned, Report, certain, number, reported
+from camtool.verification.shape import Wanted as WantedShape
+from camtool.verification.shape import (
+    cutter_of,
+    machined_shape,
+    overcut_findings,
+    points_wanted,
+    wanted_shape,
+)
+from camtool.verification.slides import SeenCircle, SlidePass, Trace, largest, trace_size
+
+
+def depth_error_mm(case: Case, cuts: CutMoves) -> float:
+    """The largest difference in height between the slide and the moves as held, at the ends of
+    rows that cut, mm; NaN when none does."""
+    from camtool.simulation.mechanics import Mechanics
+
+    toolpath = cuts.toolpath
+    if not cuts.is_cut.any():
+        return math.nan
+    mechanics = Mechanics(case.machine, toolpath.start, case.options.effects)
+    slide, _ = mechanics.follow(toolpath.end, np.array([0, len(toolpath)]))
+    return float(np.abs(slide[:, 2] - toolpath.end[:, 2])[cuts.is_cut].max())
+
+
+# Judge a program: run its decoded moves on the machine's model and compare with what was wanted.
+#
+#     decoded ─held─▶ as the controller rounds it
+#     held, wanted ─cuts─▶ lines and arcs that cut, by contour
+#     held × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
+#     decoded ─simulate─▶ chunks ─slides─▶ rows: errors, circles, extents, trace
+#     all of it ─▶ Report and Trace
+#
+# Every distance is to true lines and arcs. Memory grows with the rows of the program, not with the
+# steps of the machine.
+
+__all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """The report, all findings that are in it, the slides' path for pictures, what became of
+    each row, the moves that the slides' path was judged against, and full circles."""
+
+    report: Report
+    trace: Trace
+    findings: tuple[Finding, ...]
+    rows: RowFigures
+    wanted: CutMoves
+    circles: tuple[SeenCircle, ...] = ()
+
+    def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
+        """The same with these findings, in the report too."""
+        return replace(self, report=self.report.with_findings(findings), findings=findings)
+
+    def with_planning(self, planned: Planned, before: Before | None) -> Verification:
+        """The same with what planning gained in the report."""
+        report = msgspec.structs.replace(self.report, planned=planned, before=before)
+        return replace(self, report=report)
+
+
+def verify(
+    decoded: Toolpath,
+    machine: Machine,
+    *,
+    wanted: Toolpath | None = None,
+    drawing: Drawing | None = None,
+    options: VerifyOptions | None = None,
+    sent: Bent | None = None,
+    asked: Asked | None = None,
+    said: Toolpath | None = None,
+) -> Verification:
+    """Simulate `decoded` on `machine` and judge it; against `wanted` when there is one.
+
+    `drawing` gives the fitting error and its findings; `sent` is what the program was written from
+    where `wanted` was bent; `asked` is what else its job asks for, `said` what the program was
+    written from. Toolpaths are in the work frame.
+    """
+    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent, asked, said)
+    check_options(machine, case.simulation)
+    steps = steps_on_the_way(decoded, machine, case.simulation)
+    return judge(case, steps or simulate(decoded, machine, case.simulation))
+
+
+def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
+    """Judge a case by the chunks of its motion, whoever made them, or by a controller that is run
+    on the way."""
+    # Without Z on either side, all feed moves are taken to cut.
+    flat_cuts = case.wanted is None or is_flat(case.wanted)
+    held = model_of(case.machine).held(case.decoded, case.machine)
+    decoded = Target(cut_moves(held, flat_cuts=flat_cuts))
+    wanted = decoded
+    if case.wanted is not None:
+        wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
+    circles = full_circles(wanted.cuts, case.coverage_mm)
+    goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
+    coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
+    held_against = _held_against(case, flat_cuts=flat_cuts)
+    cutter = cutter_of(case.options, decoded.cuts)
+    shaped = points_wanted(decoded.cuts, cutter)
+    points = max(case.options.trace_points, shaped or 0)
+    size = trace_size(case.decoded, case.spacing_mm, points)
+    slides = SlidePass(decoded, goal, coverage.match, size)
+    if isinstance(motion, Iterable):
+        for chunk in motion:
+            slides.add(chunk)
+    else:
+        slides.run(motion)
+    slides.finish()
+    rows = slides.rows
+    tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
+    extents = toolpath_extents(case.decoded)
+    noticed = motion_findings(decoded.cuts, case, tally, extents, rows)
+    shape = None
+    if shaped and cutter is not None:
+        shape = wanted_shape(wanted.cuts, cutter, case.options.kept)
+    said = () if case.wanted is None else case.wanted.findings
+    over = overcut_findings(shape, {finding.code for finding in said})
+    turned = _turned(case, decoded, flat_cuts=flat_cuts)
+    findings = _all_findings(case, coverage, held_against, (*turned, *noticed, *over))
+    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, held_against)
+    trace = slides.trace()
+    report = result.report(extents, findings, trace, shape)
+    return Verification(report, trace, findings, rows, wanted.cuts, slides.seen())
+
+
+def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:
+    if case.wanted is None:
+        return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
+    said = goal  # what the program should say
+    if case.sent is not None:
+        cuts = cut_moves(case.sent.toolpath, flat_cuts=flat_cuts)
+        said = Goal(Target(cuts), [], goal.limit_mm, goal.depth_mm)
+    limits = goal.limit_mm, goal.depth_mm
+    bores = holes_of(decoded.cuts.toolpath)
+    wanted_bores = holes_of(said.target.cuts.toolpath)
+    missing, stand = contours_drilled(said.target.cuts, bores, limits)
+    extra, wanted_stand = contours_drilled(decoded.cuts, wanted_bores, limits)
+    coverage = cover(decoded, said, case.options.sample_mm, Drilled(missing, extra))
+    holes = hole_findings(bores, wanted_bores, limits, (stand, wanted_stand))
+    match = coverage.match
+    if case.sent is not None:
+        match = carried_match(match, case.sent.row, goal)
+    return replace(coverage, match=match, findings=(*coverage.findings, *holes))
+
+
+def _turned(case: Case, decoded: Target, *, flat_cuts: bool) -> tuple[Finding, ...]:
+    if case.said is None:
+        return ()
+    said = Target(cut_moves(case.said, flat_cuts=flat_cuts))
+    limits = case.coverage_mm, case.depth_mm
+    return tuple(cut_other_way(decoded, said, limits, case.options.sample_mm))
+
+
+def _held_against(case: Case, *, flat_cuts: bool) -> Held | None:
+    if case.asked is None:
+        return None
+    return hold(case.decoded, case.asked, flat_cuts=flat_cuts, sample_mm=case.options.sample_mm)
+
+
+def _all_findings(
+    case: Case, coverage: Coverage, held: Held | None, motion: tuple[Finding, ...]
+) -> tuple[Finding, ...]:
+    """Findings of every stage once, in the order of the stages. What lies beside what was asked
+    by more than the dialect's resolution is found by coverage too, where it is far: once is
+    enough."""
+    places = coverage.findings if held is None or not held.place else held.place
+    groups = (
+        case.drawing.findings if case.drawing is not None else (),
+        case.wanted.findings if case.wanted is not None else (),
+        case.decoded.findings,
+        places,
+        () if held is None else held.settings,
+        motion,
+    )
+    return tuple(dict.fromkeys(finding for group in groups for finding in group))
+
+
+# All that was measured, turned into the report's record: mm to µm, NaN to null.
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """All that was measured, on its way into the report."""
+
+    case: Case
+    cuts: CutMoves
+    wanted: CutMoves
+    coverage: Coverage
+    slides: SlidePass
+    rows: RowFigures
+    tally: Tally
+    held: Held | None = None
+
+    def report(
+        self,
+        extents: Floats,
+        findings: tuple[Finding, ...],
+        trace: Trace,
+        shape: WantedShape | None = None,
+    ) -> Report:
+        """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides, and the
+        `shape` that they should make, where one is looked at."""
+        case, tally = self.case, self.tally
+        options = case.options
+        link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
+        slides = RowSlides(
+            self.rows.low,
+            self.rows.high,
+            places_between(case.decoded.start[:2], self.rows.slide_end),
+        )
+        x, y, z = ((certain(low), certain(high)) for low, high in extents)
+        return Report(
+            target=case.machine.target.name,
+            source=options.source,
+            moves=int(case.decoded.is_motion.sum()),
+            blocks=_blocks(case),
+            bytes=options.size_bytes,
+            extents_mm=record.ExtentsMm(x=x, y=y, z=z),
+            time_s=certain(tally.time_s + link_s),
+            steps=_steps(tally),
+            reversals=_reversals(tally),
+            error_um=self._errors(),
+            closure_um=number(closure_mm(self.cuts, slides, case.coverage_mm), UM_PER_MM),
+            dimensions=self._dimensions(slides),
+            circles=self._circles(),
+            findings=reported(findings),
+            contours=self.cuts.contour_count,
+            time_split_s=_time_split(tally, link_s),
+            interpolator=_interpolator(case),
+            camtool_version=__version__,
+            contour_errors=self._contours(),
+            bidirectional=self._both_ways(),
+            unreached=self._unreached(),
+            shape=self._shape(trace, shape),
+            worst=self._worst(),
+            assumptions=assumptions(case),
+            asked=self._asked(),
+            against="program" if case.wanted is None or case.wanted.drawn is None else "drawing",
+        )
+
+    def _errors(self) -> record.Errors:
+        slides = self.slides
+        inside, step = slides.interpolation(), self.case.step_mm
+        is_arc = self.cuts.toolpath.is_arc
+        lines_mm = largest(self.rows.interpolation, ~is_arc)
+        arcs_mm = largest(self.rows.interpolation, is_arc)
+        total = slides.total()
+        return record.Errors(
+            fit=self._fit(),
+            rounding=_max_rms(self.coverage.rounding),
+            interpolation=record.InterpolationFigures(
+                max=number(inside.max, UM_PER_MM),
+                rms=number(inside.rms, UM_PER_MM),
+                p95=number(inside.p95, UM_PER_MM),
+                lines_max=number(lines_mm, UM_PER_MM),
+                arcs_max=number(arcs_mm, UM_PER_MM),
+                lines_steps=number(lines_mm / step),
+                arcs_steps=number(arcs_mm / step),
+            ),
+            mechanics=_max_rms(slides.mechanics()),
+            total=record.ErrorFigures(
+                number(total.max, UM_PER_MM),
+                number(total.rms, UM_PER_MM),
+                number(total.p95, UM_PER_MM),
+                number(mean_error_mm(self.rows), UM_PER_MM),
+            ),
+            depth_max=number(depth_error_mm(self.case, self.cuts), UM_PER_MM),
+        )
+
+    def _fit(self) -> record.MaxRms:
+        """How far what was drawn lies from the wanted moves that cut; the rms over those moves
+        that it lies off."""
+        drawn, rows = self.wanted.toolpath.drawn, self.wanted.rows
+        if self.case.wanted is None or drawn is None or not len(rows):
+            return record.MaxRms()
+        largest, rms = drawn.off_mm[rows].T
+        length = np.where(largest > 0.0, moved_lengths(self.wanted.toolpath)[rows], 0.0)
+        mean = float((length * rms**2).sum()) / (float(length.sum()) or 1.0)
+        return record.MaxRms(
+            certain(float(largest.max()) * UM_PER_MM), certain(math.sqrt(mean) * UM_PER_MM)
+        )
+
+    def _off_um(self, off_mm: Floats) -> float | None:
+        """The largest of some rows' distances from what was drawn; None where nobody knows."""
+        known = self.case.wanted is not None and self.case.wanted.drawn is not None
+        return certain(float(off_mm[:, 0].max(initial=0.0)) * UM_PER_MM) if known else None
+
+    def _dimensions(self, slides: RowSlides) -> tuple[record.Dimension, ...]:
+        match = self.coverage.match
+        found = sizes(self.cuts, slides, self.wanted, match, self.case.coverage_mm)
+        return tuple(
+            record.Dimension(
+                name=size.name,
+                nominal_mm=certain(size.nominal_mm),
+                predicted_mm=certain(size.predicted_mm),
+                error_percent=number(size.error_percent),
+                of="edge" if size.of_edge else "centre",
+            )
+            for size in found
+        )
+
+    def _circles(self) -> tuple[record.CircleReport, ...]:
+        return tuple(
+            record.CircleReport(
+                centre_mm=(certain(circle.centre_mm[0]), certain(circle.centre_mm[1])),
+                radius_mm=certain(circle.radius_mm),
+                G_um=number(figures.circular_mm, UM_PER_MM),
+                Fmax_um=number(figures.radial_max_mm, UM_PER_MM),
+                Fmin_um=number(figures.radial_min_mm, UM_PER_MM),
+                D_um=number(figures.radial_mean_mm, UM_PER_MM),
+                direction="ccw" if circle.ccw else "cw",
+                z_mm=certain(circle.z_mm),
+                step_um=tuple(number(value, UM_PER_MM) for value in turned.step),
+                spike_um=tuple(number(value, UM_PER_MM) for value in turned.spike),
+                B_um=tuple(number(value, UM_PER_MM) for value in turned.value),
+                fit_um=self._off_um(self.coverage.match.off_mm[self.coverage.match.circle == k]),
+            )
+            for k, circle, figures, turned in zip(
+                range(len(self.slides.circles)),
+                self.slides.circles,
+                self.slides.circle_figures,
+                self.slides.reversing,
+                strict=True,
+            )
+            if figures is not UNSEEN and turned is not None
+        )
+
+    def _both_ways(self) -> tuple[record.BothWaysReport, ...]:
+        return tuple(
+            record.BothWaysReport(
+                centre_mm=(certain(one.circle.centre_mm[0]), certain(one.circle.centre_mm[1])),
+                radius_mm=certain(one.circle.radius_mm),
+                Gb_um=number(one.circular_mm, UM_PER_MM),
+                D_um=number(one.radial_mean_mm, UM_PER_MM),
+            )
+            for one in self.slides.both_ways
+        )
+
+    def _contours(self) -> tuple[record.ContourReport, ...]:
+        return tuple(
+            record.ContourReport(
+                name=contour_name(self.wanted, one.contour),
+                max_um=certain(one.max_mm * UM_PER_MM),
+                rms_um=certain(one.rms_mm * UM_PER_MM),
+                mean_um=certain(one.mean_mm * UM_PER_MM),
+                at_mm=(certain(one.at_mm[0]), certain(one.at_mm[1])),
+                block=_block(self.case, one.row),
+                interpolation_um=certain(one.interpolation_mm * UM_PER_MM),
+                mechanics_um=certain(one.mechanics_mm * UM_PER_MM),
+                fit_um=self._off_um(np.array([[one.fit_mm]])),
+            )
+            for one in contour_figures(self.rows, self.coverage.match)
+        )
+
+    def _worst(self) -> tuple[record.WorstReport, ...]:
+        rows = self.rows
+        return tuple(
+            record.WorstReport(
+                block=_block(self.case, row),
+                move=row + 1,
+                at_mm=(certain(rows.total_at[row, 0]), certain(rows.total_at[row, 1])),
+                total_um=certain(rows.total[row] * UM_PER_MM),
+                interpolation_um=number(rows.interpolation[row], UM_PER_MM),
+                mechanics_um=number(rows.mechanics[row], UM_PER_MM),
+                source=self._source(row),
+                fit_um=self._off_um(self.coverage.match.off_mm[row : row + 1]),
+            )
+            for row in worst_rows(rows, self.case.options.worst).tolist()
+        )
+
+    def _source(self, row: int) -> str:
+        """Layer and entity of the wanted move that a decoded row follows."""
+        wanted = int(self.coverage.match.row[row])
+        return self.wanted.toolpath.text(wanted) if wanted >= 0 else ""
+
+    def _unreached(self) -> record.UnreachedReport:
+        axes = self.case.machine.axes
+        steps = axes.x.coded_step_mm, axes.y.coded_step_mm
+        missed = missed_ends(self.rows, self.cuts.toolpath, steps)
+        return record.UnreachedReport(missed.count, certain(missed.most_mm * UM_PER_MM))
+
+    def _asked(self) -> record.AskedReport | None:
+        asked, held = self.case.asked, self.held
+        if asked is None or held is None:
+            return None
+        return record.AskedReport(
+            moves=held.moves,
+            alike=held.alike,
+            off_um=certain(held.off_mm * UM_PER_MM),
+            limit_um=certain(asked.limits_mm[0] * UM_PER_MM),
+        )
+
+    def _shape(self, trace: Trace, wanted: WantedShape | None) -> record.ShapeReport | None:
+        if wanted is None:
+            return None
+        shape = machined_shape(trace, self.case.decoded, wanted)
+        if shape is None:
+            return None
+        return record.ShapeReport(
+            tool_diameter_mm=certain(shape.diameter_mm),
+            overcut_mm2=certain(shape.overcut_mm2),
+            overcut_um=certain(shape.overcut_mm * UM_PER_MM),
+            undercut_mm2=certain(shape.undercut_mm2),
+            undercut_um=certain(shape.undercut_mm * UM_PER_MM),
+        )
+
+
+def assumptions(case: Case) -> tuple[str, ...]:
+    """What the times and figures take for granted."""
+    from camtool.simulation.simulate import model_of
+
+    link = case.machine.link
+    said = model_of(case.machine).assumptions(case.decoded, case.machine)
+    if link.baud is None:
+        return (*said, "the program is in the controller before it runs")
+    how = "block by block, before each is cut" if link.wait == "sequential" else "while it runs"
+    return (*said, f"the program comes at {link.baud:g} baud, {how}")
+
+
+def _block(case: Case, row: int) -> int | None:
+    """The block (from 1) that a row was read from."""
+    block = int(case.decoded.block[row])
+    return block + 1 if block >= 0 else None
+
+
+def _max_rms(figure: Figure) -> record.MaxRms:
+    return record.MaxRms(number(figure.max, UM_PER_MM), number(figure.rms, UM_PER_MM))
+
+
+def _interpolator(case: Case) -> str:
+    """How the controller makes lines and arcs."""
+    from camtool.simulation.simulate import model_of
+
+    return model_of(case.machine).interpolation(case.decoded, case.machine, case.simulation)
+
+
+def _blocks(case: Case) -> int | None:
+    if case.options.blocks is not None:
+        return case.options.blocks
+    highest = int(case.decoded.block.max(initial=-1))
+    return highest + 1 if highest >= 0 else None
+
+
+def _steps(tally: Tally) -> record.Steps:
+    x, y, z = tally.steps.tolist()
+    return record.Steps(x, y, z, tally.iterations)
+
+
+def _time_split(tally: Tally, link_s: float) -> record.TimeSplit:
+    return record.TimeSplit(
+        cutting=certain(tally.cutting_s),
+        air=certain(tally.air_s),
+        dwell=certain(tally.dwell_s),
+        compensation=certain(tally.compensation_s),
+        link=certain(link_s),
+    )
+
+
+def _reversals(tally: Tally) -> record.Reversals:
+    x, y, z = tally.reversals.tolist()
+    return record.Reversals(
+        x,
+        y,
+        z,
+        cutting=record.AxisCounts(*tally.cutting_reversals.tolist()),
+        air=record.AxisCounts(*(tally.reversals - tally.cutting_reversals).tolist()),
+    )

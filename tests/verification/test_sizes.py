@@ -1,0 +1,106 @@
+"""Sizes of the report: those of the cut edge, nominally as drawn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from camtool.geometry.polylines import Polyline
+from camtool.machine.registry import load_target
+from camtool.pipeline import post_drawing
+from camtool.planning.job import Job, Operation, Tool, job_of
+from camtool.verification.report import Dimension
+from tests.drawings import drawing_of
+
+WIDE, HIGH, TOOL = 120.0, 80.0, 3.175
+
+
+def box(x: float, y: float, width: float, height: float) -> Polyline:
+    corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
+    return Polyline(np.column_stack([corners, np.zeros(4)]), closed=True)
+
+
+def sizes(paths: list[Polyline], *settings: str, **asked: Any) -> dict[str, Dimension]:
+    """The dimensions by name."""
+    loaded = load_target("linuxcnc", settings=("dialect.path=exact-path", *settings))
+    made = post_drawing(drawing_of(paths), job_of(**asked), loaded)
+    assert made.verification is not None, made.findings
+    found = made.verification.report.dimensions
+    assert {item.of for item in found} == {"edge"}
+    return {item.name: item for item in found}
+
+
+@pytest.mark.parametrize("side", ["outside", "inside", "on"])
+@pytest.mark.parametrize("joins", ["round", "sharp", "mitre"])
+def test_a_plate_is_as_large_as_it_is_drawn(side: str, joins: str) -> None:
+    found = sizes([box(0, 0, WIDE, HIGH)], side=side, joins=joins, tool_diameter_mm=TOOL)
+    for name, nominal in (("X", WIDE), ("Y", HIGH)):
+        for of in ("part", "contour 1"):
+            item = found[f"{of} {name}"]
+            assert item.nominal_mm == nominal
+            assert item.predicted_mm == pytest.approx(nominal, abs=2e-3)
+
+
+def test_a_window_in_a_plate_and_a_diamond() -> None:
+    found = sizes([box(0, 0, 60, 40), box(10, 10, 30, 20)], tool_diameter_mm=TOOL)
+    both = sorted((item.nominal_mm, item.predicted_mm) for item in found.values())
+    assert [nominal for nominal, _ in both] == [20.0, 30.0, 40.0, 40.0, 60.0, 60.0]
+    assert all(abs(one - other) < 2e-3 for one, other in both)
+    half = math.sqrt(200.0)
+    diamond = Polyline(
+        np.array([[half, 0, 0], [0, half, 0], [-half, 0, 0], [0, -half, 0.0]]), closed=True
+    )
+    round_it = sizes([diamond], side="outside", joins="sharp", tool_diameter_mm=TOOL)
+    assert round_it["part X"].predicted_mm == pytest.approx(2.0 * half, abs=2e-3)
+    within = sizes([diamond], side="inside", tool_diameter_mm=TOOL)
+    # A round tool does not reach into the corners: r (√2 − 1) is left in each.
+    left = (math.sqrt(2.0) - 1.0) * TOOL
+    assert within["part X"].nominal_mm == pytest.approx(2.0 * half)
+    assert within["part X"].predicted_mm == pytest.approx(2.0 * half - left, abs=2e-3)
+
+
+def test_allowance_pockets_and_the_slides() -> None:
+    plate = [box(0, 0, WIDE, HIGH)]
+    larger = sizes(plate, side="outside", tool_diameter_mm=TOOL, allowance_mm=0.2)
+    assert larger["part X"].nominal_mm == WIDE
+    assert larger["part X"].predicted_mm == pytest.approx(WIDE + 0.4, abs=2e-3)
+    pocket = sizes(plate, kind="pocket", tool_diameter_mm=TOOL)
+    assert pocket["part Y"].predicted_mm == pytest.approx(HIGH, abs=2e-3)
+    # Steps that are a thousandth too large make the centre's box so much larger.
+    moved = sizes(plate, "axes.x.real_step_mm=0.0005005", "axes.x.coded_step_mm=0.0005",
+                  side="outside", tool_diameter_mm=TOOL)  # fmt: skip
+    assert moved["part X"].predicted_mm == pytest.approx(WIDE + 1e-3 * (WIDE + TOOL), abs=3e-3)
+
+
+@pytest.mark.parametrize(("depth", "least"), [(2.0, WIDE), (5.0, WIDE)])
+def test_what_is_carved_is_as_large_as_the_bit_is_wide_at_the_surface(
+    depth: float, least: float
+) -> None:
+    bit = Tool(diameter_mm=6.0, kind="v", tip_angle_rad=0.5 * math.pi)
+    carve = Job(operations=(Operation(kind="vcarve", tool=bit, depth_mm=depth),))
+    made = post_drawing(drawing_of([box(0, 0, WIDE, HIGH)]), carve, load_target("linuxcnc"))
+    assert made.verification is not None, made.findings
+    size = made.verification.report.dimensions[0]
+    assert (size.nominal_mm, size.of) == (WIDE, "edge")
+    assert size.predicted_mm == pytest.approx(least, abs=0.03)
+
+
+def test_what_is_roughed_and_finished_is_as_large_as_it_is_finished() -> None:
+    cutter = Tool(diameter_mm=TOOL)
+    rough = Operation(side="outside", tool=cutter, allowance_mm=0.3)
+    job = Job(operations=(rough, replace(rough, allowance_mm=0.0)))
+    made = post_drawing(drawing_of([box(0, 0, WIDE, HIGH)]), job, load_target("linuxcnc"))
+    assert made.verification is not None, made.findings
+    size = made.verification.report.dimensions[0]
+    assert size.nominal_mm == WIDE
+    assert size.predicted_mm == pytest.approx(WIDE, abs=0.02)
+
+
+def test_parts_that_one_contour_runs_round_are_as_the_tool_leaves_them() -> None:
+    found = sizes([box(0, 0, 20, 20), box(21, 0, 20, 20)], tool_diameter_mm=TOOL)
+    assert found["part X"].nominal_mm == pytest.approx(41.0)
+    assert found["part X"].predicted_mm == pytest.approx(41.0, abs=2e-3)
