@@ -15,11 +15,10 @@ from types import FrameType
 
 import click
 
-from camtool.batch.lock import NAME as LOCK
-from camtool.batch.manifest import NAME as MANIFEST
-from camtool.batch.manifest import Manifest
-from camtool.batch.places import Places
-from camtool.batch.records import Made, Outcome, Pool, State, Task
+from camtool.batches.lock import NAME as LOCK
+from camtool.batches.manifest import NAME as MANIFEST
+from camtool.batches.manifest import Manifest, Places
+from camtool.batches.run import Made, Outcome, Pool, State, Task
 from camtool.cli.batch_messages import Loudness, Talk, say_summary, summary_json, talking
 from camtool.cli.batch_work import SVG, JobOrder, PostWork, own_job
 from camtool.cli.files import is_foreign, refuse_same, write_all
@@ -153,8 +152,8 @@ class Batched:
         self, sources: Sequence[str], job: JobFlags, reads: Sequence[str], *, own_jobs: bool
     ) -> tuple[Ended, int | None]:
         """What became of them, and the signal that stopped the run."""
-        from camtool.batch.inputs import find_tasks
-        from camtool.batch.lock import alone_in
+        from camtool.batches.inputs import find_tasks
+        from camtool.batches.lock import alone_in
 
         begin = time.monotonic()
         made = Manifest(self.out).outputs()
@@ -244,7 +243,7 @@ class Batched:
         self, ordered: Ordered, manifest: Manifest, stop: Stop, talk: Talk
     ) -> Generator[Outcome]:
         """Those that come until something stops the run."""
-        from camtool.batch.run import Order, run_batch
+        from camtool.batches.run import Order, run_batch
 
         force = self.running.force
         order = Order(self.out, write_all, self.work.digest(), ordered.jobs, force)
@@ -260,10 +259,10 @@ class Batched:
 
     def _pool(self, note: Callable[[str], None]) -> Pool:
         if self.running.scheduler is not None:
-            from camtool.batch.cluster import ClusterPool
+            from camtool.batches.cluster import ClusterPool
 
             return ClusterPool(self.work, self.running.scheduler, note)
-        from camtool.batch.pool import LocalPool, PoolOptions
+        from camtool.batches.pool import LocalPool, PoolOptions
         from camtool.cli.messages import first_run, say_first_run
 
         judging = self.work.check

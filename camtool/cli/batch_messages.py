@@ -12,7 +12,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Protocol
 
 from camtool import __version__
-from camtool.batch.records import Outcome, State
+from camtool.batches.run import Outcome, State
 from camtool.cli.messages import say
 from camtool.plain import one_line, to_json
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from camtool import __version__
-from camtool.batch.digests import code_digest, content_digest, digest_of, packages_digest
-from camtool.batch.records import Made, Task
+from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
+from camtool.batches.run import Made, Task
 from camtool.cli.files import sealed
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags

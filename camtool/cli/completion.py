@@ -280,7 +280,7 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 def _picture_layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """The layers of pictures; of several, the one after the last comma."""
-    from camtool.preview.layers import LAYERS
+    from camtool.pictures.options import LAYERS
 
     before, comma, last = incomplete.rpartition(",")
     for name in LAYERS:
@@ -343,6 +343,6 @@ def _flat(prefix: str, values: dict[str, Any]) -> Iterator[str]:
 
 
 def _effects(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    from camtool.pipeline.ways import EFFECTS
+    from camtool.pipeline import EFFECTS
 
     return [CompletionItem(name) for name in EFFECTS if name.startswith(incomplete)]

@@ -293,7 +293,7 @@ def gate_options(command: Command) -> Command:
 
 def ways_to_compare(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
     """What `--compare SPEC` stands for; OptionError when it is nothing."""
-    from camtool.pipeline.ways import ways_of
+    from camtool.pipeline import ways_of
 
     def load(more: Sequence[str]) -> LoadedTarget:
         return replace(machine, settings=(*machine.settings, *more)).load()
@@ -303,7 +303,7 @@ def ways_to_compare(spec: str, machine: MachineFlags, judging: Judging) -> list[
 
 def left_out(names: Sequence[str]) -> Effects:
     """The mechanics without these effects; OptionError for others."""
-    from camtool.pipeline.ways import left_out as without
+    from camtool.pipeline import left_out as without
 
     return without(names)
 

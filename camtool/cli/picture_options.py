@@ -12,12 +12,12 @@ import click
 from camtool.cli.messages import say
 from camtool.cli.options import Command, is_viewer, option, with_flags
 from camtool.errors import OptionError
-from camtool.preview.layers import LAYERS, NOT_UNDER_PATH, OF_DRAWINGS, OF_PREDICTIONS, chosen
+from camtool.pictures.options import LAYERS, NOT_UNDER_PATH, OF_DRAWINGS, OF_PREDICTIONS, chosen
 from camtool.units import parse_length
 
 if TYPE_CHECKING:
-    from camtool.preview.options import Options
-    from camtool.preview.scene import Scene
+    from camtool.pictures.options import Options
+    from camtool.pictures.scene import Scene
 
 
 KIND = "closeup.svg"
@@ -45,17 +45,17 @@ class Painter:
         if not judged(drawn):  # the findings say why; the picture shows what there is
             options = replace(options, polar=None)
         if len(drawn) > 1:
-            from camtool.preview.beside import render_beside
+            from camtool.pictures.beside import render_beside
 
             return render_beside(drawn, name, options)
-        from camtool.preview.render import render
+        from camtool.pictures.draw import render
 
         return render(drawn[0], name, options)
 
     def closeups(self) -> Iterator[tuple[str, bytes]]:
         """Caption and SVG of what a page shows besides; of the last scene, which is the result."""
-        from camtool.preview.closeups import closeups
-        from camtool.preview.render import render
+        from camtool.pictures.draw import render
+        from camtool.pictures.picture import closeups
 
         for caption, options in closeups(self.scenes[-1], self.looks()):
             yield caption, render(self.scenes[-1], KIND, options)
@@ -132,7 +132,7 @@ class PictureFlags:
 
     def options(self) -> Options:
         """What `camtool.preview` is told; OptionError for what makes no picture."""
-        from camtool.preview.options import Options
+        from camtool.pictures.options import Options
 
         times = 1.0 if self.exaggerate is None else self.exaggerate
         layers = chosen(self.named, self.no_layer)
@@ -205,7 +205,7 @@ class PictureFlags:
     def _missing(self, scenes: Sequence[Scene]) -> list[str]:
         if not self.named:
             return []
-        from camtool.preview.missing import missing_layers
+        from camtool.pictures.content import missing_layers
 
         options = self.options()
         empty = [missing_layers(scene, options, self.named) for scene in scenes]

@@ -61,9 +61,9 @@ if TYPE_CHECKING:
     from camtool.cli.report import Flags
     from camtool.geometry.drawing import Drawing
     from camtool.machine.registry import LoadedTarget
+    from camtool.pictures.scene import Scene
     from camtool.pipeline import Posted
     from camtool.planning.job import Job
-    from camtool.preview.scene import Scene
 
 
 JOB_ENDING = ".toml"

@@ -35,7 +35,7 @@ from camtool.errors import CamtoolError, DrawingError
 if TYPE_CHECKING:
     from camtool.findings import Finding
     from camtool.machine.registry import LoadedTarget
-    from camtool.preview.scene import Scene
+    from camtool.pictures.scene import Scene
 
     Findings = tuple[Finding, ...]
 

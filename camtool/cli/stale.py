@@ -96,7 +96,7 @@ def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:
 
     InputError for what is no drawing or not there, OutputError for two of one name, as of a batch.
     """
-    from camtool.batch.inputs import find_tasks
+    from camtool.batches.inputs import find_tasks
 
     if not programs.is_dir():
         raise InputError("is no folder", file=str(programs), mend="give the --out of the batch")

@@ -57,9 +57,9 @@ if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
     from camtool.machine.controllers import Interpolator
     from camtool.machine.registry import LoadedTarget
+    from camtool.pictures.scene import Scene
     from camtool.pipeline import Judging, Way
     from camtool.planning.job import Job
-    from camtool.preview.scene import Scene
     from camtool.toolpath.moves import Toolpath
     from camtool.verification.verify import Verification
 
@@ -179,7 +179,7 @@ def compared(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
     rows = [row_of(variant.name, variant.verification.report) for variant in variants]
     files: dict[str, bytes] = {}
     if wishes.preview is not None:
-        from camtool.preview.overlay import render_overlay
+        from camtool.pictures.overlay import render_overlay
 
         overlay = compare_picture(data, ways, variants, title=Path(name).name)
         files[wishes.preview] = render_overlay(overlay, wishes.preview, wishes.looks.options())

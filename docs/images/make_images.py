@@ -19,8 +19,8 @@ from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.measure import point_at
 from camtool.geometry.offset import Slices, Way, shape_stages
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.preview.render import render
-from camtool.preview.scene import Scene
+from camtool.pictures.draw import render
+from camtool.pictures.scene import Scene
 
 ROOT = Path(__file__).parents[2]
 PAGES = (

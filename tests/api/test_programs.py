@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import camtool
 from camtool.cli.main import cli
-from camtool.results import Comparison, Converted, extended
+from camtool.run import Comparison, Converted, extended
 
 CIRCLE = b"G00X00000.00Y00004.20;G02X00000.00Y00004.20I00000.00J00000.00F08;M30;"
 SAMPLES = Path("samples")

@@ -61,7 +61,7 @@ def test_memory_of_the_parent(tmp_path: Path) -> None:
     make_drawings(tmp_path / "drawings", COUNT)
     code = (
         "import sys; sys.argv[0] = 'camtool'\n"
-        "from camtool.batch.worker import peak_mib\n"
+        "from camtool.batches.pool import peak_mib\n"
         "from camtool.cli.main import main\n"
         "try:\n    main()\n"
         "finally:\n    print(peak_mib())"

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from camtool.batch import digests as digests_module
-from camtool.batch.lock import alone_in
-from camtool.batch.records import Made, Pool, Task
+from camtool.batches import manifest as digests_module
+from camtool.batches.lock import alone_in
+from camtool.batches.run import Made, Pool, Task
 from camtool.cli import batch, batch_work
 from camtool.cli.batch import stoppable
 from camtool.cli.options import DrawingFlags

@@ -15,8 +15,7 @@ from typing import Any
 
 import pytest
 
-from camtool.batch.digests import file_digest
-from camtool.batch.manifest import NAME, Manifest
+from camtool.batches.manifest import NAME, Manifest, file_digest
 from tests.cli.conftest import Run
 from tests.waiting import HANG_S, heard_from
 

@@ -11,7 +11,7 @@ from camtool.cli.batch import Batched
 from camtool.cli.files import sealed
 from camtool.cli.main import cli
 from camtool.errors import OptionError
-from camtool.preview.options import Options
+from camtool.pictures.options import Options
 from tests.cli.conftest import Run
 from tests.oracles import svg_page
 from tests.oracles.batch_works import HerePool

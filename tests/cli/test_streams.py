@@ -142,7 +142,7 @@ def test_odd_places_are_refused(
 ) -> None:
     if line[0] in ("batch", "stale") and name == "/":
         return  # a folder like another, and a large one
-    monkeypatch.setattr("camtool.batch.run.run_batch", no_outcomes)
+    monkeypatch.setattr("camtool.batches.run.run_batch", no_outcomes)
     (here / "loop").symlink_to("loop")
     (here / "folder").mkdir()
     done = camtool(*line, name)

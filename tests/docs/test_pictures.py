@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from camtool.cli.main import cli
-from camtool.preview.render import render
+from camtool.pictures.draw import render
 from tests.oracles.png import decode
 
 ROOT = Path(__file__).parents[2]

@@ -8,9 +8,9 @@ import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
-from camtool.batch.digests import content_digest
-from camtool.batch.records import Made, Task, Work
-from camtool.batch.worker import made_of
+from camtool.batches.manifest import content_digest
+from camtool.batches.pool import made_of
+from camtool.batches.run import Made, Task, Work
 from camtool.errors import DrawingError
 
 

@@ -1,4 +1,4 @@
-"""The literal twin of `camtool.preview.turns`: piece by piece, each axis with its last sign.
+"""The literal twin of `camtool.pictures.strokes`: piece by piece, each axis with its last sign.
 
 An arc goes one way in X and in Y between the multiples of 90°; each such piece, and each line, has
 a sign per axis. An axis turns where its sign is another than the last one that was not 0, rapids

@@ -11,8 +11,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from camtool.api.judging import verify
-from camtool.api.reading import as_drawing, read_drawing
+from camtool.api import as_drawing, read_drawing, verify
 from camtool.findings import Code
 from camtool.jobs.drawing import read_to_scale
 from camtool.machine.registry import load_target

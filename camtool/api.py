@@ -1,0 +1,536 @@
+"""The house from Python: what the commands do, as functions on values.
+
+`import camtool` gives all of it. Values go from one call to the next; none of these calls writes
+a file. Lengths are mm, angles rad, feeds mm/min, errors of reports µm. Whatever a user can do
+wrong raises a CamtoolError with one line that says what, where, and how to mend it; what is wrong
+with a part is no exception but a finding in the result.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+
+from camtool.errors import CamtoolError, MachineError, OptionError, ProgramError
+from camtool.geometry.drawing import Drawing as DrawingRecord
+from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE, Given, Key, layers
+from camtool.machine.loader import extended_by
+from camtool.machine.registry import ListedTarget, LoadedTarget, list_target, target_names
+from camtool.pictures.scene import Scene
+from camtool.pipeline import Judging
+from camtool.pipeline import Posted as PostedRecord
+from camtool.planning.job import Job, Operation, Placement, Stock, Tool
+from camtool.planning.job import job_of as made
+from camtool.run import (
+    Calibration,
+    Comparison,
+    Converted,
+    Drawing,
+    Picture,
+    Posted,
+    Shown,
+    Toolpath,
+    Verification,
+    extended,
+)
+from camtool.simulation.motion import Effects
+from camtool.toolpath.moves import Toolpath as ToolpathRecord
+from camtool.toolpath.program import Program
+from camtool.units import parse_length
+from camtool.verification.report import Gates
+
+if TYPE_CHECKING:
+    from camtool.calibration.measurements import Measurements
+
+
+__all__ = [
+    "Calibration",
+    "CamtoolError",
+    "Comparison",
+    "Converted",
+    "Drawing",
+    "Effects",
+    "Gates",
+    "Job",
+    "Judging",
+    "ListedTarget",
+    "LoadedTarget",
+    "Looks",
+    "Operation",
+    "Picture",
+    "Placement",
+    "Posted",
+    "Reading",
+    "Stock",
+    "Tool",
+    "Toolpath",
+    "Verification",
+    "calibrate",
+    "compare",
+    "convert",
+    "job_of",
+    "load_target",
+    "plan",
+    "post",
+    "preview",
+    "read_drawing",
+    "read_job",
+    "targets",
+    "verify",
+]
+
+
+# What is read from files: drawings, jobs, programs.
+
+BYTES = "<bytes>"
+"""What messages call a program that was given as bytes."""
+
+
+class Reading(TypedDict, total=False):
+    """How a drawing is read: the fields of `camtool.importers.ReadOptions`, and of its
+    `Selection` (patterns of layers, colours and line types; none takes all)."""
+
+    units: str | None
+    tolerance_mm: float
+    gap_mm: float
+    scale: float
+    dpi: float | None
+    format: str | None
+    chain_gaps: bool
+    across_layers: bool
+    text: str
+    recognise_arcs: bool
+    layout: str | None
+    dimensions: bool
+    section_z_mm: float | None
+    allow_scripts: bool
+    layers: Sequence[str]
+    exclude_layers: Sequence[str]
+    colours: Sequence[str]
+    line_types: Sequence[str]
+
+
+_SELECTION = ("layers", "exclude_layers", "colours", "line_types")
+_LENGTHS = ("tolerance_mm", "gap_mm", "section_z_mm")
+
+
+def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
+    """Several patterns, or one as it is."""
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def read_drawing(
+    file: str | Path, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
+) -> Drawing:
+    """The drawing in a DXF, SVG, point list, STEP file or build123d script; mm, Y up.
+
+    `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
+    `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines
+    and arcs are exact, other curves become arcs within `tolerance_mm`: that of the `target` if
+    one is given. Tolerances are of the part: give its `scale` where a job scales it. Raises
+    DrawingError, and OptionError for a way of reading that cannot be. Source: docs/formats.md.
+    """
+    from camtool.importers.options import ReadOptions, Selection
+    from camtool.importers.pieces import colour_named
+    from camtool.importers.read import read_drawing as read
+
+    settings: dict[str, Any] = {}
+    if target is not None:
+        defaults = as_target(target).machine.defaults
+        settings = {"tolerance_mm": defaults.fit_tolerance_mm, "gap_mm": defaults.gap_mm}
+    settings.update(reading)
+    for key in _LENGTHS:
+        if isinstance(settings.get(key), str):
+            settings[key] = parse_length(settings[key], name=key)
+    chosen = {key: _patterns(settings.pop(key, ())) for key in _SELECTION}
+    chosen["colours"] = tuple(colour_named(colour) for colour in chosen["colours"])
+    options = ReadOptions(**settings, select=Selection(**chosen))
+    return extended(Drawing, read(Path(file), options=options))
+
+
+def read_job(
+    file: str | Path,
+    *,
+    operations: Sequence[str] = (),
+    drawing: DrawingRecord | str | Path | None = None,
+    target: str | LoadedTarget | None = None,
+) -> Job:
+    """The job that a TOML file says: tools, operations in order, placement, stock; mm, rad, s,
+    mm/min.
+
+    `operations`: only those, by name or number. Layers and colours that the `drawing` has not are
+    refused, where one is given; its file is read as finely as the `target` needs. Raises
+    OptionError, which names file, table, key and mend. Source: docs/jobs.md.
+    """
+    from camtool.jobs.build import job_of_file
+    from camtool.jobs.drawing import refuse_unmatched
+
+    job = job_of_file(Path(file), _patterns(operations))
+    if isinstance(drawing, DrawingRecord):
+        refuse_unmatched(drawing, job)
+    elif drawing is not None:
+        as_drawing(drawing, target, job)
+    return job
+
+
+def as_drawing(
+    drawing: DrawingRecord | str | Path, target: str | LoadedTarget | None, job: Job
+) -> DrawingRecord:
+    """The drawing, or what is in its file on the layers that the job's operations take."""
+    from camtool.importers.pieces import NoMatchError
+    from camtool.jobs.drawing import layers_of, read_to_scale, refuse_unmatched, unmatched
+
+    if isinstance(drawing, DrawingRecord):
+        return drawing
+    try:
+        read = read_to_scale(
+            lambda scale: read_drawing(drawing, target=target, layers=layers_of(job), scale=scale),
+            job,
+        )
+    except NoMatchError as error:
+        raise unmatched(error, job) from error
+    refuse_unmatched(read, job)
+    return read
+
+
+def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
+    """The program and what messages call it; ProgramError when its file cannot be read."""
+    if isinstance(program, bytes):
+        return program, BYTES
+    if isinstance(program, Program):
+        return program.data, BYTES
+    try:
+        return Path(program).read_bytes(), str(program)
+    except OSError as error:
+        raise ProgramError(
+            f"cannot be read ({error.strerror})", file=str(program), mend="check the path"
+        ) from error
+
+
+# Jobs from Python: values as numbers, or as texts with units, as a job file has them.
+
+
+def job_of(**settings: Any) -> Job:
+    """The job of one operation: fields of Operation, Job and Placement by name, those of its
+    Tool with `tool_` before them (`tool_diameter_mm=0.2`).
+
+    A text or a list is read as a job file reads it: `depth_mm="1/8in"`, `tabs="4:3mm:1mm"`,
+    `layers="CUT"` (one layer; commas part several); so are the numbers of `tabs`, `lead_in` and
+    the like. Other numbers are mm, rad, s and mm/min. TypeError for a name that none of them has,
+    OptionError that names the field for a value that it cannot have.
+    """
+    return made(**{name: _read(name, value) for name, value in settings.items()})
+
+
+def _read(name: str, value: Any) -> Any:
+    """The value of a field: texts, and what only a table of a job file can say, are read."""
+    key = _KEYS.get(name)
+    if name == "layers" and isinstance(value, str):
+        return layers(value)
+    if key is None or isinstance(value, bool):
+        return value
+    number_of_table = name in _TABLES and isinstance(value, int | float)
+    if number_of_table or isinstance(value, str | list | tuple | dict):
+        return key.read(Given(value, name))
+    return value
+
+
+_KEYS: dict[str, Key] = {
+    **{key.field: key for keys in (OPERATION, WHOLE, PLACE) for key in keys.values()},
+    **{f"tool_{key.field}": key for key in TOOL_KEYS.values()},
+}
+_TABLES = ("tabs", "lead_in", "lead_out", "entry")
+
+
+# The machines that camtool knows.
+
+
+def targets() -> list[ListedTarget]:
+    """The machines that camtool knows, by name: title, extension, and what a machine file must
+    still say of them. A plug-in that cannot be loaded is left out with a warning."""
+    found = []
+    for name in target_names():
+        try:
+            found.append(list_target(name))
+        except MachineError as error:
+            warnings.warn(str(error), stacklevel=2)
+    return found
+
+
+def load_target(
+    name: str | None = None,
+    *,
+    machine: str | Path | None = None,
+    settings: Mapping[str, Any] | Sequence[str] = (),
+) -> LoadedTarget:
+    """The target `name`, with a user's `machine` file and `settings` over it; without a name, the
+    one that this file extends.
+
+    `settings`: {"axes.x.backlash_mm": 0.2}, or as `--set` takes them. Units are those that the
+    keys end on. Raises UnknownTargetError (with the nearest names) and MachineError.
+    """
+    from camtool.machine.registry import load_target as loaded
+
+    if isinstance(settings, Mapping):
+        settings = [f"{key}={_as_toml(value)}" for key, value in settings.items()]
+    file = None if machine is None else Path(machine)
+    if name is None:
+        if file is None:
+            raise TypeError("load_target needs a name, or a machine file that extends one")
+        name = extended_by(file)
+    return loaded(name, machine_file=file, settings=settings)
+
+
+def as_target(target: str | LoadedTarget) -> LoadedTarget:
+    """The target, loaded if only its name is given."""
+    return load_target(target) if isinstance(target, str) else target
+
+
+def _as_toml(value: Any) -> str:
+    """A value as `--set` takes it."""
+    import json
+
+    return json.dumps(value, ensure_ascii=False)
+
+
+# Drawings and programs as programs.
+
+
+def plan(
+    drawing: DrawingRecord | str | Path, target: str | LoadedTarget, job: Job | None = None
+) -> Toolpath:
+    """The moves that cut the drawing: work frame, mm, mm/min, in order of execution.
+
+    N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, all
+    lines are followed with a tool of no width; `job_of(tool_diameter_mm=0.2, side="auto")` makes
+    a simple one. Raises OptionError for what the job asks and the drawing or the machine cannot
+    give. Of a file only the layers that the operations name are cut. Source: docs/toolpaths.md.
+    """
+    from camtool.planning.plan import plan as planned
+
+    loaded, wanted = as_target(target), job or Job()
+    read = as_drawing(drawing, loaded, wanted)
+    made = planned(read, wanted, loaded.machine)
+    return extended(Toolpath, made, drawing=read, job=wanted, target=loaded)
+
+
+def post(
+    drawing: DrawingRecord | str | Path,
+    target: str | LoadedTarget,
+    job: Job | None = None,
+    *,
+    check: bool = True,
+    compensate: bool = False,
+    gates: Gates | None = None,
+) -> Posted:
+    """The drawing as a program of the target, read back, simulated and judged.
+
+    `data` are the program's bytes, `verification` the verdict (None with `check=False`),
+    `findings` those of all stages. `compensate` bends the path against play, scale and
+    squareness; `gates` are limits whose excess is a finding. Raises OptionError, and PostError
+    for what the machine or its dialect cannot do. Source: docs/verifying.md.
+    """
+    from camtool.pipeline import post_drawing
+
+    loaded, wanted = as_target(target), job or Job()
+    read = as_drawing(drawing, loaded, wanted)
+    made = post_drawing(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
+    verdict = verdict_on(made, loaded, drawing=read, job=wanted)
+    context = {"drawing": read, "job": wanted, "target": loaded}
+    return extended(Posted, made, verification=verdict, **context)
+
+
+def convert(
+    program: bytes | Program | str | Path,
+    from_: str | LoadedTarget,
+    to: str | LoadedTarget,
+    *,
+    feed_mm_min: float | None = None,
+    check: bool = True,
+) -> Converted:
+    """A program of the machine `from_` as one of the machine `to`, read back, simulated and held
+    against the first one's moves.
+
+    `program`: its bytes, or the file they are in. `feed_mm_min` takes the place of all feeds.
+    `data` are the new bytes, `verification` the verdict (None with `check=False`). Raises
+    ProgramError with block and column, and PostError for what the second machine cannot do.
+    Source: docs/verifying.md, docs/dialects.
+    """
+    from camtool.pipeline import convert_program
+
+    before, after = as_target(from_), as_target(to)
+    data, source = as_bytes(program)
+    made = convert_program(data, before, after, file=source, feed_mm_min=feed_mm_min, check=check)
+    return extended(
+        Converted, made, verification=verdict_on(made, after), target=after, file=source
+    )
+
+
+def verdict_on(made: PostedRecord, target: LoadedTarget, **more: Any) -> Verification | None:
+    """The verdict on a program with what it was made from; None where there is none."""
+    if made.verification is None or made.decoded is None:
+        return None
+    data = b"" if made.program is None else made.program.data
+    context = {"data": data, "decoded": made.decoded, "target": target}
+    return extended(Verification, made.verification, **context, **more)
+
+
+# Programs judged, one way or several, and machines measured.
+
+
+def verify(
+    program: bytes | Program | str | Path,
+    target: str | LoadedTarget,
+    *,
+    against: DrawingRecord | str | Path | None = None,
+    job: Job | None = None,
+    judging: Judging | None = None,
+) -> Verification:
+    """Any program of the target, run by a model of its controller and mechanics, and judged.
+
+    `program`: its bytes, or the file they are in. With `against`, the slides' path is compared
+    with that drawing, planned with `job`, and the program with what that job asks for: places,
+    direction, feeds, spindle, tool, clearance, end. `report` holds errors in µm, sizes in mm,
+    times in s. Raises ProgramError with block and column, and OptionError. Source:
+    docs/verifying.md.
+    """
+    from camtool.pipeline import verify_program
+
+    loaded, wanted = as_target(target), job or Job()
+    data, source = as_bytes(program)
+    read = None if against is None else as_drawing(against, loaded, wanted)
+    decoded, found = verify_program(
+        data, loaded, source=source, drawing=read, job=wanted, judging=judging
+    )
+    context = {"target": loaded, "drawing": read, "job": wanted}
+    return extended(Verification, found, data=data, decoded=decoded, **context)
+
+
+def compare(
+    program: bytes | Program | str | Path,
+    target: str | LoadedTarget,
+    ways: str | Mapping[str, str | LoadedTarget],
+    *,
+    against: DrawingRecord | str | Path | None = None,
+    job: Job | None = None,
+    judging: Judging | None = None,
+) -> Comparison:
+    """A program of the target, run and judged several ways, side by side.
+
+    `ways`: "interpolators", "mechanics", values of a key such as "backlash=0,0.1,0.2" (mm), or
+    targets by names of your own. `rows` holds errors in µm, times in s; `verdicts` the whole
+    verdict on each way. Raises ProgramError with block and column, OptionError for ways that are
+    none, and MachineError for values that the machine cannot have. Source: docs/verifying.md.
+    """
+    from camtool.pipeline import Way, altered, compare_program, ways_of
+
+    loaded, wanted, how = as_target(target), job or Job(), judging or Judging()
+    data, source = as_bytes(program)
+    read = None if against is None else as_drawing(against, loaded, wanted)
+    if isinstance(ways, str):
+        chosen = ways_of(ways, lambda settings: altered(loaded, settings), how)
+    else:
+        chosen = [Way(name, as_target(each), how) for name, each in ways.items()]
+    if not chosen:
+        raise OptionError("there is nothing to compare", mend="give a target for each way")
+    found = compare_program(data, chosen, source=source, drawing=read, job=wanted)
+    return Comparison(data, source, tuple(chosen), tuple(found))
+
+
+def calibrate(
+    measurements: Measurements | str | Path,
+    target: str | None = None,
+    *,
+    machine: str | Path | None = None,
+) -> Calibration:
+    """The machine's steps, play (mm) and squareness (rad) from measured coupons, each with its
+    standard uncertainty.
+
+    `measurements`: the TOML file that `camtool coupon --measurements` begins; it names its target
+    unless one is given. `machine`: what is known so far, a file that extends the target.
+    `machine_file` of the result is the text of a new one. Raises InputError, which names file,
+    table and key, OptionError and MachineError. Source: docs/calibration.md.
+    """
+    from camtool.calibration.calibrate import calibrate as calibrated
+    from camtool.calibration.measurements import Measurements, read_measurements
+    from camtool.machine.loader import extended_by, read_table
+
+    own = None if machine is None else Path(machine)
+    said = measurements
+    if not isinstance(said, Measurements):
+        said = read_measurements(Path(said))
+    name = target or (said.target if own is None else extended_by(own))
+    if not name:
+        raise OptionError(
+            "no machine is named", file=said.file, mend="give target, or name it in the file"
+        )
+    known = load_target(name, machine=own).machine
+    return extended(
+        Calibration,
+        calibrated(said, known),
+        measurements=said,
+        machine=known,
+        extends={"extends": name} if own is None else read_table(own),
+    )
+
+
+# Pictures of what the other calls give.
+
+
+class Looks(TypedDict, total=False):
+    """How a picture looks: the fields of `camtool.pictures.options.Options`. `size_px` is its
+    width, `crop_mm` the part (x, y, width, height) that it shows, `exaggerate` how many times as
+    far from the wanted path the predicted one is drawn, `layers` the names of those to show,
+    `polar` the circle, from 1, of which the radial errors are plotted instead."""
+
+    size_px: int | None
+    crop_mm: tuple[float, float, float, float] | None
+    dark: bool
+    exaggerate: float
+    layers: frozenset[str]
+    polar: int | None
+
+
+def preview(
+    what: DrawingRecord | ToolpathRecord | PostedRecord | Shown,
+    *beside: DrawingRecord | ToolpathRecord | PostedRecord | Shown,
+    titles: Sequence[str] = (),
+    **looks: Unpack[Looks],
+) -> Picture:
+    """The picture of what any of these calls gave: the drawing, its toolpath, the path that the
+    slides are predicted to take, coloured by its error (µm, with scale), or several such paths.
+
+    Of several values: `beside` each other, at one scale, by one map of errors. `titles` take the
+    place of their own, in order. Raises OptionError for looks that make no picture. Source:
+    docs/pictures.md, docs/viewer.md.
+    """
+    from camtool.pictures.options import Options
+
+    scenes = [_shown(each)._scene() for each in (what, *beside)]
+    if len(titles) > len(scenes):
+        raise TypeError(f"{len(titles)} titles for {len(scenes)} values")
+    for row, title in enumerate(titles):
+        scenes[row] = replace(scenes[row], title=title)
+    options = Options(**looks)
+    if not beside:
+        return Picture(scenes[0], options)
+    for value, scene in zip((what, *beside), scenes, strict=True):
+        if not isinstance(scene, Scene):
+            raise TypeError(f"a {type(value).__name__} stands beside no other picture")
+    return Picture(tuple(scene for scene in scenes if isinstance(scene, Scene)), options)
+
+
+def _shown(what: Any) -> Shown:
+    """The value, as one that has a picture."""
+    if isinstance(what, Shown):
+        return what
+    if isinstance(what, DrawingRecord):
+        return extended(Drawing, what)
+    if isinstance(what, ToolpathRecord):
+        return extended(Toolpath, what)
+    if isinstance(what, PostedRecord):
+        return extended(Toolpath, what.decoded or what.wanted)
+    raise TypeError(f"{type(what).__name__} has no picture")

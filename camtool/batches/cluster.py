@@ -1,0 +1,299 @@
+"""The same on a Dask cluster: drawings are sent, results come back, files are written here.
+
+The workers need just this camtool, and nothing of ours: no shared disk. One that has another one
+ends the run: half of the parts would be made by other rules.
+"""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from camtool import __version__
+from camtool.batches.pool import TICK_S, made_of
+from camtool.batches.run import Made, Task, Work
+from camtool.errors import CamtoolError, OptionError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+CONNECT_S = 10.0
+"""How long the scheduler may take to answer."""
+
+CLOSE_S = 5.0
+"""How long it may take to hear that we leave."""
+
+ALONE_S = 5.0
+"""After so long without any worker somebody is told: they may come later, or never."""
+
+AHEAD = 2
+"""So many drawings for each thread of the cluster are under way: one made, one waiting. More
+would only keep their bytes in memory."""
+
+_MEND = "what is written is whole; the same command goes on"
+
+
+class OtherCodeError(Exception):
+    """A worker that has another camtool than the client; its text says which one."""
+
+
+class ClusterPool:
+    """The workers of the scheduler at `address` for one Work; `note` hears of what is amiss."""
+
+    def __init__(self, work: Work, address: str, note: Callable[[str], None]) -> None:
+        self._work = work
+        self._address = address
+        self._note = note
+
+    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
+        """Every task's result once, None every `TICK_S` without one; closing cancels the rest.
+
+        OptionError without `distributed` or a scheduler at the address; CamtoolError when the
+        scheduler is lost, or a worker has another camtool.
+        """
+        with _connected(self._address) as client:
+            order = _Order(self._work.digest(), pickle.dumps(self._work))
+            workers = _Workers(client, order, self._note)
+            sent = _Sent(client, order, tasks)
+            while sent.left:
+                threads = workers.threads()
+                came = [*sent.send(AHEAD * threads), *sent.done()]
+                yield from came
+                if not came:
+                    yield None
+
+
+@dataclass(frozen=True)
+class _Order:
+    """The work, pickled, and its digest. All goes pickled: a worker that cannot load what comes
+    to it as it is, because it has another camtool, would end without a word."""
+
+    digest: str
+    work: bytes
+
+
+class _Sent:
+    """The drawings that are to be sent, and those under way."""
+
+    def __init__(self, client: Client, order: _Order, tasks: Sequence[Task]) -> None:
+        self._client = client
+        self._order = order
+        self._queue = deque(tasks)
+        self._busy: dict[Future, Task] = {}
+
+    @property
+    def left(self) -> bool:
+        """Whether anything is still to come."""
+        return bool(self._queue or self._busy)
+
+    def send(self, most: int) -> Iterator[tuple[Task, Made]]:
+        """So many that `most` are under way; those that cannot be read come back at once."""
+        from camtool.importers.read import file_bytes
+
+        while self._queue and len(self._busy) < most:
+            task = self._queue.popleft()
+            try:
+                data = file_bytes(task.path)
+            except CamtoolError as error:
+                yield task, Made(error=str(error))
+                continue
+            future = self._client.submit(
+                made_there,
+                self._order.digest,
+                self._order.work,
+                pickle.dumps(task),
+                data,
+                pure=False,
+                key=None,
+            )
+            self._busy[future] = task
+
+    def done(self) -> Iterator[tuple[Task, Made]]:
+        """Those that are done, waiting a tick for the first."""
+        from distributed import wait
+
+        if not self._busy:
+            time.sleep(TICK_S)
+            return
+        try:
+            with self._client.as_current():
+                wait(list(self._busy), timeout=TICK_S, return_when="FIRST_COMPLETED")
+        except (TimeoutError, CancelledError):  # what was cancelled says so itself
+            pass
+        for future in [future for future in self._busy if future.done()]:
+            yield self._busy[future], _result(future, self._busy[future])
+            del self._busy[future]
+
+
+class _Workers:
+    """Those who are there; each is asked for its camtool before it gets a drawing."""
+
+    def __init__(self, client: Client, order: _Order, note: Callable[[str], None]) -> None:
+        self._client = client
+        self._order = order
+        self._note = note
+        self._known: set[str] = set()
+        self._alone_since_s: float | None = None
+        self._said = False
+
+    def threads(self) -> int:
+        """How many drawings they make at once; says so when there is nobody for long.
+
+        CamtoolError when the scheduler was lost, or a worker has another camtool.
+        """
+        there = _threads(self._client)
+        if new := sorted(there.keys() - self._known):
+            self._known.update(self._asked(new))
+        threads = sum(there[worker] for worker in there.keys() & self._known)
+        self._hear(threads)
+        return threads
+
+    def _asked(self, workers: list[str]) -> Iterator[str]:
+        """Those that have the same camtool; one that just leaves says nothing."""
+        answers = self._client.run(
+            asked_there,
+            self._order.digest,
+            self._order.work,
+            workers=workers,
+            on_error="return",
+        )
+        for worker, answer in answers.items():
+            if answer is None:
+                yield worker
+            elif not isinstance(answer, OSError):
+                raise _refused(worker, answer)
+
+    def _hear(self, threads: int) -> None:
+        if threads:
+            if self._said:
+                self._note("the cluster has workers now")
+            self._alone_since_s, self._said = None, False
+            return
+        now = time.monotonic()
+        self._alone_since_s = now if self._alone_since_s is None else self._alone_since_s
+        if not self._said and now - self._alone_since_s >= ALONE_S:
+            self._said = True
+            self._note("the cluster has no workers; waiting for some (Ctrl-C ends this)")
+
+
+def asked_there(digest: str, work: bytes) -> None:
+    """OtherCodeError when a worker has not the client's camtool."""
+    _work_of(digest, work)
+
+
+def made_there(digest: str, work: bytes, task: bytes, data: bytes) -> Made:
+    """What a worker of the cluster does with a drawing; OtherCodeError as above."""
+    return made_of(_work_of(digest, work), pickle.loads(task), data)
+
+
+@lru_cache(maxsize=1)
+def _work_of(digest: str, work: bytes) -> Work:
+    """The work, once for all drawings of a run."""
+    try:
+        loaded: Work = pickle.loads(work)
+        same = loaded.digest() == digest
+    except Exception:  # whatever comes of loading what was made by other code
+        same = False
+    if not same:
+        raise OtherCodeError(f"it has camtool {__version__}")
+    return loaded
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Client]:
+    """A client; what it has under way at the end is cancelled."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise OptionError(
+            "needs the package distributed",
+            where="--scheduler",
+            mend="pip install 'camtool[distributed]'",
+        ) from error
+    with _silenced():
+        try:
+            client = Client(address, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise OptionError(
+                f"no scheduler answers at {address!r} ({type(error).__name__})",
+                where="--scheduler",
+                mend="start one with dask scheduler, and give the address that it prints",
+            ) from error
+        try:
+            yield client
+        finally:
+            _leave(client)
+
+
+def _leave(client: Client) -> None:
+    with suppress(OSError, TimeoutError):  # a scheduler that does not answer need not know
+        if client.status == "running":
+            client.cancel(list(client.futures), force=True)
+        client.close(CLOSE_S)
+
+
+def _threads(client: Client) -> dict[str, int]:
+    """Threads by worker; CamtoolError when the scheduler was lost."""
+    try:
+        if client.status == "running":
+            return dict(client.nthreads())
+    except (OSError, TimeoutError):
+        pass
+    raise _lost()
+
+
+def _lost() -> CamtoolError:
+    return CamtoolError("the scheduler was lost", where="--scheduler", mend=_MEND)
+
+
+def _refused(worker: str, error: Exception) -> CamtoolError:
+    """What is said of a worker that cannot make what is made here."""
+    if isinstance(error, OtherCodeError):
+        why = f"{error}, or other code or packages under that number, and this is {__version__}"
+    else:
+        why = f"it cannot run this camtool {__version__} ({error})"
+    return CamtoolError(
+        f"{worker} is refused: {why}",
+        where="--scheduler",
+        mend=f"install the same everywhere; {_MEND}",
+    )
+
+
+def _result(future: Future, task: Task) -> Made:
+    """A result. What befell the worker is the error of this drawing; what concerns them all is
+    raised as CamtoolError."""
+    from distributed import KilledWorker
+
+    try:
+        made: Made = future.result()
+    except KilledWorker as error:
+        times = error.allowed_failures + 1
+        return Made(error=f"{task.source}: {times} workers were lost over it, and it was given up")
+    except CancelledError as error:
+        raise _lost() from error
+    except Exception as error:
+        raise _refused("a worker", error) from error
+    return made
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Without the log of `distributed`: what it comes to is said by us, in one line."""
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+    handlers = {handler for name in names for handler in logging.getLogger(name).handlers}
+    before = {handler: handler.level for handler in handlers}
+    for handler in handlers:
+        handler.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for handler, level in before.items():
+            handler.setLevel(level)

@@ -1,0 +1,195 @@
+"""Which drawings a batch takes, and where the outputs of each one go.
+
+    drawings/            every drawing below it      drawings/a/b.dxf → OUT/a/b.*
+    'parts/**/*.dxf'     what the pattern matches    parts/x/y.dxf    → OUT/x/y.*
+    one.dxf              this file                   one.dxf          → OUT/one.*
+
+Outputs keep the path below the folder, or below the part of a pattern that has no wildcard. Names
+that differ only in case, or in how accents are coded, are taken for one: they are one file on
+other computers, and programs travel.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import glob
+import os
+import unicodedata
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path, PurePath
+
+from camtool.batches.manifest import Places
+from camtool.batches.run import Task
+from camtool.errors import InputError, OutputError
+
+SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
+"""What a folder is searched for. Lists of points and scripts share their extensions with much
+else: they are taken when they are named or matched by a pattern."""
+
+
+def find_tasks(
+    sources: Sequence[str], out: Path, made: Collection[Path] = frozenset()
+) -> list[Task]:
+    """One task for each drawing, sorted by output; a drawing that is named twice counts once.
+
+    `made` are outputs of earlier runs (resolved paths): they are no drawings. InputError when a
+    source gives none; OutputError, which names both, when two drawings have one output.
+    """
+    tasks: dict[Path, Task] = {}
+    places = Places()
+    for source in sources:
+        found = False
+        for path, stem in _found(source, places.of(out)):
+            place = places.of(path)
+            if place not in made:
+                found = True
+                tasks.setdefault(place, Task(str(path), stem))
+        if not found:
+            raise InputError(
+                "holds no drawing" if Path(source).is_dir() else "no file matches",
+                file=source,
+                mend=f"a folder is searched for {', '.join(SUFFIXES)}; quote a pattern such as "
+                "'parts/**/*.csv' for others",
+            )
+    _refuse_collisions(tasks.values())
+    return sorted(tasks.values(), key=lambda task: task.stem)
+
+
+def _found(source: str, out: Path) -> Iterator[tuple[Path, str]]:
+    """(drawing, stem) of one argument; `out` is a real path."""
+    path = Path(source)
+    if path.is_dir():
+        for found in files_below(path, out):
+            if found.suffix.lower() in SUFFIXES:
+                yield found, _stem(found.relative_to(path))
+    elif path.exists() or not glob.has_magic(source):
+        if not path.exists():
+            raise InputError("there is no such file or folder", file=source, mend="check the path")
+        yield path, _stem(PurePath(path.name))
+    else:
+        base = _fixed_part(source)
+        if base.is_dir():
+            for found in files_matching(base, path.relative_to(base).parts, out):
+                yield found, _stem(found.relative_to(base))
+
+
+def _fixed_part(pattern: str) -> Path:
+    """The folders of a pattern before its first wildcard."""
+    parts = PurePath(pattern).parts
+    fixed = next(n for n, part in enumerate(parts) if glob.has_magic(part))
+    return Path(*parts[: min(fixed, len(parts) - 1)])
+
+
+def _stem(relative: PurePath) -> str:
+    """The path without the extension of the file."""
+    return relative.with_suffix("").as_posix()
+
+
+def _refuse_collisions(tasks: Collection[Task]) -> None:
+    places: dict[str, Task] = {}
+    for task in tasks:
+        other = places.setdefault(_folded(task.stem), task)
+        if other is not task:
+            as_what = f"as {task.stem}.*"
+            if other.stem != task.stem:
+                as_what = (
+                    f"to one file where case or the coding of accents does not count, {as_what}"
+                )
+            raise OutputError(
+                f"{other.source} and {task.source} would both be written {as_what}",
+                mend="rename one, or make them by two batches with an --out for each",
+            )
+
+
+def _folded(name: str) -> str:
+    """What a name is on a computer that knows no case."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+# Files below a folder, and files that match a pattern: neither follows links round in circles.
+#
+# `**` stands for any folders, `*`, `?` and `[...]` for parts of a name, as in a shell; a name that
+# begins with a dot is hidden from them. Links to files are files, links to folders are not entered
+# by a search or by `**`.
+
+ANY_FOLDERS = "**"
+
+
+def files_below(folder: Path, apart: Path | None = None) -> Iterator[Path]:
+    """Files in a folder and those below it, sorted; nothing hidden, and nothing in `apart`.
+
+    InputError for a folder that cannot be read: what is in it would be missing without a word.
+    """
+    folders = []
+    for entry in _entries(folder):
+        if entry.name.startswith("."):
+            continue
+        if _is_dir(entry):
+            if not entry.is_symlink():
+                folders.append(entry)
+        elif _is_file(entry):
+            yield Path(entry.path)
+    for entry in folders:
+        if apart is None or not _same(entry, apart):
+            yield from files_below(Path(entry.path), apart)
+
+
+def files_matching(base: Path, parts: Sequence[str], apart: Path | None = None) -> Iterator[Path]:
+    """Files below `base` that match a pattern, given by its parts; `**` does not enter `apart`."""
+    head, rest = parts[0], parts[1:]
+    if head == ANY_FOLDERS:
+        yield from files_matching(base, rest or ("*",), apart)
+        for entry in _entries(base):
+            hidden = entry.name.startswith(".") or entry.is_symlink()
+            if _is_dir(entry) and not (hidden or (apart is not None and _same(entry, apart))):
+                yield from files_matching(Path(entry.path), parts, apart)
+    elif not glob.has_magic(head):
+        place = base / head
+        if rest and place.is_dir():
+            yield from files_matching(place, rest, apart)
+        elif not rest and place.is_file():
+            yield place
+    else:
+        for entry in _entries(base):
+            if not fnmatch.fnmatch(entry.name, head):
+                continue
+            if entry.name.startswith(".") and not head.startswith("."):
+                continue
+            if rest and _is_dir(entry):
+                yield from files_matching(Path(entry.path), rest, apart)
+            elif not rest and not _is_dir(entry) and _is_file(entry):
+                yield Path(entry.path)
+
+
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entries, key=lambda entry: entry.name)
+    except OSError as error:
+        raise InputError(
+            f"cannot be searched ({error.strerror})",
+            file=str(folder),
+            mend="let it be read, or name the folders that are wanted",
+        ) from error
+
+
+def _is_dir(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # a link that nobody can follow
+        return False
+
+
+def _is_file(entry: os.DirEntry[str]) -> bool:
+    """A file, or a link to nothing (an error by its name later); no pipe and no device."""
+    try:
+        return entry.is_file() or (entry.is_symlink() and not Path(entry.path).exists())
+    except OSError:
+        return True
+
+
+def _same(entry: os.DirEntry[str], folder: Path) -> bool:
+    try:
+        return os.path.samestat(entry.stat(), folder.stat())
+    except OSError:  # an output folder that is still to be made
+        return False

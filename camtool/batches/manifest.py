@@ -1,0 +1,195 @@
+"""What an output folder holds, and of what it was made.
+
+A line of JSON for each drawing, appended when its files are in place, so that a run which ends
+in any way leaves a manifest that can be used: a line that was cut short is passed over, and of
+several for one drawing the last counts. A run that ends well writes it anew, sorted, without those
+whose files are all gone: it never holds more than the folder does.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+NAME = ".camtool-batch.jsonl"
+"""The manifest's name in the output folder."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One drawing: the digest of all that its outputs depend on, and theirs by name."""
+
+    key: str
+    files: Mapping[str, str]
+    warnings: int = 0
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+
+class Manifest:
+    """The entries of an output folder by stem."""
+
+    def __init__(self, out: Path) -> None:
+        self._out = out
+        self._place = out / NAME
+        self._entries, self._tidy = _read(self._place)
+
+    def up_to_date(self, stem: str, key: str) -> Entry | None:
+        """The entry if it was made of just this and its files are as they were written."""
+        entry = self._entries.get(stem)
+        if entry is None or entry.key != key:
+            return None
+        return entry if all(self._is(*each) for each in entry.files.items()) else None
+
+    def outputs(self) -> frozenset[Path]:
+        """All files that it knows of, resolved."""
+        names = (name for entry in self._entries.values() for name in entry.files)
+        places = Places()
+        return frozenset(places.of(self._out / name) for name in names)
+
+    def add(self, stem: str, entry: Entry) -> None:
+        """Append an entry; OSError when the disk does not take it."""
+        self._entries[stem] = entry
+        self._tidy = False
+        # The line break comes first too: what a full disk cut short must not take this line along.
+        line = f"\n{_line(stem, entry)}\n".encode()
+        handle = os.open(self._place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        try:
+            if os.write(handle, line) != len(line):
+                raise OSError("the disk is full")
+        finally:
+            os.close(handle)
+
+    def tidy(self, write: Callable[[dict[str, bytes]], None]) -> None:
+        """Write it anew, one line for each drawing that has files, unless it is so already."""
+        kept = [stem for stem in sorted(self._entries) if self._there(self._entries[stem])]
+        if self._tidy and len(kept) == len(self._entries):
+            return
+        lines = [_line(stem, self._entries[stem]) for stem in kept]
+        write({str(self._place): ("\n".join(lines) + "\n").encode()})
+        self._entries, self._tidy = {stem: self._entries[stem] for stem in kept}, True
+
+    def _there(self, entry: Entry) -> bool:
+        return any(os.path.lexists(self._out / name) for name in entry.files)
+
+    def _is(self, name: str, digest: str) -> bool:
+        try:
+            return file_digest(self._out / name) == digest
+        except OSError:
+            return False
+
+
+def _line(stem: str, entry: Entry) -> str:
+    row = {
+        "stem": stem,
+        "key": entry.key,
+        "files": dict(entry.files),
+        "warnings": entry.warnings,
+        "figures": dict(entry.figures),
+    }
+    return json.dumps(row, ensure_ascii=True, sort_keys=True)
+
+
+def _read(place: Path) -> tuple[dict[str, Entry], bool]:
+    """The entries of the lines that are whole, none when there is no manifest; whether it is as
+    `tidy` writes it."""
+    try:
+        lines = place.read_bytes().splitlines()
+    except OSError:
+        return {}, True
+    entries: dict[str, Entry] = {}
+    for line in lines:
+        try:
+            row: dict[str, Any] = json.loads(line)
+            stem = row.pop("stem")
+            entry = Entry(**row)
+        except (ValueError, TypeError, KeyError, AttributeError):
+            continue
+        if isinstance(stem, str) and isinstance(entry.files, dict):
+            entries[stem] = entry
+    return entries, len(lines) == len(entries) and list(entries) == sorted(entries)
+
+
+# Digests by which a batch knows what is up to date.
+
+CHUNK_BYTES = 1 << 20
+"""How much of a file is read at a time for its digest: memory stays small for any drawing."""
+
+
+def digest_of(*parts: str | bytes) -> str:
+    """The digest of several parts in their order, each with its length: none runs into another."""
+    digest = hashlib.sha256()
+    for part in parts:
+        data = part.encode("utf-8", "surrogateescape") if isinstance(part, str) else part
+        digest.update(f"{len(data)}:".encode())
+        digest.update(data)
+    return digest.hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """The digest of a file's content, equal to `content_digest` of it; OSError without one."""
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while chunk := stream.read(CHUNK_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def content_digest(data: bytes) -> str:
+    """The digest of a file's content."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def code_digest(files: Iterable[Path]) -> str:
+    """The digest of program files: their names and contents."""
+    return digest_of(*(part for path in sorted(files) for part in (path.name, file_digest(path))))
+
+
+def packages_digest(name: str) -> str:
+    """The digest of the versions of all packages that the package `name` needs, without extras;
+    that of nothing where it is not installed as a package."""
+    from importlib import metadata
+
+    try:
+        needs = metadata.requires(name) or []
+    except metadata.PackageNotFoundError:
+        return digest_of()
+    wanted = sorted(need for need in needs if "extra ==" not in need)
+    found = (re.match(r"[\w.-]+", need) for need in wanted)
+    return digest_of(*(f"{one[0]} {_version(one[0])}" for one in found if one))
+
+
+def _version(name: str) -> str:
+    """A package's version, "" for one that is only needed on other systems."""
+    from importlib import metadata
+
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+# Where files really are: as `Path.resolve`, quick for many files of few folders.
+
+
+class Places:
+    """Real paths; each folder is looked up once."""
+
+    def __init__(self) -> None:
+        self._folders: dict[str, str] = {}
+
+    def of(self, path: str | Path) -> Path:
+        """The real path of a file, there or not, through all links."""
+        folder, name = os.path.split(path)
+        if name in ("", ".", ".."):
+            return Path(os.path.realpath(path))
+        real = self._folders.get(folder)
+        if real is None:
+            real = self._folders[folder] = os.path.realpath(folder)
+        place = Path(real, name)
+        return Path(os.path.realpath(place)) if place.is_symlink() else place

@@ -1,0 +1,275 @@
+"""Processes of this computer that make drawings: each is warm, and each may die alone.
+
+A pool of the standard library is broken for good when one of its processes is killed. Here each
+worker has a pipe of its own, so its end shows whose drawing it was, and another takes its place.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import time
+import traceback
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from camtool.batches.run import Made, Task, Work
+from camtool.errors import CamtoolError
+
+TICK_S = 0.2
+"""How long results are waited for before the caller gets a moment (to redraw, to stop)."""
+
+END_S = 2.0
+"""How long a worker that was told to end may take before it is killed."""
+
+FAILED_STARTS = 3
+"""So many workers in a row that die before they are ready: no worker can live here."""
+
+
+@dataclass(frozen=True)
+class PoolOptions:
+    """How many processes; the most time for one drawing, s (None: any); after how many drawings,
+    or with how much memory (MiB), a worker is replaced by a fresh one; whether the first must be
+    ready before the others begin, because it compiles what they all load."""
+
+    jobs: int = 1
+    timeout_s: float | None = None
+    recycle_after: int = 200
+    recycle_mib: float = 1024.0
+    first_alone: bool = False
+
+
+@dataclass(eq=False)
+class _Worker:
+    process: Any
+    pipe: Connection
+    ready: bool = False
+    task: Task | None = None
+    since_s: float = 0.0
+    done: int = 0
+
+
+class LocalPool:
+    """`jobs` workers for one Work."""
+
+    def __init__(self, work: Work, options: PoolOptions) -> None:
+        self._work = work
+        self._options = options
+        self._workers: list[_Worker] = []
+        self._failed_starts = 0
+        self._warm = not options.first_alone
+
+    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
+        """Every task's result once, None every `TICK_S` without one; closing kills the workers.
+
+        CamtoolError when no worker can be started at all.
+        """
+        queue = deque(tasks)
+        try:
+            while queue or any(worker.task for worker in self._workers):
+                self._staff(queue)
+                ready = wait([worker.pipe for worker in self._workers], TICK_S)
+                came = [worker for worker in self._workers if worker.pipe in ready]
+                results = [each for worker in came if (each := self._hear(worker))]
+                results += self._late()
+                yield from results
+                if not results:
+                    yield None
+        finally:
+            self._end()
+
+    def _staff(self, queue: deque[Task]) -> None:
+        """As many workers as there is work for, each with a task."""
+        busy = sum(worker.task is not None for worker in self._workers)
+        wanted = min(self._options.jobs, busy + len(queue))
+        if not self._warm:
+            wanted = min(wanted, 1)
+        while len(self._workers) < wanted:
+            self._workers.append(self._started())
+        for worker in self._workers:
+            if queue and worker.ready and worker.task is None:
+                task = queue.popleft()
+                worker.task, worker.since_s = task, time.monotonic()
+                try:
+                    worker.pipe.send(task)
+                except OSError:  # it died while it had nothing to do: no drawing is to blame
+                    worker.task = None
+                    queue.appendleft(task)
+                    self._drop(worker)
+                    return
+
+    def _started(self) -> _Worker:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=serve, args=(theirs,), daemon=True)
+        with _interrupts_held():
+            process.start()
+        theirs.close()
+        worker = _Worker(process, ours)
+        with suppress(OSError):  # of its end the pipe tells
+            ours.send(self._work)
+        return worker
+
+    def _hear(self, worker: _Worker) -> tuple[Task, Made] | None:
+        """What a worker has to say: that it is ready, a result, or nothing any more."""
+        try:
+            message = worker.pipe.recv()
+        except (EOFError, OSError):
+            return self._died(worker)
+        self._failed_starts = 0
+        if message == READY:
+            worker.ready = self._warm = True
+            return None
+        made, peak_mib = message
+        task, worker.task = worker.task, None
+        worker.done += 1
+        if worker.done >= self._options.recycle_after or peak_mib > self._options.recycle_mib:
+            self._drop(worker)
+        return None if task is None else (task, made)
+
+    def _died(self, worker: _Worker) -> tuple[Task, Made] | None:
+        worker.process.join(END_S)
+        code = worker.process.exitcode
+        task = worker.task
+        self._drop(worker)
+        if task is None:
+            self._failed_starts += not worker.ready
+            if self._failed_starts >= FAILED_STARTS:
+                raise CamtoolError(
+                    f"workers die before their first drawing ({_cause(code)})",
+                    mend="see whether camtool post does one of the drawings",
+                )
+            return None
+        return task, Made(
+            error=f"{task.source}: its worker was lost ({_cause(code)}); the others went on",
+            seconds=time.monotonic() - worker.since_s,
+        )
+
+    def _late(self) -> list[tuple[Task, Made]]:
+        """Those that took too long: killed."""
+        limit = self._options.timeout_s
+        if limit is None:
+            return []
+        late = []
+        for worker in list(self._workers):
+            spent = time.monotonic() - worker.since_s
+            if worker.task is not None and spent > limit:
+                error = f"{worker.task.source}: took longer than --timeout {limit:g} s"
+                late.append((worker.task, Made(error=error, seconds=spent)))
+                worker.process.kill()
+                self._drop(worker)
+        return late
+
+    def _drop(self, worker: _Worker) -> None:
+        self._workers.remove(worker)
+        worker.pipe.close()
+        if worker.task is not None:
+            worker.process.kill()
+        worker.process.join(END_S)
+        if worker.process.exitcode is None:
+            worker.process.kill()
+            worker.process.join()
+        worker.process.close()
+
+    def _end(self) -> None:
+        for worker in self._workers:
+            if worker.task is not None or not worker.ready:
+                worker.process.kill()
+        for worker in list(self._workers):
+            self._drop(worker)
+
+
+def _cause(code: int | None) -> str:
+    """Why a process ended."""
+    if code is None or code >= 0:
+        return f"exit code {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    short = ": the system kills so when memory runs out" if name == "SIGKILL" else ""
+    return f"killed by {name}{short}"
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits: a worker that begins inherits that, and so is never stopped halfway in."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    old = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, old)
+
+
+# One worker: takes tasks from a pipe, sends back what it made of them, until the pipe ends.
+
+READY = "ready"
+"""What a worker sends when it is warm."""
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def serve(pipe: Connection) -> None:
+    """The worker's whole life: first a Work comes, then tasks; None or the pipe's end ends it.
+
+    Ctrl-C reaches every process of a terminal, but what it means the parent decides.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in _ONE_THREAD:  # before numpy: workers side by side share the cores already
+        os.environ.setdefault(name, "1")
+    try:
+        work: Work = pipe.recv()
+        with suppress(Exception):  # what is wrong shows at every drawing, by its name
+            work.warm()
+        pipe.send(READY)
+        while (task := pipe.recv()) is not None:
+            pipe.send((made_of(work, task, None), peak_mib()))
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        return
+
+
+def made_of(work: Work, task: Task, data: bytes | None) -> Made:
+    """What the work makes of a task; whatever goes wrong is an error of this drawing alone."""
+    begin = time.perf_counter()
+    try:
+        made = work.make(task, data)
+    except CamtoolError as error:
+        made = Made(error=str(error))
+    except MemoryError:
+        made = Made(error=f"{task.source}: needs more memory than there is")
+    except Exception as error:
+        where = traceback.format_exc(limit=-1).strip().splitlines()[1].strip()
+        made = Made(
+            error=f"{task.source}: fault in camtool itself ({type(error).__name__}: {error}; "
+            f"{where}); please report it"
+        )
+    return replace(made, seconds=time.perf_counter() - begin)
+
+
+def peak_mib() -> float:
+    """The most memory that this process has had, MiB; 0 where the system does not tell.
+
+    Linux's getrusage would tell that of the parent at the fork where it was more, even behind an
+    exec; VmHWM is that of the program itself.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        return float(status.partition("VmHWM:")[2].split()[0]) / (1 << 10)
+    except (OSError, IndexError, ValueError):
+        pass
+    try:
+        import resource
+    except ImportError:
+        return 0.0
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return peak / (1 << 20) if sys.platform == "darwin" else peak / (1 << 10)

@@ -1,0 +1,1 @@
+"""Pictures: SVG is the source, PNG is rendered from it (`camtool.pictures.draw`)."""

@@ -1,0 +1,253 @@
+"""Scenes beside each other: before and after, in one window, at one scale, by one map of errors.
+
+What is high or square stands side by side, what is wide one below the other; more than two fill a
+grid. Each panel has its own title and notes; the legend, the scale bar and the colour bar are
+those of all. Polar plots share their magnification. A panel is drawn in units of its own and then
+moved to its place, so that equal scenes make equal panels.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+from camtool.errors import OptionError
+from camtool.pictures import axes, legend, polar
+from camtool.pictures.colours import DRAWING, LAYERS
+from camtool.pictures.content import Content, content_of, entries_of
+from camtool.pictures.draw import panel, rendered
+from camtool.pictures.legend import Entry
+from camtool.pictures.marks import Group
+from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
+from camtool.pictures.page import HEAD_GAP, LEGEND_DROP, Page, fitted, foot_of, sheet, table_of
+from camtool.pictures.polar import ROOM, dial_of, plot
+from camtool.pictures.scene import Scene
+from camtool.pictures.svg import element, number
+from camtool.pictures.view import (
+    CROP_SHAPES,
+    MARGIN,
+    TALLEST,
+    WIDEST,
+    Box,
+    View,
+    page_width,
+    union,
+)
+
+WIDE = 0.5
+"""A window lower than this share of its width is wide."""
+
+NUMBERS_FOOT = 32.0
+"""Room below a plot for its numbers."""
+
+
+def render_beside(scenes: Sequence[Scene], name: str, options: Options = AS_USUAL) -> bytes:
+    """SVG or PNG bytes of the scenes for a file of this name; OutputError for other extensions,
+    OptionError for .html and where the options ask for what a scene does not have."""
+    if PurePath(name).suffix.lower() == ".html":
+        raise OptionError(
+            "a page shows one alone", file=name, mend="pictures side by side are .svg or .png"
+        )
+    return rendered(lambda sized: draw_beside(scenes, sized), name, options)
+
+
+def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
+    """The scenes as SVG text; equal input gives equal bytes. ValueError when there are none."""
+    if not scenes:
+        raise ValueError("no scene to draw")
+    if options.polar is not None:
+        return _polars(scenes, options.polar, options)
+    contents = _alike([content_of(scene, options) for scene in scenes])
+    grid, views = _views(contents, options)
+    view, ticks = views[0], axes.ticks_of(views[0])
+    panels = [
+        panel(content, Page(head, own, ticks, [], 0.0, 0.0, 0.0))
+        for content, head, own in zip(contents, grid.heads, views, strict=True)
+    ]
+    plots = grid.around([own.box for own in views])
+    table, bar_y = table_of(_entries(contents, view), view, plots)
+    legend_y = plots.bottom + LEGEND_DROP
+    top_um = _top_um(contents)
+    return sheet(
+        _title(scenes),
+        (grid.page, foot_of(table, legend_y)),
+        options,
+        *grid.placed(panels),
+        "" if top_um is None else legend.colour_bar(top_um, plots),
+        legend.legend(table, plots.left, legend_y),
+        axes.scale_bar(view, plots.right, bar_y),
+    )
+
+
+def _views(contents: Sequence[Content], options: Options) -> tuple[Grid, list[View]]:
+    """Where each panel lies, and the view in it: all the same but for the length of its head.
+    Fitted twice, since the room of the colour bar follows from the height of the plots."""
+    window, top_um = contents[0].window, _top_um(contents)
+    across, down = (window[:, 1] - window[:, 0]).tolist()
+    columns = columns_of(len(contents), wide=down < WIDE * across)
+    page = page_units(columns, options)
+    shapes = (WIDEST, columns * TALLEST) if options.crop_mm is None else CROP_SHAPES
+    heads = [(content.scene.title, content.notes) for content in contents]
+    bar = 0.0
+    for _ in range(2):
+        grid = grid_of(heads, columns, page, bar)
+        views = [fitted(window, top + HEAD_GAP, grid.width, shapes)[0] for top in grid.downs]
+        grid = grid.with_bodies(HEAD_GAP + views[0].box.height + NUMBERS_FOOT)
+        if top_um is not None:
+            bar = legend.bar_width(top_um, grid.around([view.box for view in views]).height)
+    return grid, views
+
+
+def _top_um(contents: Sequence[Content]) -> float | None:
+    """The end of the map of all."""
+    return max((one.trace.top_um for one in contents if one.trace is not None), default=None)
+
+
+def _alike(contents: Sequence[Content]) -> list[Content]:
+    """The same with one window, one map of errors, and one colour for each layer by name."""
+    top_um = _top_um(contents)
+    window = union([one.window for one in contents if not one.is_empty])
+    names = dict.fromkeys(group.name for one in contents for group in one.groups)
+    strong = {name: LAYERS[index % len(LAYERS)] for index, name in enumerate(names)}
+
+    def coloured(group: Group) -> Group:
+        pale = group.colour == DRAWING
+        return group if pale else replace(group, colour=strong[group.name])
+
+    found = []
+    for one in contents:
+        trace = one.trace
+        if trace is not None and top_um is not None:
+            trace = replace(trace, top_um=top_um)
+        groups = tuple(coloured(group) for group in one.groups)
+        shown = one.window if window is None else window
+        found.append(replace(one, window=shown, trace=trace, groups=groups))
+    return found
+
+
+def _entries(contents: Sequence[Content], view: View) -> list[Entry]:
+    """The legend of all, each entry once; layers of drawings are named alike in all."""
+    groups = {(group.name, group.colour): group for one in contents for group in one.groups}
+    every = tuple(groups.values())
+    found = [entry for one in contents for entry in entries_of(replace(one, groups=every), view)]
+    return list(dict.fromkeys(found))
+
+
+def _title(scenes: Sequence[Scene]) -> str:
+    return ", ".join(scene.title for scene in scenes if scene.title)
+
+
+def _polars(scenes: Sequence[Scene], which: int, options: Options) -> str:
+    """The same circle of each scene, all magnified alike."""
+    plots = [polar.shown(scene, which) for scene in scenes]
+    columns = columns_of(len(plots), wide=False)
+    page = page_units(columns, options)
+    width = panel_width(columns, page)
+    errors = [[circle.errors_um for circle in circles] for circles in plots]
+    dial = dial_of([each for circles in errors for each in circles], width)
+    heads = [
+        (scene.title, polar.notes(circles, dial))
+        for scene, circles in zip(scenes, plots, strict=True)
+    ]
+    grid = grid_of(heads, columns, page).with_bodies(2.0 * (dial.outer + ROOM))
+    panels = [
+        [head, *plot(shown, dial.placed(down, width))]
+        for shown, head, down in zip(errors, grid.heads, grid.downs, strict=True)
+    ]
+    entries = list(dict.fromkeys(entry for circles in plots for entry in polar.entries(circles)))
+    below, foot = polar.legend_below(entries, grid.rows[-1], page)
+    return sheet(_title(scenes), (page, foot), options, *grid.placed(panels), below)
+
+
+# Panels in rows and columns of a page: where each lies, and the names of its inner parts.
+
+GROWN = 1.25
+"""A page of panels side by side has so many times the units of another: letters become smaller,
+since each panel is."""
+
+TITLE_LINES = 2
+"""Panels are narrow: a long title goes on below."""
+
+_NAME = re.compile(r'( id="|url\(#)')
+
+Head = tuple[str, Sequence[str]]
+"""Title and notes of a panel."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Panels of `width`, margins included, in `columns` on a page so wide; `heads` are drawn,
+    `downs` where those of each panel's row end; `rows` where each row begins."""
+
+    columns: int
+    page: float
+    width: float
+    heads: tuple[str, ...]
+    downs: tuple[float, ...]
+    rows: tuple[float, ...] = ()
+
+    def with_bodies(self, height: float) -> Grid:
+        """The rows of panels that go on so far below their heads."""
+        rows = [0.0]
+        for down in self.downs[:: self.columns]:
+            rows.append(rows[-1] + down + height)
+        return replace(self, rows=tuple(rows))
+
+    def corner(self, index: int) -> tuple[float, float]:
+        """Where a panel lies on the page; the margins of neighbours are one."""
+        across = (index % self.columns) * (self.width - MARGIN)
+        return across, self.rows[index // self.columns]
+
+    def moved(self, index: int, box: Box) -> Box:
+        """A box of a panel on the page."""
+        x, y = self.corner(index)
+        return Box(box.left + x, box.top + y, box.right + x, box.bottom + y)
+
+    def around(self, boxes: Sequence[Box]) -> Box:
+        """What holds the boxes of all panels, on the page."""
+        moved = [self.moved(index, box) for index, box in enumerate(boxes)]
+        return Box(
+            min(box.left for box in moved),
+            min(box.top for box in moved),
+            max(box.right for box in moved),
+            max(box.bottom for box in moved),
+        )
+
+    def placed(self, panels: Sequence[Sequence[str]]) -> list[str]:
+        """The panels in their places; the names of their inner parts begin with their own."""
+        groups = []
+        for index, parts in enumerate(panels):
+            name = f"panel-{index + 1}"
+            x, y = self.corner(index)
+            where = f"translate({number(x)} {number(y)})"
+            inner = [_NAME.sub(rf"\g<1>{name}-", part) for part in parts]
+            groups.append(element("g", {"id": name, "transform": where}, *inner))
+        return groups
+
+
+def columns_of(count: int, *, wide: bool) -> int:
+    """How many panels stand side by side."""
+    return 1 if wide else math.ceil(math.sqrt(count))
+
+
+def page_units(columns: int, options: Options) -> float:
+    """Units of a page with so many columns."""
+    page = page_width(options.size_px or SVG_WIDTH_PX)
+    return page if columns == 1 else round(GROWN * page)
+
+
+def panel_width(columns: int, room: float) -> float:
+    """Width of a panel, margins included, of so many in this room."""
+    return float(math.floor((room + (columns - 1) * MARGIN) / columns))
+
+
+def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) -> Grid:
+    """The grid for panels of these titles and notes, `bar` of the page's width left free."""
+    width = panel_width(columns, page - bar)
+    drawn = [legend.head(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
+    downs = [down for _, down in drawn]
+    lowest = [max(downs[k - k % columns :][:columns]) for k in range(len(downs))]
+    return Grid(columns, page, width, tuple(head for head, _ in drawn), tuple(lowest))

@@ -1,0 +1,175 @@
+"""Pictures of drawings, toolpaths and predicted results.
+
+    draw   Scene → SVG (the source of truth)
+    png    SVG → PNG
+
+Read in this order: content.py sorts the scene into lines and marks, page.py decides where things
+lie, this file lays the layers one over the other. Equal scenes give equal bytes: no dates, no
+random ids, no fonts. Inside the group "mm" coordinates are those of the part, in mm, Y up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import PurePath
+
+from camtool.errors import OutputError
+from camtool.pictures import axes, legend, marks, text
+from camtool.pictures.colours import QUIET
+from camtool.pictures.content import Content, content_of
+from camtool.pictures.options import AS_USUAL, PNG_WIDTH_PX, SVG_WIDTH_PX, Options, check_width
+from camtool.pictures.page import Page, mat, page_of, sheet
+from camtool.pictures.polar import draw_polar
+from camtool.pictures.scene import Scene
+from camtool.pictures.svg import Look, element, number
+from camtool.pictures.text import Style
+from camtool.pictures.trace import trace_layer
+from camtool.pictures.view import View, page_width
+
+PNG_DPI = 96
+"""resvg's own default of 0 makes lengths in mm vanish."""
+
+TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
+
+
+def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUAL) -> str:
+    """The scene as SVG text, `size_px` wide, else as the options say; OptionError when that is no
+    sensible width."""
+    if size_px is None:
+        size_px = options.size_px or SVG_WIDTH_PX
+    check_width(size_px)
+    options = replace(options, size_px=size_px)
+    if options.polar is not None:
+        return draw_polar(scene, options.polar, options)
+    content = content_of(scene, options)
+    page = page_of(content, page_width(size_px))
+    view, sizes = page.view, (page.width, page.height)
+    return sheet(
+        scene.title,
+        sizes,
+        options,
+        axes.frame(view, page.ticks),
+        element("g", {"id": "plot"}, *_plot(content, view)),
+        mat(view.box, *sizes),
+        page.head,
+        axes.axes(view, page.ticks),
+        *_beside(content, page),
+    )
+
+
+def panel(content: Content, page: Page) -> list[str]:
+    """Head and plot with its axes, clipped: it covers nothing of its neighbours."""
+    box = page.view.box
+    sides = (box.left, box.top, box.width, box.height)
+    plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
+    # Named after its own sides: two pictures in one page share it only when it is the same.
+    clip = "clip-" + "-".join(number(side, 0) for side in sides)
+    return [
+        page.head,
+        axes.frame(page.view, page.ticks),
+        element("clipPath", {"id": clip}, element("rect", plot)),
+        element("g", {"clip-path": f"url(#{clip})"}, *_plot(content, page.view)),
+        axes.axes(page.view, page.ticks),
+    ]
+
+
+def png(svg: str, width_px: int) -> bytes:
+    """The PNG of an SVG text, `width_px` wide; OptionError when that is no sensible width."""
+    check_width(width_px)
+    import resvg_py
+
+    image = resvg_py.svg_to_bytes(
+        svg_string=svg, width=width_px, dpi=PNG_DPI, skip_system_fonts=True
+    )
+    return bytes(image)
+
+
+def _plot(content: Content, view: View) -> list[str]:
+    """What lies in the plot, from the ground up."""
+    lines = [layer for layer in _lines(content, view) if layer]
+    layers = [element("g", {"id": "mm", "transform": view.matrix()}, *lines)] if lines else []
+    strokes, trace = content.strokes, content.trace
+    turns = content.reversals.tolist()
+    layers.append(marks.dots("reversals", turns, view, marks.reversal_look()))
+    if strokes is not None and trace is None:
+        layers.append(marks.arrows(content.arrows, view))
+        layers.append(marks.dots("starts", content.starts.tolist(), view, marks.start_look()))
+        plunges = strokes.plunges.tolist()
+        layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
+    if content.zero_shown(view):
+        layers.append(marks.origin(view.page(0.0, 0.0)))
+    for name, _, places, look in content.places.looks():
+        layers.append(marks.dots(name, places.tolist(), view, look))
+    if strokes is not None and trace is None and "order" in content.shown:
+        starts = strokes.starts.tolist()
+        layers.append(marks.order(marks.placed(starts, view, marks.every(len(starts)))))
+    layers.append(marks.worst(marks.placed(content.worst.tolist(), view)))
+    if content.is_empty:
+        middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
+        layers.append(text.label("nothing to draw", middle, Style(16.0, QUIET, "middle")))
+    return layers
+
+
+def _lines(content: Content, view: View) -> list[str]:
+    """The layers that are written in mm."""
+    layers: list[str] = []
+    strokes, trace, travel = content.strokes, content.trace, content.scene.travel_mm
+    if content.outlines:
+        layers.append(marks.body(content.outlines))
+    if content.swept and content.scene.tool_mm:
+        layers.append(marks.swept(content.swept, content.scene.tool_mm))
+    if travel is not None:
+        layers.append(marks.travel(travel, view))
+    if content.outlines:
+        alone = strokes is None and trace is None
+        width = marks.pen(view, ALONE_PEN if alone else DRAWING_PEN, content.outlines)
+        layers.append(marks.drawing(content.groups, view, width))
+    if strokes is not None:
+        if strokes.rapids and trace is None:
+            layers.append(marks.rapids(strokes.rapids, view))
+        base = FEED_PEN if trace is None else 0.6 * FEED_PEN
+        cuts = (*strokes.feeds, *strokes.ramps)
+        width = marks.pen(view, base, cuts)
+        level = strokes.feeds if trace is None else cuts
+        if level:
+            layers.append(marks.feeds(level, view, width, pale=trace is not None))
+        if strokes.ramps and trace is None:
+            layers.append(marks.ramps(strokes.ramps, view, width))
+    if trace is not None:
+        layers.append(trace_layer(trace, view, TRACE_PEN))
+    return layers
+
+
+def _beside(content: Content, page: Page) -> list[str]:
+    """Colour bar, legend and scale bar."""
+    box, parts = page.view.box, []
+    if content.trace is not None:
+        parts.append(legend.colour_bar(content.trace.top_um, box))
+    parts.append(legend.legend(page.rows, box.left, page.legend_y))
+    parts.append(axes.scale_bar(page.view, box.right, page.bar_y))
+    return parts
+
+
+# A scene as the bytes of a picture file, by the file's extension.
+
+
+def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
+    """SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
+    extensions. HTML is the viewer, which has no options."""
+    if PurePath(name).suffix.lower() == ".html":
+        from camtool.pictures.viewer.page import viewer_page
+
+        return viewer_page(scene)
+    return rendered(lambda sized: draw(scene, options=sized), name, options)
+
+
+def rendered(drawn: Callable[[Options], str], name: str, options: Options) -> bytes:
+    """The same of whatever makes SVG text with options that say how wide."""
+    suffix = PurePath(name).suffix.lower()
+    if suffix not in (".svg", ".png"):
+        raise OutputError("is no kind of picture that we make", file=name, mend="use .svg or .png")
+    usual = SVG_WIDTH_PX if suffix == ".svg" else PNG_WIDTH_PX
+    width = options.size_px or usual
+    svg = drawn(replace(options, size_px=width))
+    return svg.encode() if suffix == ".svg" else png(svg, width)

@@ -1,0 +1,120 @@
+"""The layers of a picture by name: which there are, and a picture's content with some of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from camtool.errors import OptionError
+from camtool.patterns import guess
+
+LAYERS = (
+    "drawing",
+    "swept",
+    "travel",
+    "rapids",
+    "feeds",
+    "plunges",
+    "starts",
+    "order",
+    "arrows",
+    "reversals",
+    "path",
+    "worst",
+    "zero",
+    "doubts",
+)
+"""Names of layers, from the ground up."""
+
+USUAL = frozenset(LAYERS) - {"reversals"}
+"""What is shown when nobody says."""
+
+OF_DRAWINGS = frozenset({"drawing", "zero", "doubts"})
+"""What a picture of a drawing alone can show."""
+
+OF_PREDICTIONS = frozenset({"path", "worst"})
+"""What a picture shows only where it is predicted how the slides move."""
+
+NOT_UNDER_PATH = frozenset({"rapids", "plunges", "starts", "order", "arrows"})
+"""What is left out where the predicted path is shown."""
+
+
+def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
+    """The layers `names` (none: the usual ones) but those `without`; OptionError for others, and
+    when none is left."""
+    shown, left_out = set(names), set(without)
+    for name in sorted(shown | left_out):
+        if name not in LAYERS:
+            raise OptionError(
+                f"{name!r} is no layer",
+                mend=f"{guess(name, LAYERS)}There are {', '.join(LAYERS)}",
+            )
+    left = frozenset(shown or USUAL) - left_out
+    if not left:
+        raise OptionError("no layer is left to show", mend="name others, or leave out fewer")
+    return left
+
+
+# How a picture is to look: its size, its part, its palette.
+
+SMALLEST_PX, LARGEST_PX = 16, 20_000
+"""Widths of pictures that are allowed."""
+
+SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
+"""Widths of pictures when nobody says."""
+
+
+LEAST_TIMES, MOST_TIMES = 1.0, 1e6
+"""Errors may be drawn so many times as large."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
+    the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
+    ground. `exaggerate`: the predicted path is drawn so many times as far from the wanted one.
+    `polar`: the plot of the radial errors of this circle, from 1, in place of the picture.
+    `layers` are the names of those to show. OptionError for sizes that make no picture, and for
+    a plot of a circle with what such a plot does not have: a part, a factor or layers."""
+
+    size_px: int | None = None
+    crop_mm: tuple[float, float, float, float] | None = None
+    dark: bool = False
+    exaggerate: float = 1.0
+    layers: frozenset[str] = USUAL
+    polar: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.size_px is not None:
+            check_width(self.size_px)
+        if not LEAST_TIMES <= self.exaggerate <= MOST_TIMES:
+            raise OptionError(
+                f"errors cannot be drawn {self.exaggerate:g} times as large",
+                mend=f"take {LEAST_TIMES:g} to {MOST_TIMES:g}",
+            )
+        crop = self.crop_mm
+        if crop is not None and not (
+            all(map(math.isfinite, crop)) and crop[2] > 0.0 and crop[3] > 0.0
+        ):
+            raise OptionError(
+                f"a part of {crop[2]:g} × {crop[3]:g} mm cannot be shown",
+                mend="give X,Y,WIDTH,HEIGHT, the last two above 0",
+            )
+        if self.polar is not None and (crop, self.exaggerate, self.layers) != (None, 1.0, USUAL):
+            raise OptionError(
+                "a circle is plotted alone: it has no part, no layers, and a factor of its own",
+                mend="drop polar, or crop_mm, exaggerate and layers",
+            )
+
+
+AS_USUAL = Options()
+
+
+def check_width(width_px: int) -> None:
+    """OptionError when no picture can be so wide."""
+    if not SMALLEST_PX <= width_px <= LARGEST_PX:
+        raise OptionError(
+            f"a picture cannot be {width_px} pixels wide",
+            mend=f"take {SMALLEST_PX} to {LARGEST_PX}",
+        )

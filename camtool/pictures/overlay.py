@@ -1,0 +1,105 @@
+"""Several paths laid over each other in one window: what differs between ways to run a program.
+
+The wanted path lies below, pale and wide; each way to run it is one thin line with a colour of
+its own. The window is small (some tens of steps), so every step shows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.pictures import axes, legend, marks
+from camtool.pictures.colours import FEED_PALE, LAYERS
+from camtool.pictures.content import cropped
+from camtool.pictures.draw import rendered
+from camtool.pictures.legend import Entry, line_swatch
+from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
+from camtool.pictures.page import HEAD_GAP, LEGEND_DROP, fitted, foot_of, mat, sheet, table_of
+from camtool.pictures.strokes import strokes_of
+from camtool.pictures.svg import Look, PathData, element
+from camtool.pictures.trace import FINEST_SHARE
+from camtool.pictures.view import CROP_SHAPES, TALLEST, WIDEST, View, page_width
+from camtool.toolpath.moves import Toolpath
+
+Floats = npt.NDArray[np.float64]
+
+WANTED_PEN, RUN_PEN = 8.0, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """`window` (2, 2) mm [[xmin, xmax], [ymin, ymax]]; `wanted` the path without any error;
+    `runs` (name, strokes of points (n, 2) mm), in the order of the legend."""
+
+    title: str
+    window: Floats
+    wanted: Toolpath
+    runs: Sequence[tuple[str, Sequence[Floats]]]
+    notes: tuple[str, ...] = ()
+
+
+def render_overlay(overlay: Overlay, name: str, options: Options = AS_USUAL) -> bytes:
+    """SVG or PNG bytes for a file of this name; OutputError for other extensions."""
+    return rendered(lambda sized: draw_overlay(overlay, sized), name, options)
+
+
+def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
+    """The paths as SVG text; equal input gives equal bytes."""
+    size_px = options.size_px or SVG_WIDTH_PX
+    page = page_width(size_px)
+    head, down = legend.head(overlay.title, overlay.notes, page)
+    window = overlay.window if options.crop_mm is None else cropped(*options.crop_mm)
+    shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
+    view, ticks = fitted(window, down + HEAD_GAP, page, shapes)
+    table, bar_y = table_of(_entries(overlay), view, view.box)
+    legend_y = view.box.bottom + LEGEND_DROP
+    sizes = (page, foot_of(table, legend_y))
+    return sheet(
+        overlay.title,
+        sizes,
+        options,
+        axes.frame(view, ticks),
+        element("g", {"id": "plot"}, _paths(overlay, view)),
+        mat(view.box, *sizes),
+        head,
+        axes.axes(view, ticks),
+        legend.legend(table, view.box.left, legend_y),
+        axes.scale_bar(view, view.box.right, bar_y),
+    )
+
+
+def _colour(index: int) -> str:
+    return LAYERS[index % len(LAYERS)]
+
+
+def _entries(overlay: Overlay) -> list[Entry]:
+    wanted = Entry(line_swatch(FEED_PALE, WANTED_PEN), "wanted")
+    return [wanted] + [
+        Entry(line_swatch(_colour(index), RUN_PEN), name)
+        for index, (name, _) in enumerate(overlay.runs)
+    ]
+
+
+def _paths(overlay: Overlay, view: View) -> str:
+    """All paths in mm."""
+    strokes = strokes_of(overlay.wanted)
+    chains = (*strokes.feeds, *strokes.ramps)
+    layers = [marks.feeds(chains, view, WANTED_PEN, pale=True)] if chains else []
+    low, high = view.x_range
+    decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
+    for index, (_, runs) in enumerate(overlay.runs):
+        data = PathData(decimals)
+        for run in runs:
+            data.move(*run[0].tolist())
+            for point in run[1:].tolist():
+                data.line(*point)
+        if data:
+            pen: Look = {"fill": "none", "stroke-width": view.mm(RUN_PEN)}
+            look: Look = {"stroke": _colour(index), "stroke-linejoin": "round", **pen}
+            layers.append(element("path", {"id": f"run-{index + 1}", "d": str(data), **look}))
+    return element("g", {"id": "mm", "transform": view.matrix()}, *layers)

@@ -1,0 +1,107 @@
+"""Pictures as values, and what has one."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from camtool.pictures.options import AS_USUAL, Options
+from camtool.pictures.scene import Scene
+from camtool.units import UM_PER_MM
+
+if TYPE_CHECKING:
+    from camtool.pictures.overlay import Overlay
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Picture:
+    """A picture of `scene` (several: beside each other, at one scale), looking as `options` say;
+    the same bytes for the same values."""
+
+    scene: Scene | Overlay | tuple[Scene, ...]
+    options: Options = AS_USUAL
+
+    @property
+    def svg(self) -> str:
+        """The picture as SVG text; OptionError for options that make no picture."""
+        from camtool.pictures.beside import draw_beside
+        from camtool.pictures.draw import draw
+        from camtool.pictures.overlay import Overlay, draw_overlay
+
+        if isinstance(self.scene, tuple):
+            return draw_beside(self.scene, self.options)
+        if isinstance(self.scene, Overlay):
+            return draw_overlay(self.scene, self.options)
+        return draw(self.scene, options=self.options)
+
+    def render(self, name: str) -> bytes:
+        """The bytes of a file of this name: .svg, .png, or .html, which is the viewer (it has no
+        options, and shows one value alone). OutputError or OptionError for any other."""
+        from camtool.pictures.beside import render_beside
+        from camtool.pictures.draw import render
+        from camtool.pictures.overlay import Overlay, render_overlay
+
+        if isinstance(self.scene, tuple):
+            return render_beside(self.scene, name, self.options)
+        if isinstance(self.scene, Overlay):
+            return render_overlay(self.scene, name, self.options)
+        return render(self.scene, name, self.options)
+
+    def save(self, file: str | Path) -> None:
+        """Write the file, by its extension; raises as `render` does."""
+        Path(file).write_bytes(self.render(str(file)))
+
+    def __repr__(self) -> str:
+        scenes = self.scene if isinstance(self.scene, tuple) else (self.scene,)
+        titles = " and ".join(scene.title for scene in scenes if scene.title)
+        return f"<Picture of {titles}>" if titles else "<Picture>"
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+
+class Shown(ABC):
+    """A value that has a picture, and shows it in a notebook."""
+
+    @abstractmethod
+    def _scene(self) -> Scene | Overlay:
+        """What its picture is of."""
+
+    def _repr_svg_(self) -> str:
+        return Picture(self._scene()).svg
+
+
+# What a page shows of a verified part besides the whole: its worst place, and a circle's plot.
+
+ERRORS_ACROSS = 16.0
+"""A close-up is so many times the largest error wide: steps show, and what they are a step of."""
+
+LEAST_SHARE = 0.02
+"""It is no smaller than this share of the predicted path: its points are not finer."""
+
+
+def closeups(scene: Scene, options: Options) -> Iterator[tuple[str, Options]]:
+    """Caption and looks of each close-up; none where nothing was predicted. Size and ground are
+    those of `options`, the rest is as usual."""
+    plain = Options(size_px=options.size_px, dark=options.dark)
+    points, errors = scene.trace_points, scene.trace_error_mm
+    if points is not None and errors is not None and scene.worst and len(points):
+        size = float(np.ptp(points, axis=0).max())
+        largest = float(errors[scene.trace_cutting].max(initial=0.0))
+        side = max(ERRORS_ACROSS * largest, LEAST_SHARE * size)
+        if 0.0 < side < 0.5 * size:
+            x, y = scene.worst[0]
+            shown = (x - 0.5 * side, y - 0.5 * side, side, side)
+            yield f"The largest error, near ({x:.3f}, {y:.3f}) mm", replace(plain, crop_mm=shown)
+    known = [one.circular_mm for one in scene.rounds if math.isfinite(one.circular_mm)]
+    if known:
+        worst = max(known)
+        number = next(k for k, one in enumerate(scene.rounds, 1) if one.circular_mm == worst)
+        said = f"Circle {number}, that of the largest circular error, {worst * UM_PER_MM:.2f} µm"
+        yield said, replace(plain, polar=number)

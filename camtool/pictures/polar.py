@@ -1,0 +1,328 @@
+"""The polar plot of a circle: its radial error, magnified, about the programmed circle; both ways
+round in one plot where the path goes both, as a ball-bar does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camtool.errors import OptionError
+from camtool.pictures import legend, text
+from camtool.pictures.colours import BACK, BACK_SPREAD, FEED, FRAME, GRID, INK, PLOT, QUIET, SPREAD
+from camtool.pictures.legend import Entry, line_swatch
+from camtool.pictures.options import SVG_WIDTH_PX, Options
+from camtool.pictures.page import foot_of, sheet
+from camtool.pictures.scene import Floats, Round, Scene
+from camtool.pictures.svg import Look, PathData, element, number
+from camtool.pictures.text import Style
+from camtool.pictures.view import MARGIN, Box, decimals_of, page_width, round_step
+from camtool.units import UM_PER_MM
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A circle of the plot: its number, and its errors (B, 3) µm."""
+
+    which: int
+    one: Round
+    errors_um: Floats
+
+    @property
+    def way(self) -> str:
+        return "counterclockwise" if self.one.ccw else "clockwise"
+
+
+def shown(scene: Scene, which: int) -> tuple[Shown, ...]:
+    """The `which`-th circle of the scene, from 1, and the same one gone round the other way where
+    there is that, counterclockwise first; OptionError when there is no such circle."""
+    if not 1 <= which <= len(scene.rounds):
+        many = len(scene.rounds)
+        raise OptionError(
+            f"there is no circle {which}" + (f" in {scene.title}" if scene.title else ""),
+            where="--polar",
+            mend=f"take 1 to {many}" if many else "the path goes round no full circle",
+        )
+    partner = scene.rounds[which - 1].partner
+    numbers = [which] if partner is None else [which, partner]
+    rounds = [(number, scene.rounds[number - 1]) for number in numbers]
+    rounds.sort(key=lambda found: not found[1].ccw)
+    return tuple(Shown(number, one, one.errors() * UM_PER_MM) for number, one in rounds)
+
+
+def draw_polar(scene: Scene, which: int, options: Options) -> str:
+    """SVG text of the `which`-th circle of the scene, from 1; OptionError when there is none."""
+    width = page_width(options.size_px or SVG_WIDTH_PX)
+    circles = shown(scene, which)
+    errors = [circle.errors_um for circle in circles]
+    dial = dial_of(errors, width)
+    head, down = legend.head(scene.title, notes(circles, dial), width)
+    dial = dial.placed(down, width)
+    foot = dial.middle[1] + dial.outer + ROOM
+    below, foot = legend_below(entries(circles), foot, width)
+    return sheet(scene.title, (width, foot), options, head, *plot(errors, dial), below)
+
+
+def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[str, float]:
+    """The legend below `top` on a page so wide, and the height of that page."""
+    if not entries:
+        return "", round(top + MARGIN)
+    room = width - 2.0 * MARGIN
+    table = legend.rows(entries, room, room)
+    legend_y = top + 0.5 * legend.ROW_STEP
+    return legend.legend(table, MARGIN, legend_y), foot_of(table, legend_y)
+
+
+def entries(circles: Sequence[Shown]) -> list[Entry]:
+    """Which way is which, where there are two."""
+    if len(circles) < 2:
+        return []
+    return [
+        Entry(line_swatch(line, 2.4), f"{circle.way} (circle {circle.which})")
+        for circle, (line, _) in zip(circles, PENS, strict=False)
+    ]
+
+
+def notes(circles: Sequence[Shown], dial: Dial) -> tuple[str, ...]:
+    """The circle, its figures, and how much its errors are magnified."""
+    first = circles[0].one
+    x, y = first.centre_mm
+    magnified = dial.per_um * UM_PER_MM * first.radius_mm / dial.base
+    times = number(float(f"{magnified:.3g}"), 3)
+    scale = f"radial error × {times}; from ring to ring {dial.step_um:g} µm"
+    place = f"radius {first.radius_mm:.4g} mm about ({x:.4g}, {y:.4g}) mm"
+    if len(circles) == 1:
+        about = f"circle {circles[0].which}: {place}, {circles[0].way}"
+        figures = f"{_iso(first)} (µm)", f"reversal values {_reversal(first)} (µm)"
+        return (about, *figures, scale)
+    told = [
+        f"{circle.way}: {_iso(circle.one)}, {_reversal(circle.one)} (µm)" for circle in circles
+    ]
+    both = f"both ways together: G(b) {_um(first.both_circular_mm).lstrip('+')} (µm)"
+    names = " and ".join(str(circle.which) for circle in circles)
+    return (f"circles {names}: {place}, both ways round", *told, both, scale)
+
+
+def _iso(one: Round) -> str:
+    largest, least, mean = one.radial_mm
+    circular = _um(one.circular_mm).lstrip("+")
+    return f"G {circular}, F max {_um(largest)}, F min {_um(least)}, mean {_um(mean)}"
+
+
+def _reversal(one: Round) -> str:
+    return f"B: X {_um(one.reversal_mm[0])}, Y {_um(one.reversal_mm[1])}"
+
+
+def _um(length_mm: float) -> str:
+    return f"{length_mm * UM_PER_MM:+.2f}" if math.isfinite(length_mm) else "unknown"
+
+
+# The dial of a polar plot: rings, the ends of the axes, and the errors of one circle or of two.
+#
+# A ring stands for each round number of µm; the thick one is the programmed circle. The band lies
+# between the least and the largest radius of each half degree, the line is their mean.
+
+CAP, LABEL_CAP = 14.5, 12.3
+HALO = 2.5
+ROOM = 62.0
+"""Between the outermost ring and the edges of the page, for the names of the axes."""
+
+BASE_SHARE = 0.62
+"""The programmed circle lies at this share of the outermost radius, or farther in."""
+
+FEWEST_RINGS = 3
+"""At least so many rings fit between the programmed circle and the largest error."""
+
+LEAST_UM = 1e-3
+"""Errors smaller than this are not magnified further."""
+
+LABELS_DEG = (22.5, 67.5, 112.5, 157.5, 202.5, 247.5, 292.5, 337.5)
+"""The rings have their numbers along one of these directions, where they hide least."""
+
+FEWEST_LABELS = 2
+
+FIRST_LABEL = 40.0
+"""Rings smaller than this have no number: it would lie on the middle."""
+
+AXES = ("X+", "Y+", "X−", "Y−")
+
+PENS = ((FEED, SPREAD), (BACK, BACK_SPREAD))
+"""Line and band of the first circle of a plot and of the second."""
+
+
+@dataclass(frozen=True)
+class Dial:
+    """Middle of the plot, its radius, that of the programmed circle, units per µm, µm from ring
+    to ring."""
+
+    middle: tuple[float, float]
+    outer: float
+    base: float
+    per_um: float
+    step_um: float
+
+    def at(self, angle: float, error_um: float) -> tuple[float, float]:
+        """Page place of a radial error."""
+        radius = self.base + error_um * self.per_um
+        x, y = self.middle
+        return x + radius * math.cos(angle), y - radius * math.sin(angle)
+
+    def placed(self, top: float, width: float) -> Dial:
+        """The same below `top`, in the middle of the width."""
+        return replace(self, middle=(0.5 * width, top + ROOM + self.outer))
+
+
+def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
+    """The dial of errors (B, 3) of circles on a plot so wide, its middle at (0, 0): scaled so
+    that the largest error of all, out or in, just fits."""
+    outer = 0.5 * width - MARGIN - ROOM
+    errors = np.concatenate([each.ravel() for each in errors_um])
+    seen = errors[np.isfinite(errors)]
+    out = max(float(seen.max(initial=0.0)), 0.0)
+    into = max(-float(seen.min(initial=0.0)), 0.0)
+    largest = max(out, into, LEAST_UM)
+    step = round_step(largest / FEWEST_RINGS / 2.0)
+    reach = step * math.ceil(largest / step)
+    share = (1.0 - BASE_SHARE) if out >= into else 0.5
+    base = (1.0 - share) * outer
+    return Dial((0.0, 0.0), outer, base, min(share * outer, 0.9 * base) / reach, step)
+
+
+def plot(errors_um: Sequence[Floats], dial: Dial) -> list[str]:
+    """Rings, the ends of the axes, and the errors (B, 3) of each circle; bands lie below lines."""
+    bands, lines = [], []
+    for errors, (line, pale) in zip(errors_um, PENS, strict=False):
+        band, mean = _band(errors, dial, line, pale)
+        bands.append(band)
+        lines.append(mean)
+    error = element("g", {"id": "radial-error"}, *bands, *lines) if any(lines) else ""
+    return [_rings(dial), _quadrants(dial), error, _labels(errors_um, dial)]
+
+
+def _ring_errors(dial: Dial) -> list[float]:
+    """µm of each ring on the plot."""
+    low = math.ceil(-0.95 * dial.base / dial.per_um / dial.step_um)
+    high = math.floor((dial.outer - dial.base + 1e-6) / dial.per_um / dial.step_um)
+    return [k * dial.step_um for k in range(low, high + 1)]
+
+
+def _rings(dial: Dial) -> str:
+    x, y = (number(place) for place in dial.middle)
+    line: Look = {"fill": "none", "stroke": GRID, "stroke-width": 1.2}
+    parts = [element("circle", {"cx": x, "cy": y, "r": number(dial.outer), "fill": PLOT})]
+    for error in _ring_errors(dial):
+        radius = number(dial.base + error * dial.per_um)
+        base: Look = {"stroke": QUIET, "stroke-width": 2.0} if error == 0.0 else {}
+        parts.append(element("circle", {"cx": x, "cy": y, "r": radius, **line, **base}))
+    return element("g", {"id": "rings"}, *parts)
+
+
+def _quadrants(dial: Dial) -> str:
+    """A line where each axis turns, with the name of its end."""
+    data, labels = PathData(), []
+    (x, y), outer, style = dial.middle, dial.outer, Style(CAP, INK, "middle")
+    for index, name in enumerate(AXES):
+        cos, sin = round(math.cos(index * math.pi / 2)), round(math.sin(index * math.pi / 2))
+        data.move(x, y)
+        data.line(x + outer * cos, y - outer * sin)
+        away = outer + 0.5 * ROOM
+        labels.append(text.label(name, (x + away * cos, y - away * sin + 0.5 * CAP), style))
+    line: Look = {"d": str(data), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
+    return element("g", {"id": "quadrants"}, element("path", line), *labels)
+
+
+def _band(errors: Floats, dial: Dial, colour: str, pale: str) -> tuple[str, str]:
+    """Least to largest as a filled band, the mean as a line; open where nothing was seen."""
+    step = 2.0 * math.pi / len(errors)
+    band, line = PathData(), PathData()
+    for run in _runs(np.isfinite(errors[:, 1])):
+        angles = [(k + 0.5) * step for k in run]
+        rows = [errors[k % len(errors)] for k in run]
+        outside = [dial.at(a, float(row[2])) for a, row in zip(angles, rows, strict=True)]
+        inside = [dial.at(a, float(row[0])) for a, row in zip(angles, rows, strict=True)]
+        _stroke(band, outside + inside[::-1])
+        band.close()
+        _stroke(line, [dial.at(a, float(row[1])) for a, row in zip(angles, rows, strict=True)])
+    if not line:
+        return "", ""
+    edge: Look = {"stroke": pale, "stroke-width": 1.6, "stroke-linejoin": "round"}
+    pen: Look = {"fill": "none", "stroke": colour, "stroke-width": 2.4, "stroke-linejoin": "round"}
+    return (
+        element("path", {"d": str(band), "fill": pale, **edge}),
+        element("path", {"d": str(line), **pen}),
+    )
+
+
+def _stroke(data: PathData, points: list[tuple[float, float]]) -> None:
+    for index, point in enumerate(points):
+        (data.line if index else data.move)(*point)
+
+
+def _runs(seen: np.ndarray) -> list[list[int]]:
+    """Runs of bins in a row, once round; a whole circle ends where it begins."""
+    count = len(seen)
+    if seen.all():
+        return [list(range(count + 1))]
+    if not seen.any():
+        return []
+    first = int(np.flatnonzero(~seen)[0])
+    turned = np.roll(seen, -first)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], turned, [False]]).astype(np.int8)))
+    return [
+        list(range(first + low, first + high))
+        for low, high in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    ]
+
+
+def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
+    """µm at the rings, as many as have room, along the direction where they hide least; what
+    would hide an error is left out while others tell the scale."""
+    places = np.array([_places(errors, dial) for errors in errors_um]).reshape(-1, 2)
+    clear, numbers = [], []
+    for degrees in LABELS_DEG:
+        numbers.append(_numbers(dial, math.radians(degrees)))
+        clear.append([one for one in numbers[-1] if not _hides(one[2], places)])
+    best = max(range(len(clear)), key=lambda index: len(clear[index]))
+    shown = clear[best] if len(clear[best]) >= FEWEST_LABELS else numbers[best]
+    style, parts = Style(LABEL_CAP, QUIET), []
+    for name, at, _ in shown:
+        halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": 2.0 * HALO}
+        parts.append(element("path", {"d": text.strokes(name, at, style), **halo}))
+        parts.append(text.label(name, at, style))
+    return element("g", {"id": "ring-labels"}, *parts)
+
+
+def _places(errors_um: Floats, dial: Dial) -> Floats:
+    """(3 B, 2) page places of the least, mean and largest errors; NaN where nothing was seen."""
+    angle = (np.arange(len(errors_um)) + 0.5) * (2.0 * np.pi / len(errors_um))
+    radius = dial.base + errors_um * dial.per_um
+    x = dial.middle[0] + radius * np.cos(angle)[:, None]
+    y = dial.middle[1] - radius * np.sin(angle)[:, None]
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], Box]]:
+    """(number, where its baseline begins, its box) of each ring with a number."""
+    every = max(1, math.ceil(2.2 * CAP / (dial.step_um * dial.per_um)))
+    shown = [e for e in _ring_errors(dial) if round(e / dial.step_um) % every == 0]
+    found = []
+    for error in shown:
+        if dial.base + error * dial.per_um < FIRST_LABEL:
+            continue
+        x, y = dial.at(angle, error)
+        name = number(error, decimals_of(dial.step_um))
+        half, base = 0.5 * text.width(name, LABEL_CAP), y + 0.5 * LABEL_CAP
+        name += " µm" if error == shown[-1] else ""
+        left, right = x - half, x - half + text.width(name, LABEL_CAP)
+        around = Box(left - HALO, base - LABEL_CAP - HALO, right + HALO, base + HALO)
+        found.append((name, (left, base), around))
+    return found
+
+
+def _hides(box: Box, places: Floats) -> bool:
+    x, y = places.T
+    inside = (x > box.left) & (x < box.right) & (y > box.top) & (y < box.bottom)
+    return bool(inside.any())

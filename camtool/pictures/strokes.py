@@ -1,0 +1,323 @@
+"""What a toolpath and its drawing look like from above: chains of lines and true arcs.
+
+A chain is an unbroken run of moves of one sort. Arcs stay arcs all the way into the SVG; one of
+more than 3/4 turn is written as two, since a nearly full circle is ill-defined by its end points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
+from camtool.pictures.svg import MM_DECIMALS, PathData
+from camtool.toolpath.moves import Kind, Toolpath
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+LONGEST_ARC_RAD = 1.5 * math.pi
+"""An arc of more is written as two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """n moves end to end: points (n+1, 2) mm; centre (n, 2) mm; sweep (n,) rad, 0 for lines."""
+
+    points: Floats
+    centre: Floats
+    sweep: Floats
+    closed: bool = False
+
+    def lengths(self) -> Floats:
+        """(n,) mm: the true length of each move."""
+        chord = np.diff(self.points, axis=0)
+        spoke = self.points[:-1] - self.centre
+        arc = np.abs(self.sweep) * np.hypot(spoke[:, 0], spoke[:, 1])
+        return np.where(self.sweep == 0.0, np.hypot(chord[:, 0], chord[:, 1]), arc)
+
+    def at(self, index: int, share: float) -> tuple[tuple[float, float], float]:
+        """The point at `share` (0 … 1) of move `index`, and the direction of travel there, rad."""
+        begin, end = self.points[index], self.points[index + 1]
+        sweep = float(self.sweep[index])
+        if sweep == 0.0:
+            dx, dy = (end - begin).tolist()
+            return (
+                float(begin[0]) + share * dx,
+                float(begin[1]) + share * dy,
+            ), math.atan2(dy, dx)
+        cx, cy = self.centre[index].tolist()
+        x, y = float(begin[0]) - cx, float(begin[1]) - cy
+        angle = math.atan2(y, x) + share * sweep
+        radius = math.hypot(x, y)
+        heading = angle + math.copysign(math.pi / 2.0, sweep)
+        return (cx + radius * math.cos(angle), cy + radius * math.sin(angle)), heading
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """A toolpath from above: `feeds` (level), `ramps` (sinking or climbing on their way) and
+    `rapids` as chains; `plunges` (P, 2) mm, where the tool goes straight down that did not come
+    there at a feed, `starts` (S, 2) mm, where feeds in XY begin, each place once; `begin` (2,) mm
+    where the tool stands at first. What is cut at several depths is drawn once."""
+
+    feeds: tuple[Chain, ...]
+    ramps: tuple[Chain, ...]
+    rapids: tuple[Chain, ...]
+    plunges: Floats
+    starts: Floats
+    begin: Floats
+
+
+def strokes_of(toolpath: Toolpath) -> Strokes:
+    """Sort the moves of a toolpath by how they are drawn."""
+    starts, ends = toolpath.starts, toolpath.end
+    step = ends - starts
+    across = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
+    cuts = toolpath.is_feed & (across | toolpath.is_arc)
+    slopes = cuts & (np.abs(step[:, 2]) > POSITION_EPS_MM)
+    rapid = (toolpath.kind == Kind.RAPID) & across
+    # Steps straight down within a cut, as from one pass to the next, are no plunges to look at.
+    goes_on = _after(toolpath, cuts, cuts | (toolpath.kind == Kind.RAPID))
+    down = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
+    return Strokes(
+        feeds=_chains(toolpath, cuts & ~slopes),
+        ramps=_chains(toolpath, slopes),
+        rapids=_once(starts[rapid, :2], ends[rapid, :2]),
+        plunges=_places(ends[down & ~goes_on, :2]),
+        starts=_places(starts[cuts & ~goes_on, :2]),
+        begin=toolpath.start[:2],
+    )
+
+
+def _after(toolpath: Toolpath, cuts: Bools, counts: Bools) -> Bools:
+    """(N,) true where the last row that `counts` before a row is one of the `cuts`."""
+    rows = np.arange(len(toolpath))
+    latest = np.maximum.accumulate(np.where(counts, rows, -1))
+    before = np.concatenate([[-1], latest])[: len(rows)]
+    return np.asarray((before >= 0) & cuts[before]) if len(rows) else cuts
+
+
+def _places(points: Floats) -> Floats:
+    """Each place once, in their order."""
+    _, first = np.unique(points, axis=0, return_index=True)
+    return points[np.sort(first)]
+
+
+def _chains(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
+    """Runs of the chosen rows, each way once: passes at several depths, and back along a line,
+    look the same. Nothing that moves in XY lies between the rows of a run."""
+    rows = np.flatnonzero(chosen)
+    if not len(rows):
+        return ()
+    starts, ends, sweeps = toolpath.starts[:, :2], toolpath.end[:, :2], toolpath.sweeps()
+    rows = rows[_first_times(starts[rows], ends[rows], sweeps[rows])]
+    moves = toolpath.is_motion & ((starts != ends).any(axis=1) | toolpath.is_arc)
+    count = np.cumsum(moves | (toolpath.kind == Kind.RAPID))
+    runs = np.split(rows, np.flatnonzero(np.diff(count[rows]) > 1) + 1)
+    return tuple(
+        Chain(np.concatenate([starts[run[:1]], ends[run]]), toolpath.centre[run], sweeps[run])
+        for run in runs
+    )
+
+
+def _first_times(begin: Floats, end: Floats, sweep: Floats) -> npt.NDArray[np.int64]:
+    """Which of J moves are the first on their way, there or back, ascending."""
+    back = (begin[:, 0] > end[:, 0]) | ((begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1]))
+    low, high = np.where(back[:, None], end, begin), np.where(back[:, None], begin, end)
+    full = (begin == end).all(axis=1)
+    turn = np.where(full, np.abs(sweep), np.where(back, -sweep, sweep))
+    _, first = np.unique(np.column_stack([low, high, turn]), axis=0, return_index=True)
+    return np.sort(first)
+
+
+def _once(begin: Floats, end: Floats) -> tuple[Chain, ...]:
+    """Straight moves, each once, there or back: dashes over dashes would look like a line."""
+    found: dict[tuple[tuple[float, ...], ...], Chain] = {}
+    for a, b in zip(begin, end, strict=True):
+        chain = Chain(np.array([a, b]), np.full((1, 2), np.nan), np.zeros(1))
+        found.setdefault(tuple(sorted([tuple(a.tolist()), tuple(b.tolist())])), chain)
+    return tuple(found.values())
+
+
+def chains_of(lines: Polylines) -> tuple[Chain, ...]:
+    """Every path of the columns as a chain."""
+    all_segments = Segments.of(lines)
+    cuts = np.searchsorted(all_segments.path, np.arange(len(lines) + 1))
+    chains = []
+    for path, closed in enumerate(lines.closed.tolist()):
+        part = slice(int(cuts[path]), int(cuts[path + 1]))
+        points = np.concatenate([all_segments.start[part], all_segments.end[part][-1:]])
+        chains.append(
+            Chain(points, all_segments.centre[part], all_segments.sweep[part], bool(closed))
+        )
+    return tuple(chains)
+
+
+def chains_between(segments: Segments) -> tuple[Chain, ...]:
+    """Lines and arcs as chains: one goes on while the next piece begins where the last ended."""
+    if not len(segments):
+        return ()
+    apart = np.hypot(*(segments.start[1:] - segments.end[:-1]).T) > POSITION_EPS_MM
+    bounds = [0, *(np.flatnonzero(apart) + 1).tolist(), len(segments)]
+    return tuple(
+        Chain(
+            np.concatenate([segments.start[low : low + 1], segments.end[low:high]]),
+            segments.centre[low:high],
+            segments.sweep[low:high],
+        )
+        for low, high in pairwise(bounds)
+    )
+
+
+def path_data(chains: Iterable[Chain]) -> str:
+    """The `d` of a path that shows the chains, in mm, Y up (the group around it flips)."""
+    data = PathData(MM_DECIMALS)
+    for chain in chains:
+        points = chain.points.tolist()
+        data.move(*points[0])
+        closing_line = chain.closed and chain.sweep[-1] == 0.0
+        for index, sweep in enumerate(chain.sweep.tolist()):
+            if sweep != 0.0 and not _is_flat(chain, index, sweep):
+                _arc(data, chain, index, sweep)
+            elif not (closing_line and index == len(chain.sweep) - 1):
+                data.line(*points[index + 1])
+        if chain.closed:
+            data.close()
+    return str(data)
+
+
+def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
+    """Whether an arc leaves its chord by less than what tells two positions apart.
+
+    height = chord/2 · tan(sweep/4); renderers lose their way in circles of kilometres.
+    """
+    chord = math.dist(chain.points[index], chain.points[index + 1])
+    return abs(sweep) < math.pi and 0.5 * chord * math.tan(abs(sweep) / 4.0) < POSITION_EPS_MM
+
+
+def _arc(data: PathData, chain: Chain, index: int, sweep: float) -> None:
+    begin, centre = chain.points[index], chain.centre[index]
+    radius = math.hypot(*(begin - centre).tolist())
+    if abs(sweep) > LONGEST_ARC_RAD:
+        sweep /= 2.0
+        data.arc(*chain.at(index, 0.5)[0], radius=radius, sweep_rad=sweep)
+    data.arc(*chain.points[index + 1].tolist(), radius=radius, sweep_rad=sweep)
+
+
+def chains_box(chains: Sequence[Chain]) -> Floats | None:
+    """[[xmin, xmax], [ymin, ymax]] mm of the true lines and arcs; None when there are none."""
+    if not chains:
+        return None
+    boxes = segment_boxes(_halved(chains))
+    return np.column_stack([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+
+
+def _halved(chains: Sequence[Chain]) -> Segments:
+    """All moves as segments, each arc as two: a full circle has no bulge of its own."""
+    begin = np.concatenate([chain.points[:-1] for chain in chains])
+    end = np.concatenate([chain.points[1:] for chain in chains])
+    centre = np.concatenate([chain.centre for chain in chains])
+    sweep = np.concatenate([chain.sweep for chain in chains])
+    is_arc = sweep != 0.0
+    begin_arc, end_arc, turn = begin[is_arc], end[is_arc], sweep[is_arc] / 2.0
+    spoke = begin_arc - centre[is_arc]
+    cos, sin = np.cos(turn), np.sin(turn)
+    turned = [cos * spoke[:, 0] - sin * spoke[:, 1], sin * spoke[:, 0] + cos * spoke[:, 1]]
+    middle = centre[is_arc] + np.column_stack(turned)
+    bulge = np.tan(turn / 4.0)
+    return Segments.between(
+        np.concatenate([begin[~is_arc], begin_arc, middle]),
+        np.concatenate([end[~is_arc], middle, end_arc]),
+        np.concatenate([np.zeros(int((~is_arc).sum())), bulge, bulge]),
+    )
+
+
+# Where an axis turns back while the tool is fed: there its play shows.
+#
+# An arc goes one way in X and in Y between the multiples of 90°; each such piece, and each line,
+# has a sign per axis. An axis turns where its sign is another than the last one that was not 0,
+# rapids included; a turn counts where the piece behind it is a feed.
+
+Ints = npt.NDArray[np.int64]
+
+QUARTER_RAD = 0.5 * np.pi
+
+LEAST_PIECE_RAD = 1e-9
+"""Of an arc that begins or ends at a multiple of 90°, no shorter piece is taken for its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Where P pieces begin, (P, 2) mm, and the signs of X and Y on each, (P, 2); `row` (P,) of
+    the toolpath."""
+
+    begin: Floats
+    signs: Ints
+    row: Ints
+
+
+def turns_of(toolpath: Toolpath) -> Floats:
+    """(R, 2) mm: the places, in order; both axes may turn at one."""
+    pieces = _pieces(toolpath)
+    turned = _turned(pieces.signs[:, 0]) | _turned(pieces.signs[:, 1])
+    return np.asarray(pieces.begin[turned & toolpath.is_feed[pieces.row]])
+
+
+def _turned(signs: Ints) -> Bools:
+    """(P,) whether the sign is another than the last one before it that was not 0."""
+    found: Bools = np.zeros(len(signs), dtype=np.bool_)
+    moving = np.flatnonzero(signs)
+    found[moving[1:]] = signs[moving[1:]] != signs[moving[:-1]]
+    return found
+
+
+def _pieces(toolpath: Toolpath) -> _Pieces:
+    """All moves in their order, arcs cut at the multiples of 90°."""
+    starts, ends, sweeps = toolpath.starts[:, :2], toolpath.end[:, :2], toolpath.sweeps()
+    rows = np.flatnonzero(toolpath.is_motion)
+    is_arc = toolpath.is_arc[rows] & (sweeps[rows] != 0.0)
+    spoke = np.where(is_arc[:, None], starts[rows] - toolpath.centre[rows], 0.0)
+    sweep = np.where(is_arc, sweeps[rows], 0.0)
+    angle = np.arctan2(spoke[:, 1], spoke[:, 0])
+    first, inside = _quarters(angle, sweep)
+    # A row of n inner quarters has the pieces 0 … n; piece k > 0 begins at the k-th of them.
+    of = np.repeat(np.arange(len(rows)), inside + 1)
+    k = np.arange(len(of)) - np.repeat(np.cumsum(inside + 1) - (inside + 1), inside + 1)
+    way = np.where(sweep[of] < 0.0, -1.0, 1.0)
+    quarter = (first[of] + way * (k - 1)) * QUARTER_RAD
+    low = np.where(k == 0, angle[of], quarter)
+    high = np.where(k == inside[of], (angle + sweep)[of], quarter + way * QUARTER_RAD)
+    radius = np.hypot(spoke[:, 0], spoke[:, 1])[of]
+    turned = np.where(is_arc, toolpath.centre[rows].T, 0.0).T[of]
+    turned = turned + radius[:, None] * np.column_stack([np.cos(low), np.sin(low)])
+    middle = 0.5 * (low + high)
+    bent = np.column_stack([-way * np.sin(middle), way * np.cos(middle)])
+    straight = (ends - starts)[rows][of]
+    arcs = is_arc[of, None]
+    return _Pieces(
+        np.where(arcs & (k > 0)[:, None], turned, starts[rows][of]),
+        _signs(np.where(arcs, bent, straight)),
+        rows[of],
+    )
+
+
+def _quarters(begin: Floats, sweep: Floats) -> tuple[Floats, Ints]:
+    """Of arcs (A,): the first multiple of 90° strictly inside, in the order of travel, and how
+    many there are. Lines, of sweep 0, have none."""
+    low = np.minimum(begin, begin + sweep) + LEAST_PIECE_RAD
+    high = np.maximum(begin, begin + sweep) - LEAST_PIECE_RAD
+    least, most = np.ceil(low / QUARTER_RAD), np.floor(high / QUARTER_RAD)
+    inside = np.where(sweep == 0.0, 0, np.maximum(most - least + 1.0, 0.0)).astype(np.int64)
+    return np.where(sweep < 0.0, most, least), inside
+
+
+def _signs(lengths: Floats) -> Ints:
+    up, down = lengths > POSITION_EPS_MM, lengths < -POSITION_EPS_MM
+    return up.astype(np.int64) - down.astype(np.int64)

@@ -1,0 +1,100 @@
+"""Labels as single strokes, so that a picture needs no font and looks alike everywhere.
+
+The letters are those of `camtool.geometry.hershey`; what that font lacks is shown as an empty box.
+The true text always stays in the label's `<title>` and `aria-label`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import accumulate
+
+from camtool.geometry.hershey import BASELINE, BOX, CAP_UNITS, Glyph, glyph
+from camtool.pictures.colours import INK
+from camtool.pictures.svg import Look, PathData, element, one_line, title
+
+_UNIT = re.compile(r" (?!\(?(?:µm|mm|h)\b)")
+"""Blanks to break at: not those between a number and its unit."""
+
+
+@dataclass(frozen=True)
+class Style:
+    """`cap` is the height of a capital on the page; `weight` the stroke as a share of it."""
+
+    cap: float = 13.0
+    colour: str = INK
+    anchor: str = "start"
+    weight: float = 0.12
+
+
+def _drawn(letter: str) -> Glyph:
+    return glyph(letter) or BOX
+
+
+def width(text: str, cap: float) -> float:
+    """Width on the page of `text` at this height of capitals."""
+    return sum(_drawn(letter).advance for letter in one_line(text)) * cap / CAP_UNITS
+
+
+def shortened(text: str, cap: float, limit: float) -> str:
+    """`text` on one line, cut and ended with "…" when it is wider than `limit`."""
+    text = one_line(text)
+    if width(text, cap) <= limit:
+        return text
+    # Names of many thousand letters come too: each letter is looked at once.
+    advances = accumulate((_drawn(letter).advance for letter in text), initial=_drawn("…").advance)
+    kept = sum(advance * cap / CAP_UNITS <= limit for advance in advances)
+    return text[: max(kept - 1, 0)].rstrip() + "…"
+
+
+def wrapped(text: str, cap: float, limit: float) -> list[str]:
+    """`text` as lines no wider than `limit`, broken at blanks but not before a unit; a longer word
+    is shortened."""
+    lines: list[str] = []
+    for word in filter(None, _UNIT.split(one_line(text))):
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and width(longer, cap) <= limit:
+            lines[-1] = longer
+        else:
+            lines.append(shortened(word, cap, limit))
+    return lines
+
+
+def label(text: str, at: tuple[float, float], style: Style, *, full: str | None = None) -> str:
+    """The strokes of `text` with its baseline at `at`; `full` is the text for screen readers."""
+    data = strokes(text, at, style)
+    spoken = text if full is None else full
+    return element(
+        "g",
+        {"role": "img", "aria-label": spoken},
+        title(spoken),
+        element("path", {"d": data, **stroke_of(style)}) if data else "",
+    )
+
+
+def strokes(text: str, at: tuple[float, float], style: Style) -> str:
+    """The path data of a label; empty when there is nothing to see."""
+    shown = one_line(text)
+    scale = style.cap / CAP_UNITS
+    x = at[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[style.anchor] * width(shown, style.cap)
+    data = PathData()
+    for letter in shown:
+        drawn = _drawn(letter)
+        for stroke in drawn.strokes:
+            for index, (dx, dy) in enumerate(stroke):
+                to = (x + dx * scale, at[1] + (dy - BASELINE) * scale)
+                (data.line if index else data.move)(*to)
+        x += drawn.advance * scale
+    return str(data)
+
+
+def stroke_of(style: Style) -> Look:
+    """The pen of a label."""
+    return {
+        "fill": "none",
+        "stroke": style.colour,
+        "stroke-width": round(style.cap * style.weight, 3),
+        "stroke-linecap": "round",
+        "stroke-linejoin": "round",
+    }

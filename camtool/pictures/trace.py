@@ -1,0 +1,180 @@
+"""The path of the slides, coloured by its error.
+
+Points in a row that fall into the same step of the colour map become one stroke, and all strokes
+of one step become one path, so that 20,000 points stay well below a megabyte. Larger errors are
+drawn later: what is worst lies on top.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import Segments
+from camtool.pictures.colours import BINS, bin_colours
+from camtool.pictures.scene import Scene
+from camtool.pictures.svg import Look, PathData, element
+from camtool.pictures.view import View
+from camtool.units import UM_PER_MM
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+LEAST_TOP_UM = 1e-3
+"""The colour map ends here when no error is larger."""
+
+FINEST_SHARE = 1e-5
+"""Coordinates of the trace are written to this share of the window, a 25th pixel of 4000."""
+
+MERGED_SHARE = 1.25e-4
+"""Points nearer than this share of the window, half a pixel of 4000, may become one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Points (T, 2) mm, |error| (T,) µm, whether the tool cut on the way there (T,); the map's
+    end; how many times as far from the wanted path the points are drawn as they are."""
+
+    points: Floats
+    error_um: Floats
+    cutting: npt.NDArray[np.bool_]
+    top_um: float
+    times: float = 1.0
+
+
+def trace_of(scene: Scene, times: float = 1.0) -> Trace | None:
+    """The trace of a scene, its errors drawn so many `times` as large where the wanted path is
+    known; None when there is none or it never cuts."""
+    points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
+    if points is None or error is None or cutting is None or not cutting.any():
+        return None
+    error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
+    top_um = max(float(error_um.max()), LEAST_TOP_UM)
+    if times == 1.0 or scene.wanted is None:
+        return Trace(points, error_um, cutting, top_um)
+    # The point before a cut is where the cut begins.
+    drawn = cutting | np.append(cutting[1:], False)
+    moved = points.copy()
+    moved[drawn] = exaggerated(points[drawn], scene.wanted, times)
+    return Trace(moved, error_um, cutting, top_um, times)
+
+
+def bins_of(trace: Trace) -> Ints:
+    """(T−1,) the step of the map for each piece of the path, by its worse end; −1: not cutting.
+
+    Whether a piece cuts is said by the point that it leads to.
+    """
+    worse = np.maximum(trace.error_um[:-1], trace.error_um[1:])
+    step = np.minimum((worse / trace.top_um * BINS).astype(np.int64), BINS - 1)
+    return np.where(trace.cutting[1:], step, -1)
+
+
+def strokes(trace: Trace, window_mm: float) -> list[list[Floats]]:
+    """For each step of the map, its strokes: arrays (n, 2) of points, n ≥ 2."""
+    keep = _kept(trace, MERGED_SHARE * window_mm)
+    chosen = Trace(
+        trace.points[keep], _worst_between(trace, keep), trace.cutting[keep], trace.top_um
+    )
+    bins = bins_of(chosen)
+    found: list[list[Floats]] = [[] for _ in range(BINS)]
+    edges = np.flatnonzero(np.diff(bins)) + 1
+    for begin, end in zip(
+        np.concatenate([[0], edges]), np.concatenate([edges, [len(bins)]]), strict=True
+    ):
+        if end > begin and bins[begin] >= 0:
+            found[int(bins[begin])].append(chosen.points[begin : end + 1])
+    return found
+
+
+def _kept(trace: Trace, apart_mm: float) -> Ints:
+    """Points to draw: those at least `apart_mm` from the one before, and all ends of cuts."""
+    cutting = trace.cutting
+    ends = np.ones(len(cutting), dtype=np.bool_)
+    ends[1:-1] = (cutting[1:-1] != cutting[:-2]) | (cutting[1:-1] != cutting[2:])
+    kept, (last_x, last_y) = [], (math.inf, math.inf)
+    for index, ((x, y), is_end) in enumerate(
+        zip(trace.points.tolist(), ends.tolist(), strict=True)
+    ):
+        if is_end or math.hypot(x - last_x, y - last_y) >= apart_mm:
+            kept.append(index)
+            last_x, last_y = x, y
+    return np.array(kept, dtype=np.int64)
+
+
+def _worst_between(trace: Trace, keep: Ints) -> Floats:
+    """(kept,) the largest error from each kept point up to the next: merging hides none."""
+    return np.maximum.reduceat(trace.error_um, keep)
+
+
+def trace_layer(trace: Trace, view: View, pen: float) -> str:
+    """The coloured path, in mm."""
+    (low, high), colours = view.x_range, bin_colours()
+    decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
+    paths = []
+    for colour, runs in zip(colours, strokes(trace, high - low), strict=True):
+        data = PathData(decimals)
+        for run in runs:
+            points = run.tolist()
+            data.move(*points[0])
+            for point in points[1:]:
+                data.line(*point)
+        if data:
+            paths.append(element("path", {"d": str(data), "stroke": colour}))
+    pen_of_all: Look = {
+        "fill": "none",
+        "stroke-width": view.mm(pen),
+        "stroke-linecap": "round",
+        "stroke-linejoin": "round",
+    }
+    return element("g", {"id": "slide-path", **pen_of_all}, *paths)
+
+
+# The path of the slides with its deviation from what was wanted, many times as large.
+#
+# With p a point of the slides and q the point of the wanted path that is nearest to it, there is
+# drawn  q + N (p − q).  A factor of 1 changes nothing; where two points of the wanted path are as
+# near, the picture jumps, as the nearest point does.
+
+
+def exaggerated(points: Floats, wanted: Segments, times: float) -> Floats:
+    """(T, 2) mm of points (T, 2) mm, `times` as far from the nearest point of `wanted`."""
+    if not len(points) or not len(wanted):
+        return points
+    foot = nearest_points(points, wanted)
+    return np.asarray(foot + times * (points - foot))
+
+
+def nearest_points(points: Floats, wanted: Segments) -> Floats:
+    """(T, 2) mm: of the lines and arcs of `wanted`, the point nearest to each of the points."""
+    from camtool.kernels.closest import nearest_rows
+
+    boxes = segment_boxes(wanted)
+    row = nearest_rows(points, wanted.start, wanted.end, wanted.bulge, boxes)
+    begin, end, sweep = wanted.start[row], wanted.end[row], wanted.sweep[row]
+    chord = end - begin
+    square = (chord**2).sum(axis=1)
+    share = ((points - begin) * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+    foot = begin + np.clip(share, 0.0, 1.0)[:, None] * chord
+    is_arc = sweep != 0.0
+    foot[is_arc] = _on_arcs(points[is_arc], wanted, row[is_arc])
+    return np.asarray(foot)
+
+
+def _on_arcs(points: Floats, wanted: Segments, row: npt.NDArray[np.int64]) -> Floats:
+    """Along the spoke through each point where that meets the arc, else its nearer end."""
+    spoke = points - wanted.centre[row]
+    length = np.hypot(spoke[:, 0], spoke[:, 1])
+    along = spoke / np.where(length > 0.0, length, 1.0)[:, None]
+    foot = wanted.centre[row] + wanted.radius[row, None] * along
+    sweep = wanted.sweep[row]
+    angle = np.arctan2(spoke[:, 1], spoke[:, 0]) - wanted.start_angle[row]
+    turned = np.mod(np.sign(sweep) * angle, 2.0 * np.pi)
+    begin, end = wanted.start[row], wanted.end[row]
+    first = np.hypot(*(points - begin).T) <= np.hypot(*(points - end).T)
+    ends = np.where(first[:, None], begin, end)
+    within = (turned <= np.abs(sweep)) & (length > 0.0)
+    return np.where(within[:, None], foot, ends)

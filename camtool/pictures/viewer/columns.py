@@ -1,0 +1,296 @@
+"""A scene as columns of numbers, packed for the page.
+
+All columns follow each other in one block of bytes, little-endian, each beginning at a multiple of
+four: f4 (float), u1 (byte), i2 and i4 (integer), d1 (integers as the small steps from each to the
+next, from 0 to the first). Floats of 32 bits hold a place on a table of 8 m to a micrometre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.geometry.drawing import Drawing
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.pictures.colours import BINS
+from camtool.pictures.content import bare_starts
+from camtool.pictures.scene import Floats, Ints, Playback, Scene
+from camtool.pictures.strokes import strokes_of, turns_of
+from camtool.pictures.trace import Trace, bins_of, nearest_points
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.units import UM_PER_MM
+
+Columns = dict[str, npt.NDArray[np.generic]]
+
+FLOAT, INT, BYTE = np.dtype("<f4"), np.dtype("<i4"), np.dtype("u1")
+SHORT, STEP = np.dtype("<i2"), np.dtype("i1")
+
+ALIGN_BYTES = 4
+"""Every column begins at a multiple of this: browsers refuse others."""
+
+
+def columns_of(scene: Scene, run: Playback | None) -> Columns:
+    """All columns of the page; those of what the scene does not have are empty."""
+    return {
+        **_drawing(scene.drawing),
+        **_moves(scene.toolpath, run),
+        **_marks(scene.toolpath),
+        **_wanted(scene.wanted if run is not None else None),
+    }
+
+
+def packed(columns: Columns) -> tuple[dict[str, tuple[str, int, int]], bytes]:
+    """({name: (type, byte offset, count)}, all bytes)."""
+    named: dict[str, tuple[str, int, int]] = {}
+    parts: list[bytes] = []
+    at = 0
+    for name, column in columns.items():
+        kind, narrow = _narrow(column)
+        data = narrow.tobytes()
+        data += bytes(-len(data) % ALIGN_BYTES)
+        named[name] = (kind, at, column.size)
+        parts.append(data)
+        at += len(data)
+    return named, b"".join(parts)
+
+
+def _narrow(column: npt.NDArray[np.generic]) -> tuple[str, npt.NDArray[np.generic]]:
+    """A column in the smallest of the types that hold it, and the name of that type."""
+    if column.dtype != INT:
+        return column.dtype.str.lstrip("<|"), column
+    steps = np.diff(column.astype(np.int64), prepend=0)
+    for kind, values, dtype in (("d1", steps, STEP), ("i2", column, SHORT)):
+        limits = np.iinfo(dtype)
+        if not column.size or (values.min() >= limits.min and values.max() <= limits.max):
+            return kind, values.astype(dtype)
+    return "i4", column
+
+
+def layer_names(drawing: Drawing) -> list[str]:
+    """The layers in the order of their first paths, then of their first points."""
+    return list(dict.fromkeys((*drawing.layers, *(mark.layer for mark in drawing.marks))))
+
+
+def _drawing(drawing: Drawing | None) -> Columns:
+    if drawing is None:
+        none = np.empty(0)
+        return {
+            **_bends("drawn", none.astype(np.bool_), none.reshape(0, 2), none),
+            **{name: none.astype(FLOAT) for name in ("drawn_from", "drawn_to", "mark_at")},
+            **{name: none.astype(INT) for name in ("drawn_path", "drawn_layer", "mark_layer")},
+        }
+    segments, names = Segments.of(drawing.paths), layer_names(drawing)
+    number = {name: index for index, name in enumerate(names)}
+    layer = np.array([number[name] for name in drawing.layers], dtype=INT)
+    marks = drawing.marks
+    return {
+        **_bends("drawn", segments.bulge != 0.0, segments.centre, segments.sweep),
+        "drawn_from": segments.start.astype(FLOAT),
+        "drawn_to": segments.end.astype(FLOAT),
+        "drawn_path": segments.path.astype(INT),
+        "drawn_layer": layer[segments.path] if len(layer) else np.empty(0, dtype=INT),
+        "mark_at": np.array([mark.at_mm for mark in marks], dtype=FLOAT).reshape(-1, 2),
+        "mark_layer": np.array([number[mark.layer] for mark in marks], dtype=INT),
+    }
+
+
+def _moves(toolpath: Toolpath | None, run: Playback | None) -> Columns:
+    if toolpath is None or run is None:
+        none = np.empty(0)
+        floats = ("move_start", "move_end", "move_feed", "move_seconds", "move_error")
+        return {
+            **_bends("move", none.astype(np.bool_), none.reshape(0, 2), none),
+            **{name: none.astype(FLOAT) for name in floats},
+            **{name: none.astype(INT) for name in ("move_block", "move_source")},
+            **{name: none.astype(BYTE) for name in ("move_kind", "move_sort")},
+        }
+    if len(run.seconds) != len(toolpath):
+        raise ValueError("the run is that of another toolpath")
+    return {
+        **_bends("move", toolpath.is_arc, toolpath.centre, toolpath.sweeps()),
+        "move_start": toolpath.start.astype(FLOAT),
+        "move_end": toolpath.end.astype(FLOAT),
+        "move_feed": toolpath.feed.astype(FLOAT),
+        "move_seconds": run.seconds.astype(FLOAT),
+        "move_error": (run.error_mm * UM_PER_MM).astype(FLOAT),
+        "move_block": toolpath.block.astype(INT),
+        "move_source": toolpath.source.astype(INT),
+        "move_kind": toolpath.kind.astype(BYTE),
+        "move_sort": _sorts(toolpath),
+    }
+
+
+def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
+    """0 rapids and events, 1 level feeds, 2 feeds that sink or climb."""
+    if not len(toolpath):
+        return np.empty(0, dtype=BYTE)
+    rise = np.abs(toolpath.end[:, 2] - toolpath.starts[:, 2]) > POSITION_EPS_MM
+    sorts = np.where(toolpath.kind == Kind.RAPID, 0, np.where(rise, 2, 1))
+    return np.where(toolpath.is_motion, sorts, 0).astype(BYTE)
+
+
+def _marks(toolpath: Toolpath | None) -> Columns:
+    """Places (x, y) mm: where contours begin, where no plunge marks that, where the tool goes
+    straight down, and where X or Y turns back."""
+    none = np.empty((0, 2))
+    starts = bare = plunges = turns = none
+    if toolpath is not None:
+        strokes = strokes_of(toolpath)
+        starts, bare, plunges = strokes.starts, bare_starts(strokes), strokes.plunges
+        turns = np.unique(turns_of(toolpath), axis=0)
+    places = {"start_at": starts, "bare_at": bare, "plunge_at": plunges, "turn_at": turns}
+    return {name: points.astype(FLOAT) for name, points in places.items()}
+
+
+def _wanted(wanted: Segments | None) -> Columns:
+    """The wanted path: where each line or arc ends, and where those begin that do not go on from
+    the one before."""
+    if wanted is None or not len(wanted):
+        none = np.empty(0)
+        return {
+            **_bends("wanted", none.astype(np.bool_), none.reshape(0, 2), none),
+            "wanted_to": none.astype(FLOAT),
+            "wanted_begin": none.astype(FLOAT),
+            "wanted_break": none.astype(INT),
+        }
+    apart = np.hypot(*(wanted.start[1:] - wanted.end[:-1]).T) > POSITION_EPS_MM
+    breaks = np.concatenate([[0], np.flatnonzero(apart) + 1])
+    return {
+        **_bends("wanted", wanted.bulge != 0.0, wanted.centre, wanted.sweep),
+        "wanted_to": wanted.end.astype(FLOAT),
+        "wanted_begin": wanted.start[breaks].astype(FLOAT),
+        "wanted_break": breaks.astype(INT),
+    }
+
+
+def _bends(
+    name: str,
+    is_arc: npt.NDArray[np.bool_],
+    centre: npt.NDArray[np.float64],
+    sweep: npt.NDArray[np.float64],
+) -> Columns:
+    """Which rows are arcs, and the centre x, y and sweep of each."""
+    rows = np.flatnonzero(is_arc)
+    bends = np.column_stack([centre[rows], sweep[rows]])
+    return {f"{name}_arc": rows.astype(INT), f"{name}_bend": bends.astype(FLOAT)}
+
+
+# The predicted path for the page: its points, their colours, and how far they are off.
+#
+# With p a point of the slides and q the nearest point of the wanted path, the page holds p and p −
+# q and draws p + (N − 1)(p − q) for a deviation N times as large (see
+# `camtool.pictures.trace`).
+
+MOST_COUNTS = 32_000
+"""Deviations are whole counts, this many for the largest of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """The columns of the predicted path, the length of a count of their deviations (0: nobody
+    knows the wanted path), and the deviations (W, 2) mm of the worst places."""
+
+    columns: Columns
+    count_mm: float
+    worst_off: Floats
+
+
+def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
+    """The path of a scene, in colours that end at `top_um`. ValueError when the rows of the run's
+    trace are not those of its points."""
+    worst = np.array([] if run is None else [one.at_mm for one in run.worst]).reshape(-1, 2)
+    points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
+    if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
+        none = np.empty(0)
+        nothing = _columns(none.reshape(0, 2), none.astype(np.int64), none, none)
+        return Traced(nothing, 0.0, np.zeros_like(worst))
+    if len(run.trace_row) != len(points):
+        raise ValueError("the trace's rows are not those of its points")
+    error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
+    steps = bins_of(Trace(points, error_um, cutting, top_um))
+    bins = np.concatenate([[BINS], np.where(steps < 0, BINS, steps)])
+    kept = thinned(points, bins, float(error_um.max(initial=0.0)) / UM_PER_MM)
+    # The point before a cut is where the cut begins.
+    drawn = (cutting | np.append(cutting[1:], False))[kept]
+    points, bins, row = points[kept], bins[kept], run.trace_row[kept]
+    off = _off(points, drawn, scene.wanted)
+    largest = float(np.abs(off).max(initial=0.0))
+    count_mm = largest / MOST_COUNTS if scene.wanted is not None and largest > 0.0 else 0.0
+    counts = np.rint(off / count_mm) if count_mm else np.zeros_like(off)
+    ever = np.ones(len(worst), dtype=np.bool_)
+    return Traced(_columns(points, bins, row, counts), count_mm, _off(worst, ever, scene.wanted))
+
+
+def _off(points: Floats, chosen: np.ndarray, wanted: Segments | None) -> Floats:
+    """(T, 2) mm from the nearest point of the wanted path to each that is chosen, else 0."""
+    off = np.zeros_like(points)
+    if wanted is not None and len(wanted) and chosen.any():
+        off[chosen] = points[chosen] - nearest_points(points[chosen], wanted)
+    return off
+
+
+def _columns(points: Floats, bins: Ints, row: Ints | Floats, counts: Floats) -> Columns:
+    return {
+        "trace_point": points.astype(FLOAT),
+        "trace_bin": bins.astype(BYTE),
+        "trace_row": row.astype(INT),
+        "trace_off": counts.astype(SHORT),
+    }
+
+
+# Fewer points of the predicted path, where nobody could see the difference.
+#
+# Of points in a row every second one goes, if it lies near the chord of its neighbours and has
+# their colour; then every second one of what is left, and so on. A point that stays is where it
+# was, and one that goes leaves the path by at most the tolerance each time.
+
+MOST_POINTS = 200_000
+"""A page has no more points of the predicted path than this."""
+
+FINEST_MM = 1e-4
+"""Points this near to the chord of their neighbours may go ..."""
+
+FINEST_SHARE = 0.01
+"""... or this share of the largest error, where that is less ..."""
+
+COARSER = 4.0
+"""... or so many times as far again, while there are too many points."""
+
+
+def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MOST_POINTS) -> Ints:
+    """Which points (T, 2) mm with their colours (T,) are kept: ascending rows, the ends of all
+    pieces of a colour among them while that leaves few enough."""
+    kept = np.arange(len(points))
+    near_mm = min(FINEST_MM, FINEST_SHARE * largest_mm)
+    while True:
+        fewer = _halved(points, bins, kept, near_mm)
+        if len(fewer) < len(kept):
+            kept = fewer
+        elif len(kept) <= most:
+            return kept
+        elif near_mm > np.ptp(points, axis=0).max():
+            return kept[:: -(-len(kept) // most)]
+        else:
+            near_mm *= COARSER
+
+
+def _halved(points: Floats, bins: Ints, kept: Ints, near_mm: float) -> Ints:
+    """Without those of the 2nd, 4th, … points that may go; the first and the last one stay."""
+    middle = np.arange(1, len(kept) - 1, 2)
+    before, at, after = kept[middle - 1], kept[middle], kept[middle + 1]
+    # The colour of a piece is that of the point that it leads to.
+    same = bins[at] == bins[after]
+    goes = same & (_from_chord(points[before], points[at], points[after]) <= near_mm)
+    stays = np.ones(len(kept), dtype=np.bool_)
+    stays[middle[goes]] = False
+    return kept[stays]
+
+
+def _from_chord(begin: Floats, point: Floats, end: Floats) -> Floats:
+    chord, out = end - begin, point - begin
+    square = (chord**2).sum(axis=1)
+    share = (out * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+    away = out - np.clip(share, 0.0, 1.0)[:, None] * chord
+    return np.asarray(np.hypot(away[:, 0], away[:, 1]))

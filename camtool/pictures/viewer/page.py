@@ -1,0 +1,265 @@
+"""The page: template, styles, script and data put together, the same bytes for the same scene.
+
+Whatever comes from drawings and programs stands in the page as data only. The head is JSON in
+which `<`, `>` and `&` are written as escapes, and the script sets it as text; title and notes are
+escaped for HTML. Should something slip through all the same, the page's own policy lets the
+browser run no script but the one whose digest it names, and load nothing from anywhere.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import math
+import re
+from collections.abc import Mapping
+from importlib import resources
+from itertools import cycle
+
+import numpy as np
+
+from camtool.geometry.drawing import Drawing
+from camtool.pictures.colours import (
+    BACK,
+    BACK_SPREAD,
+    FEED,
+    FRAME,
+    GRID,
+    INK,
+    LAYERS,
+    PLOT,
+    QUIET,
+    SPREAD,
+    bin_colours,
+    on_dark,
+)
+from camtool.pictures.polar import ROOM, dial_of, notes, plot, shown
+from camtool.pictures.scene import Floats, Playback, Scene, Table, by_feed
+from camtool.pictures.svg import Look, element, number
+from camtool.pictures.viewer.columns import Traced, columns_of, layer_names, packed, traced_of
+from camtool.units import UM_PER_MM
+
+SCRIPTS = (
+    "read.js",
+    "track.js",
+    "grid.js",
+    "view.js",
+    "paint.js",
+    "marks.js",
+    "signs.js",
+    "run.js",
+    "layers.js",
+    "stage.js",
+    "words.js",
+    "panel.js",
+    "player.js",
+    "hand.js",
+    "main.js",
+)
+"""The files of the script in their order; the last one begins."""
+
+LEAST_TOP_UM = 1e-3
+"""The colour map ends here when no error is larger."""
+
+_SLOT = re.compile(r"\{([a-z]+)\}")
+
+
+def viewer_page(scene: Scene) -> bytes:
+    """The HTML file of a scene, UTF-8. Where the scene does not tell how its toolpath runs, every
+    move takes as long as its feed says. ValueError when that is the run of another toolpath."""
+    run = _run(scene)
+    traced = traced_of(scene, run, _top_um(scene, run))
+    named, data = packed({**columns_of(scene, run), **traced.columns})
+    script = '(() => {\n"use strict";\n' + "\n".join(map(_file, SCRIPTS)) + "})();\n"
+    style = _file("viewer.css")
+    title = _printable(scene.title) or "camtool"
+    slots = {
+        "policy": _policy(script, style),
+        "title": html.escape(title),
+        "notes": html.escape(" · ".join(map(_printable, scene.notes))),
+        "label": html.escape(f"picture of {title}"),
+        "style": style,
+        "script": script,
+        "circles": circles_of(scene),
+        "head": _json({"columns": named, **_head(scene, run, traced)}),
+        "columns": base64.b64encode(data).decode("ascii"),
+    }
+    # One pass: what stands in a slot is never looked through for slots.
+    page = _SLOT.sub(lambda found: slots[found[1]], _file("viewer.html"))
+    return page.encode("utf-8")
+
+
+def _run(scene: Scene) -> Playback | None:
+    if scene.toolpath is None:
+        return None
+    return by_feed(scene.toolpath, np.inf) if scene.run is None else scene.run()
+
+
+def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, object]:
+    drawing, toolpath = scene.drawing, scene.toolpath
+    names = [] if drawing is None else layer_names(drawing)
+    blocks = None if run is None or run.blocks is None else run.blocks
+    return {
+        "layers": [
+            {"name": name, "light": colour, "dark": on_dark(colour)}
+            for name, colour in zip(names, cycle(LAYERS), strict=False)
+        ],
+        "sources": [] if drawing is None else list(drawing.sources),
+        "texts": [] if toolpath is None else list(toolpath.texts),
+        "blocks": None if blocks is None else "\n".join(map(_one_line, blocks)),
+        "hex": run is not None and run.binary,
+        "tool_mm": scene.tool_mm,
+        "top_um": _top_um(scene, run),
+        "map": {"light": bin_colours(), "dark": bin_colours(dark=True)},
+        "tables": [] if run is None else [_table(table) for table in run.tables],
+        "off_mm": traced.count_mm,
+        "worst": [
+            {"at": place.at_mm, "off": off}
+            for place, off in zip(
+                () if run is None else run.worst, traced.worst_off.tolist(), strict=True
+            )
+        ],
+        "travel_mm": scene.travel_mm,
+        "doubts": [] if drawing is None else _doubts(drawing),
+    }
+
+
+def _doubts(drawing: Drawing) -> list[tuple[float, float]]:
+    """Open ends, crossings and branches."""
+    healing = drawing.healing
+    places = [gap.at_mm for gap in drawing.gaps]
+    places += [one.at_mm for one in healing.crossings] + [one.at_mm for one in healing.branches]
+    return [(float(x), float(y)) for x, y in places]
+
+
+def _table(table: Table) -> dict[str, object]:
+    return {
+        "title": table.title,
+        "columns": table.columns,
+        "rows": [{"cells": line.cells, "move": line.move} for line in table.lines],
+    }
+
+
+def _top_um(scene: Scene, run: Playback | None) -> float:
+    """Where the map of errors ends: at the largest that is known, of moves and of the trace."""
+    errors = [LEAST_TOP_UM / UM_PER_MM]
+    if run is not None:
+        errors += [float(error) for error in run.error_mm[np.isfinite(run.error_mm)]]
+    if scene.trace_error_mm is not None and scene.trace_cutting is not None:
+        errors += np.abs(scene.trace_error_mm[scene.trace_cutting]).tolist()
+    return round(max(errors) * UM_PER_MM, 6)
+
+
+def _policy(script: str, style: str) -> str:
+    def digest(text: str) -> str:
+        return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+
+    return (
+        f"default-src 'none'; base-uri 'none'; form-action 'none'; "
+        f"script-src 'sha256-{digest(script)}'; style-src 'sha256-{digest(style)}'"
+    )
+
+
+def _json(value: Mapping[str, object]) -> str:
+    """JSON in ASCII without any sign that means something to HTML."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def _one_line(words: str) -> str:
+    """Lines are told apart by line feeds, so a line has none."""
+    return words.replace("\r", " ").replace("\n", " ")
+
+
+def _printable(words: str) -> str:
+    return "".join(sign if sign.isprintable() else " " for sign in words)
+
+
+def _file(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+# The polar plots of full circles below the report: SVG within the page, in the page's colours.
+
+MOST_PLOTS = 16
+"""A page has no more plots than this: those of the largest circular errors."""
+
+BINS_SHOWN = 120
+"""Errors are joined until a plot has no more of them than this, every 3°."""
+
+WIDTH = 520.0
+"""Of a plot, in its own units; letters are some 14 high."""
+
+NAMES = {
+    FEED: "feed",
+    SPREAD: "spread",
+    BACK: "back",
+    BACK_SPREAD: "back-spread",
+    FRAME: "frame",
+    GRID: "grid",
+    INK: "ink",
+    PLOT: "paper",
+    QUIET: "quiet",
+}
+"""The page's own name of each colour of a plot, which is light or dark as the page is."""
+
+_PAINT = re.compile('(fill|stroke)="(#[0-9a-f]{6})"')
+_SHAPE = re.compile(' d="[^"]*"')
+_DECIMAL = re.compile(r"(\.\d)\d")
+_ID = re.compile(' id="[^"]*"')
+
+
+def circles_of(scene: Scene) -> str:
+    """HTML of the plots in the order of the report; empty without a full circle."""
+    # The same circle gone round the other way is in the plot of the first.
+    first = [
+        which
+        for which, one in enumerate(scene.rounds, 1)
+        if one.partner is None or one.partner > which
+    ]
+    chosen = sorted(sorted(first, key=lambda which: -_size(scene, which))[:MOST_PLOTS])
+    if not chosen:
+        return ""
+    said = "Full circles"
+    if len(chosen) < len(first):
+        said += f": the {len(chosen)} of {len(first)} with the largest circular error"
+    figures = "\n".join(_figure(scene, which) for which in chosen)
+    return f'<h2>{said}</h2>\n<div class="plots">\n{figures}\n</div>\n'
+
+
+def _size(scene: Scene, which: int) -> float:
+    error = scene.rounds[which - 1].circular_mm
+    return error if math.isfinite(error) else 0.0
+
+
+def _figure(scene: Scene, which: int) -> str:
+    circles = shown(scene, which)
+    errors = [_joined(circle.errors_um) for circle in circles]
+    dial = dial_of(errors, WIDTH)
+    dial = dial.placed(0.0, WIDTH)
+    side = 2.0 * (dial.outer + ROOM)
+    box = " ".join(map(number, (0.5 * (WIDTH - side), 0.0, side, side)))
+    about = f"radial error of circle {which}"
+    look: Look = {"viewBox": box, "role": "img", "aria-label": about}
+    svg = element("svg", look, *plot(errors, dial))
+    svg = _PAINT.sub(lambda found: f'{found[1]}="var(--{NAMES[found[2]]})"', _ID.sub("", svg))
+    svg = _SHAPE.sub(lambda found: _DECIMAL.sub(r"\1", found[0]), svg)
+    caption = "<br>".join(map(html.escape, notes(circles, dial)))
+    return f"<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>"
+
+
+def _joined(errors_um: Floats) -> Floats:
+    """(B, 3) least, mean and largest of neighbours; those of nothing but NaN stay so."""
+    together = max(1, math.ceil(len(errors_um) / BINS_SHOWN))
+    if len(errors_um) % together:
+        return errors_um
+    groups = errors_um.reshape(-1, together, 3)
+    seen = np.isfinite(groups)
+    count = seen.sum(axis=1)
+    least = np.where(seen, groups, np.inf)[:, :, 0].min(axis=1)
+    largest = np.where(seen, groups, -np.inf)[:, :, 2].max(axis=1)
+    mean = np.where(seen, groups, 0.0)[:, :, 1].sum(axis=1) / np.maximum(count[:, 1], 1)
+    joined = np.column_stack([least, mean, largest])
+    return np.asarray(np.where(count > 0, joined, np.nan))

@@ -1,1 +1,0 @@
-"""Pictures: SVG is the source, PNG is rendered from it (`camtool.preview.draw`)."""

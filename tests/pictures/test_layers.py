@@ -1,0 +1,237 @@
+"""Layers: what each shows, and pictures with some of them only."""
+
+import math
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from camtool.errors import OptionError
+from camtool.geometry.drawing import Gap
+from camtool.pictures.content import content_of, missing_layers
+from camtool.pictures.draw import draw
+from camtool.pictures.marks import CLEAR, every, placed
+from camtool.pictures.options import LAYERS, USUAL, Options, chosen
+from camtool.pictures.page import page_of
+from camtool.pictures.scene import Scene, scene_of_toolpath
+from camtool.pictures.strokes import turns_of
+from camtool.toolpath.builder import ToolpathBuilder
+from tests.oracles import literal_turns, svg_page
+from tests.pictures.conftest import SCENES, circle, drawing_of, followed, plate
+
+MILLED = replace(scene_of_toolpath(followed(plate()), title="", drawing=plate()), tool_mm=0.5)
+JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))
+GROUPS = {
+    "drawing": ("drawing",),
+    "swept": ("swept",),
+    "rapids": ("rapids",),
+    "feeds": ("feeds",),
+    "plunges": ("plunges",),
+    "order": ("order",),
+    "arrows": ("arrows",),
+    "reversals": ("reversals",),
+    "zero": ("part-zero",),
+}
+
+
+def ids(scene: Scene, *layers: str) -> set[str]:
+    svg = draw(scene, options=Options(layers=frozenset(layers)))
+    return {g.attrib["id"] for g in svg_page.parse(svg).iter() if "id" in g.attrib}
+
+
+@pytest.mark.parametrize("layer", list(GROUPS))
+def test_a_layer_alone_shows_itself_alone(layer: str) -> None:
+    shown = ids(MILLED, layer)
+    assert set(GROUPS[layer]) <= shown
+    others = {group for name, groups in GROUPS.items() if name != layer for group in groups}
+    assert not others & shown
+
+
+@pytest.mark.parametrize("layer", list(GROUPS))
+def test_without_a_layer_the_others_stay(layer: str) -> None:
+    shown = ids(MILLED, *(set(LAYERS) - {layer}))
+    assert not set(GROUPS[layer]) & shown
+    others = {group for name, groups in GROUPS.items() if name != layer for group in groups}
+    assert others <= shown
+
+
+def test_layers_do_not_move_the_picture() -> None:
+    usual = content_of(JUDGED).window
+    for layer in LAYERS:
+        options = Options(layers=frozenset(LAYERS) - {layer})
+        assert content_of(JUDGED, options).window.tolist() == usual.tolist()
+
+
+def test_names_of_layers_are_checked() -> None:
+    assert chosen([], []) == USUAL
+    assert chosen(["feeds", "order"], ["order"]) == {"feeds"}
+    with pytest.raises(OptionError) as found:
+        chosen(["reversal"], [])
+    assert "did you mean reversals?" in str(found.value)
+    with pytest.raises(OptionError, match="no layer"):
+        chosen([], ["x"])
+    with pytest.raises(OptionError, match="no layer is left"):
+        chosen(["feeds"], ["feeds"])
+
+
+def test_layers_that_hold_nothing_are_known() -> None:
+    every = Options(layers=frozenset(LAYERS))
+    empty = ["travel", "starts", "path", "worst", "doubts"]  # each contour begins with a plunge
+    assert missing_layers(MILLED, every, LAYERS) == empty
+    assert missing_layers(replace(MILLED, tool_mm=None), every, ["swept"]) == ["swept"]
+    below = missing_layers(JUDGED, every, LAYERS)
+    assert {"rapids", "plunges", "starts", "order", "arrows"} <= set(below)
+    assert not {"path", "worst", "feeds", "zero"} & set(below)
+    alone = Options(layers=frozenset({"order", "arrows"}))  # without the path they are drawn
+    assert missing_layers(JUDGED, alone, ["order", "arrows"]) == []
+    groups = {g for name in LAYERS if name not in empty for g in GROUPS.get(name, ())}
+    assert groups <= ids(MILLED, *LAYERS)
+
+
+def test_the_tool_is_drawn_at_its_true_width() -> None:
+    root = svg_page.parse(draw(MILLED))
+    swept = svg_page.group(root, "swept")
+    assert swept is not None
+    assert float(swept.attrib["stroke-width"]) == 0.5
+    assert "tool 0.5 mm wide" in {g.get("aria-label") for g in root.iter()}
+    feeds = svg_page.group(root, "feeds")
+    assert feeds is not None
+    assert swept[0].attrib["d"] == feeds[0].attrib["d"]
+
+
+def test_what_a_wide_tool_covers_is_in_the_picture() -> None:
+    window = content_of(replace(MILLED, tool_mm=8.0)).window
+    assert (window[:, 0] < 0.5 - 4.0).all()
+    assert (window[:, 1] > 4.5 + 4.0).all()
+
+
+def test_contours_are_numbered_in_their_order() -> None:
+    root = svg_page.parse(draw(MILLED))
+    order = svg_page.group(root, "order")
+    assert order is not None
+    assert [g.get("aria-label") for g in order if "aria-label" in g.attrib] == ["1", "2"]
+
+
+def test_no_number_covers_another_and_crowded_ones_are_left_out() -> None:
+    view = page_of(content_of(SCENES["many paths"])).view
+    rng = np.random.default_rng(7)
+    for count in (10, 100, 400):
+        found = placed(rng.uniform(0.0, 500.0, (count, 2)).tolist(), view)
+        for one, other in combinations([number.box for number in found], 2):
+            apart = one[2] + CLEAR <= other[0] or other[2] + CLEAR <= one[0]
+            assert apart or one[3] + CLEAR <= other[1] or other[3] + CLEAR <= one[1]
+        names = [int(number.name) for number in found]
+        assert names == sorted(names)
+        assert len(names) <= count
+    assert len(found) < 400  # there is no room for all
+
+
+def test_the_worst_places_have_rings_and_ranks() -> None:
+    layer = svg_page.group(svg_page.parse(draw(JUDGED)), "worst")
+    assert layer is not None
+    assert [g.get("aria-label") for g in layer if "aria-label" in g.attrib] == ["1", "2", "3"]
+    assert len([circle for circle in layer if circle.tag.endswith("circle")]) == 3
+
+
+def test_an_axis_turns_at_corners_and_at_quarters_of_circles() -> None:
+    full = ToolpathBuilder((2.0, 0.0, 0.0)).arc(2.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=1.0)
+    turns = turns_of(full.finish())
+    # At 0° it begins and ends: nothing goes before and nothing comes after.
+    assert turns == pytest.approx(np.array([[0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]]), abs=1e-12)
+    tour = ToolpathBuilder()
+    for x, y in ((1.0, 1.0), (2.0, 0.0), (3.0, 0.0), (2.0, 0.0)):
+        tour.line(x, y, feed=1.0)
+    assert turns_of(tour.finish()).tolist() == [[1.0, 1.0], [3.0, 0.0]]
+
+
+def test_a_turn_counts_when_the_tool_is_fed_after_it() -> None:
+    air = ToolpathBuilder().line(1.0, 0.0, feed=1.0).rapid(0.0, 0.0).line(1.0, 0.0, feed=1.0)
+    assert turns_of(air.finish()).tolist() == [[0.0, 0.0]]
+
+
+@pytest.mark.parametrize("ccw", [False, True])
+def test_turns_are_those_of_a_finely_sampled_path(ccw: bool) -> None:
+    path = ToolpathBuilder((1.0, 0.0, 0.0))
+    path.arc(math.cos(2.0), math.sin(2.0), centre=(0.0, 0.0), ccw=ccw, feed=1.0)
+    path.line(-2.0, 0.3, feed=1.0).line(-1.0, 2.0, feed=1.0)
+    toolpath = path.finish()
+    sweep = float(toolpath.sweeps()[0])
+    angle = np.linspace(0.0, sweep, 20_001)
+    points = np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([points, toolpath.end[1:, :2]])
+    last, found = np.zeros(2), 0
+    for step in np.sign(np.diff(points, axis=0)):
+        found += bool((step * last < 0).any())
+        last = np.where(step == 0, last, step)
+    assert len(turns_of(toolpath)) == found
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_turns_are_those_of_the_literal_loop(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    path, (x, y) = ToolpathBuilder(), (0.0, 0.0)
+    for kind in rng.integers(0, 5, 40).tolist():
+        if kind > 2:
+            radius = float(rng.integers(1, 3))
+            cx, cy = x + radius * (-1) ** int(rng.integers(2)), y
+            turn = float(rng.choice([0.5 * math.pi, math.pi, 2.0 * math.pi, 2.1]))
+            cos, sin = math.cos(turn), math.sin(turn)
+            x, y = cx + cos * (x - cx) - sin * (y - cy), cy + sin * (x - cx) + cos * (y - cy)
+            path.arc(x, y, centre=(cx, cy), ccw=bool(kind == 3), feed=1.0)
+        else:
+            x, y = rng.integers(-3, 4, 2).astype(float).tolist()
+            path.rapid(x, y) if kind == 0 else path.line(x, y, feed=1.0)
+    toolpath = path.finish()
+    assert turns_of(toolpath) == pytest.approx(literal_turns.turns_of(toolpath), abs=1e-12)
+
+
+def test_pictures_of_all_layers_are_drawn() -> None:
+    scene = scene_of_toolpath(followed(drawing_of([circle(1.0, 1.0, 1.0)], ["0"])), title="all")
+    assert draw(scene, options=Options(layers=frozenset(LAYERS)))
+
+
+def rows_of_marks(count: int) -> Scene:
+    b = ToolpathBuilder().rapid(z=1.0)
+    for k in range(count):
+        b.rapid(float(k % 40), float(k // 40)).line(z=-1.0, feed=5.0)
+        b.line(k % 40 + 0.5, feed=5.0).rapid(z=1.0)
+    return Scene("marks", toolpath=b.finish())
+
+
+def test_of_very_many_contours_some_are_numbered() -> None:
+    root = svg_page.parse(draw(rows_of_marks(1200), options=Options(size_px=4000)))
+    order = svg_page.group(root, "order")
+    assert order is not None
+    shown = [int(g.attrib["aria-label"]) for g in order if "aria-label" in g.attrib]
+    assert shown[0] == 1
+    assert len(shown) > 30
+    assert all(number % 20 == 0 for number in shown[1:])
+    assert (every(100), every(101), every(7000)) == (1, 2, 100)
+
+
+def test_rims_of_marks_shrink_with_them() -> None:
+    root = svg_page.parse(draw(rows_of_marks(1200)))
+    plunges = svg_page.group(root, "plunges")
+    assert plunges is not None
+    radius, rim = float(plunges[0].attrib["r"]), float(plunges.attrib["stroke-width"])
+    assert radius / rim == pytest.approx(5.0 / 1.6, rel=0.02)
+
+
+def test_numbers_lie_over_all_other_marks() -> None:
+    gapped = drawing_of([circle(2.5, 2.5, 1.0)], ["0"], (Gap((3.5, 2.5), 0.1, ""),))
+    svg = draw(
+        replace(SCENES["toolpath"], drawing=gapped), options=Options(layers=frozenset(LAYERS))
+    )
+    marks = ("plunges", "reversals", "arrows", "part-zero", "gaps")
+    assert svg.index('id="order"') > max(svg.index(f'id="{name}"') for name in marks)
+
+
+def test_arrows_of_passes_over_each_other_are_left_out() -> None:
+    b = ToolpathBuilder()
+    for depth, (low, high) in enumerate([(0.0, 10.0), (0.1, 9.9), (0.2, 9.8)]):
+        b.rapid(z=1.0).rapid(low, 0.0).line(z=-1.0 - depth, feed=5.0).line(high, 0.0, feed=5.0)
+    svg = draw(Scene("passes", toolpath=b.rapid(z=1.0).finish()))
+    arrows = svg_page.group(svg_page.parse(svg), "arrows")
+    assert arrows is not None
+    assert arrows[0].attrib["d"].count("M") == 1

@@ -1,0 +1,69 @@
+"""The commands that make pages: what the viewer gets to know of a program."""
+
+from pathlib import Path
+
+import click
+import pytest
+
+from camtool.cli.main import cli
+from tests.pictures.viewer_pages import head_of
+
+
+@pytest.fixture
+def drawing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_text("0,0\n4,0\n4,3\n0,0\n", encoding="utf-8")
+    return "a.csv"
+
+
+def head(*arguments: str, page: str = "a.html") -> dict[str, object]:
+    cli.main([*arguments, "-q"], standalone_mode=False)
+    return head_of(Path(page).read_text(encoding="utf-8"))
+
+
+def counts(page: dict[str, object]) -> dict[str, int]:
+    """How many numbers each column has."""
+    columns = page["columns"]
+    assert isinstance(columns, dict)
+    return {name: count for name, (_, _, count) in columns.items()}
+
+
+def test_a_drawing_alone_has_no_time(drawing: str) -> None:
+    page = head("preview", drawing, "-o", "a.html")
+    assert page["blocks"] is None
+    assert counts(page)["move_seconds"] == 0
+    assert counts(page)["drawn_path"] == 3
+
+
+def test_post_verify_and_preview_show_the_same_program(drawing: str) -> None:
+    posted = head("post", drawing, "--target", "pic-mmh", "-o", "a.pic", "--preview", "a.html")
+    program = Path("a.pic").read_text(encoding="ascii")
+    assert str(posted["blocks"]).split() == program.split()
+    assert counts(posted)["move_seconds"] > 5
+    assert counts(posted)["trace_row"] > 5
+    judged = head("verify", "a.pic", "--target", "pic-mmh", "--preview", "a.html")
+    shown = head("preview", "a.pic", "--target", "pic-mmh", "-o", "a.html")
+    assert judged["blocks"] == shown["blocks"] == posted["blocks"]
+    assert judged["tables"] == shown["tables"] != []
+    planned = head("preview", drawing, "--target", "pic-mmh", "-o", "a.html")
+    assert planned["blocks"] == posted["blocks"]
+    assert planned["worst"] == posted["worst"] != []
+
+
+def test_the_report_names_the_moves_that_it_speaks_of(drawing: str) -> None:
+    page = head("post", drawing, "--target", "grbl", "-o", "a.nc", "--preview", "a.html")
+    tables = page["tables"]
+    assert isinstance(tables, list)
+    named = {table["title"]: table for table in tables}
+    facts = {row["cells"][0]: row["cells"][1] for row in named["Report"]["rows"]}
+    assert "grbl" in facts["target"]
+    assert "mechanics" in facts["by source"]
+    assert all(isinstance(row["move"], int) for row in named["Worst moves"]["rows"])
+    assert str(page["blocks"]).split("\n")[-1] == Path("a.nc").read_text().strip().split("\n")[-1]
+
+
+def test_several_ways_make_no_page(drawing: str) -> None:
+    head("post", drawing, "--target", "pic-mmh", "-o", "a.pic", "--preview", "a.html")
+    compared = ["verify", "a.pic", "--target", "pic-mmh", "--compare", "mechanics"]
+    with pytest.raises(click.UsageError, match=r"\.svg and \.png alone"):
+        head(*compared, "--preview", "b.html")
