@@ -25,11 +25,12 @@ from camtool.units import UM_PER_MM
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from camtool.arrays import Bools, Floats
     from camtool.geometry.drawing import Drawing
     from camtool.machine.controllers import Interpolator
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
-    from camtool.pictures.overlay import Floats, Overlay
+    from camtool.pictures.overlay import Overlay
     from camtool.pictures.scene import Line, Playback, Round, Scene, Table, Worst
     from camtool.planning.items import Step
     from camtool.planning.job import Job
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from camtool.verification.case import Cone
     from camtool.verification.conformance import Asked
     from camtool.verification.contrast import Variant
-    from camtool.verification.cuts import Bools
     from camtool.verification.report import Before, Gates, PlannedOperation, Report
     from camtool.verification.verify import Verification, VerifyOptions
 

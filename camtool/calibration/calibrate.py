@@ -25,15 +25,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats
 from camtool.calibration.measurements import Measurements
-from camtool.calibration.model import SQUARENESS, Floats, Model, Parameter, Reading, readings_of
+from camtool.calibration.model import SQUARENESS, Model, Parameter, Reading, readings_of
 from camtool.errors import InputError
 from camtool.machine.model import Axis, Machine
 from camtool.units import UM_PER_MM
-
-Bools = npt.NDArray[np.bool_]
 
 ROUNDS = 50
 """Rounds of Gauss-Newton at most; a handful is usual."""

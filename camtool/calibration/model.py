@@ -50,8 +50,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats
 from camtool.calibration.measurements import (
     Added,
     Circle,
@@ -63,9 +63,6 @@ from camtool.calibration.measurements import (
     Steps,
 )
 from camtool.machine.model import Axis, Machine
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 ALONG_AXIS = 1e-9
 """A diameter lies along an axis when the sine of the angle between them is below this."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
+from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.polylines import Polylines, Segments
 
 PAIRS_AT_A_TIME = 1 << 16
 """How many pairs of boxes are handled at a time: it bounds the memory."""

@@ -16,10 +16,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.drawing import Branch, Gap
 from camtool.geometry.measure import path_lengths, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polylines
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines
 
 
 @dataclass(frozen=True, eq=False)

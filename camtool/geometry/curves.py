@@ -15,8 +15,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import GeometryError
-from camtool.geometry.polylines import Floats
 
 MAX_PIECE_RAD = 0.5 * math.pi
 """One piece of an ellipse covers no more: its weights would spread its points too unevenly."""

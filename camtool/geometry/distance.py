@@ -22,9 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import box_pairs
 from camtool.geometry.measure import path_extents, segment_boxes
-from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Polylines, Segments
+from camtool.geometry.polylines import Polyline, Polylines, Segments
 
 POINTS_AT_A_TIME = 256
 """How many neighbouring points `nearest` handles at a time: it bounds the memory."""

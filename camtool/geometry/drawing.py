@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.measure import segment_lengths
-from camtool.geometry.polylines import Floats, Polylines, Segments, segment_rows
+from camtool.geometry.polylines import Polylines, Segments, segment_rows
 
 
 @dataclass(frozen=True)

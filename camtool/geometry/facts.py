@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.distance import paired_distances
@@ -21,7 +22,7 @@ from camtool.geometry.measure import (
     segment_boxes,
     segment_lengths,
 )
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 
 
 def drawing_extents(drawing: Drawing) -> Floats:

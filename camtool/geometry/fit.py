@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.curves import (
     BezierCurve,
@@ -27,7 +28,7 @@ from camtool.geometry.curves import (
     Pieces,
     SplineCurve,
 )
-from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Bools, Floats, Ints
+from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM
 from camtool.kernels.fit_limits import (
     ACCEPTED_SHARE,
     ASIDE_FROM,

@@ -24,10 +24,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import box_pairs, touching_boxes
 from camtool.geometry.drawing import SelfCrossing
 from camtool.geometry.measure import Frames, dot, point_at, segment_boxes, turned
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 
 
 @dataclass(frozen=True)

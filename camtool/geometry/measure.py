@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
-from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Polylines, Segments
+from camtool.geometry.polylines import Polyline, Polylines, Segments
 
 SHALLOW_BULGE = 1e-3
 """Below this bulge the area beside a chord comes from its series: relative error under 1e-11."""

@@ -19,9 +19,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.measure import segment_boxes, segment_lengths
-from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
+from camtool.geometry.polylines import Polylines, Segments
 
 FIRST_SAMPLES = 9
 """Places on each element at which the discs are looked for first."""

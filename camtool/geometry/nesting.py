@@ -11,18 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.boxes import Curves
 from camtool.geometry.measure import path_extents, point_at, signed_areas
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
-    Polylines,
-    Segments,
-    reverse,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, reverse
 
 
 @dataclass(frozen=True, eq=False)

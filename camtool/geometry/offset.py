@@ -67,15 +67,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
 from camtool.geometry.boxes import Curves, curve_rows_of, meets_itself, next_rows
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.measure import Frames, dot, path_lengths, point_at, signed_areas, turned
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
     Polyline,
     Polylines,
     Segments,

@@ -18,9 +18,10 @@ from itertools import chain
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.measure import segment_lengths
-from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
+from camtool.geometry.polylines import Polylines, Segments
 
 SAME_LINE_MM = 1e-4
 """Lines and arcs nearer to each other than this lie on each other, at most the tolerance."""

@@ -19,13 +19,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 POSITION_EPS_MM = 1e-6
 """Two positions nearer than this are one (docs/numerics.md)."""
@@ -212,7 +208,7 @@ class Segments:
     def __len__(self) -> int:
         return len(self.bulge)
 
-    def __getitem__(self, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice) -> Segments:
+    def __getitem__(self, rows: Bools | Ints | slice) -> Segments:
         """The chosen rows."""
         return Segments(
             self.start[rows],

@@ -22,15 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats
 from camtool.geometry.measure import segment_lengths
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Polyline,
-    Polylines,
-    Segments,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 
 NOISE_MM = 1e-7
 """Points of exact drawings lie on their circle within this."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import DrawingError, GeometryError
 from camtool.geometry.chain import Chained, Kinds, chain, numbered
 from camtool.geometry.drawing import Gap, Healing, Skipped
@@ -21,9 +22,6 @@ from camtool.geometry.measure import path_lengths, point_at
 from camtool.geometry.overlaps import SAME_LINE_MM, without_overlaps
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
     Polylines,
     Segments,
     encloses,

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError, OptionError
 from camtool.geometry.drawing import Skipped
-from camtool.geometry.polylines import Floats
 from camtool.importers.options import Selection
 from camtool.patterns import guess, matches
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.geometry import hershey
-from camtool.geometry.polylines import Floats
 from camtool.importers.dxf.shapes import Unusable
 
 # Letters as curves: outlines of an installed font, or the single strokes of Hershey's Roman.

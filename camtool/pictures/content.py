@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Floats
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pictures import legend, marks
@@ -28,8 +28,6 @@ from camtool.pictures.strokes import (
 from camtool.pictures.svg import Look
 from camtool.pictures.trace import Trace, exaggerated, trace_of
 from camtool.pictures.view import View, points_box, union, window
-
-Floats = npt.NDArray[np.float64]
 
 T = TypeVar("T")
 NOWHERE: Floats = np.empty((0, 2))

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from camtool.geometry.drawing import Drawing
 from camtool.pictures import text
@@ -31,8 +30,6 @@ from camtool.pictures.strokes import Chain, path_data
 from camtool.pictures.svg import Look, PathData, element, number, title
 from camtool.pictures.text import Style
 from camtool.pictures.view import View, round_step
-
-Floats = npt.NDArray[np.float64]
 
 MOST_BODIES = 500
 """The light fill shows what is closed; drawings of more paths go without."""

@@ -10,9 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
+from camtool.arrays import Floats
 from camtool.pictures import axes, legend, marks
 from camtool.pictures.colours import FEED_PALE, LAYERS
 from camtool.pictures.content import cropped
@@ -25,8 +23,6 @@ from camtool.pictures.svg import Look, PathData, element
 from camtool.pictures.trace import FINEST_SHARE
 from camtool.pictures.view import CROP_SHAPES, TALLEST, WIDEST, View, page_width
 from camtool.toolpath.moves import Toolpath
-
-Floats = npt.NDArray[np.float64]
 
 WANTED_PEN, RUN_PEN = 8.0, 2.0
 

@@ -7,9 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
+from camtool.arrays import Floats
 from camtool.pictures import axes, legend
 from camtool.pictures.axes import Ticks, ticks_of
 from camtool.pictures.colours import PAPER, darkened
@@ -18,8 +16,6 @@ from camtool.pictures.legend import Entry
 from camtool.pictures.options import SMALLEST_PX, SVG_WIDTH_PX, Options
 from camtool.pictures.svg import Look, PathData, element, number, title
 from camtool.pictures.view import CROP_SHAPES, MARGIN, PAGE, TALLEST, WIDEST, Box, View, fit
-
-Floats = npt.NDArray[np.float64]
 
 HEAD_GAP = 50.0
 """Room between the head and the plot, for the names above it."""

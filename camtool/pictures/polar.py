@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.pictures import legend, text
 from camtool.pictures.colours import BACK, BACK_SPREAD, FEED, FRAME, GRID, INK, PLOT, QUIET, SPREAD
 from camtool.pictures.legend import Entry, line_swatch
 from camtool.pictures.options import SVG_WIDTH_PX, Options
 from camtool.pictures.page import foot_of, sheet
-from camtool.pictures.scene import Floats, Round, Scene
+from camtool.pictures.scene import Round, Scene
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import Style
 from camtool.pictures.view import MARGIN, Box, decimals_of, page_width, round_step

@@ -7,14 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Segments
 from camtool.toolpath.moves import Kind, Toolpath
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +120,6 @@ class Round:
 
 
 # How a toolpath runs, for the viewer: seconds, errors, the program's lines, the report.
-
-Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)

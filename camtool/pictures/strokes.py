@@ -12,15 +12,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.pictures.svg import MM_DECIMALS, PathData
 from camtool.toolpath.moves import Kind, Toolpath
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 LONGEST_ARC_RAD = 1.5 * math.pi
 """An arc of more is written as two."""
@@ -127,7 +124,7 @@ def _chains(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
     )
 
 
-def _first_times(begin: Floats, end: Floats, sweep: Floats) -> npt.NDArray[np.int64]:
+def _first_times(begin: Floats, end: Floats, sweep: Floats) -> Ints:
     """Which of J moves are the first on their way, there or back, ascending."""
     back = (begin[:, 0] > end[:, 0]) | ((begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1]))
     low, high = np.where(back[:, None], end, begin), np.where(back[:, None], begin, end)
@@ -245,7 +242,6 @@ def _halved(chains: Sequence[Chain]) -> Segments:
 # has a sign per axis. An axis turns where its sign is another than the last one that was not 0,
 # rapids included; a turn counts where the piece behind it is a feed.
 
-Ints = npt.NDArray[np.int64]
 
 QUARTER_RAD = 0.5 * np.pi
 

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
 from camtool.pictures.colours import BINS, bin_colours
@@ -20,9 +20,6 @@ from camtool.pictures.scene import Scene
 from camtool.pictures.svg import Look, PathData, element
 from camtool.pictures.view import View
 from camtool.units import UM_PER_MM
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 LEAST_TOP_UM = 1e-3
 """The colour map ends here when no error is larger."""
@@ -41,7 +38,7 @@ class Trace:
 
     points: Floats
     error_um: Floats
-    cutting: npt.NDArray[np.bool_]
+    cutting: Bools
     top_um: float
     times: float = 1.0
 
@@ -164,7 +161,7 @@ def nearest_points(points: Floats, wanted: Segments) -> Floats:
     return np.asarray(foot)
 
 
-def _on_arcs(points: Floats, wanted: Segments, row: npt.NDArray[np.int64]) -> Floats:
+def _on_arcs(points: Floats, wanted: Segments, row: Ints) -> Floats:
     """Along the spoke through each point where that meets the arc, else its nearer end."""
     spoke = points - wanted.centre[row]
     length = np.hypot(spoke[:, 0], spoke[:, 1])

@@ -7,9 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from camtool.arrays import Floats
 
 PAGE = 1000.0
 """Width of a picture of ordinary size in its own units, in which lines and letters are given."""

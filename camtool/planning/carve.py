@@ -27,6 +27,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.boxes import touching_boxes
@@ -44,15 +45,7 @@ from camtool.geometry.medial import (
 )
 from camtool.geometry.nesting import nesting, regions
 from camtool.geometry.offset import merge_points
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
-    Polyline,
-    Polylines,
-    Segments,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import key_of

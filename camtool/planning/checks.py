@@ -14,8 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.planning.items import Setting, Step
 from camtool.planning.job import Job, Tool

@@ -19,6 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import (
@@ -33,9 +34,6 @@ from camtool.geometry.nesting import inside
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
     Polyline,
     Polylines,
     Segments,

@@ -15,6 +15,7 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import GeometryError
 from camtool.geometry.curves import EllipseCurve
 from camtool.geometry.fit import fit_curve
@@ -22,7 +23,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.planning.reversing import Residual, residual
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Bent, Floats, Kind, Move, Toolpath
+from camtool.toolpath.moves import Bent, Kind, Move, Toolpath
 
 __all__ = ["compensated"]
 

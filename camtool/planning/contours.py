@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polyline
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
 from camtool.planning.items import Bridge, Contour, Run
 from camtool.planning.leads import KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place

@@ -25,9 +25,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import extents
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import Bools, Floats, Ints, Polylines, Segments
+from camtool.geometry.polylines import Polylines, Segments
 from camtool.planning.items import Contour, Fixed, Item, Step
 from camtool.planning.job import Operation
 from camtool.planning.sides import runs_beside

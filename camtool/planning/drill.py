@@ -15,9 +15,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import path_extents, sample
-from camtool.geometry.polylines import Bools, Floats, Polyline, Polylines, Segments
+from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation, refuse_endless
 from camtool.planning.naming import key_of, operation_name

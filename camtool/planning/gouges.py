@@ -13,19 +13,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, path_lengths, point_at, sample
 from camtool.geometry.nesting import inside, nesting
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
-    Polyline,
-    Polylines,
-    Segments,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Chosen, Contour, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, operation_name, told_together, tool_name

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
-from camtool.geometry.polylines import Bools, Floats, Ints, Polyline, Polylines
+from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.job import Operation
 
 RAPID = float("nan")

@@ -19,19 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import nearest, paired_distances, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import Frames, dot, point_at, signed_area
 from camtool.geometry.nesting import inside
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Polyline,
-    Polylines,
-    Segments,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
 from camtool.planning.naming import at_place

@@ -15,17 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Floats,
-    Ints,
-    Polyline,
-    Polylines,
-    reverse,
-    rolled,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, reverse, rolled
 from camtool.planning.items import Contour, Item, Run
 from camtool.planning.paths import joints
 

@@ -17,9 +17,10 @@ from functools import cached_property
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turned
-from camtool.geometry.polylines import POSITION_EPS_MM, Bools, Floats, Ints, Polyline, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,18 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError, OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Gap, Healing, Unchosen
 from camtool.geometry.measure import extents
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Floats,
-    Ints,
-    Polylines,
-    encloses,
-    without_repeats,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, encloses, without_repeats
 from camtool.planning.job import Job, Placement
 
 MOST_SIZE_MM = 1e5

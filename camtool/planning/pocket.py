@@ -20,6 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import points_to_segments
@@ -27,7 +28,7 @@ from camtool.geometry.intersect import meetings, self_crossings
 from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.nesting import nesting, oriented
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
     Rails,

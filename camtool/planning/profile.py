@@ -14,18 +14,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from camtool.arrays import Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, point_at, signed_areas
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Ints,
-    Polyline,
-    Polylines,
-    Segments,
-    reverse,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Chosen, Contour, Setting, Work
 from camtool.planning.naming import at_place, told_together, tool_name
 from camtool.planning.paths import joints

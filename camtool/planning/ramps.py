@@ -30,8 +30,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.geometry.measure import segment_lengths
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.planning.items import Feeds
 from camtool.planning.paths import Along
 

@@ -16,22 +16,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.boxes import Curves
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, extents, point_at, segment_lengths, signed_areas
 from camtool.geometry.nesting import regions
 from camtool.geometry.offset import merge_points, offset_shape
-from camtool.geometry.polylines import (
-    POSITION_EPS_MM,
-    Bools,
-    Floats,
-    Ints,
-    Polyline,
-    Polylines,
-    Segments,
-    reverse,
-)
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Setting
 from camtool.planning.naming import MOST_PLACES, tool_name
 from camtool.planning.paths import Along

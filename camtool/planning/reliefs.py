@@ -20,10 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.geometry.distance import paired_distances, points_to_segments
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.job import CORNERS
 from camtool.planning.paths import Along
 

@@ -23,10 +23,11 @@ from itertools import chain, pairwise
 import msgspec
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Polyline, Segments, reverse
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments, reverse
 from camtool.machine.controllers import Controller
 from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.planning.items import Contour, Fixed, Item, Run

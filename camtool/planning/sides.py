@@ -20,13 +20,14 @@ from functools import cached_property
 
 import numpy as np
 
+from camtool.arrays import Bools, Ints
 from camtool.errors import OptionError
 from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_extents, point_at
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import Bools, Ints, Polyline, Polylines, Segments
+from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.patterns import matches
 from camtool.planning.items import Chosen
 from camtool.planning.job import Job, Operation

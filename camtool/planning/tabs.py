@@ -25,13 +25,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import path_lengths, point_at, segment_boxes, signed_areas
 from camtool.geometry.nesting import inside
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Bridge, Contour, Feeds, Item, Run
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name

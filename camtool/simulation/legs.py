@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.legs import legs_fill
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, Ledger, Options
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.toolpath.moves import Kind, Toolpath
 
 

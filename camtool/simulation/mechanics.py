@@ -19,10 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.kernels.lattice import to_steps
 from camtool.kernels.play import play_fill, play_limits, play_start, play_varied_fill
 from camtool.machine.model import Axis, Machine, PlayCells
-from camtool.simulation.motion import Effects, Floats, Ints
+from camtool.simulation.motion import Effects
 
 REVERSAL_STEPS = 0.5
 """An axis has reversed when it came back by this much of a coded step."""

@@ -27,15 +27,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import PathController
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, Ledger, Options
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.toolpath.moves import Arms, Kind, Toolpath
-
-Bools = npt.NDArray[np.bool_]
 
 MAX_PATH_STEPS = 1 << 40
 """Positions beyond this many steps (a million kilometres at 1 µm) are refused: counts must stay

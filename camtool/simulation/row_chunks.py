@@ -8,8 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Floats, Ints, still_ledger
+from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
 
 
 class Samples(Protocol):

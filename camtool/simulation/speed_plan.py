@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from camtool.arrays import Ints
 from camtool.findings import Finding
-from camtool.toolpath.moves import Ints, Kind, PathMode, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
 Coordinate = float | None
 

@@ -18,14 +18,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError, PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Arms, Floats, Ints, Kind, Toolpath
-
-Bools = npt.NDArray[np.bool_]
+from camtool.toolpath.moves import Arms, Kind, Toolpath
 
 MAX_CHORD_SWEEP_RAD = 0.5 * math.pi
 """No chord stands for more of an arc than this, however wide the tolerance: a circle has four."""

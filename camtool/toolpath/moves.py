@@ -15,15 +15,11 @@ from enum import IntEnum
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.toolpath.wanted import Drawn
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-
 
 COLUMNS = ("kind", "end", "centre", "feed", "value", "source", "block", "mode")
 """What a Toolpath says of each row ..."""
@@ -148,17 +144,17 @@ class Toolpath:
         return np.concatenate([self.start[None, :], self.end[:-1]]) if len(self) else self.end
 
     @property
-    def is_arc(self) -> npt.NDArray[np.bool_]:
+    def is_arc(self) -> Bools:
         """(N,) true for ARC_CW and ARC_CCW."""
         return np.asarray((self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW))
 
     @property
-    def is_motion(self) -> npt.NDArray[np.bool_]:
+    def is_motion(self) -> Bools:
         """(N,) true for RAPID, LINE and arcs."""
         return np.asarray(self.kind <= Kind.ARC_CCW)
 
     @property
-    def is_feed(self) -> npt.NDArray[np.bool_]:
+    def is_feed(self) -> Bools:
         """(N,) true for LINE and arcs: moves at a feed."""
         return np.asarray((self.kind >= Kind.LINE) & (self.kind <= Kind.ARC_CCW))
 
@@ -186,7 +182,7 @@ class Toolpath:
         """The first rows alone."""
         return self.picked(np.arange(min(rows, len(self))))
 
-    def picked(self, row: Ints, **others: npt.NDArray[np.int64] | Floats) -> Toolpath:
+    def picked(self, row: Ints, **others: Ints | Floats) -> Toolpath:
         """Rows (M,) of this one, in that order and as often as they are named; `others`: columns
         that take the place of theirs."""
         columns = {name: getattr(self, name)[row] for name in COLUMNS}
@@ -243,8 +239,6 @@ class Bent:
 # An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the spiral
 # between them; radius and, in a helix, Z change in proportion to the angle, so that both ends are
 # met.
-
-Bools = npt.NDArray[np.bool_]
 
 
 class Arms:
@@ -318,7 +312,7 @@ def _arc_extremes(toolpath: Toolpath) -> Floats:
 # Tool changes of a toolpath, for machines that have none or only some.
 
 
-def mounted_before(toolpath: Toolpath) -> npt.NDArray[np.bool_]:
+def mounted_before(toolpath: Toolpath) -> Bools:
     """(N,) true for tool changes before the first move at a feed: where a machine cannot be told
     of tools, the operator mounts this one before the program starts."""
     fed = np.cumsum(toolpath.is_feed) > 0

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
+from camtool.arrays import Ints
 from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
@@ -24,7 +22,7 @@ class Program:
     data: bytes
     extension: str
     target: str
-    row_of_block: npt.NDArray[np.int64]
+    row_of_block: Ints
     findings: tuple[Finding, ...] = ()
 
 

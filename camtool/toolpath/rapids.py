@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.toolpath.lower import arcs_to_lines
-from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 
 STOCK_TOP_MM = 0.0
 """Part zero lies on the stock."""

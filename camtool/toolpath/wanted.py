@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from camtool.geometry.polylines import Bools, Floats, Ints, Polylines
+from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.polylines import Polylines
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats, Ints
+from camtool.arrays import Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.cuts import CutMoves
 

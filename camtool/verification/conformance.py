@@ -18,9 +18,10 @@ from functools import cached_property
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import point_at
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.coverage import (
@@ -38,7 +39,7 @@ from camtool.verification.coverage import (
     round_trips,
     turned,
 )
-from camtool.verification.cuts import Bools, CutMoves, cut_moves, is_flat
+from camtool.verification.cuts import CutMoves, cut_moves, is_flat
 from camtool.verification.matching import nearest_at_height
 from camtool.verification.nearest import Target
 

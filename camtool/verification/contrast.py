@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from camtool.arrays import Bools, Floats
 from camtool.machine.model import Machine
 from camtool.plain import to_json as json_text
-from camtool.simulation.motion import Chunk, Floats
-from camtool.verification.cuts import Bools
+from camtool.simulation.motion import Chunk
 from camtool.verification.report import Report, clock
 from camtool.verification.verify import Verification
 

@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.cuts import (
     NO_LOOP,
-    Bools,
     CutMoves,
     Samples,
     cutting_rows,

@@ -16,13 +16,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
-
-Bools = npt.NDArray[np.bool_]
 
 FEWEST_SAMPLES = 4
 """Each line and arc is sampled in at least so many parts: short moves must not slip through."""

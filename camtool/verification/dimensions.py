@@ -23,9 +23,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
-from camtool.verification.cuts import NO_LOOP, Bools, CutMoves, loops, of_loops
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.verification.cuts import NO_LOOP, CutMoves, loops, of_loops
 from camtool.verification.matching import Match
 
 

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.error_bins import BEFORE_FIRST, BINS, SHIFT, leading_bits
 from camtool.simulation.motion import Ledger
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verification.cuts import Bools, CutMoves
+from camtool.verification.cuts import CutMoves
 from camtool.verification.matching import Match
 
 PERCENTILE = 0.95

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.verification.circles import Circle
-from camtool.verification.cuts import Bools, CutMoves, Samples
+from camtool.verification.cuts import CutMoves, Samples
 from camtool.verification.nearest import ANY_CONTOUR, Found, Groups, Target, ranges, run_offsets
 
 MOST_TRIES = 4

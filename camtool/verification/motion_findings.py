@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.findings import Code, Finding, Severity
-from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
 from camtool.planning.naming import own_numbers
 from camtool.simulation.simulate import findings_of

@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.verification.cuts import CutMoves
 
 PAIRS_AT_ONCE = 1 << 17

@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.measure import point_at
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Ints, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.toolpath.wanted import Kept

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import Floats, Ints
 from camtool.simulation.motion import Chunk, still_ledger
 from camtool.simulation.simulate import StepsOnTheWay
 from camtool.toolpath.moves import Toolpath
@@ -33,7 +33,7 @@ from camtool.verification.circles import (
     circle_figures,
     reversing,
 )
-from camtool.verification.cuts import Bools, CutMoves, moved_lengths
+from camtool.verification.cuts import CutMoves, moved_lengths
 from camtool.verification.figures import Figure, RowFigures, add_ledger, empty_columns, row_figures
 from camtool.verification.matching import Goal, Match
 from camtool.verification.nearest import ANY_CONTOUR, Target, run_peaks

@@ -14,9 +14,9 @@ import msgspec
 import numpy as np
 
 from camtool import __version__
+from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.polylines import Floats
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Chunk
 from camtool.simulation.simulate import (

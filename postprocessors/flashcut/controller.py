@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.kernels.timers import (
@@ -43,7 +44,7 @@ from camtool.kernels.timers import (
 from camtool.machine.controllers import FlashcutController
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, Ledger, Options
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.path import check_positions, check_rows, placed
 from camtool.toolpath.moves import Kind, Toolpath
 

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.controllers import FlashcutController
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 PERIOD_GUARD = 1e-6
 """ms. Half periods of feeds that are decimals may lie this much below a half of a millisecond."""

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.kernels.lattice import to_steps
@@ -220,9 +220,6 @@ class _Writer:
 # milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes K = ⌈m / (P −
 # 1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its start, so that the
 # controller, which rounds the way of each piece by itself, has nothing to round.
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
 
 
 def split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:

@@ -20,14 +20,12 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import GcodeDialect
-from .format import Floats, Ints, units_of
-
-Bools = npt.NDArray[np.bool_]
+from .format import units_of
 
 FLAT_UNITS: Final = 0.5
 """An arc with less sagitta (in units) is a line."""

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Ints
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
@@ -15,9 +15,6 @@ from camtool.toolpath.lower import Lowered, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import feed_decimals
-from .format import Ints
-
-Bools = npt.NDArray[np.bool_]
 
 MOST_MM: Final = 99_999.0
 """Coordinates beyond this are refused: with three decimals, grbl's 8 digits end there."""

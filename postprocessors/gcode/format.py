@@ -18,10 +18,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from camtool.arrays import Floats, Ints
 
 MOST_UNITS: Final = 10**15
 """Whole units beyond this are not said: their decimals would no longer be exact in a float."""

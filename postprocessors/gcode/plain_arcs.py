@@ -19,15 +19,13 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .format import Floats, Ints, units_of
-
-Bools = npt.NDArray[np.bool_]
+from .format import units_of
 
 SPREAD_UNITS: Final = 1.0
 """The radii at start and end of a written arc differ by no more units."""

@@ -18,8 +18,8 @@ from typing import Final
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Ints
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
@@ -30,7 +30,6 @@ from .arcs import ArcCounts, Arcs, arcs_of
 from .checks import check, feed_units, place
 from .dialect import GcodeDialect, feed_decimals
 from .format import (
-    Ints,
     NumberStyle,
     comment,
     first_too_long,
@@ -262,7 +261,6 @@ def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> list[Finding]:
 
 # Which rows grbl and linuxcnc are sent, and the modal text of each, by whole columns.
 
-Bools = npt.NDArray[np.bool_]
 
 WORD: Final = np.array([" G0", " G1", " G2", " G3"], dtype=object)
 

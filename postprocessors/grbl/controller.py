@@ -22,12 +22,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.step_lines import step_lines_fill, steps_taken
 from camtool.machine.controllers import GrblController
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Chunk, Floats, Ints, Options
+from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.path import check_positions, check_rows, placed
 from camtool.simulation.row_chunks import RowTotals, row_chunks
 from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits

@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
@@ -31,7 +32,7 @@ from camtool.simulation.legs import (
     place,
     waits_s,
 )
-from camtool.simulation.motion import Chunk, Floats, Ints, Options
+from camtool.simulation.motion import Chunk, Options
 from camtool.toolpath.moves import Toolpath
 
 from .pulses import PulseTimes, firmware_of

@@ -36,10 +36,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from camtool.arrays import Ints
 
 FREE: Final = -1
 """A reach that binds nothing: rapids may take any dog-leg."""

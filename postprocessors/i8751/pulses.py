@@ -16,14 +16,11 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 from msgspec import Meta
 
+from camtool.arrays import Floats, Ints
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 CLOCK_HZ: Final = 12e6
 """The controller's crystal (L2993)."""

@@ -20,8 +20,8 @@ from itertools import islice
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
@@ -29,8 +29,6 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, dialect_of
 from .pulses import PulseTimes
-
-Ints = npt.NDArray[np.int64]
 
 
 def read_program(data: bytes, machine: Machine) -> Toolpath:
@@ -108,9 +106,7 @@ def _kinds(ends: Ints, steps: Ints, slot: Ints) -> Ints:
     return np.where(above | rises, np.int64(Kind.RAPID), np.int64(Kind.LINE))
 
 
-def _feeds(
-    steps: Ints, step_mm: npt.NDArray[np.float64], times: PulseTimes
-) -> list[npt.NDArray[np.float64]]:
+def _feeds(steps: Ints, step_mm: Floats, times: PulseTimes) -> list[Floats]:
     """Feeds (R,) in X and Y, and in Z, mm/min; NaN where nothing moves."""
     way_xy = np.hypot(*(steps[:, :2] * step_mm[:2]).T)
     way_z = np.abs(steps[:, 2]) * step_mm[2]

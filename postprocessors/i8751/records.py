@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
@@ -17,8 +17,6 @@ from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 
 from .dialect import MOST_DWELL_BYTE_S, Dialect
 from .dogleg import FREE, Line, elbows, reaches
-
-Bools = npt.NDArray[np.bool_]
 
 MOST_STEPS: Final = 10_000_000
 """A coordinate of more steps is taken for a mistake: 26 hours at the machine's speed."""
@@ -140,7 +138,6 @@ def _check_arcs(toolpath: Toolpath, dialect: Dialect) -> None:
 # chords, slopes become flat moves and small ones of Z, lines are cut where their dog-leg would
 # stray too far (`_i8751_dogleg`) and where a motor would make more steps than two bytes can say.
 
-Ints = npt.NDArray[np.int64]
 
 MOST_RECORDS: Final = 2_000_000
 """A program of more records (30 MB, hours over the link) is taken for a mistake."""
@@ -275,7 +272,7 @@ def _cut_rows(
     return pieces
 
 
-def _refuse_too_many(each: npt.NDArray[np.float64]) -> None:
+def _refuse_too_many(each: Floats) -> None:
     """PostError for rows (N,) that need about so many records, or more."""
     total = float(np.maximum(each, 1.0).sum())
     if total > MOST_RECORDS:

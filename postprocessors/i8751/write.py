@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import Bools, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
@@ -134,9 +135,7 @@ def _left_out(counts: Counts) -> Iterator[Finding]:
 #
 # (L4106-4167, L4343-4383, L4397-4417.)
 
-Ints = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
-Bools = npt.NDArray[np.bool_]
 
 KEY: Final = 0x13
 """The byte that opens the access (13H)."""

@@ -18,13 +18,14 @@ from typing import cast, get_args
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.controllers import LinuxcncController
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Bools, Chunk, Floats, Ints, Options
+from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.path import (
     PathSamples,
     check_positions,

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import MatlabRouterController
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, Ledger, Options
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.path import placed
 from camtool.toolpath.moves import Kind, Toolpath
 

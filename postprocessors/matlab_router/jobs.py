@@ -15,16 +15,13 @@ from dataclasses import dataclass
 from typing import Final, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Ints
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Ints
 from camtool.toolpath.program import Listing
 
 from .dialect import CHUNK_UNITS, FIXED_Y_UNITS, MOST_NUMBER, UNIT_MM, Dialect, dialect_of
-
-Bools = npt.NDArray[np.bool_]
 
 Where = Callable[[str, int, int], str]
 """The place of a number in the file, by the name of its array, its row and its column."""

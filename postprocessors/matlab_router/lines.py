@@ -15,17 +15,15 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Floats, Ints, Toolpath
+from camtool.toolpath.moves import Toolpath
 
 from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Dialect
 from .strokes import Cuts, place
-
-Bools = npt.NDArray[np.bool_]
 
 TIE_TOLERANCE: Final = 1e-6
 """A coordinate within this part of the grid of half-way between two of its lines is half-way, and

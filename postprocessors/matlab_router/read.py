@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import FIXED_Y_UNITS, UNIT_MM, UNITS_PER_MM, Dialect, cut_z_mm, dialect_of
 from .jobs import Executed, ReadJob, execute, read_stream, read_text
@@ -144,7 +144,6 @@ class _Moves:
 
 # How the axes run the lines of a job: both start together, each stops by itself.
 
-Bools = npt.NDArray[np.bool_]
 
 MOST_OFF = 8.0
 """Counts in 5 ms by which the speed of an axis may differ from what its distance asks for (the

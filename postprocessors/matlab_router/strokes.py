@@ -12,18 +12,16 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, xy_then_z
-from camtool.toolpath.moves import Floats, Ints, Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect, cut_z_mm
-
-Bools = npt.NDArray[np.bool_]
 
 DEPTH_TOLERANCE_MM: Final = 0.005
 """A cut may lie this much above or below the one depth that the machine plunges to."""

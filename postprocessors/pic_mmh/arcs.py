@@ -26,7 +26,9 @@ from typing import Final
 
 import numpy as np
 
-from .numbers import Bools, Floats, Grid, Ints
+from camtool.arrays import Bools, Floats, Ints
+
+from .numbers import Grid
 
 WINDOW: Final = (0.6, 1.1)
 WINDOW_SLACK: Final = 4

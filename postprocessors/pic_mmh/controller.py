@@ -29,6 +29,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.findings import Code, Finding, Severity
 from camtool.kernels import arc_stops as stopping
@@ -42,7 +43,7 @@ from camtool.kernels.stairs import stairs_fill, stairs_start
 from camtool.machine.controllers import Interpolator, PicMmhController
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Bools, Chunk, Floats, Ints, Options, one_row
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .legs import METHODS, JudgedSteps, legs_of, positions

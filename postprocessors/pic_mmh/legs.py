@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from camtool.arrays import Floats, Ints
 from camtool.machine.controllers import Interpolator
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Floats, Ints, Ledger
+from camtool.simulation.motion import Ledger
 from camtool.toolpath.moves import Kind, Toolpath
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.controllers import PicMmhController
@@ -22,10 +22,6 @@ from camtool.machine.model import Machine, controller_of
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 HALF_STEP_TOLERANCE: Final = 1e-6
 """A coordinate within this much (in steps) of half a step is half-way between two steps."""

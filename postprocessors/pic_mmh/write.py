@@ -14,6 +14,7 @@ from typing import Final, NoReturn
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
@@ -34,7 +35,7 @@ from .arcs import (
     unwrapped_rad,
 )
 from .dialect import dialect_of
-from .numbers import SAY, Floats, Grid, check_motion, event_words, far_arcs, numbers_of, place
+from .numbers import SAY, Grid, check_motion, event_words, far_arcs, numbers_of, place
 
 XY = tuple[int, int]
 

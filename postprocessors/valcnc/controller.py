@@ -21,8 +21,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.kernels.valcnc_arcs import arc_angles
@@ -39,7 +39,7 @@ from camtool.simulation.legs import (
     place,
     waits_s,
 )
-from camtool.simulation.motion import Chunk, Floats, Ints, Options
+from camtool.simulation.motion import Chunk, Options
 from camtool.toolpath.moves import Kind, Toolpath
 
 PIECES_AT_ONCE = 1 << 14
@@ -174,7 +174,7 @@ class _Pieces:
             )
         return angles
 
-    def _check_arcs(self, toolpath: Toolpath, arcs: npt.NDArray[np.bool_]) -> None:
+    def _check_arcs(self, toolpath: Toolpath, arcs: Bools) -> None:
         """ProgramError for arcs that it cannot count."""
         rows = np.flatnonzero(arcs)
         centre = toolpath.centre[rows]

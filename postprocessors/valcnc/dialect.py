@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from camtool.arrays import Floats
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
 from camtool.machine.ranges import Count, Scale, Step, Tolerance
@@ -14,8 +15,7 @@ from camtool.machine.ranges import Count, Scale, Step, Tolerance
 from ..gcode.dialect import check_unit
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
+    pass
 
 
 class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,7 +50,7 @@ def dialect_of(machine: Machine) -> Dialect:
     return dialect
 
 
-def scales_of(machine: Machine, dialect: Dialect) -> npt.NDArray[np.float64]:
+def scales_of(machine: Machine, dialect: Dialect) -> Floats:
     """(3,) units of the program per mm on X, Y and Z.
 
     The controller makes 1 / (coord_scale · nominal_step_mm) steps of a unit, whatever the axis;

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
@@ -23,7 +24,7 @@ from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
 from ..gcode.checks import check_plain, left_out, place, split_z
-from ..gcode.format import Floats, NumberStyle, first_too_long, say_units
+from ..gcode.format import NumberStyle, first_too_long, say_units
 from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
 from .dialect import Dialect, dialect_of, scales_of
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from camtool.arrays import Floats
 from camtool.geometry.boxes import box_pairs
 from camtool.geometry.intersect import (
     Crossings,
@@ -23,7 +24,7 @@ from camtool.geometry.intersect import (
     self_crossings,
 )
 from camtool.geometry.measure import Frames, point_at, segment_boxes
-from camtool.geometry.polylines import Floats, Polyline, Segments
+from camtool.geometry.polylines import Polyline, Segments
 from tests.oracles.offset import chords, distance
 
 QUARTER = math.tan(math.pi / 8)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 
+from camtool.arrays import Floats
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import sample
 from camtool.geometry.medial import Boundary, Trace, discs_at, medial_trace
 from camtool.geometry.nesting import oriented, regions
-from camtool.geometry.polylines import Floats, Polyline, Polylines, Segments
+from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.discs import LENGTH, SWEEP, frame
 from camtool.planning.carve import with_level
 from tests.oracles import contours as shapes

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BASE = {"plain", "errors", "units", "findings", "patterns"}
+BASE = {"arrays", "plain", "errors", "units", "findings", "patterns"}
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
 JUDGE = SHARED | {"importers", "planning", "simulation", "postprocessors"}
 
@@ -20,6 +20,7 @@ ALLOWED = {
     "errors": {"plain"},
     "units": {"errors"},
     "findings": {"plain"},
+    "arrays": set(),
     "patterns": set(),
     "geometry": BASE | {"kernels"},
     "kernels": BASE,

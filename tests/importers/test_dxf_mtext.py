@@ -12,7 +12,7 @@ from ezdxf.math import Matrix44
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.geometry.polylines import Floats
+from camtool.arrays import Floats
 from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.dxf.text import TextShape, text_strokes
 

@@ -12,8 +12,8 @@ from ezdxf.math import Matrix44
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.arrays import Floats
 from camtool.findings import Code
-from camtool.geometry.polylines import Floats
 from camtool.importers import text as text_fonts
 from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.dxf.text import TextShape, text_strokes

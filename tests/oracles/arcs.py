@@ -6,9 +6,8 @@ import math
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from camtool.arrays import Floats
 
 FLAT = 1e-13
 """Below this bulge an arc is taken as its chord."""

@@ -10,14 +10,12 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
+from camtool.arrays import Floats
 from camtool.geometry.polylines import Polylines
 from camtool.planning.items import Run
 from tests.oracles.offset import chords
-
-Floats = npt.NDArray[np.float64]
 
 
 def dense(run: Run, step_mm: float) -> Floats:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.geometry.chain import CLASS_RATIO, SAME_TURN_RAD
 from camtool.geometry.measure import length, signed_area
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Polyline, reverse
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, reverse
 
 
 @dataclass(frozen=True)

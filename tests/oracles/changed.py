@@ -13,11 +13,9 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Floats
 from camtool.toolpath.moves import Kind, Move, Toolpath
-
-Floats = npt.NDArray[np.float64]
 
 CHORDS = 24
 """Chords of an arc or line, at least."""

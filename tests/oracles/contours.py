@@ -6,14 +6,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
+from camtool.arrays import Floats
 from camtool.geometry.intersect import self_crossings
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments
 from tests.oracles.offset import chords, pieces
 
-Floats = npt.NDArray[np.float64]
 QUARTER = math.tan(math.pi / 8.0)
 """Bulge of a quarter circle."""
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats
 from tests.oracles import arcs
-from tests.oracles.arcs import Floats
 
 SPLITS = 40
 """How often a piece of a sampled curve is halved, at most."""

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Chunk, Floats, one_row
+from camtool.simulation.motion import Chunk, one_row
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 

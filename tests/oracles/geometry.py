@@ -10,7 +10,8 @@ import math
 import numpy as np
 import shapely
 
-from camtool.geometry.polylines import Floats, Polyline
+from camtool.arrays import Floats
+from camtool.geometry.polylines import Polyline
 
 
 def dense_points(path: Polyline, per_segment: int) -> Floats:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from camtool.geometry.polylines import Bools, Floats, Segments
+from camtool.arrays import Bools, Floats
+from camtool.geometry.polylines import Segments
 
 
 def inside(points: Floats, ring: Segments) -> Bools:

@@ -12,12 +12,11 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Floats
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.toolpath.moves import Toolpath
 
-Floats = npt.NDArray[np.float64]
 Piece = tuple[tuple[float, float], tuple[int, int]]
 
 LEAST_PIECE_RAD = 1e-9

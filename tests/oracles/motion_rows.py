@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from camtool.simulation.motion import Chunk, Floats, Ints
+from camtool.arrays import Floats, Ints
+from camtool.simulation.motion import Chunk
 
 
 @dataclass

@@ -11,14 +11,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
+from camtool.arrays import Bools, Floats
 from camtool.geometry.polylines import Polyline
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-
 
 GRID_MM = 1e-9
 """shapely unites on this grid: without one it has lost whole parts of nearly equal arcs."""

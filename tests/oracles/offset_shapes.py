@@ -12,13 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
+from camtool.arrays import Bools, Floats
 from camtool.geometry.polylines import Polyline
 from tests.oracles.offset import (
     EXACT_MM,
     GRID_MM,
     Arc,
-    Bools,
-    Floats,
     chords,
     dense,
     distance,

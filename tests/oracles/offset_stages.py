@@ -7,10 +7,11 @@ from collections import defaultdict
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import Frames, point_at
 from camtool.geometry.offset import Slices
-from camtool.geometry.polylines import Bools, Floats, Ints, Segments
+from camtool.geometry.polylines import Segments
 
 U_TURN_RAD = 1e-3
 ALONG = (0.5, 0.03, 0.2, 0.35, 0.65, 0.8, 0.97)

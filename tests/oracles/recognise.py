@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tests.oracles.arcs import Floats
+from camtool.arrays import Floats
 
 
 def least_squares_circle(points: Floats) -> tuple[Floats, float]:

@@ -6,7 +6,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats, Polyline
+from camtool.arrays import Floats
+from camtool.geometry.polylines import Polyline
 
 CHORDS = 2048
 """So many points stand for each arc."""

@@ -7,15 +7,13 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline
 from camtool.planning.contours import runs_of as cut_of
 from camtool.planning.items import Contour, Run
 from tests.oracles.arcs import FLAT, centre_of
-
-Floats = npt.NDArray[np.float64]
 
 
 def runs_of(contour: Contour, path: Polyline) -> tuple[list[Run], list[Finding]]:

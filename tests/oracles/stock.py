@@ -15,10 +15,9 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from camtool.arrays import Bools, Floats, Ints
+
 Path = Sequence[tuple[float, float, float]]
 """A closed path: x, y, bulge of the side that leaves there (tan of a quarter of its sweep)."""
 
@@ -285,7 +284,7 @@ class Walls:
     b: Floats
     centre: Floats
     sweep: Floats
-    ring: npt.NDArray[np.int64]
+    ring: Ints
 
     @classmethod
     def of(cls, paths: Sequence[Path]) -> Walls:
@@ -341,7 +340,7 @@ class Walls:
                 odd ^= beyond & inside
         return odd
 
-    def samples(self, spacing: float) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
+    def samples(self, spacing: float) -> tuple[Floats, Floats, Ints]:
         """(J, 2) places on the sides (not their ends), (J, 2) the left normals there, and (J,)
         the path of each."""
         places, normals, rings = [], [], []

@@ -13,11 +13,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from tests.oracles.stock import CELL_MM, POINT_MM, Cutter, Floats, Move, Path, Stock, Walls
+from camtool.arrays import Bools, Floats, Ints
+from tests.oracles.stock import CELL_MM, POINT_MM, Cutter, Move, Path, Stock, Walls
 
 Rng = np.random.Generator
 
@@ -69,7 +69,7 @@ class Seen:
     chips: list[float]
     places: list[tuple[float, float]]
     points: Floats
-    row: npt.NDArray[np.int64]
+    row: Ints
 
 
 def complaints(asked: Asked, moves: list[Move], findings: Collection[str]) -> list[str]:
@@ -180,7 +180,7 @@ def _gouges(asked: Asked, seen: Seen, walls: Walls, said: set[str]) -> Iterator[
             yield f"stray: {stray[k]:.2f} mm farther than expected, line {line}"
 
 
-def _at_corner(asked: Asked, walls: Walls, points: Floats) -> npt.NDArray[np.bool_]:
+def _at_corner(asked: Asked, walls: Walls, points: Floats) -> Bools:
     """Points from which the tool's edge reaches a corner of the drawing, and no farther."""
     apart, _ = cKDTree(walls.a).query(points)
     return np.asarray((apart >= asked.away - GOUGE_MM) & (apart <= 1.5 * asked.away))

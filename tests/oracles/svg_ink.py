@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import resvg_py
 
+from camtool.arrays import Bools
 from tests.oracles.png import SIGNATURE
 
 Extents = tuple[float, float, float, float]
@@ -25,7 +26,7 @@ Extents = tuple[float, float, float, float]
 class Picture:
     """`inked` (height, width): where there is ink; `zoom` of its pixels make a px of the page."""
 
-    inked: npt.NDArray[np.bool_]
+    inked: Bools
     zoom: int
 
     @property

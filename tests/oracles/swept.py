@@ -11,18 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
+from camtool.arrays import Floats
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.items import Run
-from tests.oracles.offset import (
-    GRID_MM,
-    Floats,
-    chords,
-    dense,
-    distance,
-    inside,
-    near_region,
-    pieces,
-)
+from tests.oracles.offset import GRID_MM, chords, dense, distance, inside, near_region, pieces
 
 CHORD_RAD = 0.05
 """Sweep of the chords that stand for the edges of discs, at first."""

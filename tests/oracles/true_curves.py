@@ -16,13 +16,11 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from camtool.arrays import Floats
 from camtool.machine.model import Machine
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.moves import Toolpath
-
-Floats = NDArray[np.float64]
 
 POINTS = 4000
 """A curve is sampled at so many places: chords of a half circle stray by a ten millionth of it."""

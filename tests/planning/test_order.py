@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.arrays import Ints
 from camtool.errors import OptionError
-from camtool.geometry.polylines import Ints, Polyline
+from camtool.geometry.polylines import Polyline
 from camtool.planning.items import Contour, Feeds, Fixed, Item, Run, Setting
 from camtool.planning.job import Operation
 from camtool.planning.order import (

@@ -3,17 +3,15 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camtool.arrays import Floats
 from camtool.machine.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.postprocessors.i8751_machines import SAMPLE
-
-Floats = npt.NDArray[np.float64]
 
 # How far the decoded path may lie from the arc: a chord's sagitta of a unit or step (or the
 # tolerance that the machine file gives to lines), and its points' own rounding, mm.

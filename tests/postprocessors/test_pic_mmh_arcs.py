@@ -24,8 +24,6 @@ STEP_MM = 0.00014
 SEED = 20240607
 EQUAL = ["controller.arc_end=equal"]
 
-Floats = np.typing.NDArray[np.float64]
-
 
 def random_path(rng: np.random.Generator, count: int, low_mm: float, high_mm: float) -> Toolpath:
     """`count` arcs and `count` lines in random order, each beginning where the last one ended:

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camtool.arrays import Floats
 from camtool.kernels.lattice import to_steps
 from camtool.machine.loader import build_machine, read_table
-from camtool.simulation.motion import Chunk, Floats
+from camtool.simulation.motion import Chunk
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath

@@ -9,11 +9,12 @@ from camtool_postprocessors.linuxcnc.controller import assumptions, merged
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.arrays import Floats
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
 from camtool.machine.registry import load_target
-from camtool.simulation.motion import CHUNK_STEPS, Floats, Options
+from camtool.simulation.motion import CHUNK_STEPS, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from camtool.arrays import Floats, Ints
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import ALL, IDEAL, Effects, Floats, Ints
+from camtool.simulation.motion import ALL, IDEAL, Effects
 from tests.oracles.mechanics import LiteralMechanics
 from tests.oracles.path_machine import STEP, path_machine
 

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from camtool.arrays import Floats
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import ALL, Floats
+from camtool.simulation.motion import ALL
 from tests.oracles.mechanics import deviates, split_mix_64
 from tests.oracles.path_machine import path_machine
 

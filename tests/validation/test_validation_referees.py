@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.machine.registry import load_target
-from camtool.simulation.motion import IDEAL, Floats, Options
+from camtool.simulation.motion import IDEAL, Options
 from camtool.simulation.simulate import simulate
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.validation.page import check, mm, signed

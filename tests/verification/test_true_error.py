@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from camtool.api import as_drawing, read_drawing, verify
+from camtool.arrays import Floats
 from camtool.findings import Code
 from camtool.jobs.drawing import read_to_scale
 from camtool.machine.registry import load_target
 from camtool.pipeline import Posted, post_drawing
 from camtool.planning.job import Job, Tool, job_of
-from tests.oracles.true_curves import Floats, distances, drawn, slides_cutting
+from tests.oracles.true_curves import distances, drawn, slides_cutting
 
 ROOT = Path(__file__).parents[2]
 SCALES = (0.05, 1.0, 40.0)

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Ints
 from camtool.errors import DrawingError
-from camtool.geometry.polylines import Ints
 from camtool.importers.formats import BINARY_DXF
 
 MAX_BYTES = 100_000_000

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
 from camtool.geometry.fit import (
     BezierCurve,
@@ -28,7 +29,7 @@ from camtool.geometry.fit import (
     fit_curve,
     split_bulges,
 )
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.importers.pieces import MAX_COORDINATE_MM
 
 FLAT_TILT = 1e-4

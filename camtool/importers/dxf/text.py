@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats
+from camtool.arrays import Floats
 from camtool.importers.dxf.load import printable
 from camtool.importers.dxf.mtext import write_mtext
 from camtool.importers.dxf.shapes import Unusable, require

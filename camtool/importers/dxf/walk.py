@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Mark
-from camtool.geometry.polylines import Floats
 from camtool.importers.dxf.load import printable
 from camtool.importers.dxf.shapes import (
     Frame,

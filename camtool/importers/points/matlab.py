@@ -24,8 +24,8 @@ from typing import NoReturn
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError
-from camtool.geometry.polylines import Floats
 from camtool.importers.points.tables import Stroke, Table
 
 MM_PER_UNIT = 0.1

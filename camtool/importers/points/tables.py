@@ -14,8 +14,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError
-from camtool.geometry.polylines import Floats
 from camtool.units import MM_PER_UNIT
 
 COLUMNS = (2, 3)

@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError
 from camtool.geometry.curves import Curve, EllipseCurve, FunctionCurve, SplineCurve
 from camtool.geometry.fit import arc_vertices, fit_curve
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.solid.bodies import Body, subshapes
 
 SECTION_MARGIN = 0.1

@@ -13,11 +13,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped
 from camtool.geometry.fit import BezierCurve, Curve, EllipseCurve, arc_vertices, fit_curve
-from camtool.geometry.polylines import POSITION_EPS_MM, Floats
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.assemble import assemble, font_findings
 from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions

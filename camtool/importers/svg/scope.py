@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from camtool.geometry.polylines import Floats
+from camtool.arrays import Floats
 from camtool.importers.svg.shapes import Lengths
 from camtool.importers.svg.style import Style
 from camtool.importers.svg.transform import (

@@ -18,8 +18,8 @@ from itertools import accumulate
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError
-from camtool.geometry.polylines import Floats
 from camtool.importers.options import ReadOptions
 from camtool.importers.svg.style import FONT_PX
 from camtool.importers.svg.transform import MAX_NUMBER, NUMBER, in_bounds, parse_numbers

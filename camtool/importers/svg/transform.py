@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.errors import DrawingError
-from camtool.geometry.polylines import Floats
 
 MAX_NUMBER = 1e12
 """Numbers beyond this belong to no drawing; their products could overflow."""

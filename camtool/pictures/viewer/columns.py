@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.pictures.colours import BINS
 from camtool.pictures.content import bare_starts
-from camtool.pictures.scene import Floats, Ints, Playback, Scene
+from camtool.pictures.scene import Playback, Scene
 from camtool.pictures.strokes import strokes_of, turns_of
 from camtool.pictures.trace import Trace, bins_of, nearest_points
 from camtool.toolpath.moves import Kind, Toolpath
@@ -167,9 +168,9 @@ def _wanted(wanted: Segments | None) -> Columns:
 
 def _bends(
     name: str,
-    is_arc: npt.NDArray[np.bool_],
-    centre: npt.NDArray[np.float64],
-    sweep: npt.NDArray[np.float64],
+    is_arc: Bools,
+    centre: Floats,
+    sweep: Floats,
 ) -> Columns:
     """Which rows are arcs, and the centre x, y and sweep of each."""
     rows = np.flatnonzero(is_arc)

@@ -20,6 +20,7 @@ from itertools import cycle
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.geometry.drawing import Drawing
 from camtool.pictures.colours import (
     BACK,
@@ -36,7 +37,7 @@ from camtool.pictures.colours import (
     on_dark,
 )
 from camtool.pictures.polar import ROOM, dial_of, notes, plot, shown
-from camtool.pictures.scene import Floats, Playback, Scene, Table, by_feed
+from camtool.pictures.scene import Playback, Scene, Table, by_feed
 from camtool.pictures.svg import Look, element, number
 from camtool.pictures.viewer.columns import Traced, columns_of, layer_names, packed, traced_of
 from camtool.units import UM_PER_MM

@@ -1,0 +1,13 @@
+"""The types of arrays: numbers, whole numbers and truths, of any shape.
+
+Shapes are said where an array is used: `(K, 2)` mm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
