@@ -24,7 +24,6 @@ from camtool.toolpath.program import Program
 
 from ..gcode.checks import check_plain, feed_units, left_out, place, split_z
 from ..gcode.dialect import feed_decimals
-from ..gcode.format import Ints as Ints_here
 from ..gcode.format import NumberStyle, say_units
 from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
 from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
@@ -76,7 +75,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     )
 
 
-def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints_here, dialect: Dialect) -> None:
+def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: Dialect) -> None:
     far = (np.abs(rows.end) > MOST_MM * 10**dialect.decimals).any(axis=1)
     if far.any():
         raise PostError(
@@ -86,7 +85,7 @@ def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints_here, dialect
         )
 
 
-def _texts(units: Ints_here, dialect: Dialect) -> list[str]:
+def _texts(units: Ints, dialect: Dialect) -> list[str]:
     """Column of units (M,) as texts: "1.0", "-0.25"; zero has no minus."""
     texts = say_units(units, NumberStyle(dialect.decimals))
     if dialect.trailing_zeros:
@@ -147,7 +146,7 @@ class _Writer:
         self._said_feeds: dict[int, str] = {}
         self._feed = 0
 
-    def run(self, events: dict[int, str], of_row: Ints_here, feeds: Ints_here) -> None:
+    def run(self, events: dict[int, str], of_row: Ints, feeds: Ints) -> None:
         """All blocks; `of_row` (M,) names the toolpath's rows, `feeds` (M,) in units of F."""
         table, dialect = self._table, self._dialect
         sign = 1 if dialect.z_up == "+" else -1
@@ -180,7 +179,7 @@ class _Writer:
                 self._move(WORD[kind], target, row, feed, at)
             at = xy[index]
 
-    def _xy_texts(self, units: Ints_here) -> list[str]:
+    def _xy_texts(self, units: Ints) -> list[str]:
         x, y = (_texts(units[:, axis], self._dialect) for axis in (0, 1))
         return [f"X{one} Y{two}" for one, two in zip(x, y, strict=True)]
 
