@@ -1,4 +1,10 @@
-"""What the numbers and words of a job may be: OptionError with the mend for all others."""
+"""The Job: what is to be cut and how, as far as the user says it.
+
+A job places the drawing (`Placement`), may say what the stock is (`Stock`), and lists operations
+in the order in which they are cut. An operation takes the paths of its layers and colours, and
+says how: the tool, where it runs, how deep, how it goes in and out. What is None is left to the
+machine. `job_of` makes the job of a single operation from flat settings, as flags give them.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +15,53 @@ from typing import Any
 
 from camtool.errors import OptionError
 from camtool.patterns import matches
+
+KINDS = ("profile", "pocket", "engrave", "drill", "vcarve")
+"""Kinds of operation."""
+
+SIDES = ("on", "outside", "inside", "auto")
+"""Where the tool of a profile runs: on the line, around it, within it, or as the nesting says."""
+
+DIRECTIONS = ("drawn", "climb", "conventional")
+"""Which way round: as drawn, or with the tool's teeth going with or against the feed."""
+
+PATTERNS = ("contour", "zigzag")
+"""How a pocket is cleared: parallel to its contours from inside out, or in straight lines."""
+
+JOINS = ("round", "mitre", "sharp")
+"""What the tool's middle does about an outer corner: an arc, a corner up to the mitre limit
+(else cut off), or a corner however long."""
+
+CORNERS = ("none", "dogbone", "overcut")
+"""What is done at inner corners that a round tool cannot fill: nothing; a relief towards the
+corner; or along one of its sides."""
+
+ENTRIES = ("plunge", "ramp", "helix")
+"""How the tool goes down: straight, sloping along the contour, or in a helix (pockets)."""
+
+LEADS = ("none", "line", "arc")
+"""How the tool comes to a contour and leaves it."""
+
+STARTS = ("nearest", "longest-line", "corner")
+"""Where a closed contour may begin, if not at a place given by hand."""
+
+ORIGINS = ("drawing", "lower-left", "centre")
+"""Where part zero lies: at the drawing's own zero, or at a place of the paths that are cut."""
+
+GOALS = ("rapids", "reversals")
+"""What the order is chosen for: short rapids, or few reversals while cutting."""
+
+FRAMES = ("*border*", "*frame*", "*title*")
+"""Layers, by patterns of their names, of what belongs to the sheet of paper."""
+
+THROUGH_MM = 1.0
+"""How far cuts may go below a stock, into the spoilboard, where nobody says how far."""
+
+THROUGH_SHARE = 0.5
+"""And no farther than this part of its thickness: thin stock has a thin board under it."""
+
+TOOL_KINDS = ("flat", "v", "drill")
+"""Shapes of tools: an end mill (or a point of no width), a V bit, a drill."""
 
 MOST = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "": 1e6}
 """The most that a number of this unit may be, as in `camtool.machine.ranges`: 100 m, 167 m/s,
@@ -28,7 +81,7 @@ MOST_MOVES = 1_000_000
 program of some 25 MB."""
 
 
-def above_zero(name: str, value: float | None, unit: str, most: float | None = None) -> None:
+def above_zero(name: str, value: float | None, unit: str) -> None:
     """Refuse a number that is given (not None) and not above 0, or not plausible."""
     if value is None:
         return
@@ -41,7 +94,7 @@ def above_zero(name: str, value: float | None, unit: str, most: float | None = N
         raise OptionError(
             f"{_said(name, value, unit)} is less than {LEAST:g}", mend=f"give a larger {name}"
         )
-    _at_most(name, value, unit, most)
+    _at_most(name, value, unit, None)
 
 
 def all_above_zero(name: str, values: Sequence[float], unit: str = "") -> None:
@@ -96,81 +149,6 @@ def one_of(name: str, value: str, known: Sequence[str]) -> None:
         raise OptionError(f"unknown {name} {value!r}", mend=f"use one of {', '.join(known)}")
 
 
-# Settings of a job that are fine one by one and cannot be together: OptionError names the key.
-
-
-def refuse_tool(tool: Tool) -> None:
-    """Refuse a tip that is no cone, or as wide as its tool."""
-    angle = tool.tip_angle_rad
-    if angle is not None and not 0.0 < angle < math.pi:
-        raise OptionError(
-            f"tip angle {math.degrees(angle):g}° is not between 0 and 180°",
-            mend="give the full angle of the cone, such as 60deg",
-        )
-    if 0.0 < tool.diameter_mm <= tool.tip_diameter_mm:
-        raise OptionError(
-            f"the tip of {tool.tip_diameter_mm:g} mm is as wide as the tool",
-            where="key tip_diameter",
-            mend="give a smaller tip, or a wider tool",
-        )
-
-
-def refuse_entry(entry: Entry) -> None:
-    """Refuse a slope that is none."""
-    if not entry.angle_rad < 0.5 * math.pi:
-        raise OptionError(
-            f"ramp angle {math.degrees(entry.angle_rad):g}° is not below 90°",
-            mend="give a smaller angle, or plunge",
-        )
-
-
-def refuse_operation(operation: Operation) -> None:
-    """Refuse an operation whose settings contradict one another."""
-    depth, last = operation.depth_mm, operation.last_pass_mm
-    if depth is not None and last is not None and last > depth:
-        raise OptionError(
-            f"the last pass of {last:g} mm is deeper than the whole cut of {depth:g} mm",
-            where=f"{_named(operation)}key last_pass",
-            mend="give a smaller last pass, or a larger depth",
-        )
-    if operation.entry.kind == "helix" and operation.kind != "pocket":
-        raise OptionError(
-            f"a helix goes into pockets, not into what the kind {operation.kind} cuts",
-            where=f"{_named(operation)}key entry",
-            mend='use "ramp" or "plunge"',
-        )
-
-
-def refuse_placement(placement: Placement) -> None:
-    """Refuse a placement of numbers that are none, and of settings that contradict each other."""
-    if placement.fit_mm is not None:
-        _refuse_fit(placement.fit_mm)
-        if placement.scale != 1.0:
-            raise OptionError(
-                f"scale {placement.scale:g} and fit contradict each other",
-                where="key scale",
-                mend="give one of the two",
-            )
-    _refuse_beyond("pitch", placement.pitch_mm, -MOST["mm"], MOST["mm"])
-    if not isinstance(placement.origin, str):
-        _refuse_beyond("origin", placement.origin, -FARTHEST_MM, FARTHEST_MM)
-    for what, count, pitch in zip(
-        ("columns", "rows"), placement.copies, placement.pitch_mm, strict=True
-    ):
-        if count > 1 and pitch == 0.0:
-            raise OptionError(
-                f"{count} {what} of copies lie on one another",
-                where="key copies",
-                mend="give the pitch from one copy to the next",
-            )
-    if placement.copies == (1, 1) and any(placement.pitch_mm):
-        raise OptionError(
-            "a pitch, but no copies",
-            where="key pitch",
-            mend="give copies too, such as 3x2, or leave the pitch out",
-        )
-
-
 def _refuse_fit(fit_mm: tuple[float, float]) -> None:
     _refuse_beyond("fit", fit_mm, 0.0, MOST["mm"])
     if not any(fit_mm):
@@ -192,65 +170,6 @@ def _refuse_beyond(key: str, lengths: tuple[float, float], least: float, most: f
             )
 
 
-def _named(operation: Operation) -> str:
-    return f"operation {operation.name!r}, " if operation.name else ""
-
-
-# The Job: what is to be cut and how, as far as the user says it.
-#
-# A job places the drawing (`Placement`), may say what the stock is (`Stock`), and lists operations
-# in the order in which they are cut. An operation takes the paths of its layers and colours, and
-# says how: the tool, where it runs, how deep, how it goes in and out. What is None is left to the
-# machine. `job_of` makes the job of a single operation from flat settings, as flags give them.
-
-KINDS = ("profile", "pocket", "engrave", "drill", "vcarve")
-"""Kinds of operation."""
-
-SIDES = ("on", "outside", "inside", "auto")
-"""Where the tool of a profile runs: on the line, around it, within it, or as the nesting says."""
-
-DIRECTIONS = ("drawn", "climb", "conventional")
-"""Which way round: as drawn, or with the tool's teeth going with or against the feed."""
-
-PATTERNS = ("contour", "zigzag")
-"""How a pocket is cleared: parallel to its contours from inside out, or in straight lines."""
-
-JOINS = ("round", "mitre", "sharp")
-"""What the tool's middle does about an outer corner: an arc, a corner up to the mitre limit
-(else cut off), or a corner however long."""
-
-CORNERS = ("none", "dogbone", "overcut")
-"""What is done at inner corners that a round tool cannot fill: nothing; a relief towards the
-corner; or along one of its sides."""
-
-ENTRIES = ("plunge", "ramp", "helix")
-"""How the tool goes down: straight, sloping along the contour, or in a helix (pockets)."""
-
-LEADS = ("none", "line", "arc")
-"""How the tool comes to a contour and leaves it."""
-
-STARTS = ("nearest", "longest-line", "corner")
-"""Where a closed contour may begin, if not at a place given by hand."""
-
-ORIGINS = ("drawing", "lower-left", "centre")
-"""Where part zero lies: at the drawing's own zero, or at a place of the paths that are cut."""
-
-GOALS = ("rapids", "reversals")
-"""What the order is chosen for: short rapids, or few reversals while cutting."""
-
-FRAMES = ("*border*", "*frame*", "*title*")
-"""Layers, by patterns of their names, of what belongs to the sheet of paper."""
-
-THROUGH_MM = 1.0
-"""How far cuts may go below a stock, into the spoilboard, where nobody says how far."""
-
-THROUGH_SHARE = 0.5
-"""And no farther than this part of its thickness: thin stock has a thin board under it."""
-
-TOOL_KINDS = ("flat", "v", "drill")
-"""Shapes of tools: an end mill (or a point of no width), a V bit, a drill."""
-
-
 @dataclass(frozen=True)
 class Tool:
     """A tool; diameter 0 is a point that cuts no width. A V bit and a drill have a
@@ -267,7 +186,18 @@ class Tool:
         at_least_zero("tool diameter", self.diameter_mm, "mm", MOST_WIDE_MM)
         at_least_zero("tip diameter", self.tip_diameter_mm, "mm", MOST_WIDE_MM)
         one_of("kind of tool", self.kind, TOOL_KINDS)
-        refuse_tool(self)
+        angle = self.tip_angle_rad
+        if angle is not None and not 0.0 < angle < math.pi:
+            raise OptionError(
+                f"tip angle {math.degrees(angle):g}° is not between 0 and 180°",
+                mend="give the full angle of the cone, such as 60deg",
+            )
+        if 0.0 < self.diameter_mm <= self.tip_diameter_mm:
+            raise OptionError(
+                f"the tip of {self.tip_diameter_mm:g} mm is as wide as the tool",
+                where="key tip_diameter",
+                mend="give a smaller tip, or a wider tool",
+            )
 
     @property
     def radius_mm(self) -> float:
@@ -288,7 +218,11 @@ class Entry:
         one_of("entry", self.kind, ENTRIES)
         above_zero("ramp angle", self.angle_rad, "rad")
         above_zero("helix radius", self.radius_mm, "mm")
-        refuse_entry(self)
+        if not self.angle_rad < 0.5 * math.pi:
+            raise OptionError(
+                f"ramp angle {math.degrees(self.angle_rad):g}° is not below 90°",
+                mend="give a smaller angle, or plunge",
+            )
 
 
 @dataclass(frozen=True)
@@ -402,7 +336,24 @@ class Operation:
                 f"step-over {self.step_over:g} is not above 0 and at most 1",
                 mend="give the part of the tool's diameter that each way takes, such as 0.4",
             )
-        refuse_operation(self)
+        self._refuse_contradictions()
+
+    def _refuse_contradictions(self) -> None:
+        """Settings that are fine one by one and cannot be together."""
+        named = f"operation {self.name!r}, " if self.name else ""
+        depth, last = self.depth_mm, self.last_pass_mm
+        if depth is not None and last is not None and last > depth:
+            raise OptionError(
+                f"the last pass of {last:g} mm is deeper than the whole cut of {depth:g} mm",
+                where=f"{named}key last_pass",
+                mend="give a smaller last pass, or a larger depth",
+            )
+        if self.entry.kind == "helix" and self.kind != "pocket":
+            raise OptionError(
+                f"a helix goes into pockets, not into what the kind {self.kind} cuts",
+                where=f"{named}key entry",
+                mend='use "ramp" or "plunge"',
+            )
 
     def takes(self, layer: str, colour: str = "") -> bool:
         """Whether the paths of this layer and colour are cut."""
@@ -434,7 +385,36 @@ class Placement:
         finite("rotation", self.rotate_rad, "rad")
         above_zero("scale", self.scale, "")
         all_above_zero("copies", self.copies)
-        refuse_placement(self)
+        self._refuse_contradictions()
+
+    def _refuse_contradictions(self) -> None:
+        """Settings that are fine one by one and cannot be together, and lengths that are none."""
+        if self.fit_mm is not None:
+            _refuse_fit(self.fit_mm)
+            if self.scale != 1.0:
+                raise OptionError(
+                    f"scale {self.scale:g} and fit contradict each other",
+                    where="key scale",
+                    mend="give one of the two",
+                )
+        _refuse_beyond("pitch", self.pitch_mm, -MOST["mm"], MOST["mm"])
+        if not isinstance(self.origin, str):
+            _refuse_beyond("origin", self.origin, -FARTHEST_MM, FARTHEST_MM)
+        for what, count, pitch in zip(
+            ("columns", "rows"), self.copies, self.pitch_mm, strict=True
+        ):
+            if count > 1 and pitch == 0.0:
+                raise OptionError(
+                    f"{count} {what} of copies lie on one another",
+                    where="key copies",
+                    mend="give the pitch from one copy to the next",
+                )
+        if self.copies == (1, 1) and any(self.pitch_mm):
+            raise OptionError(
+                "a pitch, but no copies",
+                where="key pitch",
+                mend="give copies too, such as 3x2, or leave the pitch out",
+            )
 
 
 @dataclass(frozen=True)
