@@ -10,6 +10,7 @@ arcs, and the inner one never crosses the outer one: they run together, part, an
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -39,7 +40,13 @@ LEAST_FOOT = 1e-3
 0.068 of it, that of a corner of 156 degrees is just so large."""
 
 PROBES = (0.0, 0.3, 0.5, 0.7, 1.0)
-"""Where a stretch between two vertices is measured."""
+"""Where a stretch between two vertices is measured; its ends say nothing on whether it runs
+together with something, only on how far it leads."""
+
+PARTING = 4.0
+"""Ends of stretches that meet no other are one place when they are no farther apart than so many
+times √(2 r · TOGETHER_MM), on which a disc of radius r comes off a straight wall by TOGETHER_MM:
+where it does is not seen more sharply."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +77,8 @@ def unreached(
     reached = opened(region, tool_radius_mm)
     least = least_foot * np.pi * tool_radius_mm**2
     found = []
-    for piece in regions(_without(region, reached, least)):
+    parting = PARTING * math.sqrt(2.0 * tool_radius_mm * TOGETHER_MM)
+    for piece in regions(_without(region, reached, least, parting)):
         area = float(signed_areas(piece).sum())
         if area >= least:
             found.append(Unreached(area, _far_place(piece, reached), piece))
@@ -87,7 +95,9 @@ def _far_place(piece: Polylines, reached: Polylines) -> tuple[float, float]:
     return x, y
 
 
-def _without(region: Polylines, reached: Polylines, least_mm2: float) -> Polylines:
+def _without(
+    region: Polylines, reached: Polylines, least_mm2: float, parting_mm: float
+) -> Polylines:
     """The closed paths around what is in the region and not in `reached`, a part of it.
 
     Pieces that are surely smaller than `least_mm2` may be left out.
@@ -97,7 +107,8 @@ def _without(region: Polylines, reached: Polylines, least_mm2: float) -> Polylin
     inner = _apart(reached, region, least_mm2)
     stretches = [*_apart(region, reached, least_mm2), *map(reverse, inner)]
     whole = [path for path in stretches if path.closed]
-    return Polylines.of([*whole, *_closed([path for path in stretches if not path.closed])])
+    opens = [path for path in stretches if not path.closed]
+    return Polylines.of([*whole, *_closed(opens, parting_mm)])
 
 
 def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
@@ -114,7 +125,7 @@ def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polylin
     probes = (low[:, None] + (high - low)[:, None] * parts).ravel()
     points = point_at(segments, np.repeat(row, len(parts)), probes)
     away = _distances(points, Segments.of(other)).reshape(-1, len(parts))
-    wanted = np.asarray((away > TOGETHER_MM).any(axis=1))
+    wanted = np.asarray((away[:, 1:-1] > TOGETHER_MM).any(axis=1))
     lengths = segment_lengths(segments)[row] * (high - low)
     first = np.searchsorted(segments.path[row], np.arange(len(lines) + 1))
     found: list[Polyline] = []
@@ -194,12 +205,17 @@ def _at_any(points: Floats, others: Floats) -> Bools:
     return np.isin(node[: len(points)], node[len(points) :])
 
 
-def _closed(stretches: list[Polyline]) -> list[Polyline]:
+def _closed(stretches: list[Polyline], parting_mm: float) -> list[Polyline]:
     """Open stretches joined to closed paths; those that lead nowhere are left out."""
     if not stretches:
         return []
     ends = np.array([[path.start, path.end] for path in stretches]).reshape(-1, 2)
     node = merge_points(ends, SAME_PLACE_MM)[0].reshape(-1, 2)
+    lost = np.flatnonzero(~np.isin(node[:, 0], node[:, 1]))
+    for row in np.flatnonzero(~np.isin(node[:, 1], node[:, 0])).tolist():
+        apart = np.hypot(*(ends[2 * lost] - ends[2 * row + 1]).T)
+        if apart.min(initial=math.inf) <= parting_mm:
+            node[row, 1] = node[lost[apart.argmin()], 0]
     leaving: dict[int, list[int]] = defaultdict(list)
     for row, place in enumerate(node[:, 0].tolist()):
         leaving[place].append(row)
@@ -231,7 +247,7 @@ def _turn(arriving: Frames, leaving: Frames) -> float:
 
 def _joined(stretches: list[Polyline]) -> list[Polyline]:
     """Stretches that follow each other as one closed path; none when it is but a speck."""
-    vertices = np.concatenate([path.vertices[:-1] for path in stretches])
+    vertices = np.concatenate([path.vertices for path in stretches])
     step = np.roll(vertices[:, :2], -1, axis=0) - vertices[:, :2]
     vertices = vertices[np.hypot(*step.T) > SAME_PLACE_MM]
     if len(vertices) < 2 or (len(vertices) == 2 and not vertices[:, 2].any()):

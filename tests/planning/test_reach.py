@@ -110,6 +110,29 @@ def test_a_disc_that_comes_away_beside_a_corner() -> None:
     assert pieces[0].at_mm == pytest.approx((16.7561731, -9.72734737))
 
 
+def test_a_disc_that_comes_away_beside_an_island() -> None:
+    # Failed once: the disc slips round the island so flatly that its ends were 5 µm apart.
+    plate = closed(
+        (-2.0, 0.0),
+        (-1.0, math.sqrt(3.0)),
+        (1.0, math.sqrt(3.0)),
+        (14.82852027, -2.26163364),
+        (0.47967713, -2.98118749),
+        (-3.0, -5.19615242),
+    )
+    first = closed((0.63125, 0.0), (0.584375, 0.02706329), (0.584375, -0.02706329))
+    second = closed(
+        (-0.33, -0.51961524),
+        (-0.3, -0.48961524),
+        (-0.27252253, -0.5379751),
+        (-0.41450964, -0.74325358),
+    )
+    region, radius = region_of([plate, first, second]), 1.4189939360740422
+    exact = float(signed_areas(region).sum() - signed_areas(opened(region, radius)).sum())
+    found = sum(piece.area_mm2 for piece in unreached(region, radius, least_foot=0.0))
+    assert found == pytest.approx(exact, abs=1e-5)
+
+
 def test_nothing_is_out_of_reach_of_a_point() -> None:
     assert unreached(region_of([SQUARE]), 0.0) == []
 
