@@ -10,47 +10,39 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
+from camtool.calibration.calibrate import Calibration
+from camtool.comparison import Comparison
 from camtool.errors import CamtoolError, MachineError, OptionError, ProgramError
-from camtool.geometry.drawing import Drawing as DrawingRecord
+from camtool.geometry.drawing import Drawing
 from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE, Given, Key, layers
 from camtool.machine.loader import extended_by
 from camtool.machine.registry import ListedTarget, LoadedTarget, list_target, target_names
+from camtool.pictures.picture import Picture
 from camtool.pictures.scene import Scene
 from camtool.pipeline import Judging
-from camtool.pipeline import Posted as PostedRecord
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.job import job_of as made
-from camtool.run import (
-    Calibration,
-    Comparison,
-    Converted,
-    Drawing,
-    Picture,
-    Posted,
-    Shown,
-    Toolpath,
-    Verification,
-    extended,
-)
+from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
 from camtool.simulation.motion import Effects
-from camtool.toolpath.moves import Toolpath as ToolpathRecord
+from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 from camtool.units import parse_length
 from camtool.verification.report import Gates
+from camtool.verification.verify import Verification
 
 if TYPE_CHECKING:
     from camtool.calibration.measurements import Measurements
+    from camtool.machine.model import Machine
 
 
 __all__ = [
     "Calibration",
     "CamtoolError",
     "Comparison",
-    "Converted",
     "Drawing",
     "Effects",
     "Gates",
@@ -62,8 +54,8 @@ __all__ = [
     "Operation",
     "Picture",
     "Placement",
-    "Posted",
     "Reading",
+    "Run",
     "Stock",
     "Tool",
     "Toolpath",
@@ -124,7 +116,7 @@ def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
 
 def read_drawing(
     file: str | Path, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
-) -> Drawing:
+) -> ShownDrawing:
     """The drawing in a DXF, SVG, point list, STEP file or build123d script; mm, Y up.
 
     `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
@@ -148,14 +140,14 @@ def read_drawing(
     chosen = {key: _patterns(settings.pop(key, ())) for key in _SELECTION}
     chosen["colours"] = tuple(colour_named(colour) for colour in chosen["colours"])
     options = ReadOptions(**settings, select=Selection(**chosen))
-    return extended(Drawing, read(Path(file), options=options))
+    return ShownDrawing.of(read(Path(file), options=options))
 
 
 def read_job(
     file: str | Path,
     *,
     operations: Sequence[str] = (),
-    drawing: DrawingRecord | str | Path | None = None,
+    drawing: Drawing | str | Path | None = None,
     target: str | LoadedTarget | None = None,
 ) -> Job:
     """The job that a TOML file says: tools, operations in order, placement, stock; mm, rad, s,
@@ -169,7 +161,7 @@ def read_job(
     from camtool.jobs.drawing import refuse_unmatched
 
     job = job_of_file(Path(file), _patterns(operations))
-    if isinstance(drawing, DrawingRecord):
+    if isinstance(drawing, Drawing):
         refuse_unmatched(drawing, job)
     elif drawing is not None:
         as_drawing(drawing, target, job)
@@ -177,13 +169,13 @@ def read_job(
 
 
 def as_drawing(
-    drawing: DrawingRecord | str | Path, target: str | LoadedTarget | None, job: Job
-) -> DrawingRecord:
+    drawing: Drawing | str | Path, target: str | LoadedTarget | None, job: Job
+) -> Drawing:
     """The drawing, or what is in its file on the layers that the job's operations take."""
     from camtool.importers.pieces import NoMatchError
     from camtool.jobs.drawing import layers_of, read_to_scale, refuse_unmatched, unmatched
 
-    if isinstance(drawing, DrawingRecord):
+    if isinstance(drawing, Drawing):
         return drawing
     try:
         read = read_to_scale(
@@ -300,8 +292,8 @@ def _as_toml(value: Any) -> str:
 
 
 def plan(
-    drawing: DrawingRecord | str | Path, target: str | LoadedTarget, job: Job | None = None
-) -> Toolpath:
+    drawing: Drawing | str | Path, target: str | LoadedTarget, job: Job | None = None
+) -> ShownToolpath:
     """The moves that cut the drawing: work frame, mm, mm/min, in order of execution.
 
     N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, all
@@ -314,18 +306,18 @@ def plan(
     loaded, wanted = as_target(target), job or Job()
     read = as_drawing(drawing, loaded, wanted)
     made = planned(read, wanted, loaded.machine)
-    return extended(Toolpath, made, drawing=read, job=wanted, target=loaded)
+    return ShownToolpath.of(made, read, wanted, loaded)
 
 
 def post(
-    drawing: DrawingRecord | str | Path,
+    drawing: Drawing | str | Path,
     target: str | LoadedTarget,
     job: Job | None = None,
     *,
     check: bool = True,
     compensate: bool = False,
     gates: Gates | None = None,
-) -> Posted:
+) -> Run:
     """The drawing as a program of the target, read back, simulated and judged.
 
     `data` are the program's bytes, `verification` the verdict (None with `check=False`),
@@ -337,10 +329,7 @@ def post(
 
     loaded, wanted = as_target(target), job or Job()
     read = as_drawing(drawing, loaded, wanted)
-    made = post_drawing(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
-    verdict = verdict_on(made, loaded, drawing=read, job=wanted)
-    context = {"drawing": read, "job": wanted, "target": loaded}
-    return extended(Posted, made, verification=verdict, **context)
+    return post_drawing(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
 
 
 def convert(
@@ -350,7 +339,7 @@ def convert(
     *,
     feed_mm_min: float | None = None,
     check: bool = True,
-) -> Converted:
+) -> Run:
     """A program of the machine `from_` as one of the machine `to`, read back, simulated and held
     against the first one's moves.
 
@@ -363,19 +352,7 @@ def convert(
 
     before, after = as_target(from_), as_target(to)
     data, source = as_bytes(program)
-    made = convert_program(data, before, after, file=source, feed_mm_min=feed_mm_min, check=check)
-    return extended(
-        Converted, made, verification=verdict_on(made, after), target=after, file=source
-    )
-
-
-def verdict_on(made: PostedRecord, target: LoadedTarget, **more: Any) -> Verification | None:
-    """The verdict on a program with what it was made from; None where there is none."""
-    if made.verification is None or made.decoded is None:
-        return None
-    data = b"" if made.program is None else made.program.data
-    context = {"data": data, "decoded": made.decoded, "target": target}
-    return extended(Verification, made.verification, **context, **more)
+    return convert_program(data, before, after, file=source, feed_mm_min=feed_mm_min, check=check)
 
 
 # Programs judged, one way or several, and machines measured.
@@ -385,10 +362,10 @@ def verify(
     program: bytes | Program | str | Path,
     target: str | LoadedTarget,
     *,
-    against: DrawingRecord | str | Path | None = None,
+    against: Drawing | str | Path | None = None,
     job: Job | None = None,
     judging: Judging | None = None,
-) -> Verification:
+) -> Run:
     """Any program of the target, run by a model of its controller and mechanics, and judged.
 
     `program`: its bytes, or the file they are in. With `against`, the slides' path is compared
@@ -402,11 +379,7 @@ def verify(
     loaded, wanted = as_target(target), job or Job()
     data, source = as_bytes(program)
     read = None if against is None else as_drawing(against, loaded, wanted)
-    decoded, found = verify_program(
-        data, loaded, source=source, drawing=read, job=wanted, judging=judging
-    )
-    context = {"target": loaded, "drawing": read, "job": wanted}
-    return extended(Verification, found, data=data, decoded=decoded, **context)
+    return verify_program(data, loaded, source=source, drawing=read, job=wanted, judging=judging)
 
 
 def compare(
@@ -414,7 +387,7 @@ def compare(
     target: str | LoadedTarget,
     ways: str | Mapping[str, str | LoadedTarget],
     *,
-    against: DrawingRecord | str | Path | None = None,
+    against: Drawing | str | Path | None = None,
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Comparison:
@@ -425,7 +398,7 @@ def compare(
     verdict on each way. Raises ProgramError with block and column, OptionError for ways that are
     none, and MachineError for values that the machine cannot have. Source: docs/verifying.md.
     """
-    from camtool.pipeline import Way, altered, compare_program, ways_of
+    from camtool.comparison import Way, altered, compare_program, ways_of
 
     loaded, wanted, how = as_target(target), job or Job(), judging or Judging()
     data, source = as_bytes(program)
@@ -436,8 +409,35 @@ def compare(
         chosen = [Way(name, as_target(each), how) for name, each in ways.items()]
     if not chosen:
         raise OptionError("there is nothing to compare", mend="give a target for each way")
-    found = compare_program(data, chosen, source=source, drawing=read, job=wanted)
-    return Comparison(data, source, tuple(chosen), tuple(found))
+    return compare_program(data, chosen, source=source, drawing=read, job=wanted)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Calibrated(Calibration):
+    """The numbers of `machine` that `measurements` say
+    (`camtool.calibration.calibrate.Calibration`): estimates with uncertainties, mm and rad.
+    `extends` is the user's machine file, as a table, that `machine_file` carries on."""
+
+    measurements: Measurements
+    machine: Machine
+    extends: Mapping[str, object]
+
+    @property
+    def machine_file(self) -> str:
+        """TOML text that `load_target(..., machine=FILE)` reads: the numbers that were found over
+        what was known, each with its uncertainty and its source behind it."""
+        from camtool.calibration.machine_file import machine_file
+
+        return machine_file(self, self.measurements, self.machine, dict(self.extends))
+
+    def __str__(self) -> str:
+        from camtool.calibration.calibrate import to_text
+
+        return to_text(self, self.machine)
+
+    def __repr__(self) -> str:
+        found = ", ".join(each.name for each in self.estimates if not each.region)
+        return f"<Calibration of {self.target} from {self.file}: {found or 'nothing'}>"
 
 
 def calibrate(
@@ -445,7 +445,7 @@ def calibrate(
     target: str | None = None,
     *,
     machine: str | Path | None = None,
-) -> Calibration:
+) -> Calibrated:
     """The machine's steps, play (mm) and squareness (rad) from measured coupons, each with its
     standard uncertainty.
 
@@ -468,13 +468,10 @@ def calibrate(
             "no machine is named", file=said.file, mend="give target, or name it in the file"
         )
     known = load_target(name, machine=own).machine
-    return extended(
-        Calibration,
-        calibrated(said, known),
-        measurements=said,
-        machine=known,
-        extends={"extends": name} if own is None else read_table(own),
-    )
+    found = calibrated(said, known)
+    values = {each.name: getattr(found, each.name) for each in fields(found)}
+    extends = {"extends": name} if own is None else read_table(own)
+    return Calibrated(**values, measurements=said, machine=known, extends=extends)
 
 
 # Pictures of what the other calls give.
@@ -495,8 +492,8 @@ class Looks(TypedDict, total=False):
 
 
 def preview(
-    what: DrawingRecord | ToolpathRecord | PostedRecord | Shown,
-    *beside: DrawingRecord | ToolpathRecord | PostedRecord | Shown,
+    what: Drawing | Toolpath | Shown,
+    *beside: Drawing | Toolpath | Shown,
     titles: Sequence[str] = (),
     **looks: Unpack[Looks],
 ) -> Picture:
@@ -509,7 +506,7 @@ def preview(
     """
     from camtool.pictures.options import Options
 
-    scenes = [_shown(each)._scene() for each in (what, *beside)]
+    scenes = [_shown(each).scene() for each in (what, *beside)]
     if len(titles) > len(scenes):
         raise TypeError(f"{len(titles)} titles for {len(scenes)} values")
     for row, title in enumerate(titles):
@@ -527,10 +524,8 @@ def _shown(what: Any) -> Shown:
     """The value, as one that has a picture."""
     if isinstance(what, Shown):
         return what
-    if isinstance(what, DrawingRecord):
-        return extended(Drawing, what)
-    if isinstance(what, ToolpathRecord):
-        return extended(Toolpath, what)
-    if isinstance(what, PostedRecord):
-        return extended(Toolpath, what.decoded or what.wanted)
+    if isinstance(what, Drawing):
+        return ShownDrawing.of(what)
+    if isinstance(what, Toolpath):
+        return ShownToolpath.of(what)
     raise TypeError(f"{type(what).__name__} has no picture")

@@ -1,149 +1,72 @@
-"""What `camtool.api` gives back: the house's own records, with what they were made from.
+"""The Run: one program, what it was made from, what its controller makes of it, and the verdict.
 
-Each is its record and nothing else to whoever takes one; besides, it prints as a few lines
-(`print(posted)`), and what has a picture shows it in a notebook (`_repr_svg_`).
+`camtool.pipeline` makes Runs; commands, batches and `import camtool` pass them on. Drawings and
+toolpaths that `import camtool` gives are here too: what has a picture shows it in a notebook.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from camtool.calibration.calibrate import Calibration as CalibrationRecord
 from camtool.errors import PostError
-from camtool.geometry.drawing import Drawing as DrawingRecord
-from camtool.pictures.picture import Picture, Shown
-from camtool.pipeline import Posted as PostedRecord
-from camtool.toolpath.moves import Kind
-from camtool.toolpath.moves import Toolpath as ToolpathRecord
-from camtool.verification.contrast import ContrastRow, row_of, table
-from camtool.verification.verify import Verification as VerificationRecord
+from camtool.findings import Finding, Severity, worst
+from camtool.geometry.drawing import Drawing
+from camtool.toolpath.moves import Kind, Toolpath
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from camtool.calibration.measurements import Measurements
-    from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
     from camtool.pictures.overlay import Overlay
     from camtool.pictures.scene import Scene
-    from camtool.pipeline import Way
     from camtool.planning.job import Job
-    from camtool.verification.contrast import Variant
+    from camtool.toolpath.program import Listing, Program
+    from camtool.verification.report import Report
+    from camtool.verification.verify import Verification
 
 
-__all__ = [
-    "Calibration",
-    "Comparison",
-    "Converted",
-    "Drawing",
-    "Picture",
-    "Posted",
-    "Shown",
-    "Toolpath",
-    "Verification",
-    "extended",
-]
+class Shown(ABC):
+    """A value that has a picture, and shows it in a notebook."""
 
+    @abstractmethod
+    def scene(self) -> Scene | Overlay:
+        """What its picture is of."""
 
-# Drawings, toolpaths, verdicts and programs, with what they were made from.
+    def _repr_svg_(self) -> str:
+        from camtool.pictures.picture import Picture
 
-Made = TypeVar("Made")
-
-
-def extended(kind: type[Made], record: Any, **more: Any) -> Made:
-    """The record as one of its extended `kind`, with `more` fields."""
-    values = {each.name: getattr(record, each.name) for each in fields(record)}
-    return kind(**(values | more))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Drawing(Shown, DrawingRecord):
-    """A drawing: exact lines and arcs, mm, Y up (`camtool.geometry.drawing.Drawing`)."""
-
-    def __repr__(self) -> str:
-        return f"<Drawing {self.file}: {_size(self)}, {_counted(self)}>"
-
-    def _scene(self) -> Scene:
-        from camtool.pipeline import picture
-
-        return picture(title=PurePath(self.file).name, drawing=self)
+        return Picture(self.scene()).svg
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Toolpath(Shown, ToolpathRecord):
-    """Moves in the work frame, mm and mm/min (`camtool.toolpath.moves.Toolpath`); `drawing`,
-    `job` and `target` are what it was planned from."""
+class Run(Shown):
+    """One program of `target`, and all that is known of it; None is what there is not.
 
-    drawing: DrawingRecord | None = None
-    job: Job | None = None
-    target: LoadedTarget | None = None
+    `source` names what it was made from, or the program's own file where others made it. `wanted`
+    are the moves that `drawing` and `job` ask for, `program` the bytes, `decoded` the moves that
+    the controller makes of them, `verification` the verdict on where the slides go. `program` is
+    None when planning found an error; `verification` is None then, and when it was not asked for.
+    `findings` are those of all stages. `before` is the same job without what it does against
+    reversals and play, where it does any of that.
+    """
 
-    def __repr__(self) -> str:
-        moves = int((self.kind <= int(Kind.ARC_CCW)).sum())
-        name = f" of {self.made_from}" if self.made_from else ""
-        return f"<Toolpath{name}: {moves} moves, {_noticed(len(self.findings))}>"
-
-    def _scene(self) -> Scene:
-        from camtool.pipeline import picture
-
-        return picture(
-            title=self.made_from,
-            drawing=self.drawing,
-            job=self.job,
-            toolpath=self,
-            machine=None if self.target is None else self.target.machine,
-        )
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Verification(Shown, VerificationRecord):
-    """The verdict on a program (`camtool.verification.verify.Verification`): `report` holds the
-    figures, `findings` what is to be said. `decoded` is the toolpath that the controller makes of
-    the program `data`; it was held against `drawing`, planned with `job`, where there is one."""
-
-    data: bytes
-    decoded: ToolpathRecord
+    source: str
     target: LoadedTarget
-    drawing: DrawingRecord | None = None
+    drawing: Drawing | None = None
     job: Job | None = None
-
-    def __str__(self) -> str:
-        return self.report.to_text()
-
-    def __repr__(self) -> str:
-        report = self.report
-        error = report.error_um.total.max
-        said = "no error known" if error is None else f"error {error:.2f} µm at most"
-        noticed = _noticed(len(self.findings))
-        return f"<Verification of {report.source} on {report.target}: {said}, {noticed}>"
-
-    def _scene(self) -> Scene:
-        from camtool.pipeline import listing_of, picture
-
-        return picture(
-            title=PurePath(self.report.source).name,
-            drawing=self.drawing,
-            job=self.job,
-            toolpath=self.decoded,
-            verification=self,
-            machine=self.target.machine,
-            listing=listing_of(self.data, self.target, self.decoded),
-        )
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Written(Shown, PostedRecord):
-    """A program for `target`, written, read back and judged (`camtool.pipeline.Posted`)."""
-
-    verification: Verification | None
-    target: LoadedTarget
+    wanted: Toolpath | None = None
+    program: Program | None = None
+    decoded: Toolpath | None = None
+    verification: Verification | None = None
+    findings: tuple[Finding, ...] = ()
+    before: Run | None = None
 
     @property
-    def source(self) -> str:
-        """What it was made of, as messages name it."""
-        return self.wanted.made_from
+    def failed(self) -> bool:
+        """True when a finding is an error: such a program must not be written."""
+        return worst(self.findings) >= Severity.ERROR
 
     @property
     def data(self) -> bytes:
@@ -156,129 +79,133 @@ class Written(Shown, PostedRecord):
             )
         return self.program.data
 
+    @property
+    def report(self) -> Report | None:
+        """The figures of the verdict: errors in µm, sizes in mm, times in s."""
+        return None if self.verification is None else self.verification.report
+
+    @property
+    def listing(self) -> Callable[[], Listing | None] | None:
+        """What gives the program block by block, when asked: None where its dialect cannot say
+        which bytes are which. None without a program."""
+        program, decoded, target = self.program, self.decoded, self.target
+        if program is None or decoded is None:
+            return None
+
+        def listing() -> Listing | None:
+            make = getattr(target.post, "listing", None)
+            if make is None:
+                return None
+            made: Listing = make(program.data, target.machine)
+            last = int(decoded.block.max()) if len(decoded) else -1
+            return made if last < len(made.blocks) else None
+
+        return listing
+
+    def scene(self, title: str | None = None) -> Scene:
+        """The program's moves, or those that were planned where there is none, over the drawing,
+        with the slides' path where it was judged. The title is the source's name unless another
+        one is given."""
+        from camtool.pictures.scene import scene_of
+
+        return scene_of(
+            title=PurePath(self.source).name if title is None else title,
+            drawing=self.drawing,
+            job=self.job,
+            toolpath=self.wanted if self.decoded is None else self.decoded,
+            verification=self.verification,
+            machine=self.target.machine,
+            listing=self.listing,
+        )
+
     def __str__(self) -> str:
-        return repr(self) if self.verification is None else self.verification.report.to_text()
+        return repr(self) if self.report is None else self.report.to_text()
 
     def __repr__(self) -> str:
         name, target = PurePath(self.source).name, self.target.machine.target.name
         made = "no program" if self.program is None else f"{len(self.program.data)} bytes"
-        noticed = _noticed(len(self.findings))
-        return f"<{type(self).__name__} {name} for {target}: {made}, {noticed}>"
+        error = None if self.report is None else self.report.error_um.total.max
+        judged = "" if error is None else f", error {error:.2f} µm at most"
+        return f"<Run of {name} on {target}: {made}{judged}, {_counted(self.findings)}>"
 
-    def _scene(self) -> Scene:
-        from camtool.pipeline import posted_scene
 
-        return posted_scene(self, self.target, title=PurePath(self.source).name)
+@dataclass(frozen=True, eq=False, repr=False)
+class ShownDrawing(Shown, Drawing):
+    """A drawing: exact lines and arcs, mm, Y up (`camtool.geometry.drawing.Drawing`)."""
+
+    @classmethod
+    def of(cls, drawing: Drawing) -> ShownDrawing:
+        """The drawing as one that shows itself."""
+        return _shown(cls, drawing)
+
+    def scene(self) -> Scene:
+        """The drawing, titled by its file."""
+        from camtool.pictures.scene import scene_of_drawing
+
+        return scene_of_drawing(self, PurePath(self.file).name)
+
+    def __repr__(self) -> str:
+        closed = int(self.paths.closed.sum())
+        contours = f"{closed} closed and {len(self.paths) - closed} open contours"
+        return f"<Drawing {self.file}: {_size(self)}, {contours}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Posted(Written):
-    """A drawing as a program, with what it was made from."""
+class ShownToolpath(Shown, Toolpath):
+    """Moves in the work frame, mm and mm/min (`camtool.toolpath.moves.Toolpath`); `drawing`,
+    `job` and `target` are what it was planned from."""
 
-    drawing: DrawingRecord
-    job: Job
+    drawing: Drawing | None = None
+    job: Job | None = None
+    target: LoadedTarget | None = None
 
-    @property
-    def source(self) -> str:
-        """The drawing's file."""
-        return self.drawing.file
+    @classmethod
+    def of(
+        cls,
+        toolpath: Toolpath,
+        drawing: Drawing | None = None,
+        job: Job | None = None,
+        target: LoadedTarget | None = None,
+    ) -> ShownToolpath:
+        """The toolpath as one that shows itself, with what it was planned from."""
+        return _shown(cls, toolpath, drawing=drawing, job=job, target=target)
 
-    def _scene(self) -> Scene:
-        from camtool.pipeline import posted_scene
+    def scene(self) -> Scene:
+        """The moves over the drawing."""
+        from camtool.pictures.scene import scene_of
 
-        return posted_scene(self, self.target, drawing=self.drawing, job=self.job)
+        return scene_of(
+            title=self.made_from,
+            drawing=self.drawing,
+            job=self.job,
+            toolpath=self,
+            machine=None if self.target is None else self.target.machine,
+        )
+
+    def __repr__(self) -> str:
+        moves = int((self.kind <= int(Kind.ARC_CCW)).sum())
+        name = f" of {self.made_from}" if self.made_from else ""
+        return f"<Toolpath{name}: {moves} moves, {_counted(self.findings)}>"
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Converted(Written):
-    """A program of one machine as that of another; `file` names the first one's."""
-
-    file: str
-
-    @property
-    def source(self) -> str:
-        """The first program's file."""
-        return self.file
+_Kind = TypeVar("_Kind", ShownDrawing, ShownToolpath)
 
 
-def _noticed(count: int) -> str:
+def _shown(kind: type[_Kind], record: Drawing | Toolpath, **more: object) -> _Kind:
+    """The record as one of its kind that shows itself, with `more` fields."""
+    values = {each.name: getattr(record, each.name) for each in fields(record)}
+    return kind(**(values | more))
+
+
+def _counted(findings: tuple[Finding, ...]) -> str:
+    count = len(findings)
     return "no findings" if not count else f"{count} finding{'s' * (count > 1)}"
 
 
-def _size(drawing: DrawingRecord) -> str:
+def _size(drawing: Drawing) -> str:
     from camtool.geometry.measure import extents
 
     if not len(drawing.paths):
         return "no lines"
     (left, right), (low, high) = extents(drawing.paths).tolist()
     return f"{right - left:.3f} × {high - low:.3f} mm"
-
-
-def _counted(drawing: DrawingRecord) -> str:
-    closed = int(drawing.paths.closed.sum())
-    return f"{closed} closed and {len(drawing.paths) - closed} open contours"
-
-
-# What was found out by comparing, and by measuring.
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Shown):
-    """One program, run several ways: `ways` says which, `variants` what came of each, in the
-    same order. Its picture shows the paths about the place of the largest error."""
-
-    data: bytes
-    source: str
-    ways: tuple[Way, ...]
-    variants: tuple[Variant, ...]
-
-    @property
-    def rows(self) -> tuple[ContrastRow, ...]:
-        """A line for each way: errors µm, time s, counts."""
-        return tuple(row_of(each.name, each.verification.report) for each in self.variants)
-
-    @property
-    def verdicts(self) -> Mapping[str, VerificationRecord]:
-        """The verdict on each way, by its name."""
-        return {each.name: each.verification for each in self.variants}
-
-    def __str__(self) -> str:
-        return table(self.rows)
-
-    def __repr__(self) -> str:
-        names = ", ".join(each.name for each in self.variants)
-        return f"<Comparison of {self.source}: {names}>"
-
-    def _scene(self) -> Overlay:
-        from camtool.pipeline import compare_picture
-
-        title = PurePath(self.source).name
-        return compare_picture(self.data, self.ways, self.variants, title=title)
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibration(CalibrationRecord):
-    """The numbers of `machine` that `measurements` say
-    (`camtool.calibration.calibrate.Calibration`): estimates with uncertainties, mm and rad.
-    `extends` is the user's machine file, as a table, that `machine_file` carries on."""
-
-    measurements: Measurements
-    machine: Machine
-    extends: Mapping[str, object]
-
-    @property
-    def machine_file(self) -> str:
-        """TOML text that `load_target(..., machine=FILE)` reads: the numbers that were found over
-        what was known, each with its uncertainty and its source behind it."""
-        from camtool.calibration.machine_file import machine_file
-
-        return machine_file(self, self.measurements, self.machine, dict(self.extends))
-
-    def __str__(self) -> str:
-        from camtool.calibration.calibrate import to_text
-
-        return to_text(self, self.machine)
-
-    def __repr__(self) -> str:
-        found = ", ".join(each.name for each in self.estimates if not each.region)
-        return f"<Calibration of {self.target} from {self.file}: {found or 'nothing'}>"

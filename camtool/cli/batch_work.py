@@ -17,10 +17,9 @@ from camtool.plain import one_line
 
 if TYPE_CHECKING:
     from camtool.findings import Finding
-    from camtool.geometry.drawing import Drawing
     from camtool.machine.registry import LoadedTarget
-    from camtool.pipeline import Posted
     from camtool.planning.job import Job
+    from camtool.run import Run
     from camtool.verification.report import Gates
 
 REMARKS = 20
@@ -82,7 +81,7 @@ class PostWork:
         name = task.source.encode("utf-8", "backslashreplace").decode()
         drawing = self.drawing.read(name, self.target.machine, order.job, data)
         with JobFlags(order.file, (), {}).blamed():
-            posted = post_drawing(
+            run = post_drawing(
                 drawing,
                 order.job,
                 self.target,
@@ -90,11 +89,11 @@ class PostWork:
                 compensate=self.compensate,
                 gates=self.gates,
             )
-        made = _said(task, posted)
+        made = _said(task, run)
         if made.error is not None:
             return made
-        files = dict(self._files(task, drawing, order.job, posted))
-        return replace(made, content=content_digest(data), files=files, figures=_figures(posted))
+        files = dict(self._files(task, run))
+        return replace(made, content=content_digest(data), files=files, figures=_figures(run))
 
     def digest(self) -> str:
         """The digest of all that outputs depend on but drawing and job."""
@@ -113,22 +112,15 @@ class PostWork:
             repr(options),
         )
 
-    def _files(
-        self, task: Task, drawing: Drawing, job: Job, posted: Posted
-    ) -> Iterator[tuple[str, bytes]]:
-        if posted.program is not None:
-            yield posted.program.extension, posted.program.data
+    def _files(self, task: Task, run: Run) -> Iterator[tuple[str, bytes]]:
+        if run.program is not None:
+            yield run.program.extension, run.program.data
         if self.preview is not None:
-            picture = self._picture(drawing, job, posted)
+            paint = self.looks.painter(lambda: [run.scene()], quiet=True)
+            picture = paint(f"picture{self.preview}")
             yield self.preview, sealed(picture, task.stem) if self.preview == SVG else picture
-        if self.reports and posted.verification is not None:
-            yield ".json", posted.verification.report.to_json().encode()
-
-    def _picture(self, drawing: Drawing, job: Job, posted: Posted) -> bytes:
-        from camtool.pipeline import posted_scene
-
-        scene = posted_scene(posted, self.target, drawing=drawing, job=job)
-        return self.looks.painter(lambda: [scene], quiet=True)(f"picture{self.preview}")
+        if self.reports and run.report is not None:
+            yield ".json", run.report.to_json().encode()
 
 
 def own_job(source: Path) -> Path | None:
@@ -141,19 +133,19 @@ def _is_code(path: Path) -> bool:
     return path.suffix in (".py", ".toml") and path.is_file()
 
 
-def _said(task: Task, posted: Posted) -> Made:
+def _said(task: Task, run: Run) -> Made:
     """The findings: the error of a drawing that must not be written, and the worst lines."""
     from camtool.findings import Severity
 
     def lines(severity: Severity) -> list[Finding]:
-        return [each for each in posted.findings if each.severity == severity]
+        return [each for each in run.findings if each.severity == severity]
 
     errors, warnings = lines(Severity.ERROR), lines(Severity.WARNING)
     remarks = tuple(
         f"{task.source}: {one_line(str(finding))}" for finding in (*errors, *warnings)[:REMARKS]
     )
     made = Made(remarks=remarks, warnings=len(warnings))
-    if not posted.failed and posted.program is not None:
+    if not run.failed and run.program is not None:
         return made
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     if not errors:
@@ -161,12 +153,11 @@ def _said(task: Task, posted: Posted) -> Made:
     return replace(made, error=f"{remarks[0]}{more}", code=errors[0].code.name)
 
 
-def _figures(posted: Posted) -> dict[str, float]:
+def _figures(run: Run) -> dict[str, float]:
     """What the summary says of a drawing."""
-    program, verification = posted.program, posted.verification
+    program, report = run.program, run.report
     figures: dict[str, float] = {"bytes": len(program.data) if program else 0}
-    if verification is not None:
-        report = verification.report
+    if report is not None:
         figures["time_s"] = report.time_s
         if report.error_um.total.max is not None:
             figures["error_um"] = report.error_um.total.max

@@ -216,12 +216,10 @@ def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
     if asked.report is not None:
         files[asked.report] = to_json(facts).encode()
     if asked.preview is not None:
-        from camtool.pipeline import picture
+        from camtool.pictures.scene import scene_of_drawing
 
         title = Path(read.file).name
-        painted = asked.looks.painter(
-            lambda: [picture(title=title, drawing=read)], quiet=asked.quiet
-        )
+        painted = asked.looks.painter(lambda: [scene_of_drawing(read, title)], quiet=asked.quiet)
         files[asked.preview] = painted(asked.preview)
     write_all(files)
     if asked.report != STDOUT and not asked.quiet:

@@ -343,6 +343,6 @@ def _flat(prefix: str, values: dict[str, Any]) -> Iterator[str]:
 
 
 def _effects(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    from camtool.pipeline import EFFECTS
+    from camtool.comparison import EFFECTS
 
     return [CompletionItem(name) for name in EFFECTS if name.startswith(incomplete)]

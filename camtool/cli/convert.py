@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from camtool.cli.files import read_bytes, shown
@@ -68,10 +66,10 @@ def convert(
     asked = Asked(program, output, report, preview, page, flags_given(), reads)
     asked.check(after.machine.target.extension, verified=not no_verify)
 
-    from camtool.pipeline import convert_program, posted_scene
+    from camtool.pipeline import convert_program
 
     say_first_run(quiet=quiet, judging=not no_verify)
-    made = convert_program(
+    run = convert_program(
         read_bytes(program),
         before,
         after,
@@ -79,12 +77,11 @@ def convert(
         feed_mm_min=feed_mm_min,
         check=not no_verify,
     )
-    title = Path(shown(program)).name
     return finish(
-        made,
+        run,
         asked,
         quiet=quiet,
         verbose=verbose,
-        picture=picture.painter(lambda: [posted_scene(made, after, title=title)], quiet=quiet),
+        picture=picture.painter(lambda: [run.scene()], quiet=quiet),
         target=after,
     )

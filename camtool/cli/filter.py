@@ -48,14 +48,14 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
     _progress(BEGUN)
     target = posting.load()
     posting = posting.of(source)
-    made = posting.make(source, target, quiet=quiet, on_read=lambda: _progress(READ))
+    run = posting.make(source, target, quiet=quiet, on_read=lambda: _progress(READ))
     _progress(MADE)
     code = finish(
-        made.posted,
+        run,
         Asked(source, STDOUT, None, reads=[*posting.files(source), str(target.file)]),
         quiet=quiet,
         verbose=verbose,
-        picture=PictureFlags().painter(made.scenes, quiet=quiet),
+        picture=PictureFlags().painter(lambda: [run.scene()], quiet=quiet),
         target=target,
     )
     if code == 0:

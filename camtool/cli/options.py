@@ -16,10 +16,11 @@ from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, TOOL_NAME, WHOLE, Giv
 from camtool.units import parse_feed, parse_length, parse_time
 
 if TYPE_CHECKING:
+    from camtool.comparison import Way
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
-    from camtool.pipeline import Judging, Way
+    from camtool.pipeline import Judging
     from camtool.planning.job import Job
     from camtool.simulation.motion import Effects
     from camtool.verification.report import Gates
@@ -293,7 +294,7 @@ def gate_options(command: Command) -> Command:
 
 def ways_to_compare(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
     """What `--compare SPEC` stands for; OptionError when it is nothing."""
-    from camtool.pipeline import ways_of
+    from camtool.comparison import ways_of
 
     def load(more: Sequence[str]) -> LoadedTarget:
         return replace(machine, settings=(*machine.settings, *more)).load()
@@ -303,7 +304,7 @@ def ways_to_compare(spec: str, machine: MachineFlags, judging: Judging) -> list[
 
 def left_out(names: Sequence[str]) -> Effects:
     """The mechanics without these effects; OptionError for others."""
-    from camtool.pipeline import left_out as without
+    from camtool.comparison import left_out as without
 
     return without(names)
 

@@ -59,43 +59,27 @@ from camtool.errors import CamtoolError, OptionError
 if TYPE_CHECKING:
     from camtool.cli.picture_options import Painter
     from camtool.cli.report import Flags
-    from camtool.geometry.drawing import Drawing
     from camtool.machine.registry import LoadedTarget
     from camtool.pictures.scene import Scene
-    from camtool.pipeline import Posted
-    from camtool.planning.job import Job
+    from camtool.run import Run
 
 
 JOB_ENDING = ".toml"
 
 
-@dataclass(frozen=True, eq=False)
-class Made:
-    """A drawing and what was made of it."""
-
-    drawing: Drawing
-    job: Job
-    posted: Posted
-    target: LoadedTarget
-
-    def scenes(self, *, before: bool = False) -> list[Scene]:
-        """The predicted result; `before` it that of the job without what it does against reversals
-        and play. OptionError where it does nothing of that kind."""
-        if not before or self.posted.failed:
-            return [self._scene(self.posted)]
-        if self.posted.before is None:
-            raise OptionError(
-                "the job does nothing against reversals or play",
-                where="--before-after",
-                mend="add --compensate, --minimise reversals or --approach, or drop it",
-            )
-        return [self._scene(self.posted.before, ", before"), self._scene(self.posted, ", after")]
-
-    def _scene(self, posted: Posted, when: str = "") -> Scene:
-        from camtool.pipeline import posted_scene
-
-        title = f"{Path(self.drawing.file).name}{when}"
-        return posted_scene(posted, self.target, title=title, drawing=self.drawing, job=self.job)
+def scenes_of(run: Run, *, before: bool) -> list[Scene]:
+    """The predicted result; `before` it that of the job without what it does against reversals and
+    play. OptionError where it does nothing of that kind."""
+    if not before or run.failed:
+        return [run.scene()]
+    if run.before is None:
+        raise OptionError(
+            "the job does nothing against reversals or play",
+            where="--before-after",
+            mend="add --compensate, --minimise reversals or --approach, or drop it",
+        )
+    name = Path(run.source).name
+    return [run.before.scene(f"{name}, before"), run.scene(f"{name}, after")]
 
 
 @dataclass(frozen=True)
@@ -123,10 +107,11 @@ class Posting:
         quiet: bool,
         on_read: Callable[[], None] | None = None,
         preview: str | None = None,
-    ) -> Made:
+    ) -> Run:
         """The drawing posted, for a picture of this name; `on_read` is called when it has been
         read."""
-        from camtool.pipeline import points_for, post_drawing
+        from camtool.pictures.scene import points_for
+        from camtool.pipeline import post_drawing
 
         name, judging = target.machine.target.name, not self.no_verify
         with compiled_beside(name, quiet=quiet, judging=judging):
@@ -135,7 +120,7 @@ class Posting:
             if on_read is not None:
                 on_read()
             with self.job.blamed():
-                posted = post_drawing(
+                return post_drawing(
                     read,
                     wanted,
                     target,
@@ -144,7 +129,6 @@ class Posting:
                     gates=self.gates.gates(),
                     trace_points=points_for(preview),
                 )
-        return Made(read, wanted, posted, target)
 
     def files(self, source: str) -> list[str]:
         """The files that a program is made of: drawing, job, its tool table, and machine."""
@@ -235,13 +219,13 @@ def post(
         reads = [*posting.files(source), str(target.file)]
         asked = Asked(source, output, report, preview, page, flags, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
-        made = posting.make(source, target, quiet=quiet, preview=preview)
+        run = posting.make(source, target, quiet=quiet, preview=preview)
         return finish(
-            made.posted,
+            run,
             asked,
             quiet=quiet,
             verbose=verbose,
-            picture=picture.painter(lambda: made.scenes(before=before_after), quiet=quiet),
+            picture=picture.painter(lambda: scenes_of(run, before=before_after), quiet=quiet),
             target=target,
         )
 
@@ -288,7 +272,7 @@ class Asked:
 
 
 def finish(
-    made: Posted,
+    run: Run,
     asked: Asked,
     *,
     quiet: bool,
@@ -300,10 +284,10 @@ def finish(
 
     Where something is wrong only the page that was asked for is written: it says what.
     """
-    say_findings(made.findings, quiet=quiet, verbose=verbose)
-    if made.failed or made.program is None:
+    say_findings(run.findings, quiet=quiet, verbose=verbose)
+    if run.failed or run.program is None:
         if asked.page is not None:
-            write_all(_page_alone(made, asked, picture, target))
+            write_all(_page_alone(run, asked, picture, target))
         no = "nothing" if asked.page is None else "no program"
         say(
             f"camtool: error: {asked.source}: {no} was written; mend the errors above",
@@ -311,42 +295,42 @@ def finish(
         )
         return 1
     # A dialect of several forms (binary, listing) says only now which extension it takes.
-    asked.check(made.program.extension, verified=True)
-    output = asked.program(made.program.extension)
-    files = {output: made.program.data}
+    asked.check(run.program.extension, verified=True)
+    output = asked.program(run.program.extension)
+    files = {output: run.program.data}
     if asked.preview is not None:
         files[asked.preview] = picture(asked.preview)
-    if asked.report is not None and made.verification is not None:
-        files[asked.report] = made.verification.report.to_json().encode()
+    if asked.report is not None and run.report is not None:
+        files[asked.report] = run.report.to_json().encode()
     if asked.page is not None:
-        files.update(_page(made, asked, picture, target))
+        files.update(_page(run, asked, picture, target))
     write_all(files)
-    if made.verification is not None and not quiet:
-        said = made.verification.report.to_text(findings=False)
+    if run.report is not None and not quiet:
+        said = run.report.to_text(findings=False)
         if target.any_machine:
             said += f"\n{'machine':<10} {ANY_MACHINE.format(target.machine.target.name)}"
-        show_facts(said, REPORT_NAMES, report_marks(made.findings), err=True)
+        show_facts(said, REPORT_NAMES, report_marks(run.findings), err=True)
     where = "stdout" if output == STDOUT else output
-    say(f"written: {where} ({len(made.program.data)} bytes)", quiet=quiet)
+    say(f"written: {where} ({len(run.program.data)} bytes)", quiet=quiet)
     return 0
 
 
 def _page_alone(
-    made: Posted, asked: Asked, picture: Painter, target: LoadedTarget
+    run: Run, asked: Asked, picture: Painter, target: LoadedTarget
 ) -> dict[str, bytes]:
     """The files of the page, and the picture of `--preview` if that is what the page shows."""
-    files, linked = _page(made, asked, picture, target), linked_picture(asked.page, asked.preview)
+    files, linked = _page(run, asked, picture, target), linked_picture(asked.page, asked.preview)
     return files if linked is None or linked in files else {**files, linked: picture(linked)}
 
 
-def _page(made: Posted, asked: Asked, picture: Painter, target: LoadedTarget) -> dict[str, bytes]:
+def _page(run: Run, asked: Asked, picture: Painter, target: LoadedTarget) -> dict[str, bytes]:
     """The files of the page that was asked for."""
     subject = Subject(
         title=Path(asked.source).name if asked.source != STDOUT else "<stdin>",
         target=target,
-        report=made.verification.report if made.verification is not None else None,
-        findings=made.findings,
-        program=made.program.data if made.program is not None else None,
+        report=run.report,
+        findings=run.findings,
+        program=run.program.data if run.program is not None else None,
         flags=asked.flags,
     )
     return report_files(str(asked.page), subject, picture, preview=asked.preview)

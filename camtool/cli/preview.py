@@ -146,51 +146,37 @@ class Seen:
         return False
 
     def _of_drawing(self, source: str) -> tuple[Scene, Findings]:
-        from camtool.pipeline import picture
+        from camtool.pictures.scene import scene_of_drawing
 
         _refuse_program(source)
         read = self.drawing.read(source)
-        return picture(title=Path(read.file).name, drawing=read), read.findings
+        return scene_of_drawing(read, Path(read.file).name), read.findings
 
     def _of_program(self, source: str, target: LoadedTarget) -> Scene:
-        from camtool.pipeline import (
-            Judging,
-            listing_of,
-            picture,
-            points_for,
-            read_program,
-            verify_program,
-        )
+        from camtool.pictures.scene import points_for
+        from camtool.pipeline import Judging, read_program, verify_program
 
-        data, judged = read_bytes(source), None
-        if self.simulate:
-            judging = Judging(trace_points=points_for(self.output))
-            decoded, judged = verify_program(data, target, source=source, judging=judging)
-        else:
-            decoded = read_program(data, target, source)
-        return picture(
-            title=Path(source).name,
-            toolpath=decoded,
-            verification=judged,
-            machine=target.machine,
-            listing=listing_of(data, target, decoded),
-        )
+        data = read_bytes(source)
+        if not self.simulate:
+            return read_program(data, target, source=source).scene()
+        judging = Judging(trace_points=points_for(self.output))
+        return verify_program(data, target, source=source, judging=judging).scene()
 
     def _of_job(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
-        from camtool.pipeline import picture, points_for, post_drawing, posted_scene
+        from camtool.pictures.scene import points_for
+        from camtool.pipeline import post_drawing
         from camtool.planning.plan import plan
+        from camtool.run import Run
 
         title, job = Path(source).name, self.job.job(self.drawing)
         read = self.drawing.read(source, target.machine, job)
         with self.job.blamed():
             if self.simulate:
-                posted = post_drawing(read, job, target, trace_points=points_for(self.output))
-                scene = posted_scene(posted, target, title=title, drawing=read, job=job)
-                return scene, posted.findings if posted.failed else read.findings
+                run = post_drawing(read, job, target, trace_points=points_for(self.output))
+                return run.scene(title), run.findings if run.failed else read.findings
             moves = plan(read, job, target.machine)
-        machine = target.machine
-        made = picture(title=title, drawing=read, job=job, toolpath=moves, machine=machine)
-        return made, read.findings
+        run = Run(source=read.file, target=target, drawing=read, job=job, wanted=moves)
+        return run.scene(title), read.findings
 
 
 def _refuse_program(source: str) -> None:

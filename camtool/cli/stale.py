@@ -140,12 +140,12 @@ def _posted(
 ) -> Program | Fault:
     """What would be written of a drawing now, or why nothing would be."""
     try:
-        made = posting.of(str(drawing)).make(str(drawing), target, quiet=quiet)
+        run = posting.of(str(drawing)).make(str(drawing), target, quiet=quiet)
     except CamtoolError as error:
         return Fault(error.exit_code, str(error))
-    program = made.posted.program
-    if made.posted.failed or program is None:
-        grave = next(each for each in made.posted.findings if each.severity >= Severity.ERROR)
+    program = run.program
+    if run.failed or program is None:
+        grave = next(each for each in run.findings if each.severity >= Severity.ERROR)
         return Fault(1, f"{drawing}: cannot be posted any more: {grave}")
     return program
 

@@ -54,14 +54,14 @@ from camtool.cli.report import (
 )
 
 if TYPE_CHECKING:
+    from camtool.comparison import Way
     from camtool.geometry.drawing import Drawing
     from camtool.machine.controllers import Interpolator
     from camtool.machine.registry import LoadedTarget
     from camtool.pictures.scene import Scene
-    from camtool.pipeline import Judging, Way
+    from camtool.pipeline import Judging
     from camtool.planning.job import Job
-    from camtool.toolpath.moves import Toolpath
-    from camtool.verification.verify import Verification
+    from camtool.run import Run
 
 
 @dataclass(frozen=True)
@@ -86,65 +86,37 @@ class Case:
     drawing: Drawing | None
     job: Job
 
-    def judge(self, file: str) -> Judged:
+    def judge(self, file: str) -> Run:
         """The program in a file, run and judged."""
         from camtool.pipeline import verify_program
 
-        data, name = read_bytes(file), shown(file)
-        decoded, verification = verify_program(
-            data,
+        return verify_program(
+            read_bytes(file),
             self.target,
-            source=name,
+            source=shown(file),
             drawing=self.drawing,
             job=self.job,
             judging=self.judging,
         )
-        return Judged(self, name, data, decoded, verification)
 
 
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """A program, its moves as the controller decodes them, and the verdict."""
-
-    case: Case
-    name: str
-    data: bytes
-    decoded: Toolpath
-    verification: Verification
-
-    def scene(self) -> Scene:
-        """The predicted path over what was programmed."""
-        from camtool.pipeline import listing_of, picture
-
-        case = self.case
-        return picture(
-            title=Path(self.name).name,
-            drawing=case.drawing,
-            job=case.job,
-            toolpath=self.decoded,
-            verification=self.verification,
-            machine=case.target.machine,
-            listing=listing_of(self.data, case.target, self.decoded),
-        )
-
-    def subject(self) -> Subject:
-        """What its page is about."""
-        return Subject(
-            title=Path(self.name).name,
-            target=self.case.target,
-            report=self.verification.report,
-            findings=self.verification.findings,
-            program=self.data,
-            flags=flags_given(),
-        )
+def _subject(run: Run) -> Subject:
+    """What the page of a program is about."""
+    return Subject(
+        title=Path(run.source).name,
+        target=run.target,
+        report=run.report,
+        findings=run.findings,
+        program=None if run.program is None else run.program.data,
+        flags=flags_given(),
+    )
 
 
 def judged(file: str, case: Case, wishes: Wishes) -> int:
     """The verdict on one program, in words and files; the exit code."""
-    from camtool.findings import Severity, worst
-
     one = case.judge(file)
-    report, findings = one.verification.report, one.verification.findings
+    report, findings = one.report, one.findings
+    assert report is not None
 
     def scenes() -> list[Scene]:
         return [one.scene(), *([case.judge(wishes.beside).scene()] if wishes.beside else [])]
@@ -156,38 +128,39 @@ def judged(file: str, case: Case, wishes: Wishes) -> int:
     if wishes.report is not None:
         files[wishes.report] = report.to_json().encode()
     if wishes.page is not None:
-        files.update(report_files(wishes.page, one.subject(), painted, preview=wishes.preview))
+        files.update(report_files(wishes.page, _subject(one), painted, preview=wishes.preview))
     write_all(files)
     if STDOUT not in (wishes.report, wishes.page) and not wishes.quiet:
         show_facts(report.to_text(findings=False), REPORT_NAMES, report_marks(findings))
         if case.judging.worst:
             show_text(report.worst_text())
     say_findings(findings, quiet=wishes.quiet, verbose=wishes.verbose)
-    if worst(findings) < Severity.ERROR:
+    if not one.failed:
         return 0
-    say(f"camtool: error: {one.name}: the errors above would spoil the part", quiet=False)
+    say(f"camtool: error: {one.source}: the errors above would spoil the part", quiet=False)
     return 1
 
 
 def compared(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
     """The table of all ways to run a program, and their picture; the exit code."""
-    from camtool.pipeline import compare_picture, compare_program
-    from camtool.verification.contrast import row_of, table, to_json
+    from camtool.comparison import compare_program
+    from camtool.verification.contrast import to_json
 
-    data, name = read_bytes(file), shown(file)
-    variants = compare_program(data, ways, source=name, drawing=case.drawing, job=case.job)
-    rows = [row_of(variant.name, variant.verification.report) for variant in variants]
+    found = compare_program(
+        read_bytes(file), ways, source=shown(file), drawing=case.drawing, job=case.job
+    )
     files: dict[str, bytes] = {}
     if wishes.preview is not None:
         from camtool.pictures.overlay import render_overlay
 
-        overlay = compare_picture(data, ways, variants, title=Path(name).name)
-        files[wishes.preview] = render_overlay(overlay, wishes.preview, wishes.looks.options())
+        files[wishes.preview] = render_overlay(
+            found.scene(), wishes.preview, wishes.looks.options()
+        )
     if wishes.report is not None:
-        files[wishes.report] = to_json(rows).encode()
+        files[wishes.report] = to_json(found.rows).encode()
     write_all(files)
     if wishes.report != STDOUT and not wishes.quiet:
-        show_compared(table(rows), rows)
+        show_compared(str(found), found.rows)
     return 0
 
 
@@ -282,7 +255,8 @@ def verify(
     )
     refuse_foreign_picture(page, preview)
 
-    from camtool.pipeline import Judging, points_for
+    from camtool.pictures.scene import points_for
+    from camtool.pipeline import Judging
 
     judging = Judging(
         interpolator=cast("Interpolator | None", interpolator),

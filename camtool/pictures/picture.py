@@ -1,9 +1,8 @@
-"""Pictures as values, and what has one."""
+"""Pictures as values: SVG text, or the bytes of a file by its name; and a page's close-ups."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,19 +64,6 @@ class Picture:
     def _repr_svg_(self) -> str:
         return self.svg
 
-
-class Shown(ABC):
-    """A value that has a picture, and shows it in a notebook."""
-
-    @abstractmethod
-    def _scene(self) -> Scene | Overlay:
-        """What its picture is of."""
-
-    def _repr_svg_(self) -> str:
-        return Picture(self._scene()).svg
-
-
-# What a page shows of a verified part besides the whole: its worst place, and a circle's plot.
 
 ERRORS_ACROSS = 16.0
 """A close-up is so many times the largest error wide: steps show, and what they are a step of."""

@@ -1,17 +1,41 @@
-"""The Scene: everything that one picture shows, in one frame (the work frame, mm)."""
+"""The Scene: everything that one picture shows, in one frame (the work frame, mm).
+
+`scene_of` makes it of whatever is known of a part: its drawing, its toolpath, the verdict on its
+program. The viewer asks for its `Playback` besides: seconds, errors, the program's lines, tables.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
+from camtool.geometry.measure import extents
 from camtool.geometry.polylines import Segments
 from camtool.toolpath.moves import Kind, Toolpath
+
+if TYPE_CHECKING:
+    from camtool.machine.model import Machine
+    from camtool.planning.job import Job
+    from camtool.toolpath.program import Listing
+    from camtool.verification.report import Report
+    from camtool.verification.verify import Verification
+
+
+LINES_SHOWN = 200
+"""A table of the viewer has no more lines than this; the JSON report has them all."""
+
+POINTS_OF_A_PAGE = 400_000
+"""The viewer is given so many points of the slides' path: enough for the ends of 200,000 moves and
+the largest error within each."""
+
+NAME_WIDTH = 11
+"""Characters of the report's text before the figures of a line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +48,8 @@ class Scene:
 
     trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
     wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
-    other errors do not count. travel_mm is the size of the table's travel from (0, 0). `run` gives
-    how the toolpath runs, for the viewer; it is called only there.
+    other errors do not count. travel_mm is the size of the table's travel from (0, 0). `playback`
+    gives how the toolpath runs, for the viewer; it is called only there.
     The drawing is in the work frame. With a trace the picture is one of the
     part: rapids and plunges are left out, feeds are pale. ValueError when the trace is incomplete
     or not finite.
@@ -43,7 +67,7 @@ class Scene:
     worst: tuple[tuple[float, float], ...] = ()
     tool_mm: float | None = None
     rounds: tuple[Round, ...] = ()
-    run: Callable[[], Playback] | None = None
+    playback: Callable[[], Playback] | None = None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -60,31 +84,6 @@ class Scene:
             raise ValueError("the columns of the trace have different lengths")
         if not (np.isfinite(points).all() and np.isfinite(error[cutting]).all()):
             raise ValueError("a number of the trace is not finite")
-
-
-def scene_of_drawing(drawing: Drawing) -> Scene:
-    """A drawing alone, with its size."""
-    return Scene(title=drawing.file, drawing=drawing, notes=(_size_note(drawing),))
-
-
-def scene_of_toolpath(toolpath: Toolpath, *, title: str, drawing: Drawing | None = None) -> Scene:
-    """A toolpath, over the drawing that it was planned from where there is one."""
-    moves, feeds = int(toolpath.is_motion.sum()), int(toolpath.is_feed.sum())
-    note = f"{moves} moves, {feeds} of them at a feed"
-    sizes = () if drawing is None else (_size_note(drawing),)
-    return Scene(title=title, toolpath=toolpath, drawing=drawing, notes=(*sizes, note))
-
-
-def _size_note(drawing: Drawing) -> str:
-    from camtool.geometry.measure import extents
-
-    if not len(drawing.paths):
-        return f"{len(drawing.marks)} points" if drawing.marks else "nothing drawn"
-    (left, right), (bottom, top) = extents(drawing.paths).tolist()
-    return f"{right - left:.4g} × {top - bottom:.4g} mm"
-
-
-# A full circle and what became of it, as a polar plot shows it.
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +118,6 @@ class Round:
         return found - self.radius_mm
 
 
-# How a toolpath runs, for the viewer: seconds, errors, the program's lines, the report.
-
-
 @dataclass(frozen=True)
 class Line:
     """A line of a table: its cells, and the row of the toolpath that it speaks of."""
@@ -139,13 +135,6 @@ class Table:
     lines: tuple[Line, ...]
 
 
-@dataclass(frozen=True)
-class Worst:
-    """A place (x, y) mm with a large error."""
-
-    at_mm: tuple[float, float]
-
-
 @dataclass(frozen=True, eq=False)
 class Playback:
     """How N rows of a toolpath run: `seconds` (N,); `error_mm` (N,), NaN where not known;
@@ -161,7 +150,6 @@ class Playback:
     blocks: tuple[str, ...] | None = None
     binary: bool = False
     tables: tuple[Table, ...] = ()
-    worst: tuple[Worst, ...] = ()
 
     def __post_init__(self) -> None:
         if self.seconds.shape != self.error_mm.shape or self.seconds.ndim != 1:
@@ -186,3 +174,194 @@ def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
         dwell = toolpath.kind == Kind.DWELL
         seconds[dwell] = np.nan_to_num(toolpath.value[dwell])
     return Playback(seconds, np.full(len(toolpath), np.nan), np.empty(0, dtype=np.int64))
+
+
+def scene_of_drawing(drawing: Drawing, title: str = "") -> Scene:
+    """A drawing alone, with its size; the title is its file unless another one is given."""
+    note = f"{len(drawing.marks)} points" if drawing.marks else "nothing drawn"
+    if len(drawing.paths):
+        (left, right), (bottom, top) = extents(drawing.paths).tolist()
+        note = f"{right - left:.4g} × {top - bottom:.4g} mm"
+    return Scene(title=title or drawing.file, drawing=drawing, notes=(note,))
+
+
+def scene_of(
+    *,
+    title: str,
+    drawing: Drawing | None = None,
+    job: Job | None = None,
+    toolpath: Toolpath | None = None,
+    verification: Verification | None = None,
+    machine: Machine | None = None,
+    listing: Callable[[], Listing | None] | None = None,
+) -> Scene:
+    """The scene of whatever is there; with a verification, the slides' path by its error.
+
+    `job` tells where it places the drawing in the work frame; `listing` gives the program's lines
+    to the viewer.
+    """
+    from camtool.verification.case import cone_of, tool_mm
+
+    if drawing is not None and toolpath is None:
+        return scene_of_drawing(drawing, title)
+    if drawing is not None and job is not None:
+        from camtool.planning.place import place
+
+        drawing = place(drawing, job)
+    trace = verification.trace if verification is not None else None
+    # A V bit is as wide as it is deep: one width for all of its path would be false.
+    even = job is not None and cone_of(job) is None
+    return Scene(
+        title=title,
+        drawing=drawing,
+        toolpath=toolpath,
+        trace_points=trace.points if trace is not None else None,
+        trace_error_mm=trace.error_mm if trace is not None else None,
+        trace_cutting=trace.cutting if trace is not None else None,
+        travel_mm=_travel(toolpath, machine),
+        notes=verification.report.notes() if verification is not None else (),
+        wanted=verification.wanted.segments if verification is not None else None,
+        worst=worst_places(verification),
+        tool_mm=tool_mm(job) if job is not None and even else None,
+        rounds=() if verification is None else rounds_of(verification),
+        playback=_playback(toolpath, verification, machine, listing),
+    )
+
+
+def points_for(picture: str | None) -> int | None:
+    """How many points of the slides' path a picture of this name wants; None: as usual."""
+    return POINTS_OF_A_PAGE if (picture or "").lower().endswith(".html") else None
+
+
+def rounds_of(verification: Verification) -> tuple[Round, ...]:
+    """The full circles as polar plots show them, each with the same one gone round the other way
+    where there is that."""
+    from camtool.verification.circles import Pairs, both_ways
+
+    seen = verification.circles
+    pairs = Pairs([one.circle for one in seen])
+    found = []
+    for index, one in enumerate(seen):
+        partner, both_mm = pairs.partner(index), math.nan
+        if partner is not None:
+            bins = np.concatenate([one.bins, seen[partner].bins])
+            both_mm = both_ways(one.circle, bins).circular_mm
+        figures = one.figures
+        found.append(
+            Round(
+                one.circle.centre_mm,
+                one.circle.radius_mm,
+                one.circle.ccw,
+                one.bins,
+                figures.circular_mm,
+                (figures.radial_max_mm, figures.radial_min_mm, figures.radial_mean_mm),
+                one.reversing.value,
+                None if partner is None else partner + 1,
+                both_mm,
+            )
+        )
+    return tuple(found)
+
+
+def worst_places(verification: Verification | None) -> tuple[tuple[float, float], ...]:
+    """Where the largest errors are, mm, the largest first."""
+    if verification is None:
+        return ()
+    return tuple(one.at_mm for one in verification.report.worst)
+
+
+def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
+    """The table's travel, mm, if the path lies in it with part zero at its lower-left corner:
+    only then is there a place where the frame can honestly be drawn."""
+    if toolpath is None or machine is None:
+        return None
+    from camtool.toolpath.moves import toolpath_extents
+
+    x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
+    (left, right), (low, high), _ = toolpath_extents(toolpath).tolist()
+    if x is None or y is None or left < 0.0 or low < 0.0 or right > x or high > y:
+        return None
+    return x, y
+
+
+def _playback(
+    toolpath: Toolpath | None,
+    verification: Verification | None,
+    machine: Machine | None,
+    listing: Callable[[], Listing | None] | None,
+) -> Callable[[], Playback] | None:
+    """What gives, when the viewer asks, how the toolpath runs: as simulated where there is a
+    verification, else by its feeds."""
+    if toolpath is None or machine is None:
+        return None
+
+    def playback() -> Playback:
+        if verification is None:
+            made = by_feed(toolpath, machine.rapid_mm_min)
+        else:
+            made = Playback(
+                seconds=verification.rows.ledger.duration_s,
+                error_mm=verification.rows.total,
+                trace_row=verification.trace.row,
+                tables=tuple(_tables(verification.report)),
+            )
+        lines = None if listing is None else listing()
+        return made if lines is None else replace(made, blocks=lines.blocks, binary=lines.binary)
+
+    return playback
+
+
+def _tables(report: Report) -> Iterator[Table]:
+    """The report's figures; tables without a line are left out."""
+    lines = report.to_text(findings=False).splitlines()
+    facts = [(line[:NAME_WIDTH].strip(), line[NAME_WIDTH:].strip()) for line in lines]
+    yield Table("Report", (), tuple(map(Line, facts)))
+    for title, columns, found in (_findings(report), _worst(report), _contours(report)):
+        if found:
+            yield Table(title, columns, tuple(found[:LINES_SHOWN]))
+
+
+def _findings(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
+    lines = [
+        Line((item.severity, item.code, item.where, item.message)) for item in report.findings
+    ]
+    return "Findings", ("severity", "code", "where", "message"), lines
+
+
+def _worst(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
+    """The worst moves; the report counts them from 1."""
+    lines = [
+        Line(
+            (
+                str(index),
+                str(item.move if item.block is None else item.block),
+                _um(item.total_um),
+                _um(item.interpolation_um),
+                _um(item.mechanics_um),
+                _place(item.at_mm),
+                item.source,
+            ),
+            item.move - 1,
+        )
+        for index, item in enumerate(report.worst, 1)
+    ]
+    names = ("", "block", "error µm", "interpolation µm", "mechanics µm", "near mm", "from")
+    return "Worst moves", names, lines
+
+
+def _contours(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
+    lines = [
+        Line(
+            (item.name, _um(item.max_um), _um(item.rms_um), _um(item.mean_um), _place(item.at_mm))
+        )
+        for item in sorted(report.contour_errors, key=lambda item: -item.max_um)
+    ]
+    return "Contours", ("contour", "max µm", "rms µm", "mean µm", "worst near mm"), lines
+
+
+def _um(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
+
+
+def _place(at_mm: tuple[float, float]) -> str:
+    return f"({at_mm[0]:.3f}, {at_mm[1]:.3f})"

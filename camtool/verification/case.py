@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from camtool.geometry.drawing import Drawing
 from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
+from camtool.planning.job import Job
 from camtool.simulation.motion import ALL, Effects, Options
 from camtool.toolpath.moves import Bent, Toolpath
 from camtool.toolpath.wanted import Kept
@@ -43,6 +45,22 @@ class Cone:
 
     tip_mm: float
     slope: float
+
+
+def cone_of(job: Job) -> Cone | None:
+    """The shape of the V bit that all operations cut with; None for other tools, and several."""
+    tools = [operation.tool for operation in job.operations]
+    shapes = {(tool.kind, tool.tip_angle_rad, tool.tip_diameter_mm) for tool in tools}
+    if len(shapes) != 1:
+        return None
+    kind, angle, tip = shapes.pop()
+    return Cone(0.5 * tip, math.tan(0.5 * angle)) if kind == "v" and angle is not None else None
+
+
+def tool_mm(job: Job) -> float | None:
+    """The diameter of the one tool that all operations cut with, mm; None for several or none."""
+    diameters = {operation.tool.diameter_mm for operation in job.operations}
+    return (diameters.pop() or None) if len(diameters) == 1 else None
 
 
 @dataclass(frozen=True)

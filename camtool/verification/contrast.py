@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
 from camtool.arrays import Bools, Floats
-from camtool.machine.model import Machine
 from camtool.plain import to_json as json_text
 from camtool.simulation.motion import Chunk
 from camtool.verification.report import Report, clock
 from camtool.verification.verify import Verification
-
-
-@dataclass(frozen=True, eq=False)
-class Variant:
-    """One way to run the program: what it is called, the machine, and the verdict."""
-
-    name: str
-    machine: Machine
-    verification: Verification
 
 
 class ContrastRow(msgspec.Struct, frozen=True):
@@ -90,11 +79,11 @@ def to_json(rows: Sequence[ContrastRow]) -> str:
     return json_text(list(rows))
 
 
-def worst_place(variants: Sequence[Variant]) -> tuple[float, float]:
+def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
     """Where in XY (mm) the largest error of all lies; part zero when nothing cuts."""
     best, place = -1.0, (0.0, 0.0)
-    for variant in variants:
-        trace = variant.verification.trace
+    for verdict in verdicts:
+        trace = verdict.trace
         error = np.where(trace.cutting, trace.error_mm, -1.0)
         index = int(error.argmax())
         if float(error[index]) > best:

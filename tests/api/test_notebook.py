@@ -62,5 +62,5 @@ def test_everything_with_a_picture_shows_it(values: dict[str, object]) -> None:
 def test_the_rest_is_text(values: dict[str, object]) -> None:
     found = camtool.calibrate(Path("samples") / "measured" / "pic-mmh-lines.toml")
     assert list(displayed(found)) == ["text/plain"]
-    assert list(displayed(camtool.Posted)) == ["text/plain"]
+    assert list(displayed(camtool.Run)) == ["text/plain"]
     assert displayed(values["posted"]) == displayed(values["posted"])

@@ -5,7 +5,7 @@ import importlib
 import inspect
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -15,7 +15,7 @@ from camtool import api
 from camtool.cli.main import cli
 from camtool.importers.options import ReadOptions, Selection
 from camtool.pictures.options import Options
-from camtool.run import Posted, Verification, extended
+from camtool.run import Run
 
 LOGO = Path("samples/logo.dxf")
 SQUARE = "0,0\n4,0\n4,4\n0,4\n0,0\n"
@@ -29,7 +29,7 @@ def square(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def posted(tmp_path_factory: pytest.TempPathFactory) -> Posted:
+def posted(tmp_path_factory: pytest.TempPathFactory) -> Run:
     file = tmp_path_factory.mktemp("api") / "square.csv"
     file.write_text(SQUARE)
     return api.post(file, "pic-mmh")
@@ -75,7 +75,7 @@ def test_pictures_take_every_option() -> None:
     assert set(api.Looks.__annotations__) == {each.name for each in fields(Options)}
 
 
-def test_looks_change_a_picture(posted: Posted) -> None:
+def test_looks_change_a_picture(posted: Run) -> None:
     usual = camtool.preview(posted)
     for looks in ({"size_px": 400}, {"dark": True}, {"crop_mm": (0.0, 0.0, 1.0, 1.0)}):
         assert camtool.preview(posted, **looks).svg != usual.svg
@@ -83,10 +83,10 @@ def test_looks_change_a_picture(posted: Posted) -> None:
     assert repr(usual) == "<Picture of square.csv>"
 
 
-def test_the_viewer_has_the_programs_blocks(posted: Posted, tmp_path: Path) -> None:
+def test_the_viewer_has_the_programs_blocks(posted: Run, tmp_path: Path) -> None:
     camtool.preview(posted).save(tmp_path / "square.html")
     assert posted.verification is not None
-    page = camtool.preview(posted.verification).render("x.html")
+    page = camtool.preview(camtool.verify(posted.data, "pic-mmh")).render("x.html")
     assert b"<html" in page
     assert b"G01" in page
     assert (tmp_path / "square.html").read_bytes().startswith(b"<!")
@@ -109,7 +109,7 @@ def test_the_targets_tolerance_reads_a_drawing() -> None:
     assert len(fine.paths.vertices) > len(coarse.paths.vertices)
 
 
-def test_post_gives_what_the_command_writes(posted: Posted, tmp_path: Path) -> None:
+def test_post_gives_what_the_command_writes(posted: Run, tmp_path: Path) -> None:
     from click.testing import CliRunner
 
     output = tmp_path / "square.pic"
@@ -118,10 +118,10 @@ def test_post_gives_what_the_command_writes(posted: Posted, tmp_path: Path) -> N
     assert posted.data == output.read_bytes()
     assert not posted.failed
     assert "µm at most" in str(posted)
-    assert repr(posted).startswith("<Posted square.csv for pic-mmh: ")
+    assert repr(posted).startswith("<Run of square.csv on pic-mmh: ")
 
 
-def test_verify_of_bytes_a_file_and_a_program(posted: Posted, tmp_path: Path) -> None:
+def test_verify_of_bytes_a_file_and_a_program(posted: Run, tmp_path: Path) -> None:
     file = tmp_path / "square.pic"
     file.write_bytes(posted.data)
     assert posted.program is not None
@@ -134,13 +134,13 @@ def test_verify_of_bytes_a_file_and_a_program(posted: Posted, tmp_path: Path) ->
     assert "error " in repr(held)
 
 
-def test_everything_has_a_picture(posted: Posted) -> None:
+def test_everything_has_a_picture(posted: Run) -> None:
     verdict = posted.verification
-    assert isinstance(verdict, Verification)
+    assert isinstance(verdict, camtool.Verification)
     path = camtool.plan(posted.drawing, "pic-mmh")
     again = camtool.verify(posted.data, "pic-mmh")
     shown = [camtool.preview(posted.drawing), camtool.preview(path), camtool.preview(posted)]
-    shown += [camtool.preview(verdict), camtool.preview(again)]
+    shown.append(camtool.preview(again))
     pictures = [each.svg for each in shown]
     assert all(svg.startswith("<svg") for svg in pictures)
     assert pictures[0] != pictures[1] != pictures[2]
@@ -181,8 +181,8 @@ def test_settings_of_a_machine() -> None:
         camtool.load_target("pic-mh")
 
 
-def test_a_program_with_errors_has_no_bytes(posted: Posted) -> None:
-    without = extended(Posted, posted, program=None)
+def test_a_program_with_errors_has_no_bytes(posted: Run) -> None:
+    without = replace(posted, program=None)
     with pytest.raises(camtool.CamtoolError, match="must not be run"):
         _ = without.data
 

@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 BASE = {"arrays", "plain", "errors", "units", "findings", "patterns"}
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
 JUDGE = SHARED | {"importers", "planning", "simulation", "postprocessors"}
+MADE = JUDGE | {"verification", "pictures", "run", "pipeline", "comparison"}
 
 # Which rooms each room may import from (besides itself); docs/overview.md draws it.
 ALLOWED = {
@@ -34,12 +35,13 @@ ALLOWED = {
     "pictures": JUDGE | {"verification"},
     "calibration": SHARED,
     "jobs": SHARED | {"importers", "planning"},
-    "pipeline": JUDGE | {"verification", "pictures"},
-    "batches": JUDGE | {"verification", "pictures", "pipeline"},
-    "cli": JUDGE | {"verification", "pictures", "calibration", "pipeline", "batches", "jobs"},
+    "run": JUDGE | {"verification", "pictures"},
+    "pipeline": JUDGE | {"verification", "run"},
+    "comparison": JUDGE | {"verification", "pictures", "run", "pipeline"},
+    "batches": MADE,
+    "cli": MADE | {"calibration", "batches", "jobs"},
     "__main__": {"cli"},
-    "run": JUDGE | {"verification", "pictures", "calibration", "pipeline", "jobs"},
-    "api": JUDGE | {"verification", "pictures", "calibration", "pipeline", "jobs", "run"},
+    "api": MADE | {"calibration", "jobs"},
     "__init__": {"api", "errors"},
 }
 HEAVY = {

@@ -7,7 +7,7 @@ import pytest
 
 from camtool.geometry.drawing import Drawing, Gap, Units
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.pictures.scene import Scene, scene_of_drawing, scene_of_toolpath
+from camtool.pictures.scene import Scene, scene_of_drawing
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
@@ -20,6 +20,14 @@ def line(*points: tuple[float, ...], closed: bool = False) -> Polyline:
 
 def circle(x: float, y: float, radius: float) -> Polyline:
     return line((x + radius, y, 1.0), (x - radius, y, 1.0), closed=True)
+
+
+def scene_of_toolpath(toolpath: Toolpath, *, title: str, drawing: Drawing | None = None) -> Scene:
+    """A toolpath with a note of its moves, over its drawing with its size."""
+    moves, feeds = int(toolpath.is_motion.sum()), int(toolpath.is_feed.sum())
+    sizes = () if drawing is None else scene_of_drawing(drawing).notes
+    notes = (*sizes, f"{moves} moves, {feeds} of them at a feed")
+    return Scene(title=title, toolpath=toolpath, drawing=drawing, notes=notes)
 
 
 def drawing_of(paths: list[Polyline], layers: list[str], gaps: tuple[Gap, ...] = ()) -> Drawing:

@@ -14,11 +14,18 @@ from camtool.pictures.draw import draw
 from camtool.pictures.marks import CLEAR, every, placed
 from camtool.pictures.options import LAYERS, USUAL, Options, chosen
 from camtool.pictures.page import page_of
-from camtool.pictures.scene import Scene, scene_of_toolpath
+from camtool.pictures.scene import Scene
 from camtool.pictures.strokes import turns_of
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles import literal_turns, svg_page
-from tests.pictures.conftest import SCENES, circle, drawing_of, followed, plate
+from tests.pictures.conftest import (
+    SCENES,
+    circle,
+    drawing_of,
+    followed,
+    plate,
+    scene_of_toolpath,
+)
 
 MILLED = replace(scene_of_toolpath(followed(plate()), title="", drawing=plate()), tool_mm=0.5)
 JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))

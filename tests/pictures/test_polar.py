@@ -9,8 +9,7 @@ from camtool.errors import OptionError
 from camtool.kernels.circle_bins import bin_directions, empty_bins, fill_bins
 from camtool.pictures.draw import draw, png
 from camtool.pictures.options import Options
-from camtool.pictures.scene import Round, Scene
-from camtool.pipeline import rounds_of
+from camtool.pictures.scene import Round, Scene, rounds_of
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.verify import verify
 from tests.oracles import svg_page

@@ -122,11 +122,11 @@ def test_names_stay_names(words: str) -> None:
 
 def test_columns_come_back_as_they_went_in(scenes: dict[str, Scene]) -> None:
     scene = busy(scenes["result"])
-    assert scene.run is not None
+    assert scene.playback is not None
     assert scene.toolpath is not None
     run = Playback(
-        scene.run().seconds,
-        scene.run().error_mm,
+        scene.playback().seconds,
+        scene.playback().error_mm,
         np.arange(len(scene.trace_points if scene.trace_points is not None else ())),
     )
     wide = {"wide": np.array([7, -70_000], dtype="<i4"), "short": np.array([0, 900], dtype="<i4")}
@@ -150,17 +150,17 @@ def test_columns_come_back_as_they_went_in(scenes: dict[str, Scene]) -> None:
 def test_the_page_draws_deviations_as_pictures_do() -> None:
     ring = Segments.of(Polylines.of([circle(2.5, 2.5, 2.0)]))
     scene = traced(busy(replace(SCENES["result"], wanted=ring)))
-    assert scene.run is not None
+    assert scene.playback is not None
     assert scene.trace_points is not None
     assert scene.trace_cutting is not None
-    found = traced_of(scene, scene.run(), 20.0)
+    found = traced_of(scene, scene.playback(), 20.0)
     off = found.columns["trace_off"].astype(float) * found.count_mm
     assert np.abs(found.columns["trace_off"]).max() == 32_000
     cut = scene.trace_cutting
     drawn = scene.trace_points + 49.0 * off
     wanted = exaggerated(scene.trace_points, ring, 50.0)
     np.testing.assert_allclose(drawn[cut], wanted[cut], atol=50.0 * found.count_mm)
-    worst = np.array([one.at_mm for one in scene.run().worst])
+    worst = np.array(scene.worst)
     moved = exaggerated(worst, ring, 50.0)
     np.testing.assert_allclose(worst + 49.0 * found.worst_off, moved, atol=1e-9)
     picture = trace_of(scene)

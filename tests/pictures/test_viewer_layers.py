@@ -9,7 +9,7 @@ import pytest
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.machine.registry import load_target
 from camtool.pictures.scene import Scene
-from camtool.pipeline import listing_of, picture, verify_program
+from camtool.pipeline import verify_program
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.pictures.conftest import SCENES, circle
@@ -150,11 +150,8 @@ def test_at_the_end_stands_the_last_block(shown: Any) -> None:
 def test_bytes_under_the_cursor_and_the_largest_error_of_the_report(shown: Any) -> None:
     target = load_target("i8751", machine_file=SAMPLE, settings=["axes.x.backlash_mm=0.05"])
     program = target.post.write(_square(), target.machine).data
-    decoded, judged = verify_program(program, target, source="a.bin")
-    listing = listing_of(program, target, decoded)
-    scene = picture(
-        title="a", toolpath=decoded, verification=judged, machine=target.machine, listing=listing
-    )
+    run = verify_program(program, target, source="a.bin")
+    listing, scene = run.listing, run.scene("a")
     view = shown(scene)
     tip = find_move(view, view.place_of(0.5, 0.92))
     made = listing()
@@ -162,7 +159,7 @@ def test_bytes_under_the_cursor_and_the_largest_error_of_the_report(shown: Any) 
     block = int(tip.split("block\n")[1].split()[0]) - 1
     assert f"bytes\n{made.blocks[block]}" in tip
     said = float(view.text("#scale-high").removesuffix(" µm"))
-    assert said == pytest.approx(judged.report.error_um.total.max, rel=1e-3)
+    assert said == pytest.approx(run.report.error_um.total.max, rel=1e-3)
 
 
 def _square() -> Toolpath:

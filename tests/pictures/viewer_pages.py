@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camtool.geometry.polylines import Segments
-from camtool.pictures.scene import Line, Playback, Scene, Table, Worst, by_feed
+from camtool.pictures.scene import Line, Playback, Scene, Table, by_feed
 from camtool.pictures.viewer.page import viewer_page
 from camtool.toolpath.moves import Toolpath
 
@@ -25,7 +25,7 @@ def run_of(toolpath: Toolpath, **more: object) -> Playback:
 
 
 def with_run(scene: Scene, run: Playback) -> Scene:
-    return replace(scene, run=lambda: run)
+    return replace(scene, playback=lambda: run)
 
 
 def busy(scene: Scene) -> Scene:
@@ -39,18 +39,17 @@ def busy(scene: Scene) -> Scene:
         error_mm=np.linspace(0.0, 0.02, count),
         blocks=tuple(f"N{row} G01 X{row}" for row in range(count)),
         tables=(Table("Worst moves", ("block", "error"), (Line(("3", "20"), 2),)),),
-        worst=(Worst((2.5, 2.5)),),
     )
-    return with_run(replace(scene, toolpath=numbered, tool_mm=0.5), run)
+    return with_run(replace(scene, toolpath=numbered, tool_mm=0.5, worst=((2.5, 2.5),)), run)
 
 
 def traced(scene: Scene) -> Scene:
     """The scene with a run that knows the rows of its trace."""
-    assert scene.run is not None
+    assert scene.playback is not None
     assert scene.toolpath is not None
     assert scene.trace_points is not None
     rows = np.linspace(0, len(scene.toolpath) - 1, len(scene.trace_points)).astype(np.int64)
-    return with_run(scene, replace(scene.run(), trace_row=rows))
+    return with_run(scene, replace(scene.playback(), trace_row=rows))
 
 
 def spiral(count: int) -> Toolpath:

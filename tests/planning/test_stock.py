@@ -213,10 +213,8 @@ def test_what_is_done_against_reversals_is_accepted(kind: str, name: str, path: 
     posted = post_drawing(drawing, job, target)
     assert not posted.failed, [str(finding) for finding in posted.findings]
     assert posted.program is not None
-    _, verification = verify_program(
-        posted.program.data, target, source="x.ngc", drawing=drawing, job=job
-    )
-    errors = [each for each in verification.findings if each.severity is Severity.ERROR]
+    run = verify_program(posted.program.data, target, source="x.ngc", drawing=drawing, job=job)
+    errors = [each for each in run.findings if each.severity is Severity.ERROR]
     assert errors == []
 
 

@@ -49,7 +49,7 @@ def circle_of_30(method: Interpolator) -> Report:
     path.arc(at, at + radius, centre=(at, at), ccw=False, feed=0.8)
     data = target.post.write(path.rapid(z=0.0014).finish(), target.machine).data
     judging = Judging(interpolator=method, effects=IDEAL)
-    return verify_program(data, target, source="circle.pic", judging=judging)[1].report
+    return verify_program(data, target, source="circle.pic", judging=judging).report
 
 
 def iterations(method: Interpolator) -> int:

@@ -51,7 +51,9 @@ def program(target: LoadedTarget, job: Job = ASKED) -> str:
 
 
 def held(text: str, target: LoadedTarget, job: Job = ASKED) -> Verification:
-    return verify_program(text.encode(), target, source="a.nc", drawing=DRAWING, job=job)[1]
+    return verify_program(
+        text.encode(), target, source="a.nc", drawing=DRAWING, job=job
+    ).verification
 
 
 def errors(verification: Verification) -> list[Code]:

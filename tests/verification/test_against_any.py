@@ -12,8 +12,9 @@ from camtool.errors import CamtoolError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polyline, moved, scaled
-from camtool.pipeline import Judging, Posted, post_drawing, verify_program
+from camtool.pipeline import Judging, post_drawing, verify_program
 from camtool.planning.job import Job, Placement, job_of
+from camtool.run import Run
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.verify import Verification
@@ -52,7 +53,7 @@ def drawings(draw: st.DrawFn, scale: float) -> Drawing:
     return drawing_of([scaled(path, scale) for path in paths])
 
 
-def post(name: str, drawing: Drawing, job: Job, *, compensate: bool) -> Posted:
+def post(name: str, drawing: Drawing, job: Job, *, compensate: bool) -> Run:
     """The program; another example where the target cannot make it."""
     try:
         made = post_drawing(
@@ -70,7 +71,8 @@ def judged(
 ) -> Verification:
     judging = Judging(compensated=compensated)
     target = sound(name)[0].target
-    return verify_program(data, target, source="a", drawing=drawing, job=job, judging=judging)[1]
+    run = verify_program(data, target, source="a", drawing=drawing, job=job, judging=judging)
+    return run.verification
 
 
 def against(verification: Verification) -> list[Finding]:

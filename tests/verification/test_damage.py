@@ -115,12 +115,10 @@ def found(name: str, data: bytes) -> bool:
     """Whether `verify --against` would end with exit code 1 (or 2)."""
     whole, drawing, job = sound(name)
     try:
-        _, verification = verify_program(
-            data, whole.target, source="damaged", drawing=drawing, job=job
-        )
+        run = verify_program(data, whole.target, source="damaged", drawing=drawing, job=job)
     except ProgramError:  # the controller's model cannot follow it
         return True
-    return worst(verification.findings) is Severity.ERROR
+    return worst(run.findings) is Severity.ERROR
 
 
 def missed(name: str, seed: int, count: int) -> list[str]:

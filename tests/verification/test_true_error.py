@@ -16,8 +16,9 @@ from camtool.arrays import Floats
 from camtool.findings import Code
 from camtool.jobs.drawing import read_to_scale
 from camtool.machine.registry import load_target
-from camtool.pipeline import Posted, post_drawing
+from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Tool, job_of
+from camtool.run import Run
 from tests.oracles.true_curves import distances, drawn, slides_cutting
 
 ROOT = Path(__file__).parents[2]
@@ -74,14 +75,14 @@ def bezier_svg(file: Path, seed: int) -> None:
     )
 
 
-def posted(file: Path, target: str, job: Job, *settings: str) -> Posted:
+def posted(file: Path, target: str, job: Job, *settings: str) -> Run:
     """The file posted on a machine as large as the part."""
     room = [LARGE.format(axis) for axis in "xy"]
     loaded = load_target(target, settings=[*room, *settings])
     return post_drawing(as_drawing(file, loaded, job), job, loaded)
 
 
-def truth_um(made: Posted, file: Path, scale: float, target: str) -> Floats:
+def truth_um(made: Run, file: Path, scale: float, target: str) -> Floats:
     """(S,) the distance of every slide from the true drawing at its size."""
     loaded = load_target(target, settings=[LARGE.format(axis) for axis in "xy"])
     assert made.decoded is not None
@@ -89,7 +90,7 @@ def truth_um(made: Posted, file: Path, scale: float, target: str) -> Floats:
     return 1000.0 * distances(slides, [scale * curve for curve in drawn(file)])
 
 
-def check(file: Path, target: str, scale: float, fits: float = 1.0) -> Posted:
+def check(file: Path, target: str, scale: float, fits: float = 1.0) -> Run:
     """The report's total is never below the truth, and not above it by more than so many fits.
 
     With d from a slide to its move and f from that to the curve, the truth t is d − f at least, so
@@ -162,7 +163,7 @@ def test_the_tolerance_is_of_the_part_whatever_brings_it_to_its_size(tmp_path: P
     spline_dxf(file, 1)
     loaded = load_target("grbl", settings=[LARGE.format(axis) for axis in "xy"])
 
-    def made(job: Job, **reading: str) -> Posted:
+    def made(job: Job, **reading: str) -> Run:
         read = read_to_scale(
             lambda scale: read_drawing(file, target=loaded, scale=scale, **reading), job
         )

@@ -201,7 +201,7 @@ class Traced:
 def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     """The path of a scene, in colours that end at `top_um`. ValueError when the rows of the run's
     trace are not those of its points."""
-    worst = np.array([] if run is None else [one.at_mm for one in run.worst]).reshape(-1, 2)
+    worst = np.array(scene.worst, dtype=np.float64).reshape(-1, 2)
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
         none = np.empty(0)

@@ -95,7 +95,7 @@ def viewer_page(scene: Scene) -> bytes:
 def _run(scene: Scene) -> Playback | None:
     if scene.toolpath is None:
         return None
-    return by_feed(scene.toolpath, np.inf) if scene.run is None else scene.run()
+    return by_feed(scene.toolpath, np.inf) if scene.playback is None else scene.playback()
 
 
 def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, object]:
@@ -117,10 +117,8 @@ def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, objec
         "tables": [] if run is None else [_table(table) for table in run.tables],
         "off_mm": traced.count_mm,
         "worst": [
-            {"at": place.at_mm, "off": off}
-            for place, off in zip(
-                () if run is None else run.worst, traced.worst_off.tolist(), strict=True
-            )
+            {"at": place, "off": off}
+            for place, off in zip(scene.worst, traced.worst_off.tolist(), strict=True)
         ],
         "travel_mm": scene.travel_mm,
         "doubts": [] if drawing is None else _doubts(drawing),
