@@ -1,15 +1,18 @@
-"""Toolpaths in fewer words: what a dialect cannot say, said by what it can.
+"""Toolpaths made fit for a machine: what a dialect cannot say, said by what it can.
 
     xy_then_z           moves of XY and Z at once become two: up before XY, down after
     helices_to_steps    slopes and helices become flat pieces with small plunges between
     arcs_to_lines       chosen arcs become chords
-    split_full_circles  an arc that ends where it starts becomes two halves
     arcs_within         arcs of more than a given sweep become equal parts
 
-Each function gives a new Toolpath and, for each of its rows, the row that it came from. All new
+Each of them gives a new Toolpath and, for each of its rows, the row that it came from. All new
 points lie on the true arc, and the last one is the old end itself. Feed, provenance, block and
 value of a row go on in all the rows that it becomes; events stay as they are. Arcs whose ends lie
-at two radii are spirals, as in `camtool.toolpath.moves`.
+at two radii are spirals (`Arms`).
+
+    carried_over        the program of one machine as what another one shall do
+    at_feed             all cuts at one feed
+    within_feeds        no cut faster than the machine's highest feed
 """
 
 from __future__ import annotations
@@ -120,13 +123,6 @@ def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lower
     return _split(toolpath, arms, parts, lines=True)
 
 
-def split_full_circles(toolpath: Toolpath) -> Lowered:
-    """Arcs that end where they start, as two halves each; PostError for one without a centre."""
-    same = (toolpath.end[:, :2] == toolpath.starts[:, :2]).all(axis=1)
-    arms = Arms(toolpath, toolpath.is_arc & same)
-    return _split(toolpath, arms, _of_rows(toolpath, arms, np.full(len(arms.row), 2.0)))
-
-
 def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> Lowered:
     """Arcs of more than `max_sweep_rad` as equal parts of no more.
 
@@ -194,7 +190,17 @@ def _built(toolpath: Toolpath, row: Ints, kind: Ints, end: Floats, centre: Float
     return Lowered(toolpath.picked(row, kind=kind, end=end, centre=centre), row)
 
 
-# A toolpath decoded from one machine's program, as what another machine shall do.
+def carried_over(decoded: Toolpath) -> Toolpath:
+    """The moves and events of a program, free of what belongs to its own machine alone.
+
+    Part zero set at the very beginning is left out: there every program begins. Homing becomes a
+    rapid to where machine zero lay. Rows lose their block: the new program has blocks of its own.
+    """
+    first = 1 if len(decoded) and decoded.kind[0] == Kind.SET_ZERO else 0
+    homes = (decoded.kind == Kind.HOME_XY) | (decoded.kind == Kind.HOME_Z)
+    kind = np.where(homes, int(Kind.RAPID), decoded.kind)[first:]
+    rows = np.arange(first, len(decoded))
+    return decoded.picked(rows, kind=kind, block=np.full(len(rows), -1))
 
 
 def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:
@@ -225,16 +231,3 @@ def within_feeds(toolpath: Toolpath, machine: Machine) -> Toolpath:
         feed=np.where(fast, limit, toolpath.feed),
         findings=(*toolpath.findings, found),
     )
-
-
-def carried_over(decoded: Toolpath) -> Toolpath:
-    """The moves and events of a program, free of what belongs to its own machine alone.
-
-    Part zero set at the very beginning is left out: there every program begins. Homing becomes a
-    rapid to where machine zero lay. Rows lose their block: the new program has blocks of its own.
-    """
-    first = 1 if len(decoded) and decoded.kind[0] == Kind.SET_ZERO else 0
-    homes = (decoded.kind == Kind.HOME_XY) | (decoded.kind == Kind.HOME_Z)
-    kind = np.where(homes, int(Kind.RAPID), decoded.kind)[first:]
-    rows = np.arange(first, len(decoded))
-    return decoded.picked(rows, kind=kind, block=np.full(len(rows), -1))

@@ -194,6 +194,11 @@ class Toolpath:
         index = int(self.source[row])
         return self.texts[index] if index >= 0 else ""
 
+    def place(self, row: int) -> str:
+        """A row and where it came from, for messages: `move 12 (CIRCLE 2F)`."""
+        source = self.text(row)
+        return f"move {row} ({source})" if source else f"move {row}"
+
     def __iter__(self) -> Iterator[Move]:
         starts = self.starts
         for row in range(len(self)):
@@ -222,28 +227,24 @@ def _or_none(number: np.float64) -> float | None:
     return None if np.isnan(number) else float(number)
 
 
-# A toolpath that was bent beforehand, so that a machine's slides come out on another one.
-
-
 @dataclass(frozen=True, eq=False)
 class Bent:
-    """`toolpath` is what the controller is told; `row` (N,) of each of its rows the row of the
-    wanted toolpath that it is there for."""
+    """A toolpath bent beforehand so that a machine's slides come out on another one: `toolpath` is
+    what the controller is told, `row` (N,) of each of its rows the row of the wanted toolpath that
+    it is there for."""
 
     toolpath: Toolpath
     row: Ints
 
 
-# Arcs of a toolpath seen from their centres, and the points on them.
-#
-# An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the spiral
-# between them; radius and, in a helix, Z change in proportion to the angle, so that both ends are
-# met.
-
-
 class Arms:
     """The chosen arcs seen from their centres: radius at start and end mm, angle at the start and
-    signed sweep rad, each (J,), for the rows `row` (J,)."""
+    signed sweep rad, each (J,), for the rows `row` (J,).
+
+    An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the
+    spiral between them; radius and, in a helix, Z change in proportion to the angle, so that both
+    ends are met.
+    """
 
     def __init__(self, toolpath: Toolpath, chosen: Bools) -> None:
         """PostError for an arc without a centre."""
@@ -273,12 +274,9 @@ class Arms:
         )
 
 
-# How far a toolpath reaches, exact with its arcs.
-
-
 def toolpath_extents(toolpath: Toolpath, *, cuts: bool = False) -> Floats:
-    """(3, 2) mm: lowest and highest X, Y and Z that any move reaches, the start included; with
-    `cuts` those that moves at a feed reach.
+    """(3, 2) mm: lowest and highest X, Y and Z that any move reaches, exact with its arcs, the
+    start included; with `cuts` those that moves at a feed reach.
 
     An arc reaches centre ± radius where its sweep passes the direction of an axis.
     """
@@ -307,9 +305,6 @@ def _arc_extremes(toolpath: Toolpath) -> Floats:
     turn = np.mod(sign[:, None] * from_start, 2.0 * np.pi)
     arc, which = np.nonzero(turn <= sweep[:, None])
     return np.asarray(centre[arc] + radius[arc, None] * compass[which])
-
-
-# Tool changes of a toolpath, for machines that have none or only some.
 
 
 def mounted_before(toolpath: Toolpath) -> Bools:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
 
 from camtool.arrays import Ints
 from camtool.findings import Finding
@@ -24,6 +27,23 @@ class Program:
     target: str
     row_of_block: Ints
     findings: tuple[Finding, ...] = ()
+
+    @classmethod
+    def of_lines(
+        cls,
+        lines: Iterable[str],
+        machine: Machine,
+        row_of_block: Sequence[int] | Ints,
+        findings: Iterable[Finding],
+    ) -> Program:
+        """A program of lines of ASCII text, for a machine that calls its programs so."""
+        return cls(
+            data="".join(f"{line}\n" for line in lines).encode("ascii"),
+            extension=machine.target.extension,
+            target=machine.target.name,
+            row_of_block=np.array(row_of_block, dtype=np.int64),
+            findings=tuple(findings),
+        )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What was drawn, as far as a planned toolpath stands for it: how well, and in which size."""
+"""What a planned toolpath is wanted for: what was drawn, and what it must leave standing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from camtool.geometry.polylines import Polylines
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """Of the N rows of a planned toolpath.
+    """What was drawn, as far as the N rows of a planned toolpath stand for it.
 
     `off_mm` (N, 2): the largest and the rms distance, mm, between the lines that a row was planned
     along and what was drawn; 0 for rows that stand for nothing drawn. `edge` (N,): the edge of the
@@ -27,9 +27,6 @@ class Drawn:
     def picked(self, row: Ints) -> Drawn:
         """Rows (M,) of this one, in that order and as often as they are named."""
         return replace(self, off_mm=self.off_mm[row], edge=self.edge[row])
-
-
-# What cuts must leave of the material: regions between drawn lines, and who must leave them.
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,6 @@ from camtool.toolpath.lower import (
     Lowered,
     arcs_to_lines,
     arcs_within,
-    split_full_circles,
     xy_then_z,
 )
 from camtool.toolpath.moves import Kind, Toolpath
@@ -53,7 +52,7 @@ def mixed(count: int) -> Toolpath:
 LOWERINGS: dict[str, Callable[[Toolpath], Lowered]] = {
     "XY, then Z": xy_then_z,
     "four chords an arc": lambda path: arcs_to_lines(path, path.is_arc, 0.5),
-    "halves": split_full_circles,
+    "halves": lambda path: arcs_within(path, math.pi),
     "quarters": lambda path: arcs_within(path, 0.5 * math.pi),
 }
 

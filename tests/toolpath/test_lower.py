@@ -18,7 +18,6 @@ from camtool.toolpath.lower import (
     arcs_within,
     helices_to_steps,
     slope_step_mm,
-    split_full_circles,
     xy_then_z,
 )
 from camtool.toolpath.moves import Kind, Toolpath
@@ -181,15 +180,6 @@ def test_no_point_of_the_arc_is_farther_from_the_chords_than_the_tolerance() -> 
     assert sagitta.min() > -1e-12
 
 
-@given(toolpaths())
-def test_full_circles_become_two_halves(toolpath: Toolpath) -> None:
-    full = {m.index: 2 for m in toolpath if m.centre and m.start[:2] == m.end[:2]}
-    lowered = split_full_circles(toolpath)
-    agrees(lowered, toolpath, lowering.split(toolpath, full))
-    sweeps = lowered.toolpath.sweeps()[np.isin(lowered.row, list(full))]
-    assert sweeps == pytest.approx(np.copysign(math.pi, sweeps), abs=1e-6)
-
-
 @given(toolpaths(), st.sampled_from([0.1, 0.5 * math.pi, math.pi, 6.0, 7.0]))
 def test_arcs_within_a_sweep_are_their_twins(toolpath: Toolpath, most: float) -> None:
     parts = {
@@ -229,7 +219,6 @@ def empty() -> Toolpath:
     "run",
     [
         xy_then_z,
-        split_full_circles,
         lambda t: helices_to_steps(t, 1.0),
         lambda t: arcs_within(t, 1.0),
         lambda t: arcs_to_lines(t, t.is_arc, 0.1),
