@@ -30,6 +30,15 @@ LEXING: Final = Lexing(letters="GMXYZIJF")
 FEED_GUARD: Final = 1e-9
 """Part of a feed: a feed above its limit by less is at the limit."""
 
+HELD_GUARD: Final = 0.01
+"""Part of a feed: whole milliseconds bring it no nearer than this at the fastest."""
+
+WARNED_PART: Final = 0.5
+"""Of the feed that a program says: a cut that gets less is a warning, not a remark."""
+
+MOST_MS: Final = 1e9
+"""Half periods longer than this make no shorter axis too long."""
+
 TEMPLATES: Final = {
     "G00": ("XY", "Z"),
     "G01": ("XY", "XYF", "Z"),
@@ -63,7 +72,7 @@ def read_program(data: bytes, machine: Machine) -> Toolpath:
     if not reader.blocks:
         raise ProgramError("the program is empty", mend="a program has blocks such as M30")
     path = reader.path.finish(reader.findings())
-    return replace(path, findings=(*path.findings, *timer_findings(path, machine)))
+    return replace(path, findings=(*path.findings, *_timer_findings(path, machine)))
 
 
 @dataclass
@@ -213,19 +222,10 @@ def _refuse_spacing(block: Block) -> None:
     block.fail("one space, no more and no tab, goes between words", mend="as in G00 X1.0 Y1.0")
 
 
-# What the machine's timers make of a program's lines and feeds: found when it is read.
-
-HELD_GUARD: Final = 0.01
-"""Part of a feed: whole milliseconds bring it no nearer than this at the fastest."""
-
-WARNED_PART: Final = 0.5
-"""Of the feed that a program says: a cut that gets less is a warning, not a remark."""
-
-MOST_MS: Final = 1e9
-"""Half periods longer than this make no shorter axis too long."""
+# What the machine's timers make of a program's lines and feeds.
 
 
-def timer_findings(path: Toolpath, machine: Machine) -> tuple[Finding, ...]:
+def _timer_findings(path: Toolpath, machine: Machine) -> tuple[Finding, ...]:
     """What feeds become, and which moves of both axes get steps too many on their shorter one."""
     controller = machine.controller
     if not isinstance(controller, FlashcutController):

@@ -21,20 +21,15 @@ from camtool.machine.model import Machine
 from camtool.toolpath.lower import MAX_PARTS, Lowered
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
+from camtool.toolpath.refusals import refuse
 
-from ..gcode.checks import check_plain, feed_units, left_out, place, split_z
+from ..gcode.checks import check_plain, feed_units, left_out, split_z
 from ..gcode.dialect import feed_decimals
-from ..gcode.format import NumberStyle, say_units
+from ..gcode.format import CODE, NumberStyle, say_units
 from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
 from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
 from .timers import half_periods_ms
 
-WORD: Final[dict[int, str]] = {
-    Kind.RAPID: "G00",
-    Kind.LINE: "G01",
-    Kind.ARC_CW: "G02",
-    Kind.ARC_CCW: "G03",
-}
 EVENT: Final = {
     Kind.SPINDLE_CW: "M03",
     Kind.SPINDLE_CCW: "M04",
@@ -50,7 +45,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     feeds, feed_note = feed_units(toolpath, machine)
     lowered, split_note = split_z(toolpath, machine)
     if dialect.slants == "split":
-        lowered = split_slants(lowered.toolpath, machine).after(lowered)
+        lowered = _split_slants(lowered.toolpath, machine).after(lowered)
     rules = ArcRules(dialect.decimals, dialect.full_circles, MOST_MM)
     rows = plain_rows(lowered.toolpath, rules)
     of_row = lowered.row[rows.row]
@@ -58,31 +53,75 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     writer = _Writer(rows, dialect, machine)
     writer.run(_event_words(toolpath), of_row, feeds[of_row])
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
-    first = place(toolpath, int(lowered.row[rows.first])) if rows.first >= 0 else ""
+    first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
     notes = [
         *([feed_note] if feed_note else []),
         *([split_note] if split_note else []),
         *arc_findings(rows, first),
         *_event_notes(toolpath, dialect),
     ]
-    blocks = [*writer.blocks, dialect.program_end]
-    return Program(
-        data="".join(f"{block}\n" for block in blocks).encode("ascii"),
-        extension=machine.target.extension,
-        target=machine.target.name,
-        row_of_block=np.array([*writer.rows, len(toolpath) - 1 if ended else -1], dtype=np.int64),
-        findings=tuple(notes),
+    return Program.of_lines(
+        [*writer.blocks, dialect.program_end],
+        machine,
+        [*writer.rows, len(toolpath) - 1 if ended else -1],
+        notes,
     )
+
+
+def _split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:
+    """Long slanted lines in pieces that the machine's timers do exactly; PostError when they would
+    be too many. XY and Z are apart.
+
+    The timers make the shorter axis too long where it has more steps than the half period P has
+    milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes
+    K = ⌈m / (P − 1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its
+    start, so that the controller, which rounds the way of each piece by itself, has nothing to
+    round.
+    """
+    controller = machine.controller
+    if not isinstance(controller, FlashcutController):
+        return Lowered(toolpath, np.arange(len(toolpath)))
+    q_mm = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
+    begin = toolpath.starts
+    way = toolpath.end[:, :2] - begin[:, :2]
+    steps = np.column_stack([to_steps(way[:, axis], float(q_mm[axis])) for axis in (0, 1)])
+    feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
+    alone = (steps == 0).any(axis=1)
+    half_period = half_periods_ms(feed, float(q_mm.max()), alone, controller)
+    exact = np.maximum(half_period - 1.0, 1.0)
+    slanted = toolpath.kind == Kind.LINE
+    pieces = np.where(slanted, np.ceil(np.abs(steps).min(axis=1) / exact), 1.0)
+    count = np.maximum(pieces, 1.0)
+    if count.sum() > MAX_PARTS:
+        raise PostError(
+            f"the program would have more than {MAX_PARTS} blocks",
+            where=toolpath.place(int(count.argmax())),
+            mend="say --set dialect.slants=whole",
+        )
+    return _cut(toolpath, count.astype(np.int64), steps, q_mm)
+
+
+def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
+    """Each row in `count` (N,) pieces; `steps` (N, 2) of its whole way."""
+    row = np.repeat(np.arange(len(count)), count)
+    part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    inner = np.flatnonzero(part + 1 < count[row])
+    of = row[inner]
+    share = ((part[inner] + 1) / count[of])[:, None]
+    end = toolpath.end[row]
+    end[inner, :2] = toolpath.starts[of, :2] + np.rint(share * steps[of]) * q_mm
+    return Lowered(toolpath.picked(row, end=end), row)
 
 
 def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: Dialect) -> None:
     far = (np.abs(rows.end) > MOST_MM * 10**dialect.decimals).any(axis=1)
-    if far.any():
-        raise PostError(
-            f"a coordinate has more than four digits before the point (±{MOST_MM:g} mm)",
-            where=place(toolpath, int(of_row[far.argmax()])),
-            mend="check the units",
-        )
+    refuse(
+        toolpath,
+        far,
+        f"a coordinate has more than four digits before the point (±{MOST_MM:g} mm)",
+        "check the units",
+        rows=of_row,
+    )
 
 
 def _texts(units: Ints, dialect: Dialect) -> list[str]:
@@ -176,7 +215,7 @@ class _Writer:
                     target += f" I{next(i)} J{next(j)}"
                 if kind == Kind.RAPID and in_xy and cornered[index]:
                     self._corner(at, target, row)
-                self._move(WORD[kind], target, row, feed, at)
+                self._move(CODE[kind], target, row, feed, at)
             at = xy[index]
 
     def _xy_texts(self, units: Ints) -> list[str]:
@@ -187,7 +226,7 @@ class _Writer:
         """The way along X of a rapid of both axes, before that along Y."""
         corner = f"{target.partition(' ')[0]} {at.partition(' ')[2]}"
         if corner not in (at, target):
-            self._send(f"{WORD[Kind.RAPID]} {corner}", row)
+            self._send(f"{CODE[Kind.RAPID]} {corner}", row)
 
     def _move(self, word: str, target: str, row: int, feed: int, at: str) -> None:
         """One move, and a block in front that says the feed where its own cannot."""
@@ -211,48 +250,3 @@ class _Writer:
     def _send(self, block: str, row: int) -> None:
         self.blocks.append(block)
         self.rows.append(row)
-
-
-# Long slanted lines as pieces that the machine's timers do exactly.
-#
-# The timers make the shorter axis too long where it has more steps than the half period has
-# milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes K = ⌈m / (P −
-# 1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its start, so that the
-# controller, which rounds the way of each piece by itself, has nothing to round.
-
-
-def split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:
-    """Lines of X and Y in pieces; PostError when they would be too many. XY and Z are apart."""
-    controller = machine.controller
-    if not isinstance(controller, FlashcutController):
-        return Lowered(toolpath, np.arange(len(toolpath)))
-    q_mm = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
-    begin = toolpath.starts
-    way = toolpath.end[:, :2] - begin[:, :2]
-    steps = np.column_stack([to_steps(way[:, axis], float(q_mm[axis])) for axis in (0, 1)])
-    feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    alone = (steps == 0).any(axis=1)
-    half_period = half_periods_ms(feed, float(q_mm.max()), alone, controller)
-    exact = np.maximum(half_period - 1.0, 1.0)
-    slanted = toolpath.kind == Kind.LINE
-    pieces = np.where(slanted, np.ceil(np.abs(steps).min(axis=1) / exact), 1.0)
-    count = np.maximum(pieces, 1.0)
-    if count.sum() > MAX_PARTS:
-        raise PostError(
-            f"the program would have more than {MAX_PARTS} blocks",
-            where=place(toolpath, int(count.argmax())),
-            mend="say --set dialect.slants=whole",
-        )
-    return _cut(toolpath, count.astype(np.int64), steps, q_mm)
-
-
-def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
-    """Each row in `count` (N,) pieces; `steps` (N, 2) of its whole way."""
-    row = np.repeat(np.arange(len(count)), count)
-    part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
-    inner = np.flatnonzero(part + 1 < count[row])
-    of = row[inner]
-    share = ((part[inner] + 1) / count[of])[:, None]
-    end = toolpath.end[row]
-    end[inner, :2] = toolpath.starts[of, :2] + np.rint(share * steps[of]) * q_mm
-    return Lowered(toolpath.picked(row, end=end), row)

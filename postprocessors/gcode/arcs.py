@@ -91,10 +91,7 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
     sweep = toolpath.sweeps()[rows]
     arm = toolpath.starts[rows, :2] - toolpath.centre[rows]
     radius = np.hypot(arm[:, 0], arm[:, 1])
-    half = np.minimum(np.abs(sweep), math.pi) / 2.0
-    # 1 − cos a = 2 sin²(a/2), which keeps its digits where a is small.
-    sagitta = radius * 2.0 * np.sin(half / 2.0) ** 2
-    flat = sagitta < FLAT_UNITS * unit
+    flat = sagitta_of(radius, sweep) < FLAT_UNITS * unit
     huge = ~flat & (radius > dialect.arc_most_radius_mm)
     kind[rows[flat]] = Kind.LINE
     arcs.counts.flat = int(flat.sum())
@@ -128,7 +125,7 @@ def arcs_hold(
         gap > dialect.arc_difference_part * np.minimum(r1, r2)
     )
     small = np.minimum(r1, r2) <= dialect.arc_least_radius_mm / RULE_MARGIN
-    turn = _turns(out, back, kind)
+    turn = turns_of(out, back, kind == Kind.ARC_CW)
     limit = dialect.arc_full_turn_rad / RULE_MARGIN
     same = (start == end).all(axis=1)
     vague = ~same & ((turn <= limit) | (turn >= 2.0 * math.pi - limit))
@@ -138,10 +135,17 @@ def arcs_hold(
     )
 
 
-def _turns(out: Floats, back: Floats, kind: Ints) -> Floats:
-    """(K,) in (0, 2π]: how far an arc turns from the arm `out` to the arm `back`."""
+def sagitta_of(radius: Floats, sweep_rad: Floats) -> Floats:
+    """(K,) how far arcs rise above their chords; the radius where they turn by π or more."""
+    half = np.minimum(np.abs(sweep_rad), math.pi) / 2.0
+    # 1 − cos a = 2 sin²(a/2), which keeps its digits where a is small.
+    return np.asarray(radius * 2.0 * np.sin(half / 2.0) ** 2)
+
+
+def turns_of(out: Floats, back: Floats, clockwise: Bools) -> Floats:
+    """(K,) in (0, 2π]: how far arcs turn from the arms `out` to the arms `back`, both (K, 2)."""
     cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
-    sign = np.where(kind == Kind.ARC_CW, -1.0, 1.0)
+    sign = np.where(clockwise, -1.0, 1.0)
     angle = np.mod(sign * np.arctan2(cross, (out * back).sum(axis=1)), 2.0 * math.pi)
     return np.where(angle == 0.0, 2.0 * math.pi, angle)
 

@@ -14,7 +14,7 @@ are only worked out when something is wrong: that is why words carry none.
 `Block.comments` holds the texts of the line's comments, without their signs; a line of comments
 alone is given too when `Lexing.comment_lines` (with no words and an index of −1).
 
-Writers never use this module, readers never `_gcode_format`.
+Writers never use this module, readers never `format.py`.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ _COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
 _ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
 _CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _LINE_END: Final = re.compile(r"\r\n|\n|\r")
+_NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
+_BLOCK_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
 
 # What a sign means that begins no word: (message, mend).
 _SIGNS: Final = {
@@ -256,14 +258,9 @@ def _explained(rest: str, before: str, lexing: Lexing) -> tuple[str, str, int]:
     return f"{sign!r} begins no word", "remove it", 0
 
 
-# Which lines of RS274-like text are blocks: those with a word besides their number.
-
-_NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
-_BLOCK_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
-
-
 def listing(data: bytes) -> Listing:
-    """The blocks of a program that its reader takes, each as its line stands in the file."""
+    """The blocks of a program that its reader takes, each as its line stands in the file: the
+    lines with a word besides their number."""
     lines = _LINE_END.split(data.decode("latin-1"))
     return Listing(tuple(line.strip() for line in lines if _has_words(line)))
 

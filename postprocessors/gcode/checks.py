@@ -1,18 +1,19 @@
-"""What the writers of grbl and linuxcnc refuse before a line is made: PostError with the move."""
+"""What writers of G-code refuse before a line is made: a PostError with the move."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from typing import Final
 
 import numpy as np
 
-from camtool.arrays import Bools, Ints
+from camtool.arrays import Ints
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import Lowered, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.refusals import radius_spread, refuse, refuse_start
 
 from .dialect import feed_decimals
 
@@ -26,22 +27,11 @@ FEED_TOLERANCE: Final = 1e-6
 """A feed within this part of a limit is at it, within this much of a whole F word it is whole."""
 
 
-def place(toolpath: Toolpath, row: int) -> str:
-    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
-    source = toolpath.text(row)
-    return f"move {row} ({source})" if source else f"move {row}"
-
-
 def check(toolpath: Toolpath, machine: Machine) -> None:
     """Refuse what cannot be said or done, whatever the order of the rows."""
-    if toolpath.start.any():
-        x, y, z = toolpath.start.tolist()
-        raise PostError(
-            f"the toolpath starts at ({x:g}, {y:g}, {z:g}) mm, a program starts at part zero",
-            mend="begin with a rapid from (0, 0, 0)",
-        )
+    refuse_start(toolpath)
     far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MOST_MM
-    _refuse(far, toolpath, lambda row: f"a coordinate beyond {MOST_MM:g} mm", "check the units")
+    refuse(toolpath, far, f"a coordinate beyond {MOST_MM:g} mm", "check the units")
     _check_arcs(toolpath)
     _check_feeds(toolpath, machine)
 
@@ -54,9 +44,9 @@ def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, Finding | No
     nearest = np.rint(wanted)
     exact = np.abs(wanted - nearest) <= FEED_TOLERANCE
     units = np.where(exact, nearest, np.floor(wanted)).astype(np.int64)
-    _refuse(
-        toolpath.is_feed & (units <= 0),
+    refuse(
         toolpath,
+        toolpath.is_feed & (units <= 0),
         lambda row: f"a feed of {toolpath.feed[row]:g} mm/min is 0 in an F word",
         f"use {1.0 / scale:g} mm/min or more",
     )
@@ -67,31 +57,21 @@ def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, Finding | No
         Code.FEED_ROUNDED,
         Severity.INFO,
         f"{int((~exact).sum())} feeds were rounded down to a whole {1.0 / scale:g} mm/min",
-        where=place(toolpath, row),
+        where=toolpath.place(row),
         measured=float(toolpath.feed[row]),
         unit="mm_min",
     )
 
 
-def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend: str = "") -> None:
-    """PostError for the first bad row, if there is one."""
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise PostError(message(row), where=place(toolpath, row), mend=mend)
-
-
 def _check_arcs(toolpath: Toolpath) -> None:
     """Arcs have a centre, and one radius."""
-    is_arc, starts = toolpath.is_arc, toolpath.starts
-    with np.errstate(invalid="ignore", over="ignore"):
+    is_arc, spread = toolpath.is_arc, radius_spread(toolpath)
+    with np.errstate(invalid="ignore"):
         centred = np.abs(toolpath.centre).max(axis=1, initial=0.0) < np.inf
-        out = np.hypot(*(starts[:, :2] - toolpath.centre).T)
-        back = np.hypot(*(toolpath.end[:, :2] - toolpath.centre).T)
-        spread = np.abs(out - back)
-        _refuse(is_arc & ~centred, toolpath, lambda row: "an arc without a centre")
-        _refuse(
-            is_arc & (spread > ARC_RADIUS_SPREAD_MM),
+        refuse(toolpath, is_arc & ~centred, "an arc without a centre")
+        refuse(
             toolpath,
+            is_arc & (spread > ARC_RADIUS_SPREAD_MM),
             lambda row: f"the radii at start and end of an arc differ by {spread[row]:.4f} mm",
             f"they may differ by {ARC_RADIUS_SPREAD_MM:g} mm",
         )
@@ -102,44 +82,42 @@ def _check_feeds(toolpath: Toolpath, machine: Machine) -> None:
     feed, is_feed = toolpath.feed, toolpath.is_feed
     with np.errstate(invalid="ignore"):
         fine = (feed > 0.0) & np.isfinite(feed)
-        _refuse(
-            is_feed & ~fine,
+        refuse(
             toolpath,
+            is_feed & ~fine,
             lambda row: f"a {Kind(int(toolpath.kind[row])).name} without a feed above 0",
         )
         limit = machine.max_feed_mm_min
-        _refuse(
-            is_feed & (feed > limit * (1.0 + FEED_TOLERANCE)),
+        refuse(
             toolpath,
+            is_feed & (feed > limit * (1.0 + FEED_TOLERANCE)),
             lambda row: f"a feed of {feed[row]:g} mm/min, {limit:g} is the machine's highest",
             "lower the feed, or say --set limits.max_feed_mm_min=…",
         )
 
 
-# What the writers of flashcut and valcnc refuse or split before a block is made.
-
-HOMES = (Kind.HOME_XY, Kind.HOME_Z)
+# The rest is what flashcut and valcnc refuse, split or leave out besides.
 
 
 def check_plain(toolpath: Toolpath, machine: Machine) -> None:
-    """PostError for the first row that has no meaning here, named as the toolpath numbers it."""
+    """PostError for the first row that has no meaning there, named as the toolpath numbers it."""
     check(toolpath, machine)
     for row in np.flatnonzero(~toolpath.is_motion).tolist():
         kind = Kind(int(toolpath.kind[row]))
-        if kind in HOMES:
+        if kind in (Kind.HOME_XY, Kind.HOME_Z):
             raise PostError(
                 "this machine has no code to go to machine zero",
-                where=place(toolpath, row),
+                where=toolpath.place(row),
                 mend="leave homing out, do it by hand",
             )
         if kind == Kind.SET_ZERO and toolpath.end[row].any():
             raise PostError(
                 "part zero can only be set at part zero",
-                where=place(toolpath, row),
+                where=toolpath.place(row),
                 mend="set it first, before any move",
             )
         if kind == Kind.END and row < len(toolpath) - 1:
-            raise PostError("moves follow the end of the program", where=place(toolpath, row + 1))
+            raise PostError("moves follow the end of the program", where=toolpath.place(row + 1))
 
 
 def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, Finding | None]:
@@ -155,7 +133,7 @@ def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, Finding | No
         Severity.WARNING,
         f"{int(twice.sum())} feed moves in XY and Z became steps of at most {step_mm:g} mm, flat "
         "and then down, or up and then flat: nowhere deeper than the slope",
-        where=place(toolpath, int(twice.argmax())),
+        where=toolpath.place(int(twice.argmax())),
         measured=step_mm,
         unit="mm",
     )
@@ -172,6 +150,6 @@ def left_out(toolpath: Toolpath, kinds: Collection[Kind], why: str) -> list[Find
             Code.EVENT_LEFT_OUT,
             Severity.WARNING,
             f"{len(rows)} events were left out ({names}): {why}",
-            where=place(toolpath, int(rows[0])),
+            where=toolpath.place(int(rows[0])),
         )
     ]

@@ -4,10 +4,10 @@ lines that fit. Shared by the dialects that write words of a letter and a number
     units = units_of(values_mm, 3)             whole thousandths, half away from zero
     say_units(units, NumberStyle(3))           ["1.500", "-0.020"], never "-0.000"
     say_column(values, NumberStyle(3, strip=True))   both at once: ["1.5", "-0.02"]
-    comment("logo (v2).dxf", most_chars=40)    "(logo _v2_.dxf)"
+    comment("logo (v2).dxf")                   "(logo _v2_.dxf)"
     first_too_long(lines, 80)                    index of the first line over the limit, or −1
 
-Readers never use this module, writers never `_gcode_words`.
+Readers never use this module, writers never `blocks.py`.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from typing import Final
 import numpy as np
 
 from camtool.arrays import Floats, Ints
+from camtool.toolpath.moves import Kind
 
 MOST_UNITS: Final = 10**15
 """Whole units beyond this are not said: their decimals would no longer be exact in a float."""
 
 COMMENT_CHARS: Final = 60
-"""No comment is longer, its parentheses not counted, unless asked for."""
+"""No comment is longer, its parentheses not counted."""
 
 # Letters, digits and signs that mean nothing to any controller. Left out on purpose: ( ) ; % and
 # line ends, which end comments or programs; , which makes a comment active in LinuxCNC (MSG, …);
@@ -33,14 +34,22 @@ COMMENT_CHARS: Final = 60
 _UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ._+:/=-]")
 
 
+CODE: Final[dict[int, str]] = {
+    Kind.RAPID: "G00",
+    Kind.LINE: "G01",
+    Kind.ARC_CW: "G02",
+    Kind.ARC_CCW: "G03",
+}
+"""The codes of moves where they have two digits."""
+
+
 @dataclass(frozen=True)
 class NumberStyle:
     """How a number is said: digits after the point; `strip` their trailing zeros (and the point
-    if nothing follows it); `plus` also says the sign of numbers that are not negative."""
+    if nothing follows it)."""
 
     decimals: int
     strip: bool = False
-    plus: bool = False
 
 
 def units_of(values: Floats, decimals: int) -> Ints:
@@ -62,9 +71,8 @@ def values_of(units: Ints, decimals: int) -> Floats:
 def say_units(units: Ints, style: NumberStyle) -> list[str]:
     """Whole units (N,) as N texts; zero has no minus."""
     values = values_of(units, style.decimals).tolist()
-    one = f"%{'+' if style.plus else ''}.{style.decimals}f"
     # One formatting of the whole column: several times as fast as one per number.
-    texts = "\n".join([one] * len(values)) % tuple(values)
+    texts = "\n".join([f"%.{style.decimals}f"] * len(values)) % tuple(values)
     column = texts.split("\n") if values else []
     if style.strip and style.decimals > 0:
         return [text.rstrip("0").rstrip(".") for text in column]
@@ -81,21 +89,15 @@ def say_number(value: float, style: NumberStyle) -> str:
     return say_column(np.array([value]), style)[0]
 
 
-def sanitised(text: str, most_chars: int = COMMENT_CHARS) -> str:
-    """`text` as it may stand in any program: ASCII letters, digits, spaces and ._+:/=- only.
+def comment(text: str) -> str:
+    """`text` as a comment that may stand in any program: ASCII letters, digits, spaces and
+    ._+:/=- only.
 
     All else becomes _ (line ends and tabs a space); runs of spaces become one; cut to
-    `most_chars`. What comes back cannot end a comment, begin one, or be obeyed by a controller
-    within one. It is not safe outside of a comment.
+    `COMMENT_CHARS`. It cannot end a comment, begin one, or be obeyed by a controller within one.
     """
     flat = " ".join(text.split())
-    return _UNSAFE.sub("_", flat)[:most_chars].strip()
-
-
-def comment(text: str, *, most_chars: int = COMMENT_CHARS, style: str = "()") -> str:
-    """`text` sanitised, as a comment: "(text)" or, with `style=";"`, "; text"."""
-    safe = sanitised(text, most_chars)
-    return f"; {safe}" if style == ";" else f"({safe})"
+    return f"({_UNSAFE.sub('_', flat)[:COMMENT_CHARS].strip()})"
 
 
 def first_too_long(lines: Sequence[str], most_chars: int) -> int:

@@ -25,19 +25,14 @@ from camtool.findings import Code, Finding, Severity
 from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath
 
+from .arcs import FLAT_UNITS, LINE_SAGITTA_UNITS, sagitta_of, turns_of
 from .format import units_of
 
 SPREAD_UNITS: Final = 1.0
 """The radii at start and end of a written arc differ by no more units."""
 
-FLAT_UNITS: Final = 0.5
-"""An arc with less sagitta (in units) is a line."""
-
 LEAST_RADIUS_UNITS: Final = 4.0
 """Smaller arcs become lines: rounding alone would turn their ends by more than 20°."""
-
-LINE_SAGITTA_UNITS: Final = 1.0
-"""Lines in place of an arc stray from it by no more (in units), their rounding not counted."""
 
 RECENTRE_REACH: Final = 2
 """Centres are tried up to this many units from the rounded one, in I and in J."""
@@ -93,7 +88,7 @@ def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
     path = lowered.toolpath
     rows = np.flatnonzero(path.is_arc)
     begin, stop = units_of(path.starts, rules.decimals), units_of(path.end, rules.decimals)
-    wanted = _Wanted(path, rows, begin[rows, :2], stop[rows, :2], rules)
+    wanted = WantedArcs(path, rows, begin[rows, :2], stop[rows, :2], rules)
     flat = wanted.sagitta < FLAT_UNITS
     centre, found, moved = _centres(wanted)
     bad, moved = ~flat & ~found, moved & ~flat & found
@@ -167,7 +162,7 @@ def _halved(toolpath: Toolpath, rules: ArcRules) -> Lowered:
     return Lowered(replace(halves.toolpath, kind=kind), halves.row)
 
 
-class _Wanted:
+class WantedArcs:
     """K arcs as wanted and as rounded: all lengths in units."""
 
     def __init__(
@@ -179,10 +174,8 @@ class _Wanted:
         self.centre: Floats = path.centre[rows] * scale
         self.radius = np.hypot(arm[:, 0], arm[:, 1])
         self.sweep = np.abs(path.sweeps()[rows])
-        self.sign = np.where(path.kind[rows] == Kind.ARC_CW, -1.0, 1.0)
-        half = np.minimum(self.sweep, math.pi) / 2.0
-        # 1 − cos a = 2 sin²(a/2), which keeps its digits where a is small.
-        self.sagitta = self.radius * 2.0 * np.sin(half / 2.0) ** 2
+        self.clockwise = path.kind[rows] == Kind.ARC_CW
+        self.sagitta = sagitta_of(self.radius, self.sweep)
         self.most = rules.most_mm * scale
 
     def fits(self, which: Ints, centre: Floats) -> Bools:
@@ -190,11 +183,7 @@ class _Wanted:
         begin, stop = self.begin[which], self.stop[which]
         out, back = begin - centre, stop - centre
         r1, r2 = np.hypot(*out.T), np.hypot(*back.T)
-        cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
-        turn = np.arctan2(cross, (out * back).sum(axis=1)) * self.sign[which]
-        turn = np.mod(turn, 2.0 * math.pi)
-        same = (begin == stop).all(axis=1)
-        turn = np.where(same | (turn == 0.0), 2.0 * math.pi, turn)
+        turn = turns_of(out, back, self.clockwise[which])
         good = (np.abs(r1 - r2) <= SPREAD_UNITS) & (r1 >= LEAST_RADIUS_UNITS)
         good &= (np.abs(turn - self.sweep[which]) < math.pi) & (
             np.abs(out).max(axis=1) <= self.most
@@ -204,7 +193,7 @@ class _Wanted:
         return np.asarray(good)
 
 
-def _centres(wanted: _Wanted) -> tuple[Ints, Bools, Bools]:
+def _centres(wanted: WantedArcs) -> tuple[Ints, Bools, Bools]:
     """For each arc its centre (K, 2) in units, whether there is one, and whether it is another
     than the rounded one."""
     count = len(wanted.radius)

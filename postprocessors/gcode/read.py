@@ -1,4 +1,10 @@
-"""What a reader of G-code is told of its dialect, and the M words that all of them know."""
+"""Reading grbl and linuxcnc: blocks of words to rows, with the modes that both know.
+
+A block is decoded as RS274 orders it: modes and numbers first, then feed, spindle, tool, dwell,
+and its motion last. What a dialect has of its own it says in `Rules`: which G and M codes it
+takes, which it takes and ignores, which cannot be simulated, and its rule for arcs. A word that
+nothing uses is an error, and so are two words of one group: controllers refuse both.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import partial
 from typing import Final
 
 from camtool.findings import Code, Finding, Severity
@@ -14,6 +21,27 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
 from .blocks import Block
+
+Point = tuple[float, float]
+
+
+MM_PER_INCH: Final = 25.4
+"""What one unit of a coordinate is under G20."""
+
+FEED_GUARD: Final = 1e-9
+"""Part of a feed: a feed above its limit by less is at the limit."""
+
+MOTION_GROUP: Final = "motion"
+
+NO_FEED: Final = "a feed move, and no feed yet"
+
+TURNS_TOLERANCE: Final = 1e-3
+"""Turns: a P beside a whole number by no more is that number (rs274 takes 2.001)."""
+
+MOST_TURNS: Final = 10_000
+"""Turns of an arc, each of which is a move."""
+
+_TURN: Final = 2.0 * math.pi
 
 
 class G(IntEnum):
@@ -93,30 +121,6 @@ class Rules:
     m_codes: Mapping[int, str] = field(default_factory=lambda: M_CODES)
     tools: str = "none"
     most_tool: int = 99_999
-
-
-# Reading grbl and linuxcnc: blocks of words to rows, with the modes that both know.
-#
-# A block is decoded as RS274 orders it: modes and numbers first, then feed, spindle, tool, dwell,
-# and its motion last. What a dialect has of its own it says in `Rules`: which G and M codes it
-# takes, which it takes and ignores, which cannot be simulated, and its rule for arcs. A word that
-# nothing uses is an error, and so are two words of one group: controllers refuse both.
-
-MM_PER_INCH: Final = 25.4
-"""What one unit of a coordinate is under G20."""
-
-FEED_GUARD: Final = 1e-9
-"""Part of a feed: a feed above its limit by less is at the limit."""
-
-MOTION_GROUP: Final = "motion"
-
-NO_FEED: Final = "a feed move, and no feed yet"
-
-TURNS_TOLERANCE: Final = 1e-3
-"""Turns: a P beside a whole number by no more is that number (rs274 takes 2.001)."""
-
-MOST_TURNS: Final = 10_000
-"""Turns of an arc, each of which is a move."""
 
 
 class ModalReader:
@@ -352,8 +356,27 @@ class ModalReader:
             if fault := self._rules.arc_fault(r1, r2):
                 letter = "I" if any(word == "I" for word, _ in block.words) else "J"
                 block.fail_at(letter, fault)
-        circle = Circle((x, y), (to[0], to[1]), centre, ccw)
-        follow(self.path, circle, to[2], Way(self._feed, self._rules.full_turn_rad, turns))
+        self._follow(to, centre, turns, ccw=ccw)
+
+    def _follow(self, to: list[float], centre: Point, turns: int, *, ccw: bool) -> None:
+        """The rows of an arc from where the tool stands, a helix where it rises or sinks.
+
+        Whole turns come first, each with its share of the height. An arc so short that the
+        controller takes it for a full circle is one, and a line to its end.
+        """
+        x, y, z = self.path.position
+        start, end = (x, y), (to[0], to[1])
+        turn = turn_of(start, end, centre)
+        same = start == end
+        full = same or abs(turn) <= self._rules.full_turn_rad
+        sweep = _TURN if full else math.fmod((turn if ccw else -turn) + _TURN, _TURN)
+        rise = (to[2] - z) / (_TURN * (turns - 1) + sweep)
+        arc = partial(self.path.arc, centre=centre, ccw=ccw, feed=self._feed)
+        for done in range(1, turns):
+            arc(*start, z + rise * _TURN * done)
+        arc(*(start if full else end), to[2])
+        if full and not same:
+            self.path.line(*end, feed=self._feed)
 
     def _turns(self, block: Block, value: float) -> int:
         """How many turns P begins: 2 is one whole turn and then the arc."""
@@ -364,9 +387,7 @@ class ModalReader:
             block.fail_at("P", "the turns of an arc are a whole number from 1")
         return turns
 
-    def _centre(
-        self, block: Block, start: tuple[float, float], numbers: dict[str, float]
-    ) -> tuple[float, float]:
+    def _centre(self, block: Block, start: Point, numbers: dict[str, float]) -> Point:
         """The centre that I and J say."""
         if "I" not in numbers and "J" not in numbers:
             block.fail("an arc without I, J or R", mend="say where its centre is")
@@ -377,8 +398,6 @@ class ModalReader:
             block.fail("with G90.1 an arc needs both I and J")
         return numbers.pop("I") * self._mm, numbers.pop("J") * self._mm
 
-
-# Reading what is no motion: spindle, tools, stops, coolant.
 
 SPINDLE: Final = {
     M.SPINDLE_CW: Kind.SPINDLE_CW,
@@ -458,23 +477,6 @@ class MachineWords:
         return int(value)
 
 
-# Geometry of arcs as their readers need it: centre from radius, and turn.
-
-Point = tuple[float, float]
-
-_TURN = 2.0 * math.pi
-
-
-@dataclass(frozen=True)
-class Circle:
-    """An arc from `start` to `end` about `centre`, mm."""
-
-    start: Point
-    end: Point
-    centre: Point
-    ccw: bool
-
-
 def centre_of_radius(
     start: Point, end: Point, radius: float, ccw: bool, slack_mm: float
 ) -> Point | str:
@@ -498,45 +500,11 @@ def centre_of_radius(
     )
 
 
-def turn_of(circle: Circle) -> float:
-    """How far the arc turns, rad, in (−π, π]: near 0 for the shortest and for the longest."""
-    ox, oy = circle.start[0] - circle.centre[0], circle.start[1] - circle.centre[1]
-    ex, ey = circle.end[0] - circle.centre[0], circle.end[1] - circle.centre[1]
+def turn_of(start: Point, end: Point, centre: Point) -> float:
+    """How far an arc turns, rad, in (−π, π]: near 0 for the shortest and for the longest."""
+    ox, oy = start[0] - centre[0], start[1] - centre[1]
+    ex, ey = end[0] - centre[0], end[1] - centre[1]
     return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)
-
-
-@dataclass(frozen=True)
-class Way:
-    """How an arc is run: mm/min; the turn (rad) below which the controller takes it for a full
-    circle; and how many turns it begins."""
-
-    feed: float
-    full_turn_rad: float
-    turns: int = 1
-
-
-def follow(path: ToolpathBuilder, circle: Circle, to_z: float, way: Way) -> None:
-    """The rows of an arc read at the path's position, a helix where it rises or sinks.
-
-    Whole turns come first, each with its share of the height. An arc so short that the controller
-    takes it for a full circle is one, and a line to its end.
-    """
-    same = circle.start == circle.end
-    turn = turn_of(circle)
-    full = same or abs(turn) <= way.full_turn_rad
-    sweep = _TURN if full else math.fmod((turn if circle.ccw else -turn) + _TURN, _TURN)
-    z = path.position[2]
-    rise = (to_z - z) / (_TURN * (way.turns - 1) + sweep)
-    for done in range(1, way.turns):
-        height = z + rise * _TURN * done
-        path.arc(*circle.start, height, centre=circle.centre, ccw=circle.ccw, feed=way.feed)
-    end = circle.start if full else circle.end
-    path.arc(*end, to_z, centre=circle.centre, ccw=circle.ccw, feed=way.feed)
-    if full and not same:
-        path.line(*circle.end, feed=way.feed)
-
-
-# What the readers of G-code noticed, and tell as one finding each.
 
 
 @dataclass

@@ -27,7 +27,7 @@ from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, too
 from camtool.toolpath.program import Program
 
 from .arcs import ArcCounts, Arcs, arcs_of
-from .checks import check, feed_units, place
+from .checks import check, feed_units
 from .dialect import GcodeDialect, feed_decimals
 from .format import (
     NumberStyle,
@@ -38,6 +38,18 @@ from .format import (
     say_units,
     values_of,
 )
+
+WORD: Final = np.array([" G0", " G1", " G2", " G3"], dtype=object)
+
+VALUE: Final = NumberStyle(3, strip=True)
+"""Spindle speeds and dwells are said to a thousandth."""
+
+ROUNDING_PART: Final = 1e-9
+"""A value said within this part of itself was not rounded."""
+
+SPINDLE: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}
+
+EventWords = Callable[["Event"], str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +96,11 @@ def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program
     if style.frame:
         lines = [style.frame, *lines, style.frame]
     _check_length(lines, dialect)
-    return Program(
-        data="".join(f"{line}\n" for line in lines).encode("ascii"),
-        extension=machine.target.extension,
-        target=machine.target.name,
-        row_of_block=np.array(of_row, dtype=np.int64),
-        findings=(
+    return Program.of_lines(
+        lines,
+        machine,
+        of_row,
+        (
             *([feed_note] if feed_note else []),
             *_arc_findings(toolpath, arcs.counts, sent.dropped),
             *_rounded(toolpath, events.rounded),
@@ -201,7 +212,7 @@ def _message(toolpath: Toolpath, row: int, style: Style) -> str:
     """A message to the operator as a comment."""
     index = toolpath.value[row]
     if not (0 <= index < len(toolpath.texts)):
-        raise PostError("a message without its text", where=place(toolpath, row))
+        raise PostError("a message without its text", where=toolpath.place(row))
     text = comment(toolpath.texts[int(index)])
     return f"({style.message}{text[1:]}"
 
@@ -227,7 +238,7 @@ def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> list[F
                 f"{mended} arcs would not have passed the controller's rule with their rounded "
                 f"numbers: {counts.recentred} were re-centred, {counts.split} split in two, "
                 f"{counts.lines} written as lines",
-                where=place(toolpath, counts.first),
+                where=toolpath.place(counts.first),
                 measured=float(mended),
                 unit="arcs",
             )
@@ -254,15 +265,12 @@ def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> list[Finding]:
             Code.VALUE_ROUNDED,
             Severity.INFO,
             f"{len(rows)} dwells or spindle speeds were rounded to three decimals",
-            where=place(toolpath, rows[0]),
+            where=toolpath.place(rows[0]),
         )
     ]
 
 
-# Which rows grbl and linuxcnc are sent, and the modal text of each, by whole columns.
-
-
-WORD: Final = np.array([" G0", " G1", " G2", " G3"], dtype=object)
+# The rows that are sent, and the modal text of each, by whole columns.
 
 
 @dataclass(frozen=True, eq=False)
@@ -383,17 +391,7 @@ def _said(letter: str, units: Ints, said: Bools, style: NumberStyle) -> list[str
     return words
 
 
-# Events of a toolpath as the blocks that grbl and linuxcnc both know.
-
-VALUE: Final = NumberStyle(3, strip=True)
-"""Spindle speeds and dwells are said to a thousandth."""
-
-ROUNDING_PART: Final = 1e-9
-"""A value said within this part of itself was not rounded."""
-
-SPINDLE: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}
-
-EventWords = Callable[["Event"], str]
+# Events, as the blocks that grbl and linuxcnc both know.
 
 
 @dataclass(frozen=True)
@@ -431,7 +429,7 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
         event = Event(
             Kind(int(toolpath.kind[row])),
             float(toolpath.value[row]),
-            place(toolpath, row),
+            toolpath.place(row),
             bool(mounted[row]),
         )
         if event.kind == Kind.END:

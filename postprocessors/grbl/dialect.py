@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from camtool.machine.loader import convert
 from camtool.machine.model import Machine
 from camtool.machine.ranges import Seconds
 
 from ..gcode.dialect import GcodeDialect, feed_decimals
+
+MOST_TOOL: Final = 255
+"""Tools beyond it are grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
 
 
 class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):

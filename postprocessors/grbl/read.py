@@ -19,10 +19,7 @@ from camtool.toolpath.moves import Toolpath
 
 from ..gcode.blocks import Lexing, blocks_of
 from ..gcode.read import M_CODES, ModalReader, Rules
-from .dialect import Dialect, dialect_of
-
-MOST_TOOL: Final = 255
-"""Beyond it grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
+from .dialect import MOST_TOOL, Dialect, dialect_of
 
 SLOW_GUARD: Final = 1e-6
 """Part of a feed: one below the slowest by less is the slowest."""

@@ -1,4 +1,4 @@
-"""Writing grbl 1.1: what it has of its own beside `_gcode_write`."""
+"""Writing grbl 1.1: what it has of its own beside `gcode/write.py`."""
 
 from __future__ import annotations
 
@@ -10,15 +10,11 @@ from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
 from ..gcode.write import Event, Style, common_words, tool_number, write_program
-from .dialect import Dialect, dialect_of
+from .dialect import MOST_TOOL, Dialect, dialect_of
 
 HEADER = ("G17 G21 G90 G94", "G54")
 """XY plane, mm, absolute, feeds a minute; the first work frame. grbl knows I J as offsets only,
 so it is not told so (G91.1)."""
-
-MOST_TOOL = 255
-"""`MAX_TOOL_NUMBER` of grbl's gcode.c."""
-
 
 MOUNT_FIRST = Finding(
     Code.EVENT_LEFT_OUT,

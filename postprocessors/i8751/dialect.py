@@ -95,7 +95,7 @@ def dialect_of(machine: Machine) -> Dialect:
             where="table [dialect], key plus_backward",
             mend='write axes in the order x, y, z, such as "xz", or ""',
         )
-    # Staying within half of the coarser step is possible for every line; see _i8751_dogleg.
+    # Staying within half of the coarser step is possible for every line; see dogleg.py.
     least = 0.5 * max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     if dialect.tolerance_mm < least:
         raise MachineError(

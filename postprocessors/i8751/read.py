@@ -30,6 +30,44 @@ from camtool.toolpath.moves import Kind, Toolpath
 from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, dialect_of
 from .pulses import PulseTimes
 
+SHOWN_CHARS: Final = 40
+"""An error message shows no more of a line than this."""
+
+
+ACCESS: Final = 0x13
+"""The byte that opens the access, as it is read."""
+PACKET_END: Final = 0x45
+"""The byte behind a packet, as it is read."""
+DATA_END: Final = 0x54
+"""The byte behind the last packet, as it is read."""
+
+_MOTOR: Final = rb"(?:\x05|([\x03\x04])(.)(.))"
+
+
+@dataclass(frozen=True, eq=False)
+class Decoded:
+    """R records as the controller holds them: steps (R, 3), signed by part axes, and waits (R, 2)
+    s; `rounded` distances of a listing that were no whole steps, the worst off by so many."""
+
+    steps: Ints
+    waits: Ints
+    rounded: int = 0
+    worst_steps: float = 0.0
+
+
+class ByteFault(Exception):
+    """A byte (offset from 0) that no controller could take at this place of a record (from 0).
+
+    The reader of packets or of a hex dump turns it into a ProgramError that says the place.
+    """
+
+    def __init__(self, offset: int, record: int, message: str, mend: str = "") -> None:
+        self.offset = offset
+        self.record = record
+        self.message = message
+        self.mend = mend
+        super().__init__(message)
+
 
 def read_program(data: bytes, machine: Machine) -> Toolpath:
     """The moves of a program; ProgramError naming record and byte, or line and column."""
@@ -152,19 +190,10 @@ def _findings(decoded: Decoded) -> tuple[Finding, ...]:
     )
 
 
-# Reading packets: bytes as the controller stores them, and refused where it could not.
+# Packets: bytes as the controller stores them, and refused where it could not.
 #
 # One pattern takes a whole record; only a record that does not match is walked byte by byte, to
 # say where it goes wrong.
-
-ACCESS: Final = 0x13
-"""The byte that opens the access, as it is read."""
-PACKET_END: Final = 0x45
-"""The byte behind a packet, as it is read."""
-DATA_END: Final = 0x54
-"""The byte behind the last packet, as it is read."""
-
-_MOTOR: Final = rb"(?:\x05|([\x03\x04])(.)(.))"
 
 
 class PacketReader:
@@ -308,13 +337,16 @@ def replies(data: bytes, decoded: Decoded, dialect: Dialect) -> list[str]:
     return [*answers, "A"]
 
 
-# Reading the signed-mm listing: `X+10.000 Y-2.500 T0 Z+0.000 T0`, one record a line, END last.
+# The signed-mm listing: `X+10.000 Y-2.500 T0 Z+0.000 T0`, one record a line, END last.
 #
 # Every word must be there, in this order, every distance with its sign (L5250-5254). A distance is
 # rounded to whole steps, as the operator's program must do; each on its own.
 
 WHOLE_STEP_TOLERANCE: Final = 0.05
 """A distance within this much (in steps) of a whole step is that step, without a word."""
+
+SHOWN_AHEAD: Final = 12
+"""A comma so many characters behind the fault is taken for a decimal one."""
 
 LAST_LINE: Final = "END"
 
@@ -429,11 +461,7 @@ class ListingReader:
         )
 
 
-SHOWN_AHEAD: Final = 12
-"""A comma so many characters behind the fault is taken for a decimal one."""
-
-
-# Reading a hex dump: offset, bytes, and after `;` a comment that may state the replies.
+# The hex dump: offset, bytes, and after `;` a comment that may state the replies.
 #
 # Offsets must be those of the bytes, and replies those that the bytes get; all else in a comment
 # is passed over.
@@ -553,35 +581,7 @@ def _check_replies(runs: list[_Run], expected: list[str]) -> None:
             )
 
 
-# What the readers of the three formats share: records as read, and where one goes wrong.
-
-SHOWN_CHARS: Final = 40
-"""An error message shows no more of a line than this."""
-
-
-@dataclass(frozen=True, eq=False)
-class Decoded:
-    """R records as the controller holds them: steps (R, 3), signed by part axes, and waits (R, 2)
-    s; `rounded` distances of a listing that were no whole steps, the worst off by so many."""
-
-    steps: Ints
-    waits: Ints
-    rounded: int = 0
-    worst_steps: float = 0.0
-
-
-class ByteFault(Exception):
-    """A byte (offset from 0) that no controller could take at this place of a record (from 0).
-
-    The reader of packets or of a hex dump turns it into a ProgramError that says the place.
-    """
-
-    def __init__(self, offset: int, record: int, message: str, mend: str = "") -> None:
-        self.offset = offset
-        self.record = record
-        self.message = message
-        self.mend = mend
-        super().__init__(message)
+# Both texts.
 
 
 def text_lines(data: bytes) -> list[str]:

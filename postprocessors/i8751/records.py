@@ -1,19 +1,25 @@
-"""The writer's first stage: what this machine cannot do is refused before anything is written."""
+"""The writer's stages before bytes: what this machine cannot do is refused, the rest made records.
+
+A record moves X and Y, waits T1, moves Z, waits T2 (L4151-4167). Every end is rounded to whole
+steps from part zero, never from the record before, so that rounding does not add up. Arcs become
+chords, slopes become flat moves and small ones of Z, lines are cut where their dog-leg would stray
+too far (`dogleg.py`) and where a motor would make more steps than two bytes can say.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
+from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
 from .dialect import MOST_DWELL_BYTE_S, Dialect
 from .dogleg import FREE, Line, elbows, reaches
@@ -24,6 +30,9 @@ MOST_STEPS: Final = 10_000_000
 MOST_DWELL_S: Final = 36_000.0
 """A longer dwell (10 hours) is taken for a mistake."""
 
+MOST_RECORDS: Final = 2_000_000
+"""A program of more records (30 MB, hours over the link) is taken for a mistake."""
+
 REFUSED: Final = {
     Kind.HOME_XY: "this machine has no limit switches to go home to",
     Kind.HOME_Z: "this machine has no limit switches to go home to",
@@ -31,74 +40,57 @@ REFUSED: Final = {
 """Homing was proposed and not built (L5267-5273)."""
 
 
-def place(toolpath: Toolpath, row: int) -> str:
-    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
-    source = toolpath.text(row)
-    return f"move {row} ({source})" if source else f"move {row}"
-
-
 def check_toolpath(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> None:
     """PostError for the first row that this machine cannot do."""
-    if toolpath.start.any():
-        x, y, z = toolpath.start.tolist()
-        raise PostError(
-            f"the toolpath starts at ({x:g}, {y:g}, {z:g}) mm, a program starts at part zero",
-            mend="begin with a rapid from (0, 0, 0)",
-        )
+    refuse_start(toolpath)
     _check_events(toolpath)
     _check_coordinates(toolpath, machine)
     with np.errstate(invalid="ignore"):
         bad_feed = toolpath.is_feed & ~((toolpath.feed > 0.0) & np.isfinite(toolpath.feed))
-    _refuse(
-        bad_feed,
+    refuse(
         toolpath,
+        bad_feed,
         lambda row: f"feed {toolpath.feed[row]:g} mm/min is no feed",
         "give a feed above 0; this machine then moves at its own speed",
     )
-    _check_arcs(toolpath, dialect)
-
-
-def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend: str) -> None:
-    """PostError for the first bad row, if there is one."""
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise PostError(message(row), where=place(toolpath, row), mend=mend)
+    # Its chords end at its end, so that its radii may differ by its tolerance.
+    refuse_two_radii(toolpath, dialect.arc_tolerance_mm)
 
 
 def _check_events(toolpath: Toolpath) -> None:
     kind, value = toolpath.kind, toolpath.value
-    _refuse(
-        (kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
+    refuse(
         toolpath,
-        lambda row: "this machine has no stop for a tool change",
+        (kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
+        "this machine has no stop for a tool change",
         "write a program for each tool",
     )
     for refused, message in REFUSED.items():
-        _refuse(
-            kind == refused,
+        refuse(
             toolpath,
-            lambda row, message=message: message,  # type: ignore[misc]
+            kind == refused,
+            message,
             "leave it out, and do it by hand before the program",
         )
-    _refuse(
-        (kind == Kind.SET_ZERO) & toolpath.end.any(axis=1),
+    refuse(
         toolpath,
-        lambda row: "part zero is where the program starts",
+        (kind == Kind.SET_ZERO) & toolpath.end.any(axis=1),
+        "part zero is where the program starts",
         "set it first, before any move",
     )
     with np.errstate(invalid="ignore"):
         bad = (kind == Kind.DWELL) & ~((value >= 0.0) & (value <= MOST_DWELL_S))
-    _refuse(
-        bad,
+    refuse(
         toolpath,
+        bad,
         lambda row: f"dwell {value[row]:g} s cannot be said",
         f"use 0 to {MOST_DWELL_S:g} s",
     )
     ended = np.cumsum(kind == Kind.END) - (kind == Kind.END)
-    _refuse(
-        ended > 0,
+    refuse(
         toolpath,
-        lambda row: "something follows the end of the program",
+        ended > 0,
+        "something follows the end of the program",
         "end the program once, last of all",
     )
 
@@ -107,40 +99,14 @@ def _check_coordinates(toolpath: Toolpath, machine: Machine) -> None:
     for axis, (name, given) in enumerate(zip("XYZ", machine.axes, strict=True)):
         most_mm = MOST_STEPS * given.coded_step_mm
         values = toolpath.end[:, axis]
-        _refuse(
-            np.abs(values) > most_mm,
+        refuse(
             toolpath,
+            np.abs(values) > most_mm,
             lambda row, name=name, values=values: (  # type: ignore[misc]
                 f"{name} = {values[row]:.6g} mm is more than {MOST_STEPS} steps"
             ),
             "check the unit of the drawing and the machine's coded_step_mm",
         )
-
-
-def _check_arcs(toolpath: Toolpath, dialect: Dialect) -> None:
-    """The two radii of an arc may differ by its tolerance, since its chords end at its end."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        out, back = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
-        spread = np.abs(np.hypot(out[:, 0], out[:, 1]) - np.hypot(back[:, 0], back[:, 1]))
-        bad = toolpath.is_arc & ~(spread <= dialect.arc_tolerance_mm)
-    _refuse(
-        bad,
-        toolpath,
-        lambda row: f"start and end differ by {spread[row]:g} mm in their distance to the centre",
-        "give the arc one radius",
-    )
-
-
-# The writer's second stage: a toolpath as records, in whole steps.
-#
-# A record moves X and Y, waits T1, moves Z, waits T2 (L4151-4167). Every end is rounded to whole
-# steps from part zero, never from the record before, so that rounding does not add up. Arcs become
-# chords, slopes become flat moves and small ones of Z, lines are cut where their dog-leg would
-# stray too far (`_i8751_dogleg`) and where a motor would make more steps than two bytes can say.
-
-
-MOST_RECORDS: Final = 2_000_000
-"""A program of more records (30 MB, hours over the link) is taken for a mistake."""
 
 
 @dataclass
@@ -185,7 +151,12 @@ def records_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Record
     lowered, row = _lowered(toolpath, slope_step_mm(machine), dialect, counts)
     targets = _rounded(lowered, machine)
     deltas = np.diff(targets, axis=0, prepend=np.zeros((1, 3), dtype=np.int64))
-    _check_events_stand(lowered, deltas)
+    refuse(
+        lowered,
+        ~lowered.is_motion & deltas.any(axis=1),
+        lambda row: f"a {Kind(int(lowered.kind[row])).name} cannot move the tool",
+        "give the row the position of the tool",
+    )
     pieces = _cut_rows(lowered, deltas, machine, dialect, counts)
     # Parts of slopes may be small: only whole rows are missed.
     whole = np.bincount(row, minlength=len(toolpath))[row] == 1
@@ -219,7 +190,7 @@ def _lowered(
     # A rapid in two parts is as good as one; a cut in steps is another cut.
     cut = (np.bincount(two.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
     counts.slopes, counts.slope_step_mm = int(cut.sum()), step_mm
-    counts.slopes_place = place(toolpath, int(cut.argmax())) if counts.slopes else ""
+    counts.slopes_place = toolpath.place(int(cut.argmax())) if counts.slopes else ""
     arcs = two.toolpath.is_arc
     lines = arcs_to_lines(two.toolpath, arcs, dialect.arc_tolerance_mm)
     counts.arcs = int(arcs.sum())
@@ -231,17 +202,6 @@ def _rounded(toolpath: Toolpath, machine: Machine) -> Ints:
     """(N, 3) ends in whole steps, half away from zero."""
     scaled = toolpath.end / np.array([axis.coded_step_mm for axis in machine.axes])
     return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
-
-
-def _check_events_stand(toolpath: Toolpath, deltas: Ints) -> None:
-    bad = ~toolpath.is_motion & deltas.any(axis=1)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise PostError(
-            f"a {Kind(int(toolpath.kind[row])).name} cannot move the tool",
-            where=place(toolpath, row),
-            mend="give the row the position of the tool",
-        )
 
 
 def _cut_rows(
@@ -368,5 +328,5 @@ class _Plain:
 
     def _note_spindle(self, index: int) -> None:
         if not self.counts.spindle:
-            self.counts.spindle_place = place(self.lowered, index)
+            self.counts.spindle_place = self.lowered.place(index)
         self.counts.spindle += 1

@@ -1,15 +1,12 @@
-"""How many bytes go over the line for a program in any of its three forms."""
+"""The packets of a program in any of its three forms: how many bytes they have, and which."""
 
 from __future__ import annotations
-
-import numpy as np
 
 from camtool.machine.model import Machine
 from camtool.toolpath.program import Listing
 
 from .dialect import dialect_of
 from .read import decoded_records
-from .records import Records
 from .write import END_OF_DATA, byte_table, packet_bytes
 
 
@@ -19,11 +16,7 @@ def packet_count(data: bytes, machine: Machine) -> int:
     if dialect.format == "packets":
         return len(data)
     decoded = decoded_records(data, machine)
-    rows = np.zeros(len(decoded.steps), dtype=np.int64)
-    return len(packet_bytes(Records(decoded.steps, decoded.waits, rows, (), -1), dialect))
-
-
-# The packets of a program record by record, for people.
+    return len(packet_bytes(decoded.steps, decoded.waits, dialect))
 
 
 def listing(data: bytes, machine: Machine) -> Listing:
@@ -33,7 +26,6 @@ def listing(data: bytes, machine: Machine) -> Listing:
     end = f"{END_OF_DATA:02X}"
     if not len(decoded.steps):
         return Listing((end,), binary=True)
-    rows = np.zeros(len(decoded.steps), dtype=np.int64)
-    table, used = byte_table(Records(decoded.steps, decoded.waits, rows, (), -1), dialect)
+    table, used = byte_table(decoded.steps, decoded.waits, dialect)
     lines = (row[sent].tobytes().hex(" ").upper() for row, sent in zip(table, used, strict=True))
     return Listing((*lines, end), binary=True)

@@ -1,4 +1,25 @@
-"""Writing i8751: a Toolpath to packets, to the signed-mm listing, or to a hex dump of packets."""
+"""Writing i8751: a Toolpath to packets, to the signed-mm listing, or to a hex dump of packets.
+
+The bytes that go over the link (L4106-4167, L4343-4383, L4397-4417):
+
+    13H                               access key
+    5 times at most:                  a packet
+        01 G [PH PL]  02 G [PH PL]    X and Y: 03H forward, 04H backward, 05H stands (no PH PL)
+        00 T1                         seconds before Z
+        03 G [PH PL]  00 T2           Z, seconds after it
+    45H                               end of the packet ("E")
+    54H                               after the last packet: end of data ("T")
+
+The listing is what the operator of the second version types: distances in mm with their sign
+(L5240-5254), and the two waits. Its layout is ours, the thesis's is lost:
+
+    X+10.000 Y-2.500 T0 Z+0.000 T0
+    END
+
+The hex dump shows every byte of the packets with its offset, its meaning and the expected reply:
+
+    0001  01 03 00 64              ; 1: X +100 steps (+1.250 mm) <- B M M M
+"""
 
 from __future__ import annotations
 
@@ -19,8 +40,43 @@ from camtool.toolpath.program import Program
 from .dialect import RECORDS_PER_PACKET, Dialect, dialect_of
 from .records import Counts, Records, check_toolpath, records_of
 
+Bytes = npt.NDArray[np.uint8]
+
+KEY: Final = 0x13
+"""The byte that opens the access (13H)."""
+FORWARD: Final = 3
+"""A motor turns forward (03H)."""
+BACKWARD: Final = 4
+"""A motor turns backward (04H)."""
+STOPPED: Final = 5
+"""A motor stands (05H)."""
+END_OF_PACKET: Final = 0x45
+"""The byte behind a packet (45H)."""
+END_OF_DATA: Final = 0x54
+"""The byte behind the last packet (54H)."""
+
+COLUMNS: Final = 18
+"""Key, then M G PH PL for X and Y, a pair, the same for Z, a pair, end of packet."""
+
+MOTOR_COLUMNS: Final = (1, 5, 11)
+"""Where X, Y and Z begin in a row of the table."""
+
+PAIR_COLUMNS: Final = (9, 15)
+
 TEXT_EXTENSION: Final = ".txt"
 """Listings and hex dumps are text whatever the machine calls its programs."""
+
+LEAST_DECIMALS: Final = 3
+"""A listing has at least so many decimals of a millimetre."""
+
+STEPS_PER_LAST_DIGIT: Final = 0.05
+"""The last decimal of a listing is worth this part of the finest step or less."""
+
+MOST_MESSAGE_CHARS: Final = 60
+"""A comment of the hex dump takes so much of a text, no more."""
+
+BYTES_WIDTH: Final = 24
+"""The comments of the hex dump stand in one column."""
 
 
 def write_program(toolpath: Toolpath, machine: Machine) -> Program:
@@ -34,7 +90,10 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     elif dialect.format == "hex":
         data = dump_text(records, machine, dialect).encode("ascii")
     else:
-        data, extension = packet_bytes(records, dialect), machine.target.extension
+        data, extension = (
+            packet_bytes(records.steps, records.waits, dialect),
+            machine.target.extension,
+        )
     return Program(
         data=data,
         extension=extension,
@@ -42,6 +101,136 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
         row_of_block=np.append(records.row, records.end_row),
         findings=tuple(_findings(records.counts, dialect)),
     )
+
+
+def packet_bytes(steps: Ints, waits: Ints, dialect: Dialect) -> bytes:
+    """The whole stream that the computer sends for records of steps (R, 3) and waits (R, 2)."""
+    table, used = byte_table(steps, waits, dialect)
+    return table[used].tobytes() + bytes([END_OF_DATA])
+
+
+def byte_table(steps: Ints, waits: Ints, dialect: Dialect) -> tuple[Bytes, Bools]:
+    """(R, COLUMNS) bytes of records of steps (R, 3) and waits (R, 2), and which are sent."""
+    count = len(steps)
+    table = np.zeros((count, COLUMNS), dtype=np.uint8)
+    used = np.ones((count, COLUMNS), dtype=np.bool_)
+    in_packet = np.arange(count) % RECORDS_PER_PACKET
+    table[:, 0] = KEY
+    used[:, 0] = in_packet == 0 if dialect.key == "each-packet" else np.arange(count) == 0
+    table[:, -1] = END_OF_PACKET
+    used[:, -1] = in_packet == RECORDS_PER_PACKET - 1
+    used[-1, -1] = True
+    for motor, column in enumerate(MOTOR_COLUMNS):
+        turns = steps[:, motor]
+        forward = turns * dialect.signs[motor] > 0
+        high, low = _high_low(turns, dialect)
+        table[:, column] = motor + 1
+        table[:, column + 1] = np.where(forward, FORWARD, BACKWARD)
+        table[turns == 0, column + 1] = STOPPED
+        table[:, column + 2], table[:, column + 3] = high, low
+        used[:, column + 2 : column + 4] = (turns != 0)[:, None]
+    for pair, column in enumerate(PAIR_COLUMNS):
+        table[:, column] = dialect.dwell_mark_byte
+        table[:, column + 1] = waits[:, pair]
+    return table, used
+
+
+def _high_low(steps: Ints, dialect: Dialect) -> tuple[Ints, Ints]:
+    """PH and PL of each motor's pulses; where PH counts 255, 255 pulses are PL alone."""
+    pulses = np.abs(steps) + dialect.lost_pulses
+    unit = dialect.high_byte_steps
+    high = np.maximum(pulses - (256 - unit), 0) // unit
+    return high, pulses - high * unit
+
+
+def decimals_of(machine: Machine) -> int:
+    """Decimals of mm that say every step of the machine without doubt."""
+    finest = min(axis.coded_step_mm for axis in machine.axes)
+    return max(LEAST_DECIMALS, math.ceil(-math.log10(STEPS_PER_LAST_DIGIT * finest)))
+
+
+def safe_text(text: str) -> str:
+    """A text from outside as part of a comment: printable ASCII, one line, short."""
+    plain = re.sub(r"[^A-Za-z0-9 _.,:+/#-]+", " ", text)
+    return " ".join(plain.split())[:MOST_MESSAGE_CHARS]
+
+
+def listing_text(records: Records, machine: Machine) -> str:
+    """The listing, one record a line, END last."""
+    step_x, step_y, step_z = (axis.coded_step_mm for axis in machine.axes)
+    digits = decimals_of(machine)
+    form = f"X%+.{digits}f Y%+.{digits}f T%d Z%+.{digits}f T%d"
+    lines = [
+        form % (x * step_x, y * step_y, before, z * step_z, after)
+        for (x, y, z), (before, after) in zip(
+            records.steps.tolist(), records.waits.tolist(), strict=True
+        )
+    ]
+    for record, text in reversed(records.messages):
+        lines.insert(record, f"; {safe_text(text)}")
+    head = "; i8751 signed mm: X and Y together, wait T1 s, Z, wait T2 s"
+    return "\n".join([head, *lines, "END"]) + "\n"
+
+
+def dump_text(records: Records, machine: Machine, dialect: Dialect) -> str:
+    """The hex dump of the packets: offset, bytes, meaning, expected replies."""
+    lines = ["; i8751 packets: offset, bytes, meaning <- expected replies"]
+    offset = 0
+    for data, meaning in _Dump(records, machine, dialect).parts():
+        if not data:
+            lines.append(f"; {meaning}")
+            continue
+        lines.append(f"{offset:04X}  {data.hex(' ').upper():<{BYTES_WIDTH}} ; {meaning}")
+        offset += len(data)
+    return "\n".join(lines) + "\n"
+
+
+class _Dump:
+    """Runs of bytes with their meaning and replies; no bytes for a line of comment alone."""
+
+    def __init__(self, records: Records, machine: Machine, dialect: Dialect) -> None:
+        self._records = records
+        self._steps_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._digits = decimals_of(machine)
+        self._wait_reply = " ".join(dialect.dwell_replies)
+        self._moving_reply = f"{dialect.motor_reply} M M M"
+        self._standing_reply = f"{dialect.motor_reply} M"
+        self._table, self._used = byte_table(records.steps, records.waits, dialect)
+
+    def parts(self) -> Iterator[tuple[bytes, str]]:
+        """All runs in order."""
+        messages = list(self._records.messages)
+        rows = [bytes(row) for row in self._table]
+        for record, (row, steps) in enumerate(
+            zip(rows, self._records.steps.tolist(), strict=True)
+        ):
+            while messages and messages[0][0] <= record:
+                yield b"", safe_text(messages.pop(0)[1])
+            if self._used[record, 0]:
+                yield row[:1], "access key <- LISTO"
+            if record % RECORDS_PER_PACKET == 0:
+                yield b"", f"packet {record // RECORDS_PER_PACKET + 1}"
+            head = f"{record + 1}: "
+            (x, y, z), (before, after) = MOTOR_COLUMNS, PAIR_COLUMNS
+            yield self._motor(row, x, steps[0], f"{head}X", 0)
+            yield self._motor(row, y, steps[1], f"{head}Y", 1)
+            yield row[before : before + 2], f"{head}T1 {row[before + 1]} s <- {self._wait_reply}"
+            yield self._motor(row, z, steps[2], f"{head}Z", 2)
+            yield row[after : after + 2], f"{head}T2 {row[after + 1]} s <- {self._wait_reply}"
+            if self._used[record, -1]:
+                yield row[-1:], "end of packet <- F"
+        for _, text in messages:
+            yield b"", safe_text(text)
+        yield bytes([END_OF_DATA]), "end of data <- A"
+
+    def _motor(
+        self, row: bytes, column: int, steps: int, head: str, axis: int
+    ) -> tuple[bytes, str]:
+        if not steps:
+            return row[column : column + 2], f"{head} stands <- {self._standing_reply}"
+        way = steps * self._steps_mm[axis]
+        meaning = f"{head} {steps:+d} steps ({way:+.{self._digits}f} mm)"
+        return row[column : column + 4], f"{meaning} <- {self._moving_reply}"
 
 
 def _findings(counts: Counts, dialect: Dialect) -> Iterator[Finding]:
@@ -121,194 +310,3 @@ def _left_out(counts: Counts) -> Iterator[Finding]:
             "spindle; do it by hand",
             where=counts.spindle_place,
         )
-
-
-# Records as the bytes that go over the link: `M G PH PL`, dwell pairs, 45H, 54H.
-#
-#     13H                               access key
-#     5 times at most:                  a packet
-#         01 G [PH PL]  02 G [PH PL]    X and Y: 03H forward, 04H backward, 05H stands (no PH PL)
-#         00 T1                         seconds before Z
-#         03 G [PH PL]  00 T2           Z, seconds after it
-#     45H                               end of the packet ("E")
-#     54H                               after the last packet: end of data ("T")
-#
-# (L4106-4167, L4343-4383, L4397-4417.)
-
-Bytes = npt.NDArray[np.uint8]
-
-KEY: Final = 0x13
-"""The byte that opens the access (13H)."""
-FORWARD: Final = 3
-"""A motor turns forward (03H)."""
-BACKWARD: Final = 4
-"""A motor turns backward (04H)."""
-STOPPED: Final = 5
-"""A motor stands (05H)."""
-END_OF_PACKET: Final = 0x45
-"""The byte behind a packet (45H)."""
-END_OF_DATA: Final = 0x54
-"""The byte behind the last packet (54H)."""
-
-COLUMNS: Final = 18
-"""Key, then M G PH PL for X and Y, a pair, the same for Z, a pair, end of packet."""
-
-MOTOR_COLUMNS: Final = (1, 5, 11)
-"""Where X, Y and Z begin in a row of the table."""
-
-PAIR_COLUMNS: Final = (9, 15)
-
-
-def packet_bytes(records: Records, dialect: Dialect) -> bytes:
-    """The whole stream that the computer sends."""
-    table, used = byte_table(records, dialect)
-    return table[used].tobytes() + bytes([END_OF_DATA])
-
-
-def byte_table(records: Records, dialect: Dialect) -> tuple[Bytes, Bools]:
-    """(R, COLUMNS) bytes, and which of them are sent."""
-    count = len(records)
-    table = np.zeros((count, COLUMNS), dtype=np.uint8)
-    used = np.ones((count, COLUMNS), dtype=np.bool_)
-    in_packet = np.arange(count) % RECORDS_PER_PACKET
-    table[:, 0] = KEY
-    used[:, 0] = in_packet == 0 if dialect.key == "each-packet" else np.arange(count) == 0
-    table[:, -1] = END_OF_PACKET
-    used[:, -1] = in_packet == RECORDS_PER_PACKET - 1
-    used[-1, -1] = True
-    for motor, column in enumerate(MOTOR_COLUMNS):
-        steps = records.steps[:, motor]
-        forward = steps * dialect.signs[motor] > 0
-        high, low = _high_low(steps, dialect)
-        table[:, column] = motor + 1
-        table[:, column + 1] = np.where(forward, FORWARD, BACKWARD)
-        table[steps == 0, column + 1] = STOPPED
-        table[:, column + 2], table[:, column + 3] = high, low
-        used[:, column + 2 : column + 4] = (steps != 0)[:, None]
-    for pair, column in enumerate(PAIR_COLUMNS):
-        table[:, column] = dialect.dwell_mark_byte
-        table[:, column + 1] = records.waits[:, pair]
-    return table, used
-
-
-def _high_low(steps: Ints, dialect: Dialect) -> tuple[Ints, Ints]:
-    """PH and PL of each motor's pulses; where PH counts 255, 255 pulses are PL alone."""
-    pulses = np.abs(steps) + dialect.lost_pulses
-    unit = dialect.high_byte_steps
-    high = np.maximum(pulses - (256 - unit), 0) // unit
-    return high, pulses - high * unit
-
-
-# Records as text: the signed-mm listing, and the annotated hex dump.
-#
-# The listing is what the operator of the second version types: distances in mm with their sign
-# (L5240-5254), and the two waits. Its layout is ours, the thesis's is lost:
-#
-#     X+10.000 Y-2.500 T0 Z+0.000 T0
-#     END
-#
-# The hex dump shows every byte of the packets with its offset, its meaning and the expected reply:
-#
-#     0001  01 03 00 64              ; 1: X +100 steps (+1.250 mm) <- B M M M
-
-LEAST_DECIMALS: Final = 3
-"""A listing has at least so many decimals of a millimetre."""
-
-STEPS_PER_LAST_DIGIT: Final = 0.05
-"""The last decimal of a listing is worth this part of the finest step or less."""
-
-MOST_MESSAGE_CHARS: Final = 60
-"""A comment of the hex dump takes so much of a text, no more."""
-
-BYTES_WIDTH: Final = 24
-"""The comments of the hex dump stand in one column."""
-
-
-def decimals_of(machine: Machine) -> int:
-    """Decimals of mm that say every step of the machine without doubt."""
-    finest = min(axis.coded_step_mm for axis in machine.axes)
-    return max(LEAST_DECIMALS, math.ceil(-math.log10(STEPS_PER_LAST_DIGIT * finest)))
-
-
-def safe_text(text: str) -> str:
-    """A text from outside as part of a comment: printable ASCII, one line, short."""
-    plain = re.sub(r"[^A-Za-z0-9 _.,:+/#-]+", " ", text)
-    return " ".join(plain.split())[:MOST_MESSAGE_CHARS]
-
-
-def listing_text(records: Records, machine: Machine) -> str:
-    """The listing, one record a line, END last."""
-    step_x, step_y, step_z = (axis.coded_step_mm for axis in machine.axes)
-    digits = decimals_of(machine)
-    form = f"X%+.{digits}f Y%+.{digits}f T%d Z%+.{digits}f T%d"
-    lines = [
-        form % (x * step_x, y * step_y, before, z * step_z, after)
-        for (x, y, z), (before, after) in zip(
-            records.steps.tolist(), records.waits.tolist(), strict=True
-        )
-    ]
-    for record, text in reversed(records.messages):
-        lines.insert(record, f"; {safe_text(text)}")
-    head = "; i8751 signed mm: X and Y together, wait T1 s, Z, wait T2 s"
-    return "\n".join([head, *lines, "END"]) + "\n"
-
-
-def dump_text(records: Records, machine: Machine, dialect: Dialect) -> str:
-    """The hex dump of the packets: offset, bytes, meaning, expected replies."""
-    lines = ["; i8751 packets: offset, bytes, meaning <- expected replies"]
-    offset = 0
-    for data, meaning in _Dump(records, machine, dialect).parts():
-        if not data:
-            lines.append(f"; {meaning}")
-            continue
-        lines.append(f"{offset:04X}  {data.hex(' ').upper():<{BYTES_WIDTH}} ; {meaning}")
-        offset += len(data)
-    return "\n".join(lines) + "\n"
-
-
-class _Dump:
-    """Runs of bytes with their meaning and replies; no bytes for a line of comment alone."""
-
-    def __init__(self, records: Records, machine: Machine, dialect: Dialect) -> None:
-        self._records = records
-        self._steps_mm = [axis.coded_step_mm for axis in machine.axes]
-        self._digits = decimals_of(machine)
-        self._wait_reply = " ".join(dialect.dwell_replies)
-        self._moving_reply = f"{dialect.motor_reply} M M M"
-        self._standing_reply = f"{dialect.motor_reply} M"
-        self._table, self._used = byte_table(records, dialect)
-
-    def parts(self) -> Iterator[tuple[bytes, str]]:
-        """All runs in order."""
-        messages = list(self._records.messages)
-        rows = [bytes(row) for row in self._table]
-        for record, (row, steps) in enumerate(
-            zip(rows, self._records.steps.tolist(), strict=True)
-        ):
-            while messages and messages[0][0] <= record:
-                yield b"", safe_text(messages.pop(0)[1])
-            if self._used[record, 0]:
-                yield row[:1], "access key <- LISTO"
-            if record % RECORDS_PER_PACKET == 0:
-                yield b"", f"packet {record // RECORDS_PER_PACKET + 1}"
-            head = f"{record + 1}: "
-            (x, y, z), (before, after) = MOTOR_COLUMNS, PAIR_COLUMNS
-            yield self._motor(row, x, steps[0], f"{head}X", 0)
-            yield self._motor(row, y, steps[1], f"{head}Y", 1)
-            yield row[before : before + 2], f"{head}T1 {row[before + 1]} s <- {self._wait_reply}"
-            yield self._motor(row, z, steps[2], f"{head}Z", 2)
-            yield row[after : after + 2], f"{head}T2 {row[after + 1]} s <- {self._wait_reply}"
-            if self._used[record, -1]:
-                yield row[-1:], "end of packet <- F"
-        for _, text in messages:
-            yield b"", safe_text(text)
-        yield bytes([END_OF_DATA]), "end of data <- A"
-
-    def _motor(
-        self, row: bytes, column: int, steps: int, head: str, axis: int
-    ) -> tuple[bytes, str]:
-        if not steps:
-            return row[column : column + 2], f"{head} stands <- {self._standing_reply}"
-        way = steps * self._steps_mm[axis]
-        meaning = f"{head} {steps:+d} steps ({way:+.{self._digits}f} mm)"
-        return row[column : column + 4], f"{meaning} <- {self._moving_reply}"

@@ -1,6 +1,8 @@
-"""Writing LinuxCNC: what it has of its own beside `_gcode_write`."""
+"""Writing LinuxCNC: what it has of its own beside `gcode/write.py`."""
 
 from __future__ import annotations
+
+from typing import Final
 
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
@@ -10,14 +12,14 @@ from ..gcode.format import NumberStyle, say_number
 from ..gcode.write import Event, Style, common_words, tool_number, write_program
 from .dialect import dialect_of
 
-MODES = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
+MODES: Final = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
 """XY plane, mm, no cutter radius, no tool length, the first work frame, no cycle, absolute, I J as
 offsets, feeds a minute: whatever the last program left."""
 
-MOST_TOOL = 99_999
+MOST_TOOL: Final = 99_999
 """Ours: LinuxCNC's tool tables hold far fewer."""
 
-TOLERANCE = NumberStyle(6, strip=True)
+TOLERANCE: Final = NumberStyle(6, strip=True)
 
 
 def write_linuxcnc(toolpath: Toolpath, machine: Machine) -> Program:

@@ -36,11 +36,11 @@ FIXED_Y_UNITS: Final = 200
 MOST_NUMBER: Final = 32767
 """Every number is a signed int16 in the master (L4625-4635)."""
 
-Lines = Annotated[int, Meta(ge=1, le=255)]
+LineCount = Annotated[int, Meta(ge=1, le=255)]
 
 
-class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The table as written; None leaves the choice to the profile."""
+class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The `[dialect]` table as written; None leaves the choice to the profile."""
 
     profile: Literal["safe", "listing", "text"] = "safe"
     format: Literal["m", "stream"] = "m"
@@ -53,7 +53,7 @@ class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     plunge_mm_min: FeedRate = 234.375
     spindle_rpm: Speed | None = None
     grid_mm: Step | None = None
-    max_lines: Lines | None = None
+    max_lines: LineCount | None = None
     odd: Literal["truncated", "kept"] | None = None
     first_y: Literal["number", "character"] | None = None
     master_y: Literal["sent", "fixed"] | None = None
@@ -100,8 +100,8 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
 
 
 @dataclass(frozen=True)
-class Dialect:
-    """Every choice made.
+class Choices:
+    """Every choice made, by the table or by its profile.
 
     `format` "m": the arrays as a Matlab file; "stream": the bytes of the serial line.
     `speed`: what a feed is: that of the faster axis, as the GUI computes ("axis"), or that of the
@@ -137,10 +137,10 @@ class Dialect:
     spindle_rpm: float | None
 
 
-def dialect_of(machine: Machine) -> Dialect:
+def dialect_of(machine: Machine) -> Choices:
     """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
     file = machine.target.name
-    table = convert(machine.dialect, _Table, file, "dialect")
+    table = convert(machine.dialect, Dialect, file, "dialect")
     chosen = {
         name: value
         for name, value in msgspec.structs.asdict(table).items()
@@ -156,9 +156,9 @@ def dialect_of(machine: Machine) -> Dialect:
             where="table [dialect], key grid_mm",
             mend="use 0.2, the chunk that the slaves execute, or 0.1",
         )
-    return Dialect(grid_units=units, **chosen)
+    return Choices(grid_units=units, **chosen)
 
 
-def cut_z_mm(machine: Machine, dialect: Dialect) -> float:
+def cut_z_mm(machine: Machine, dialect: Choices) -> float:
     """Z of every cut, mm in the work frame: the plunge always starts from home."""
     return machine.controller.machine_zero_mm[2] - dialect.plunge_mm

@@ -1,5 +1,5 @@
-"""The reader's jobs: what the master would hold after receiving one, checked as a whole, and the
-moves that the machine then makes.
+"""Reading a matlab-router program, .m or stream, into jobs: what the master would hold after
+receiving one, checked as a whole; and the same for people.
 
 A number that would make a slave run away or never end is an error here, with its place, because
 no path could be told: the loop of the slaves runs `distance / 2 − 1` times in an unsigned int16
@@ -21,7 +21,34 @@ from camtool.errors import ProgramError
 from camtool.machine.model import Machine
 from camtool.toolpath.program import Listing
 
-from .dialect import CHUNK_UNITS, FIXED_Y_UNITS, MOST_NUMBER, UNIT_MM, Dialect, dialect_of
+from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, Choices, dialect_of
+
+TABLES: Final = ("xy", "lxy", "velxy")
+NAMES: Final = (*TABLES, "size_of_array", "first_pointx", "first_pointy")
+
+SHOWN_CHARS: Final = 24
+"""An error message shows no more of a program than this."""
+
+_BLANK: Final = re.compile(r"(?:[ \t\r\n]+|%[^\n]*)*")
+_NAME: Final = re.compile(r"([A-Za-z]\w*)(?:\{(\d{1,6})\})?[ \t]*=[ \t]*", re.ASCII)
+_TEXT_NUMBER: Final = re.compile(r"[+-]?\d{1,5}")
+_WHOLE: Final = re.compile(r"(?:[ \t\r\n,;]*[+-]?\d{1,5}(?![0-9+-]))*[ \t\r\n,;]*")
+_ROWS: Final = re.compile(r"\[([0-9 \t\r\n,;+-]*)\]")
+_TOKEN: Final = re.compile(r"[^ \t\r\n,;]+")
+_ROW_END: Final = re.compile(r"[;\n]")
+_END: Final = re.compile(r"[ \t]*(?:;[ \t]*)?(?=%|\r?\n|\Z)")
+_LIST: Final = re.compile(r"\{" + r",[ \t]*".join(NAMES) + r"\}")
+
+HEADER: Final = ("size_of_array", "first_pointx", "first_pointy")
+BODY: Final = {"lxy": 0, "velxy": 2}
+"""Which of the four rows of n numbers an array's x stands in."""
+
+MOST_DIGITS: Final = 5
+"""The master's buffer takes six characters, a sign and five digits (L4668-4708)."""
+
+_STREAM_NUMBER: Final = re.compile(rb"-?\d{1,%d}" % MOST_DIGITS)
+SHOWN_BYTES: Final = 12
+"""An error message shows no more of a number than this."""
 
 Where = Callable[[str, int, int], str]
 """The place of a number in the file, by the name of its array, its row and its column."""
@@ -44,20 +71,12 @@ class ReadJob:
         return np.asarray(np.where(self.speed < 0, -self.length, self.length))
 
 
-@dataclass(frozen=True, eq=False)
-class Executed:
-    """`points` (n+1, 2) units where the machine comes to stand, and where it was `asked` to."""
-
-    points: Ints
-    asked: Ints
-
-
 def fail(where: str, message: str, mend: str = "") -> NoReturn:
     """ProgramError at a place."""
     raise ProgramError(message, where=where, mend=mend)
 
 
-def check_count(count: int, where: Where, dialect: Dialect) -> None:
+def check_count(count: int, where: Where, dialect: Choices) -> None:
     """The master's arrays hold so many lines, and it does not look (L4625-4635)."""
     if not 1 <= count <= dialect.max_lines:
         fail(
@@ -67,7 +86,7 @@ def check_count(count: int, where: Where, dialect: Dialect) -> None:
         )
 
 
-def check_job(job: ReadJob, dialect: Dialect) -> None:
+def check_job(job: ReadJob, dialect: Choices) -> None:
     """ProgramError for the first number with which the machine would run away or stop."""
     for name, table in (("lxy", job.length), ("velxy", job.speed)):
         _refuse(job, name, np.abs(table) > MOST_NUMBER, "is beyond an int16")
@@ -97,26 +116,7 @@ def _refuse(job: ReadJob, name: str, bad: Bools, what: str) -> None:
         fail(job.where(name, row, column), f"{int(table[row, column])} in {name} {what}")
 
 
-def execute(job: ReadJob, dialect: Dialect) -> Executed:
-    """Where the slaves and the listed master really bring the tool."""
-    asked = _along(job.first, job.steps)
-    first = job.first.copy()
-    if dialect.master_y == "fixed":
-        first[1] = FIXED_Y_UNITS
-    steps = job.steps
-    if dialect.odd == "truncated":
-        first = first // CHUNK_UNITS * CHUNK_UNITS
-        steps = np.sign(steps) * (np.abs(steps) // CHUNK_UNITS * CHUNK_UNITS)
-    return Executed(_along(first, steps), asked)
-
-
-def _along(first: Ints, steps: Ints) -> Ints:
-    return np.asarray(
-        first + np.concatenate([np.zeros((1, 2), dtype=np.int64), steps.T.cumsum(0)])
-    )
-
-
-# Reading the .m file: `name = numbers;` and nothing else. Numbers are read, nothing is ever run.
+# The .m file: `name = numbers;` and nothing else. Numbers are read, nothing is ever run.
 #
 #     xy = [                          two rows of whole numbers; a line's end or ; ends a row
 #       151 400
@@ -129,22 +129,6 @@ def _along(first: Ints, steps: Ints) -> Ints:
 # A job is complete when each of its six names has been assigned once; the next assignment then
 # begins another job.
 
-TABLES: Final = ("xy", "lxy", "velxy")
-NAMES: Final = (*TABLES, "size_of_array", "first_pointx", "first_pointy")
-
-SHOWN_CHARS: Final = 24
-"""An error message shows no more of a program than this."""
-
-_BLANK: Final = re.compile(r"(?:[ \t\r\n]+|%[^\n]*)*")
-_NAME: Final = re.compile(r"([A-Za-z]\w*)(?:\{(\d{1,6})\})?[ \t]*=[ \t]*", re.ASCII)
-_TEXT_NUMBER: Final = re.compile(r"[+-]?\d{1,5}")
-_WHOLE: Final = re.compile(r"(?:[ \t\r\n,;]*[+-]?\d{1,5}(?![0-9+-]))*[ \t\r\n,;]*")
-_ROWS: Final = re.compile(r"\[([0-9 \t\r\n,;+-]*)\]")
-_TOKEN: Final = re.compile(r"[^ \t\r\n,;]+")
-_ROW_END: Final = re.compile(r"[;\n]")
-_END: Final = re.compile(r"[ \t]*(?:;[ \t]*)?(?=%|\r?\n|\Z)")
-_LIST: Final = re.compile(r"\{" + r",[ \t]*".join(NAMES) + r"\}")
-
 
 @dataclass(frozen=True, eq=False)
 class _Value:
@@ -154,7 +138,7 @@ class _Value:
     offset: int
 
 
-def read_text(data: bytes, dialect: Dialect) -> Iterator[ReadJob]:
+def read_text(data: bytes, dialect: Choices) -> Iterator[ReadJob]:
     """The jobs of a .m file, checked; ProgramError naming line and column."""
     text = _Text(data)
     values: dict[str, _Value] = {}
@@ -185,7 +169,7 @@ def read_text(data: bytes, dialect: Dialect) -> Iterator[ReadJob]:
 
 
 def _job_of_arrays(
-    text: _Text, number: int, values: dict[str, _Value], dialect: Dialect
+    text: _Text, number: int, values: dict[str, _Value], dialect: Choices
 ) -> ReadJob:
     """The six values as one job, once they agree."""
     scalar = {name: int(values[name].table[0, 0]) for name in NAMES if name not in TABLES}
@@ -367,23 +351,12 @@ class _Text:
         return f"line {line}, column {offset - self.text.rfind(chr(10), 0, offset)}"
 
 
-# Reading the serial stream as the master does: numbers in digits, each ended by a carriage
-# return, in this order: lines n, first x, first y, n lx, n ly, n velx, n vely (L4294-4360,
-# L4668-4708). Jobs follow one another; a master takes one and must be reset for the next.
-
-HEADER: Final = ("size_of_array", "first_pointx", "first_pointy")
-BODY: Final = {"lxy": 0, "velxy": 2}
-"""Which of the four rows of n numbers an array's x stands in."""
-
-MOST_DIGITS: Final = 5
-"""The master's buffer takes six characters, a sign and five digits (L4668-4708)."""
-
-_STREAM_NUMBER: Final = re.compile(rb"-?\d{1,%d}" % MOST_DIGITS)
-SHOWN_BYTES: Final = 12
-"""An error message shows no more of a number than this."""
+# The serial stream, read as the master does: numbers in digits, each ended by a carriage return,
+# in this order: lines n, first x, first y, n lx, n ly, n velx, n vely (L4294-4360, L4668-4708).
+# Jobs follow one another; a master takes one and must be reset for the next.
 
 
-def read_stream(data: bytes, dialect: Dialect) -> Iterator[ReadJob]:
+def read_stream(data: bytes, dialect: Choices) -> Iterator[ReadJob]:
     """The jobs of a stream, checked; ProgramError naming job, number and byte."""
     if not data:
         raise ProgramError("the stream is empty", mend="a stream begins with the count of lines")
@@ -405,7 +378,7 @@ def read_stream(data: bytes, dialect: Dialect) -> Iterator[ReadJob]:
         first += len(HEADER) + 2 * job.length.size
 
 
-def _job_of_words(words: list[bytes], first: int, number: int, dialect: Dialect) -> ReadJob:
+def _job_of_words(words: list[bytes], first: int, number: int, dialect: Choices) -> ReadJob:
     """The job whose header begins at this word."""
 
     def place(word: int) -> str:
@@ -449,7 +422,7 @@ def _fail_number(word: bytes, where: str) -> NoReturn:
     )
 
 
-def _first_y(word: bytes, place: Callable[[int], str], dialect: Dialect) -> int:
+def _first_y(word: bytes, place: Callable[[int], str], dialect: Choices) -> int:
     """y of the first point; sent as a character, the master's atol makes its digit or 0 of it."""
     if dialect.first_y == "character":
         if len(word) != 1:
@@ -470,7 +443,7 @@ def _first_y(word: bytes, place: Callable[[int], str], dialect: Dialect) -> int:
     return int(word)
 
 
-# A program for people: each block as the columns of the arrays that make it, 1-based as there.
+# The listing: each block as the columns of the arrays that make it, 1-based as there.
 #
 # The .m file has no lines that are blocks. A block is a column of three arrays, so it is shown as
 # those columns, in the words of the language: `xy(:,13) = [400; 265]; lxy(:,12) = [249; 179];

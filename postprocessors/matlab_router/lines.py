@@ -22,8 +22,8 @@ from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
-from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Dialect
-from .strokes import Cuts, place
+from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Choices
+from .strokes import Cuts
 
 TIE_TOLERANCE: Final = 1e-6
 """A coordinate within this part of the grid of half-way between two of its lines is half-way, and
@@ -34,6 +34,13 @@ FEED_TOLERANCE: Final = 1e-6
 
 FASTEST_COUNTS: Final = 1023
 """The slaves throw away a speed that they measure above this (L5496-5516)."""
+
+
+FEED_NOTICE: Final = 1e-6
+"""A feed that is off by less than this many mm/min is as wanted."""
+
+SNAP_NOTICE_MM: Final = 1e-6
+"""A vertex that is moved by less lies on the grid already."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,18 +71,22 @@ class Jobs:
     offsets: list[int]
 
 
-def jobs_of(cuts: Cuts, toolpath: Toolpath, machine: Machine, dialect: Dialect) -> _Maker:
-    """The maker of the jobs: `jobs` and `notes` of what was changed on the way.
+def jobs_of(
+    cuts: Cuts, toolpath: Toolpath, machine: Machine, dialect: Choices
+) -> tuple[Jobs, Notes]:
+    """The jobs, and what was changed on the way to them.
 
     PostError for what lies outside of the area or has a feed that cannot be said.
     """
-    return _Maker(cuts, toolpath, machine, dialect)
+    maker = _Maker(toolpath, machine, dialect)
+    lines = maker.lines(cuts)
+    return Jobs(lines, maker.speeds(lines), maker.offsets(lines)), maker.notes
 
 
 class _Maker:
-    """One run over all lines."""
+    """One run over all lines; `notes` of what it changes."""
 
-    def __init__(self, cuts: Cuts, toolpath: Toolpath, machine: Machine, dialect: Dialect) -> None:
+    def __init__(self, toolpath: Toolpath, machine: Machine, dialect: Choices) -> None:
         self.notes = Notes()
         self._toolpath = toolpath
         self._dialect = dialect
@@ -86,8 +97,10 @@ class _Maker:
         self._most_counts = min(
             FASTEST_COUNTS, int(machine.max_feed_mm_min / self._unit + FEED_TOLERANCE)
         )
-        lines = self._straight(self._mended(self._on_grid(cuts)))
-        self.jobs = Jobs(lines, self._speeds(lines), self._offsets(lines))
+
+    def lines(self, cuts: Cuts) -> Lines:
+        """The cuts as lines that the slaves can run."""
+        return self._straight(self._mended(self._on_grid(cuts)))
 
     def _on_grid(self, cuts: Cuts) -> Lines:
         """Vertices at the nearest point of the grid, the first one of a stroke not nearer to home
@@ -104,7 +117,7 @@ class _Maker:
         if count:
             moved = np.hypot(*(units - wanted).T)
             row = int(rows[int(np.argmax(moved))])
-            self.notes.snapped(float(moved.max()) * UNIT_MM, place(self._toolpath, row))
+            self.notes.snapped(float(moved.max()) * UNIT_MM, self._toolpath.place(row))
         whole = units.astype(np.int64)
         return Lines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
 
@@ -118,7 +131,7 @@ class _Maker:
                 raise PostError(
                     f"{name} {units[line, axis] * UNIT_MM:.1f} mm from home is outside of 0 to"
                     f" {most * UNIT_MM:g} mm",
-                    where=place(self._toolpath, int(rows[line])),
+                    where=self._toolpath.place(int(rows[line])),
                     mend=self._room(units, axis, most),
                 )
 
@@ -143,7 +156,7 @@ class _Maker:
         left = np.unique(lines.stroke[keep])
         for stroke in np.setdiff1d(lines.stroke, left).tolist():
             row = int(lines.row[int(np.searchsorted(lines.stroke, stroke))])
-            self.notes.lost(place(self._toolpath, row))
+            self.notes.lost(self._toolpath.place(row))
         return lines.chosen(keep)
 
     def _without_ones(self, lines: Lines) -> Lines:
@@ -186,12 +199,12 @@ class _Maker:
             line = int(np.argmax(bad))
             raise PostError(
                 f"feed {lines.feed[line]:g} mm/min is {what}",
-                where=place(self._toolpath, int(lines.row[line])),
+                where=self._toolpath.place(int(lines.row[line])),
                 mend=f"an axis runs at {self._unit:g} to {self._most_counts * self._unit:g}"
                 " mm/min; --set dialect.too_fast=limited takes the highest",
             )
 
-    def _speeds(self, lines: Lines) -> Ints:
+    def speeds(self, lines: Lines) -> Ints:
         """(L, 2) signed counts: the larger distance at its speed, the other one in proportion,
         by the same operations as the listing (L4444-4515) so that ties fall alike."""
         distance, larger, counts = self._majors(lines)
@@ -228,7 +241,7 @@ class _Maker:
         start[again] = end[np.flatnonzero(again) - 1]
         return Lines(start, end, lines.feed[source], lines.row[source], lines.stroke[source])
 
-    def _offsets(self, lines: Lines) -> list[int]:
+    def offsets(self, lines: Lines) -> list[int]:
         """Where each job begins, and the end of the last one."""
         count = len(lines.row)
         if count == 0:
@@ -254,7 +267,7 @@ class _Maker:
             raise PostError(
                 f"{self._dialect.max_lines} lines on without a vertex at which a job could begin: "
                 "all lie on X 0 or Y 0",
-                where=place(self._toolpath, int(lines.row[first])),
+                where=self._toolpath.place(int(lines.row[first])),
                 mend="move the drawing away from home",
             )
         return first + 1 + int(np.flatnonzero(usable)[-1])
@@ -263,8 +276,7 @@ class _Maker:
 # Lines that whole speeds would bend, in pieces that stay straight.
 #
 # Speeds are whole counts, so the slower axis is a little too fast or too slow, and one axis
-# arrives first: the line bends. For distances D ≥ d and speeds V, v of the faster and the slower
-# axis
+# arrives first: the line bends. For distances D ≥ d and speeds V, v of the faster and slower axis
 #
 #     r = (v/V) / (d/D),   bend = d · (1 − min(r, 1/r))
 #
@@ -338,18 +350,9 @@ def _pieces(longer: int, shorter: int, counts: int, limits: Limits) -> list[tupl
     return [part for part in parts if part != (0, 0)]
 
 
-# What the writer changed, counted, and told as one finding each.
-
-FEED_NOTICE: Final = 1e-6
-"""A feed that is off by less than this many mm/min is as wanted."""
-
-SNAP_NOTICE_MM: Final = 1e-6
-"""A vertex that is moved by less lies on the grid already."""
-
-
 @dataclass
 class Notes:
-    """Counts of one run of the writer; places name the worst or the first of each kind."""
+    """What one run of the writer changed; places name the worst or the first of each kind."""
 
     snap_mm: float = 0.0
     snap_place: str = ""
@@ -374,11 +377,11 @@ class Notes:
         self.lost_strokes += 1
         self.lost_place = self.lost_place or place
 
-    def findings(self, dialect: Dialect) -> list[Finding]:
+    def findings(self, dialect: Choices) -> list[Finding]:
         """One finding for each kind of change that was made."""
         return [*self._places(dialect), *self._lines(dialect), *self._feeds()]
 
-    def _places(self, dialect: Dialect) -> list[Finding]:
+    def _places(self, dialect: Choices) -> list[Finding]:
         grid_mm = dialect.grid_units * UNIT_MM
         found = []
         if self.snap_mm:
@@ -412,7 +415,7 @@ class Notes:
             )
         return found
 
-    def _lines(self, dialect: Dialect) -> list[Finding]:
+    def _lines(self, dialect: Choices) -> list[Finding]:
         grid_mm = dialect.grid_units * UNIT_MM
         found = []
         if self.lost_strokes:

@@ -19,8 +19,26 @@ from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .dialect import FIXED_Y_UNITS, UNIT_MM, UNITS_PER_MM, Dialect, cut_z_mm, dialect_of
-from .jobs import Executed, ReadJob, execute, read_stream, read_text
+from .dialect import (
+    CHUNK_UNITS,
+    FIXED_Y_UNITS,
+    UNIT_MM,
+    UNITS_PER_MM,
+    Choices,
+    cut_z_mm,
+    dialect_of,
+)
+from .jobs import ReadJob, read_stream, read_text
+
+MOST_OFF: Final = 8.0
+"""Counts in 5 ms by which the speed of an axis may differ from what its distance asks for (the
+GUI's own differ by half a count, and by some when distances are cut short)."""
+
+FEED_GUARD: Final = 1e-6
+"""A speed that is above its limit by less than this (in counts) is at the limit."""
+
+TRAVEL_GUARD: Final = 1e-6
+"""A position that is beyond the travel by less than this (in units) is at its end."""
 
 _STREAM: Final = re.compile(rb"-?\d+\r(?!\n)")
 
@@ -48,7 +66,7 @@ def _looks_like_text(data: bytes) -> bool:
 class _Moves:
     """Jobs in, the columns of a toolpath out."""
 
-    def __init__(self, machine: Machine, dialect: Dialect) -> None:
+    def __init__(self, machine: Machine, dialect: Choices) -> None:
         self._machine = machine
         self._dialect = dialect
         self._home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
@@ -99,7 +117,7 @@ class _Moves:
 
     def _lines(self, job: ReadJob, done: Executed, z: float) -> None:
         """One row a line; two where its speeds bend it by more than the tolerance."""
-        run = Run(done.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
+        run = DrivenLines(done.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
         self._seen.bent.add(
             run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"
         )
@@ -142,15 +160,34 @@ class _Moves:
         self._block.append(np.array([block], dtype=np.int64))
 
 
-# How the axes run the lines of a job: both start together, each stops by itself.
+@dataclass(frozen=True, eq=False)
+class Executed:
+    """`points` (n+1, 2) units where the machine comes to stand, and where it was `asked` to."""
+
+    points: Ints
+    asked: Ints
 
 
-MOST_OFF = 8.0
-"""Counts in 5 ms by which the speed of an axis may differ from what its distance asks for (the
-GUI's own differ by half a count, and by some when distances are cut short)."""
+def execute(job: ReadJob, dialect: Choices) -> Executed:
+    """Where the slaves and the listed master really bring the tool."""
+    asked = _along(job.first, job.steps)
+    first = job.first.copy()
+    if dialect.master_y == "fixed":
+        first[1] = FIXED_Y_UNITS
+    steps = job.steps
+    if dialect.odd == "truncated":
+        first = first // CHUNK_UNITS * CHUNK_UNITS
+        steps = np.sign(steps) * (np.abs(steps) // CHUNK_UNITS * CHUNK_UNITS)
+    return Executed(_along(first, steps), asked)
 
 
-class Run:
+def _along(first: Ints, steps: Ints) -> Ints:
+    return np.asarray(
+        first + np.concatenate([np.zeros((1, 2), dtype=np.int64), steps.T.cumsum(0)])
+    )
+
+
+class DrivenLines:
     """Lines of points (n+1, 2) units at speeds (n, 2) counts in 5 ms, as the axes run them.
 
     Both start together, each stops by itself (L4855-4929). With distances d and speeds v they
@@ -224,15 +261,6 @@ def _off(distance: Floats, speed: Ints, along: Floats) -> Floats:
     return np.asarray(np.abs(speed - straight).max(axis=1))
 
 
-# What the reader noticed in the jobs, counted, and told as one finding each.
-
-FEED_GUARD: Final = 1e-6
-"""A speed that is above its limit by less than this (in counts) is at the limit."""
-
-TRAVEL_GUARD: Final = 1e-6
-"""A position that is beyond the travel by less than this (in units) is at its end."""
-
-
 @dataclass
 class Worst:
     """How many are beyond a limit, by how much at most, and where the first is."""
@@ -263,7 +291,7 @@ class Seen:
     """What was noticed in all jobs."""
 
     machine: Machine
-    dialect: Dialect
+    dialect: Choices
     odd: Worst = field(default_factory=Worst)
     empty: Worst = field(default_factory=Worst)
     fast: Worst = field(default_factory=Worst)

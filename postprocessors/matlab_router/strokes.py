@@ -20,8 +20,9 @@ from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, xy_then_z
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.refusals import refuse
 
-from .dialect import Dialect, cut_z_mm
+from .dialect import Choices, cut_z_mm
 
 DEPTH_TOLERANCE_MM: Final = 0.005
 """A cut may lie this much above or below the one depth that the machine plunges to."""
@@ -40,13 +41,7 @@ class Cuts:
     stroke: Ints
 
 
-def place(toolpath: Toolpath, row: int) -> str:
-    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
-    source = toolpath.text(row)
-    return f"move {row} ({source})" if source else f"move {row}"
-
-
-def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> tuple[Cuts, list[Finding]]:
+def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Choices) -> tuple[Cuts, list[Finding]]:
     """The strokes of a toolpath, and what had to be changed to have them."""
     findings = _events(toolpath)
     apart = xy_then_z(toolpath)
@@ -61,7 +56,7 @@ def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> tuple[Cut
                 Severity.WARNING,
                 f"{split} moves in XY and Z were split: up first, down last, because Z only goes "
                 "from home to its one depth",
-                where=place(toolpath, first),
+                where=toolpath.place(first),
                 measured=float(split),
                 unit="moves",
             )
@@ -81,25 +76,20 @@ def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> tuple[Cut
     return lines, findings
 
 
-def _refuse(bad: Bools, rows: Ints, toolpath: Toolpath, message: str, mend: str = "") -> None:
-    """PostError naming the first bad row, if there is one."""
-    if bad.any():
-        row = int(rows[int(np.argmax(bad))])
-        raise PostError(message, where=place(toolpath, row), mend=mend)
-
-
 def _refuse_moves(toolpath: Toolpath, path: Toolpath, cut: Bools, rows: Ints) -> None:
     rapid = cut & (path.kind == Kind.RAPID)
-    _refuse(rapid, rows, toolpath, "a rapid below the top of the stock", "raise the tool first")
+    refuse(
+        toolpath, rapid, "a rapid below the top of the stock", "raise the tool first", rows=rows
+    )
     with np.errstate(invalid="ignore"):
         still = cut & ~((path.feed > 0.0) & np.isfinite(path.feed))
-    _refuse(still, rows, toolpath, "a cut without a feed above 0", "give each cut a feed")
+    refuse(toolpath, still, "a cut without a feed above 0", "give each cut a feed", rows=rows)
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
     under = homing & (path.end != path.starts)[:, :2].any(axis=1) & (path.end[:, 2] < 0.0)
-    _refuse(under, rows, toolpath, "X and Y go home below the top of the stock")
+    refuse(toolpath, under, "X and Y go home below the top of the stock", rows=rows)
     ended = np.cumsum(path.kind == Kind.END) > 0
     after = ended & (path.kind != Kind.END)
-    _refuse(after, rows, toolpath, "rows follow the end of the program")
+    refuse(toolpath, after, "rows follow the end of the program", rows=rows)
 
 
 def _refuse_depths(
@@ -108,7 +98,7 @@ def _refuse_depths(
     cut: Bools,
     rows: Ints,
     machine: Machine,
-    dialect: Dialect,
+    dialect: Choices,
 ) -> None:
     """All cuts lie at the one depth that the machine plunges to."""
     depth = cut_z_mm(machine, dialect)
@@ -121,59 +111,56 @@ def _refuse_depths(
     bad = cut & ~(np.abs(z - depth) <= DEPTH_TOLERANCE_MM)
     slopes = toolpath.is_feed & (toolpath.end != toolpath.starts)[:, 2]
     slopes &= (toolpath.end != toolpath.starts)[:, :2].any(axis=1) | toolpath.is_arc
-    _refuse(
-        bad & slopes[rows],
-        rows,
+    refuse(
         toolpath,
+        bad & slopes[rows],
         f"a slope in the stock: this machine only cuts at Z {depth:g} mm",
         "enter by a plunge, without tabs, and cut in one pass",
+        rows=rows,
     )
     if bad.any():
         wanted = float(z[int(np.argmax(bad))])
         x, y, _ = machine.controller.machine_zero_mm
         home = wanted + dialect.plunge_mm
-        _refuse(
-            bad,
-            rows,
+        refuse(
             toolpath,
+            bad,
             f"a cut at Z {wanted:g} mm: this machine always plunges {dialect.plunge_mm:g} mm from"
             f" home, to Z {depth:g} mm",
             f"place the stock {home:g} mm below the raised tool and say so: "
             f"--set controller.machine_zero_mm=[{x:g},{y:g},{home:g}]",
+            rows=rows,
         )
 
 
 def _refuse_holes(toolpath: Toolpath, number: Ints, below: Bools, cut: Bools, rows: Ints) -> None:
     """A plunge without a line behind it: the master has no job of no lines."""
     hole = below & ~np.isin(number, number[cut])
-    _refuse(
-        hole,
-        rows,
+    refuse(
         toolpath,
+        hole,
         "a plunge without a line behind it: this machine drills no holes",
         "leave it out, or draw a short line",
+        rows=rows,
     )
 
 
 def _events(toolpath: Toolpath) -> list[Finding]:
     """Which events the master has in its own order, and which nobody can tell it."""
     kind = toolpath.kind
-    rows = np.arange(len(kind))
     message = "the tool turns one way only: it can be switched on and off, no more"
-    _refuse(kind == Kind.SPINDLE_CCW, rows, toolpath, message)
+    refuse(toolpath, kind == Kind.SPINDLE_CCW, message)
     moved = (toolpath.end != 0.0).any(axis=1)
-    _refuse(
-        (kind == Kind.SET_ZERO) & moved,
-        rows,
+    refuse(
         toolpath,
+        (kind == Kind.SET_ZERO) & moved,
         "part zero can only be set at part zero",
         "set it first, before any move",
     )
     cutting = np.cumsum(toolpath.is_motion & (toolpath.end[:, 2] < 0.0)) > 0
-    _refuse(
-        (kind == Kind.TOOL_CHANGE) & cutting,
-        rows,
+    refuse(
         toolpath,
+        (kind == Kind.TOOL_CHANGE) & cutting,
         "a tool change between cuts",
         "post a program for each tool",
     )
@@ -197,7 +184,7 @@ def _unsaid(toolpath: Toolpath, rows: Bools, what: str, severity: Severity) -> l
             Code.EVENT_LEFT_OUT,
             severity,
             f"{count} {what} are not sent: the arrays have no place for them",
-            where=place(toolpath, int(np.argmax(rows))),
+            where=toolpath.place(int(np.argmax(rows))),
             measured=float(count),
         )
     ]

@@ -20,7 +20,7 @@ from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 
-from .dialect import UNIT_MM, Dialect, dialect_of
+from .dialect import UNIT_MM, Choices, dialect_of
 from .lines import Jobs, jobs_of
 from .strokes import cuts_of
 
@@ -37,22 +37,22 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     """The program; PostError for the first thing that this machine cannot do."""
     dialect = dialect_of(machine)
     cuts, findings = cuts_of(toolpath, machine, dialect)
-    made = jobs_of(cuts, toolpath, machine, dialect)
-    if len(made.jobs.lines.row) == 0:
+    made, notes = jobs_of(cuts, toolpath, machine, dialect)
+    if len(made.lines.row) == 0:
         raise PostError(
             "nothing is left to cut"
             + (f" on a grid of {dialect.grid_units * UNIT_MM:g} mm" if len(cuts.row) else ""),
             mend="scale the drawing up" if len(cuts.row) else "cut below the stock's top, Z < 0",
         )
     stream = dialect.format == "stream"
-    jobs = _said(made.jobs)
-    heads = np.array(made.jobs.offsets[:-1])
+    jobs = _said(made)
+    heads = np.array(made.offsets[:-1])
     return Program(
         data=_stream(jobs, dialect) if stream else _matlab(jobs, dialect),
         extension=STREAM_EXTENSION if stream else machine.target.extension,
         target=machine.target.name,
-        row_of_block=np.insert(made.jobs.lines.row, heads, -1),
-        findings=(*findings, *made.notes.findings(dialect)),
+        row_of_block=np.insert(made.lines.row, heads, -1),
+        findings=(*findings, *notes.findings(dialect)),
     )
 
 
@@ -82,7 +82,7 @@ def _said(jobs: Jobs) -> list[_Said]:
     return said
 
 
-def _matlab(jobs: list[_Said], dialect: Dialect) -> bytes:
+def _matlab(jobs: list[_Said], dialect: Choices) -> bytes:
     """One section a job: the last job's arrays remain when all are run; `jobs` then holds all."""
     lines = [
         f"% camtool: matlab-router, profile {dialect.profile}, {_count(len(jobs), 'job')}",
@@ -117,7 +117,7 @@ def _matrix(name: str, rows: tuple[list[int], list[int]]) -> list[str]:
     return [f"{name} = [", first, second, "];"]
 
 
-def _stream(jobs: list[_Said], dialect: Dialect) -> bytes:
+def _stream(jobs: list[_Said], dialect: Choices) -> bytes:
     """Each number in digits and a carriage return: lines, first x and y, all lx, ly, velx, vely
     (L4294-4360)."""
     parts = []
@@ -128,7 +128,7 @@ def _stream(jobs: list[_Said], dialect: Dialect) -> bytes:
     return b"".join(parts)
 
 
-def _first_y(y: int, number: int, dialect: Dialect) -> bytes:
+def _first_y(y: int, number: int, dialect: Choices) -> bytes:
     """y of the first point: in digits, or as the one character of that number (L4306)."""
     if dialect.first_y == "number":
         return b"%d\r" % y

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
-    from camtool.toolpath.moves import Move, Toolpath
+    from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
 
@@ -35,12 +35,6 @@ class PicMmhPost:
         from .read import read_program
 
         return read_program(data, machine)
-
-    def format_block(self, move: Move, machine: Machine) -> str:
-        """One motion as its block, without planning where its arc would end."""
-        from .write import format_block
-
-        return format_block(move, machine)
 
     def unit_mm(self, machine: Machine) -> float:
         """The coarser of the last decimal of a coordinate and a step."""

@@ -27,6 +27,11 @@ from typing import Final
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.kernels.direct_search import (
+    direct_search_hits,
+    direct_search_nearest,
+    direct_search_path,
+)
 
 from .numbers import Grid
 
@@ -84,8 +89,6 @@ class Landing:
 def hits(arc: Arc, at: tuple[int, int], low: int, high: int) -> int:
     """The iteration in low … high at which the controller, D = 0 at the start, would stop if the
     block's end were `at`; −1 when it would not, or not there with any other start of D."""
-    from camtool.kernels.direct_search import direct_search_hits
-
     found = -1
     for error in arc.errors:
         met = int(direct_search_hits(*arc.start, arc.clockwise, *at, high, error))
@@ -105,8 +108,6 @@ def land(arc: Arc, grid: Grid) -> Landing | None:
     last step that can be said at all. None when lines do as well: the whole arc lies within that
     reach, or no step of its paths can be said.
     """
-    from camtool.kernels.direct_search import direct_search_nearest
-
     length = arc.radius * arc.sweep_rad
     low = max(1, math.floor(WINDOW[0] * length) - WINDOW_SLACK)
     high = math.ceil(WINDOW[1] * length) + WINDOW_SLACK
@@ -139,8 +140,6 @@ def land(arc: Arc, grid: Grid) -> Landing | None:
 def _common(arc: Arc, first: int, count: int) -> tuple[Ints, Bools]:
     """The path (count, 2) after the iterations first + 1 … first + count, D = 0 at the start, and
     which of its steps the paths of all other starts of D pass as well."""
-    from camtool.kernels.direct_search import direct_search_path
-
     state = (*arc.start, arc.clockwise)
     path = direct_search_path(*state, first, count, 0)
     common = np.ones(count, dtype=np.bool_)

@@ -1,4 +1,7 @@
-"""Numbers of the writer: what the dialect can say, and the steps that the controller makes of it.
+"""The writer's first stage: every number of a toolpath checked, and turned into the dialect's own.
+
+Nothing is sent from here. What this machine or its dialect cannot do is a PostError that names
+the move, its source and the value.
 
 A *unit* is the finest difference that the form can say: 0.01 µm in the example form, 1 µm in the
 annex form. A position is held twice, as whole units (what is sent) and as whole steps (where the
@@ -8,7 +11,6 @@ controller then stands):  steps = round(units · unit / step), half away from ze
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,6 +22,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.machine.controllers import PicMmhController
 from camtool.machine.model import Machine, controller_of
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
 from .dialect import Dialect
 
@@ -28,6 +31,28 @@ HALF_STEP_TOLERANCE: Final = 1e-6
 
 UNITS_PER_MM: Final = {"example": 100_000, "annex": 1_000}
 MOST_UNITS: Final = {"example": 9_999_999, "annex": 99_999}
+
+FEED_TOLERANCE: Final = 1e-6
+"""A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""
+
+MOST_FEED_UNITS: Final = 99
+"""Two digits (L3297-3309)."""
+
+ARC_RADIUS_SPREAD_MM: Final = 0.005
+"""The radii at the start and at the end of an arc may differ by this much, no more. It is above
+what rounding centre and ends to 1 µm makes of an arc (√2 µm at each end)."""
+
+MOST_DWELL_S: Final = 9900.0
+"""A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
+
+DWELL_DIGITS_S: Final = 99
+"""Seconds that the two digits of one G04 can say (L3359-3366)."""
+
+MOST_SPINDLE: Final = 9999
+"""Rev/min that the four digits of S can say (L3418-3426)."""
+
+MOST_TOOL: Final = 99
+"""Tools that the two digits of T can say (L3455-3464)."""
 
 
 def say_example(units: int) -> str:
@@ -95,22 +120,6 @@ class Grid:
         return np.asarray((self.steps(units) == steps) & (np.abs(units) <= self.most_units))
 
 
-# The writer's first stage: every number of a toolpath checked, and turned into the dialect's own.
-#
-# Nothing is sent from here. What this machine or its dialect cannot do is a PostError that names
-# the move, its source and the value.
-
-FEED_TOLERANCE: Final = 1e-6
-"""A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""
-
-MOST_FEED_UNITS: Final = 99
-"""Two digits (L3297-3309)."""
-
-ARC_RADIUS_SPREAD_MM: Final = 0.005
-"""The radii at the start and at the end of an arc may differ by this much, no more. It is above
-what rounding centre and ends to 1 µm makes of an arc (√2 µm at each end)."""
-
-
 @dataclass(frozen=True, eq=False)
 class Numbers:
     """One item per row: ends (x, y, z) and centres (x, y) as units and as steps, feed words.
@@ -151,12 +160,6 @@ def numbers_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Number
     )
 
 
-def place(toolpath: Toolpath, row: int) -> str:
-    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
-    source = toolpath.text(row)
-    return f"move {row} ({source})" if source else f"move {row}"
-
-
 def _both(values_mm: Floats, grids: tuple[Grid, Grid, Grid]) -> tuple[Ints, Ints]:
     """Columns of mm as units and as steps, each column by its own axis."""
     columns = list(zip(grids, values_mm.T, strict=False))
@@ -165,32 +168,15 @@ def _both(values_mm: Floats, grids: tuple[Grid, Grid, Grid]) -> tuple[Ints, Ints
     return np.column_stack(units), np.column_stack(steps)
 
 
-def _refuse(bad: Bools, toolpath: Toolpath, message: Callable[[int], str], mend: str) -> None:
-    """PostError for the first bad row, if there is one."""
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise PostError(message(row), where=place(toolpath, row), mend=mend)
-
-
 def check_motion(toolpath: Toolpath, machine: Machine) -> None:
     """What hangs on more than one number: where the path starts, and that arcs are arcs."""
-    _check_start(toolpath)
+    refuse_start(toolpath)
     _check_arcs(toolpath, machine)
-
-
-def _check_start(toolpath: Toolpath) -> None:
-    if toolpath.start.any():
-        x, y, z = toolpath.start.tolist()
-        raise PostError(
-            f"the toolpath starts at ({x:g}, {y:g}, {z:g}) mm, a program starts at part zero",
-            mend="begin with a rapid from (0, 0, 0)",
-        )
 
 
 def _check_arcs(toolpath: Toolpath, machine: Machine) -> None:
     """Arcs are planned for one interpolator, for equal steps, and must be arcs."""
-    rows = toolpath.is_arc
-    if not rows.any():
+    if not toolpath.is_arc.any():
         return
     arcs = controller_of(machine, PicMmhController).arcs
     if arcs != "dsm":
@@ -203,24 +189,15 @@ def _check_arcs(toolpath: Toolpath, machine: Machine) -> None:
             "this controller draws no circles when the coded steps of X and Y differ",
             mend="set axes.x.coded_step_mm and axes.y.coded_step_mm to one value",
         )
-    with np.errstate(invalid="ignore", over="ignore"):
-        out, back = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
-        spread = np.abs(np.hypot(out[:, 0], out[:, 1]) - np.hypot(back[:, 0], back[:, 1]))
-        bad = rows & ~(spread <= ARC_RADIUS_SPREAD_MM)
-    _refuse(
-        bad,
-        toolpath,
-        lambda row: f"start and end differ by {spread[row]:g} mm in their distance to the centre",
-        "give the arc one radius",
-    )
+    refuse_two_radii(toolpath, ARC_RADIUS_SPREAD_MM)
 
 
 def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> None:
     """Five digits of µm (L3284-3285) for every end."""
     for name, values, grid in zip("XYZ", toolpath.end.T, grids, strict=True):
-        _refuse(
-            ~grid.fits(values),
+        refuse(
             toolpath,
+            ~grid.fits(values),
             lambda row, name=name, values=values: (  # type: ignore[misc]
                 f"{name} = {values[row]:.6g} mm has more than five digits of µm"
             ),
@@ -247,15 +224,15 @@ def _feed_words(toolpath: Toolpath, machine: Machine) -> tuple[list[str], Findin
     used = toolpath.is_feed
     feed = np.where(used, toolpath.feed, unit)
     highest = min(machine.max_feed_mm_min, MOST_FEED_UNITS * unit)
-    _refuse(~(feed > 0.0), toolpath, lambda row: f"feed {feed[row]:g} mm/min is no feed", mend)
-    _refuse(
-        feed > highest + FEED_TOLERANCE * unit,
+    refuse(toolpath, ~(feed > 0.0), lambda row: f"feed {feed[row]:g} mm/min is no feed", mend)
+    refuse(
         toolpath,
+        feed > highest + FEED_TOLERANCE * unit,
         lambda row: f"feed {feed[row]:g} mm/min is above what the link to the machine allows",
         mend,
     )
     units = np.floor(feed / unit + FEED_TOLERANCE).astype(np.int64)
-    _refuse(units < 1, toolpath, lambda row: f"feed {feed[row]:g} mm/min would be F00", mend)
+    refuse(toolpath, units < 1, lambda row: f"feed {feed[row]:g} mm/min would be F00", mend)
     lost = feed - units * unit
     rounded = lost > FEED_TOLERANCE * unit
     known = {number: f"F{number:02d}" for number in np.unique(units).tolist()}
@@ -271,24 +248,11 @@ def _feed_words(toolpath: Toolpath, machine: Machine) -> tuple[list[str], Findin
         Severity.INFO,
         f"the feed of {int(rounded.sum())} moves was rounded down to whole steps of {unit:g} "
         f"mm/min, at most from {feed[row]:g} to {units[row] * unit:g}",
-        where=place(toolpath, row),
+        where=toolpath.place(row),
         measured=float(lost[row]),
         limit=unit,
         unit="mm_min",
     )
-
-
-MOST_DWELL_S: Final = 9900.0
-"""A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
-
-DWELL_DIGITS_S: Final = 99
-"""Seconds that the two digits of one G04 can say (L3359-3366)."""
-
-MOST_SPINDLE: Final = 9999
-"""Rev/min that the four digits of S can say (L3418-3426)."""
-
-MOST_TOOL: Final = 99
-"""Tools that the two digits of T can say (L3455-3464)."""
 
 
 def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
@@ -309,14 +273,14 @@ def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
     if math.isnan(value) and name == "spindle speed":
         raise PostError(
             "the spindle is started without a speed, which M03 and M04 must say here",
-            where=place(toolpath, row),
+            where=toolpath.place(row),
             mend="say S in the program",
         )
     whole = kind != Kind.TOOL_CHANGE or value == math.floor(value)
     if not (0.0 <= value <= most and whole):
         raise PostError(
             f"{name} {value:g} cannot be said",
-            where=place(toolpath, row),
+            where=toolpath.place(row),
             mend=f"use a whole number from 0 to {most:g}",
         )
     number = math.ceil(value) if kind == Kind.DWELL else round(value)

@@ -2,7 +2,7 @@
 (L1755-1757) is an error here, with the block and the column.
 
 A program is cut at `;`; line ends and blanks between blocks are passed over. The first characters
-choose the pattern that the whole block must match (`_pic_mmh_grammar`); only a block that does
+choose the pattern that the whole block must match (`patterns`); only a block that does
 not is walked word by word, to say where it goes wrong.
 """
 
@@ -19,6 +19,48 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import dialect_of
+
+SHOWN_CHARS: Final = 48
+"""An error message shows no more of a block than this."""
+
+Shape = tuple[tuple[str, str], ...]
+"""The words behind a code: letter and kind of value ("c" is a coordinate)."""
+
+_ARC: Final[Shape] = (("X", "c"), ("Y", "c"), ("I", "c"), ("J", "c"), ("F", "2"))
+
+# Annex A.1, L3265-3471; Z blocks by the same rule (the decoder takes any axis letter, L1817-1849).
+SHAPES: Final[dict[str, tuple[Shape, ...]]] = {
+    "G00": ((("X", "c"), ("Y", "c")), (("Z", "c"),)),
+    "G01": ((("X", "c"), ("Y", "c"), ("F", "2")), (("Z", "c"), ("F", "2"))),
+    "G02": (_ARC,),
+    "G03": (_ARC,),
+    "G04": ((("P", "2"),),),
+    "G28": ((("X", "0"), ("Y", "0")), (("Z", "0"),)),
+    "G54": ((),),
+    "G90": ((),),
+    "M03": ((("S", "4"),),),
+    "M04": ((("S", "4"),),),
+    "M05": ((),),
+    "M06": ((("T", "2"),),),
+    "M30": ((),),
+}
+
+# The routine of the sign asks for "-" and takes anything else for the other sense (L1765-1768);
+# "JX+;" shows it a "+" (L1730), so that the example form may have one too.
+_COORDINATES: Final = {"example": r"([+-]?\d{5})\.(\d\d)", "annex": r"([+-]\d{5})()"}
+_COORDINATE_WORDS: Final = {
+    "example": "five digits, a point and two digits (in front of them a sign or none)",
+    "annex": "a sign and five digits",
+}
+_VALUES: Final = {"2": r"(\d\d)", "4": r"(\d{4})", "0": "0"}
+_VALUE_WORDS: Final = {"2": "two digits", "4": "four digits", "0": "the digit 0"}
+
+# The interactive commands of the annex (L3474-3505): the operator's, not a program's.
+_INTERACTIVE: Final = re.compile(
+    r"A|H|Q|W|V|J[XYZ][+-]|&(?:[XYZ][+-]){2,3}|P[XYZ][+-]\d{4}|B[XYZ]\d{3}|F[XYZ][+-]\d{3}"
+)
+
+Patterns = dict[str, tuple[tuple[str, re.Pattern[str]], ...]]
 
 BLANKS: Final = " \t\r\n"
 
@@ -202,50 +244,7 @@ class _Reader:
             self._ended = code == "M30"
 
 
-# The reader's grammar of a pic-mmh block: the patterns that match one, and the words that say
-# where a block goes wrong.
-
-SHOWN_CHARS: Final = 48
-"""An error message shows no more of a block than this."""
-
-Shape = tuple[tuple[str, str], ...]
-"""The words behind a code: letter and kind of value ("c" is a coordinate)."""
-
-_ARC: Final[Shape] = (("X", "c"), ("Y", "c"), ("I", "c"), ("J", "c"), ("F", "2"))
-
-# Annex A.1, L3265-3471; Z blocks by the same rule (the decoder takes any axis letter, L1817-1849).
-SHAPES: Final[dict[str, tuple[Shape, ...]]] = {
-    "G00": ((("X", "c"), ("Y", "c")), (("Z", "c"),)),
-    "G01": ((("X", "c"), ("Y", "c"), ("F", "2")), (("Z", "c"), ("F", "2"))),
-    "G02": (_ARC,),
-    "G03": (_ARC,),
-    "G04": ((("P", "2"),),),
-    "G28": ((("X", "0"), ("Y", "0")), (("Z", "0"),)),
-    "G54": ((),),
-    "G90": ((),),
-    "M03": ((("S", "4"),),),
-    "M04": ((("S", "4"),),),
-    "M05": ((),),
-    "M06": ((("T", "2"),),),
-    "M30": ((),),
-}
-
-# The routine of the sign asks for "-" and takes anything else for the other sense (L1765-1768);
-# "JX+;" shows it a "+" (L1730), so that the example form may have one too.
-_COORDINATES: Final = {"example": r"([+-]?\d{5})\.(\d\d)", "annex": r"([+-]\d{5})()"}
-_COORDINATE_WORDS: Final = {
-    "example": "five digits, a point and two digits (in front of them a sign or none)",
-    "annex": "a sign and five digits",
-}
-_VALUES: Final = {"2": r"(\d\d)", "4": r"(\d{4})", "0": "0"}
-_VALUE_WORDS: Final = {"2": "two digits", "4": "four digits", "0": "the digit 0"}
-
-# The interactive commands of the annex (L3474-3505): the operator's, not a program's.
-_INTERACTIVE: Final = re.compile(
-    r"A|H|Q|W|V|J[XYZ][+-]|&(?:[XYZ][+-]){2,3}|P[XYZ][+-]\d{4}|B[XYZ]\d{3}|F[XYZ][+-]\d{3}"
-)
-
-Patterns = dict[str, tuple[tuple[str, re.Pattern[str]], ...]]
+# The grammar of a block: the patterns that match one, and the words that say where it goes wrong.
 
 
 @dataclass(frozen=True)

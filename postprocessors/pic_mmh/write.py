@@ -1,9 +1,9 @@
 """Writing pic-mmh: a Toolpath to the blocks that this controller decodes.
 
 Everything that can be refused by its numbers alone is refused before the first block is made
-(`_pic_mmh_numbers`). Then the rows are followed one by one, together with the controller's own
+(`numbers.py`). Then the rows are followed one by one, together with the controller's own
 step position: a block is sent only when it moves that position, and every arc is planned from it
-(`_pic_mmh_arcs`), so that it ends where the next row begins.
+(`arcs.py`), so that it ends where the next row begins.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
-from camtool.toolpath.moves import Kind, Move, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 
 from .arcs import (
@@ -35,7 +35,12 @@ from .arcs import (
     unwrapped_rad,
 )
 from .dialect import dialect_of
-from .numbers import SAY, Grid, check_motion, event_words, far_arcs, numbers_of, place
+from .numbers import SAY, Grid, check_motion, event_words, far_arcs, numbers_of
+
+WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
+
+BUFFER_CHARS: Final = 35
+"""Characters of the thesis's buffer (L1740-1742), which cannot have taken its own sample block."""
 
 XY = tuple[int, int]
 
@@ -44,13 +49,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
     writer = _Writer(toolpath, machine)
     writer.run()
-    return Program(
-        data="".join(f"{block}\n" for block in writer.blocks).encode("ascii"),
-        extension=machine.target.extension,
-        target=machine.target.name,
-        row_of_block=np.array(writer.rows, dtype=np.int64),
-        findings=writer.findings(),
-    )
+    return Program.of_lines(writer.blocks, machine, writer.rows, writer.findings())
 
 
 def _refuse_chords(where: str) -> NoReturn:
@@ -84,18 +83,18 @@ class _Writer:
         lowered = stepped.after(straight)
         beyond = ~given.grids[0].fits(lowered.toolpath.end[:, :2]).all(axis=1)
         if beyond.any():
-            _refuse_chords(place(toolpath, int(lowered.row[beyond.argmax()])))
+            _refuse_chords(toolpath.place(int(lowered.row[beyond.argmax()])))
         self._toolpath, self._row = lowered.toolpath, lowered.row.tolist()
         self._numbers = numbers_of(lowered.toolpath, machine, dialect)
         self._notes = Notes(split_step_mm=step_mm, far=int(far.sum()))
         if far.any():
-            self._notes.far_place = place(toolpath, int(far.argmax()))
+            self._notes.far_place = toolpath.place(int(far.argmax()))
         self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
         steps = np.bincount(stepped.row, minlength=len(straight.toolpath)) > 1
         slopes = np.unique(straight.row[steps & straight.toolpath.is_feed])
         if len(slopes):
             self._notes.split = len(slopes)
-            self._notes.split_place = place(toolpath, int(slopes[0]))
+            self._notes.split_place = toolpath.place(int(slopes[0]))
         self._units = [0, 0, 0]
         self._steps = [0, 0, 0]
         self._starts = lowered.toolpath.starts[:, :2]
@@ -131,7 +130,7 @@ class _Writer:
 
     def _place(self, row: int) -> str:
         """The given row that a row of the lowered toolpath came from."""
-        return place(self._wanted, self._row[row])
+        return self._wanted.place(self._row[row])
 
     def _send(self, block: str, row: int) -> None:
         self.blocks.append(block)
@@ -291,48 +290,9 @@ class _Writer:
             self._steps[axis] = int(grid.steps(grid.units(zero))[0])
 
 
-# One block of pic-mmh for one motion.
-
-WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
-
-
-def format_block(move: Move, machine: Machine) -> str:
-    """One motion as the block that says it, without planning where its arc would end.
-
-    PostError when the move is no motion, or needs two blocks (XY and Z).
-    """
-    single = Toolpath(
-        kind=np.array([move.kind]),
-        end=np.array([move.end]),
-        centre=np.array([move.centre or (math.nan, math.nan)]),
-        feed=np.array([math.nan if move.feed is None else move.feed]),
-        value=np.array([math.nan]),
-        source=np.array([-1]),
-        block=np.array([-1]),
-        start=np.zeros(3),
-    )
-    flat, tall = move.end[:2] != move.start[:2], move.end[2] != move.start[2]
-    if move.kind > Kind.ARC_CCW or (tall and (flat or move.centre)):
-        raise PostError("this is not one block", where=f"move {move.index}")
-    dialect = dialect_of(machine)
-    numbers = numbers_of(single, machine, dialect)
-    say = SAY[dialect.form]
-    x, y, z = (say(units) for units in numbers.end_units[0])
-    tail = numbers.feed_words[0]
-    if tall:
-        return f"{WORD[move.kind]}Z{z}{tail};"
-    centre = "".join(
-        f"{name}{say(units)}" for name, units in zip("IJ", numbers.centre_units[0], strict=True)
-    )
-    return f"{WORD[move.kind]}X{x}Y{y}{centre if move.centre else ''}{tail};"
-
-
-# What the writer noticed while it wrote, counted, and told as one finding each.
-
-
 @dataclass
 class Notes:
-    """Counts of one run of the writer; places name the first of each kind."""
+    """What one run of the writer changed, counted; places name the first of each kind."""
 
     dropped: int = 0
     """Moves of less than a step."""
@@ -412,10 +372,6 @@ class Notes:
                 )
             )
         return found
-
-
-BUFFER_CHARS: Final = 35
-"""Characters of the thesis's buffer (L1740-1742), which cannot have taken its own sample block."""
 
 
 def too_long(blocks: list[str], buffer_chars: int | None) -> list[Finding]:

@@ -22,18 +22,13 @@ from camtool.machine.model import Machine
 from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
+from camtool.toolpath.refusals import refuse
 
-from ..gcode.checks import check_plain, left_out, place, split_z
-from ..gcode.format import NumberStyle, first_too_long, say_units
+from ..gcode.checks import check_plain, left_out, split_z
+from ..gcode.format import CODE, NumberStyle, first_too_long, say_units
 from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
 from .dialect import Dialect, dialect_of, scales_of
 
-WORD: Final[dict[int, str]] = {
-    Kind.RAPID: "G00",
-    Kind.LINE: "G01",
-    Kind.ARC_CW: "G02",
-    Kind.ARC_CCW: "G03",
-}
 UNSAID: Final = (
     Kind.DWELL,
     Kind.SPINDLE_CW,
@@ -66,13 +61,12 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
         if wanted
     ]
     _check_length(blocks, dialect)
-    first = place(toolpath, int(lowered.row[rows.first])) if rows.first >= 0 else ""
-    return Program(
-        data="".join(f"{block}\n" for block in blocks).encode("ascii"),
-        extension=machine.target.extension,
-        target=machine.target.name,
-        row_of_block=of_row[sent],
-        findings=(
+    first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
+    return Program.of_lines(
+        blocks,
+        machine,
+        of_row[sent],
+        (
             *_scale_note(dialect),
             *([split_note] if split_note else []),
             *squeezed,
@@ -85,13 +79,12 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
 
 def _check_tools(toolpath: Toolpath) -> None:
     """Nothing would stop the machine for another tool."""
-    bad = (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath)
-    if bad.any():
-        raise PostError(
-            "this machine has no code that stops it for a tool change",
-            where=place(toolpath, int(bad.argmax())),
-            mend="write a program for each tool",
-        )
+    refuse(
+        toolpath,
+        (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
+        "this machine has no code that stops it for a tool change",
+        "write a program for each tool",
+    )
 
 
 def _arcs_lowered(
@@ -130,7 +123,7 @@ def _blocks(rows: PlainRows, dialect: Dialect) -> list[str]:
     """The block of each row, without a code for events."""
     style = NumberStyle(dialect.decimals)
     x, y, z = (say_units(rows.end[:, axis], style) for axis in range(3))
-    words = [WORD.get(kind, "") for kind in rows.kind.tolist()]
+    words = [CODE.get(kind, "") for kind in rows.kind.tolist()]
     blocks = [f"{w} X{a} Y{b} Z{c}" for w, a, b, c in zip(words, x, y, z, strict=True)]
     arcs = np.flatnonzero(rows.is_arc)
     i, j = (say_units(rows.offset[arcs, axis], style) for axis in range(2))
@@ -180,7 +173,7 @@ def _feed_note(toolpath: Toolpath, machine: Machine) -> list[Finding]:
             Severity.WARNING,
             f"the feeds of {int(other.sum())} moves are not said: the machine has one speed, "
             f"{speed:g} mm/min",
-            where=place(toolpath, row),
+            where=toolpath.place(row),
             measured=float(toolpath.feed[row]),
             limit=speed,
             unit="mm_min",

@@ -12,7 +12,7 @@ from camtool.machine.registry import load_target
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.i8751_machines import SAMPLE
+from tests.postprocessors.i8751.machines import SAMPLE
 
 pytestmark = pytest.mark.benchmark
 MOVES = 200_000

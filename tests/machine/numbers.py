@@ -22,7 +22,7 @@ DIALECTS: dict[str, type] = {
     "grbl": grbl.Dialect,
     "i8751": i8751.Dialect,
     "linuxcnc": linuxcnc.Dialect,
-    "matlab-router": matlab_router._Table,
+    "matlab-router": matlab_router.Dialect,
     "pic-mmh": pic_mmh.Dialect,
     "valcnc": valcnc.Dialect,
 }

@@ -15,7 +15,7 @@ from camtool_postprocessors.i8751.pulses import (
 
 from camtool.errors import MachineError
 from tests.oracles.i8751_run import CRYSTAL_HZ, Reading, listing_periods, record
-from tests.postprocessors.i8751_machines import loaded
+from tests.postprocessors.i8751.machines import loaded
 
 
 def firmware(*settings: str) -> Firmware:

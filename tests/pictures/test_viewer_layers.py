@@ -15,7 +15,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from tests.pictures.conftest import SCENES, circle
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser, find_move, paper, shown
 from tests.pictures.viewer_pages import busy, traced
-from tests.postprocessors.i8751_machines import SAMPLE
+from tests.postprocessors.i8751.machines import SAMPLE
 
 __all__ = ["browser", "shown"]
 

@@ -11,7 +11,7 @@ from camtool.arrays import Floats
 from camtool.machine.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from tests.postprocessors.i8751_machines import SAMPLE
+from tests.postprocessors.i8751.machines import SAMPLE
 
 # How far the decoded path may lie from the arc: a chord's sagitta of a unit or step (or the
 # tolerance that the machine file gives to lines), and its points' own rounding, mm.

@@ -13,8 +13,8 @@ from camtool.machine.registry import LoadedTarget, load_target, target_names
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Listing
-from tests.postprocessors.i8751_machines import STEP_MM, loaded
-from tests.postprocessors.router_parts import router, strokes
+from tests.postprocessors.i8751.machines import STEP_MM, loaded
+from tests.postprocessors.matlab_router.parts import router, strokes
 
 FORWARD, STANDS = 3, 5
 """Bytes of a motor's sense on the i8751."""

@@ -19,7 +19,7 @@ from camtool.verification.verify import verify
 from tests.oracles.corte_recto import walk
 from tests.oracles.i8751_run import Reading, record
 from tests.oracles.motion_rows import RowMotion, rows_of
-from tests.postprocessors.i8751_machines import ROOT, SAMPLE, STEP_MM, loaded
+from tests.postprocessors.i8751.machines import ROOT, SAMPLE, STEP_MM, loaded
 
 
 def machine(*settings: str) -> Machine:

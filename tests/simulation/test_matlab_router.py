@@ -27,7 +27,7 @@ from camtool.simulation.motion import IDEAL, Chunk, Options
 from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.router_parts import ROOT, STAR, STAR_LXY, STAR_VELXY
+from tests.postprocessors.matlab_router.parts import ROOT, STAR, STAR_LXY, STAR_VELXY
 
 TICK_S = 0.005
 COUNTS_PER_MM = 25600.0

@@ -23,8 +23,8 @@ from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of
-from tests.postprocessors.i8751_machines import STEP_MM as STEP_8751_MM
-from tests.postprocessors.i8751_machines import loaded
+from tests.postprocessors.i8751.machines import STEP_MM as STEP_8751_MM
+from tests.postprocessors.i8751.machines import loaded
 from tests.validation.page import check, signed
 from tests.validation.pieces import ROOT
 

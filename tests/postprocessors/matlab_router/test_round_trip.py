@@ -9,7 +9,7 @@ from camtool.findings import Severity, worst
 from camtool.machine.registry import LoadedTarget
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
-from tests.postprocessors.router_parts import (
+from tests.postprocessors.matlab_router.parts import (
     ROOT,
     Point,
     arrays,

@@ -9,7 +9,7 @@ from camtool.findings import Code, Severity
 from camtool.machine.registry import LoadedTarget
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.i8751_machines import OPTIONS, STEP_MM, loaded
+from tests.postprocessors.i8751.machines import OPTIONS, STEP_MM, loaded
 
 RECORD = bytes.fromhex("01 03 00 64 02 05 00 02 03 04 01 2C 00 00")
 """X 100 steps forward, Y stands, 2 s, Z 300 steps back, no wait."""

@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh.numbers import SAY
 
 from camtool.errors import MachineError, PostError
 from camtool.findings import Code, Severity
 from camtool.machine.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-
-THESIS = "G02X02969.00Y03400.00I03012.00J03040.00F08;"
 
 
 def written(path: ToolpathBuilder, *settings: str) -> list[str]:
@@ -30,11 +29,9 @@ def findings(path: ToolpathBuilder, *settings: str) -> dict[Code, str]:
     return {finding.code: finding.message for finding in found}
 
 
-def test_the_block_of_the_thesis_is_formatted_from_its_arc() -> None:
-    target = load_target("pic-mmh")
-    path = ToolpathBuilder().arc(2.969, 3.4, centre=(3.012, 3.04), ccw=False, feed=0.8).finish()
-    (move,) = path
-    assert target.post.format_block(move, target.machine) == THESIS
+def test_numbers_are_said_as_in_the_block_of_the_thesis_and_in_its_annex() -> None:
+    assert [SAY["example"](units) for units in (296_900, -14)] == ["02969.00", "-00000.14"]
+    assert [SAY["annex"](units) for units in (2_969, -1)] == ["+02969", "-00001"]
 
 
 @pytest.mark.parametrize(
@@ -259,15 +256,6 @@ def test_arcs_are_planned_for_one_interpolator_and_one_step(setting: str, messag
 def test_a_dialect_table_that_does_not_fit_is_refused(setting: str) -> None:
     with pytest.raises(MachineError, match="dialect"):
         load_target("pic-mmh", settings=[setting])
-
-
-def test_a_block_that_needs_two_is_not_formatted() -> None:
-    target = load_target("pic-mmh")
-    both, down, dwell = ToolpathBuilder().rapid(1, 1, 1).rapid(z=0).event(Kind.DWELL, 1).finish()
-    assert target.post.format_block(down, target.machine) == "G00Z00000.00;"
-    for move in (both, dwell):
-        with pytest.raises(PostError, match="not one block"):
-            target.post.format_block(move, target.machine)
 
 
 def test_no_minus_zero_and_only_plain_characters() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from camtool.errors import ProgramError
 from camtool.machine.registry import load_target
 from camtool.toolpath.moves import Toolpath
-from tests.postprocessors.plain_parts import KINDS, part
+from tests.postprocessors.gcode.plain_parts import KINDS, part
 from tests.waiting import no_chewing
 
 LOADED = {name: load_target(name) for name in sorted(KINDS)}

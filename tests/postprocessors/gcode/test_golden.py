@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from camtool.machine.registry import load_target
-from tests.postprocessors.gcode_parts import part
+from tests.postprocessors.gcode.parts import part
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 GOLDEN = ROOT / "tests" / "golden"
 
 CASES = {

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from camtool.machine.registry import LoadedTarget, load_target
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SAMPLE = ROOT / "samples" / "i8751-sample.toml"
 STEP_MM = 0.0125
 

@@ -14,7 +14,7 @@ from camtool.findings import Code, Severity
 from camtool.machine.registry import load_target
 from camtool.toolpath.lower import carried_over
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
-from tests.postprocessors.gcode_parts import part
+from tests.postprocessors.gcode.parts import part
 
 TARGETS = ("grbl", "linuxcnc")
 

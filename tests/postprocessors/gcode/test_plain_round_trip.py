@@ -11,7 +11,7 @@ from camtool.findings import Code
 from camtool.machine.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.plain_parts import KINDS, anywhere, judge, on_grid, part
+from tests.postprocessors.gcode.plain_parts import KINDS, anywhere, judge, on_grid, part
 
 TARGETS = sorted(KINDS)
 LOADED = {name: load_target(name) for name in TARGETS}

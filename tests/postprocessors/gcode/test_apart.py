@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2] / "postprocessors"
+ROOT = Path(__file__).parents[3] / "postprocessors"
 # Options of the [dialect] table are what both must agree on.
 SHARED = {"gcode.dialect"}
 

@@ -13,9 +13,9 @@ from camtool.machine.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
-from tests.postprocessors.plain_parts import part
+from tests.postprocessors.gcode.plain_parts import part
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 ONE = ("dialect.coord_scale=1",)
 CALIBRATED = (
     "axes.x.coded_step_mm=0.04038",

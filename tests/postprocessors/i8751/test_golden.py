@@ -7,7 +7,7 @@ import pytest
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.i8751_machines import ROOT, STEP_MM, loaded
+from tests.postprocessors.i8751.machines import ROOT, STEP_MM, loaded
 
 GOLDEN = ROOT / "tests" / "golden"
 PAGE = ROOT / "docs" / "dialects" / "i8751.md"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from camtool_postprocessors.gcode.plain_arcs import ArcRules, PlainRows, _Wanted, plain_rows
+from camtool_postprocessors.gcode.plain_arcs import ArcRules, PlainRows, WantedArcs, plain_rows
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -45,7 +45,7 @@ def test_a_centre_on_the_other_side_of_the_chord_is_refused() -> None:
     """It is equally far from both ends, but the arc about it turns by 300° in place of 60°."""
     path = arc((1.0, 0.0), (0.5, 0.866))
     begin, stop = np.array([[0, 0]]), np.array([[1000, 0]])
-    wanted = _Wanted(path, np.array([0]), begin, stop, RULES)
+    wanted = WantedArcs(path, np.array([0]), begin, stop, RULES)
     which = np.array([0])
     assert wanted.fits(which, np.array([[500.0, 866.0]])).tolist() == [True]
     assert wanted.fits(which, np.array([[500.0, -866.0]])).tolist() == [False]

@@ -39,13 +39,6 @@ def test_the_block_of_the_thesis_is_its_arc(data: bytes, form: str) -> None:
     )
 
 
-@pytest.mark.parametrize(("data", "form"), [(THESIS, "example"), (ANNEX, "annex")])
-def test_and_is_formatted_back(data: bytes, form: str) -> None:
-    target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
-    (move,) = target.post.read(data, target.machine)
-    assert target.post.format_block(move, target.machine).encode() == data
-
-
 def test_every_code() -> None:
     settings = "controller.machine_zero_mm=[-1.0, -2.0, 3.0]"
     path = read(

@@ -10,7 +10,7 @@ from camtool.planning.plan import plan
 from camtool.toolpath.moves import Move
 from camtool.verification.verify import verify
 from tests.oracles.corte_recto import walk
-from tests.postprocessors.i8751_machines import ROOT, STEP_MM, loaded
+from tests.postprocessors.i8751.machines import ROOT, STEP_MM, loaded
 
 LOGO = ROOT / "samples" / "logo.dxf"
 

@@ -13,9 +13,9 @@ from camtool.machine.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
-from tests.postprocessors.plain_parts import FLASHCUT, on_grid, part
+from tests.postprocessors.gcode.plain_parts import FLASHCUT, on_grid, part
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 EXAMPLES = {
     # L1004-1005; the text has a blank before G02, which is read and not written.
     "L1004": (b"G01 X1.0 Y1.0 F3.0\n G02 X3.0 Y3.0 I1.0 J1.0\n", (2.0, 2.0), 3.0),

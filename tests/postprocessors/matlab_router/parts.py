@@ -13,7 +13,7 @@ from camtool.planning.plan import plan
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 Point = tuple[float, float]
 

@@ -13,7 +13,7 @@ from camtool.findings import Code, Severity
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.matlab_router import gui_arrays, off_line, run_line
-from tests.postprocessors.router_parts import (
+from tests.postprocessors.matlab_router.parts import (
     STAR,
     STAR_LXY,
     STAR_VELXY,

@@ -14,7 +14,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles.corte_recto import farthest, walk
-from tests.postprocessors.i8751_machines import OPTIONS, STEP_MM, loaded
+from tests.postprocessors.i8751.machines import OPTIONS, STEP_MM, loaded
 
 FORMATS = ("packets", "listing", "hex")
 TOLERANCE_MM = 0.05

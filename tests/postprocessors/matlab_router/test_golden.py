@@ -6,7 +6,7 @@ import pytest
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.router_parts import ROOT, posted, router
+from tests.postprocessors.matlab_router.parts import ROOT, posted, router
 
 GOLDEN = ROOT / "tests" / "golden"
 

@@ -11,7 +11,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles.gcode_paths import farthest_mm
-from tests.postprocessors.gcode_parts import part, toolpaths
+from tests.postprocessors.gcode.parts import part, toolpaths
 
 TARGETS = ("grbl", "linuxcnc")
 UNIT_MM = 0.001

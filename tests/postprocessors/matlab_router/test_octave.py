@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.postprocessors.router_parts import STAR, arrays, posted, router, strokes
-from tests.postprocessors.test_matlab_router_golden import GOLDEN, part
+from tests.postprocessors.matlab_router.parts import STAR, arrays, posted, router, strokes
+from tests.postprocessors.matlab_router.test_golden import GOLDEN, part
 from tests.waiting import HANG_S
 
 OCTAVE = shutil.which("octave-cli")

@@ -11,7 +11,7 @@ from camtool.machine.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
-from tests.postprocessors.i8751_machines import STEP_MM, loaded
+from tests.postprocessors.i8751.machines import STEP_MM, loaded
 
 
 def write(path: ToolpathBuilder | Toolpath, *settings: str) -> Program:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.router_parts import (
+from tests.postprocessors.matlab_router.parts import (
     STAR,
     cut_points,
     posted,

@@ -14,7 +14,7 @@ from camtool.planning.plan import plan
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, interpreted, motions, needs_rs274, run_rs274
-from tests.postprocessors.gcode_parts import part, toolpaths
+from tests.postprocessors.gcode.parts import part, toolpaths
 
 pytestmark = needs_rs274
 
@@ -60,7 +60,7 @@ def test_the_path_mode_is_the_one_asked_for(path: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", TARGETS)
 def test_the_logo(name: str, tmp_path: Path) -> None:
     target = load_target(name)
-    drawing = read_drawing(Path(__file__).parents[2] / "samples" / "logo.dxf")
+    drawing = read_drawing(Path(__file__).parents[3] / "samples" / "logo.dxf")
     program = target.post.write(plan(drawing, job_of(), target.machine), target.machine)
     compare(target.post.read(program.data, target.machine), program.data, tmp_path)
 
