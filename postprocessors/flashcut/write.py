@@ -23,10 +23,18 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
 
-from ..gcode.checks import check_plain, feed_units, left_out, split_z
+from ..gcode.checks import feed_units
 from ..gcode.dialect import feed_decimals
 from ..gcode.format import CODE, NumberStyle, say_units
-from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
+from ..gcode.plain import (
+    ArcRules,
+    PlainRows,
+    arc_findings,
+    check_plain,
+    left_out,
+    plain_rows,
+    split_z,
+)
 from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
 from .timers import half_periods_ms
 

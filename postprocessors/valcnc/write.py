@@ -24,9 +24,16 @@ from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
 
-from ..gcode.checks import check_plain, left_out, split_z
 from ..gcode.format import CODE, NumberStyle, first_too_long, say_units
-from ..gcode.plain_arcs import ArcRules, PlainRows, arc_findings, plain_rows
+from ..gcode.plain import (
+    ArcRules,
+    PlainRows,
+    arc_findings,
+    check_plain,
+    left_out,
+    plain_rows,
+    split_z,
+)
 from .dialect import Dialect, dialect_of, scales_of
 
 UNSAID: Final = (

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from camtool_postprocessors.gcode.plain_arcs import ArcRules, PlainRows, WantedArcs, plain_rows
+from camtool_postprocessors.gcode.plain import ArcRules, PlainRows, WantedArcs, plain_rows
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

@@ -1,6 +1,7 @@
-"""Writing arcs of dialects that say nothing of a tolerance: both radii equal to within a unit.
+"""Writing flashcut and valcnc: what both refuse, split or leave out, and how their arcs survive.
 
-A *unit* is the last decimal that is said. Start, end and centre lie on whole units; what is sent
+Their theses give no rule for arcs whose radii differ, so both radii are equal to within a unit. A
+*unit* is the last decimal that is said. Start, end and centre lie on whole units; what is sent
 is the end and the offset centre − start. For each arc, by its rounded numbers:
 
     sagitta below half a unit        one line says it as well
@@ -8,24 +9,32 @@ is the end and the offset centre − start. For each arc, by its rounded numbers
     far to within a unit, and about which the arc turns as wanted
                                      the one nearest to the wanted centre
     otherwise                        lines within a unit of the arc
-
-Shared by flashcut and valcnc, whose theses give no rule for arcs whose radii differ.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
-from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
+from camtool.machine.model import Machine
+from camtool.toolpath.lower import (
+    Lowered,
+    arcs_to_lines,
+    arcs_within,
+    helices_to_steps,
+    slope_step_mm,
+)
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .arcs import FLAT_UNITS, LINE_SAGITTA_UNITS, sagitta_of, turns_of
+from .checks import check
 from .format import units_of
 
 SPREAD_UNITS: Final = 1.0
@@ -36,6 +45,62 @@ LEAST_RADIUS_UNITS: Final = 4.0
 
 RECENTRE_REACH: Final = 2
 """Centres are tried up to this many units from the rounded one, in I and in J."""
+
+
+def check_plain(toolpath: Toolpath, machine: Machine) -> None:
+    """PostError for the first row that has no meaning there, named as the toolpath numbers it."""
+    check(toolpath, machine)
+    for row in np.flatnonzero(~toolpath.is_motion).tolist():
+        kind = Kind(int(toolpath.kind[row]))
+        if kind in (Kind.HOME_XY, Kind.HOME_Z):
+            raise PostError(
+                "this machine has no code to go to machine zero",
+                where=toolpath.place(row),
+                mend="leave homing out, do it by hand",
+            )
+        if kind == Kind.SET_ZERO and toolpath.end[row].any():
+            raise PostError(
+                "part zero can only be set at part zero",
+                where=toolpath.place(row),
+                mend="set it first, before any move",
+            )
+        if kind == Kind.END and row < len(toolpath) - 1:
+            raise PostError("moves follow the end of the program", where=toolpath.place(row + 1))
+
+
+def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, Finding | None]:
+    """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
+    step_mm = slope_step_mm(machine)
+    lowered = helices_to_steps(toolpath, step_mm)
+    twice = np.bincount(lowered.row, minlength=len(toolpath)) > 1
+    twice &= toolpath.is_feed
+    if not twice.any():
+        return lowered, None
+    return lowered, Finding(
+        Code.MOVE_SPLIT,
+        Severity.WARNING,
+        f"{int(twice.sum())} feed moves in XY and Z became steps of at most {step_mm:g} mm, flat "
+        "and then down, or up and then flat: nowhere deeper than the slope",
+        where=toolpath.place(int(twice.argmax())),
+        measured=step_mm,
+        unit="mm",
+    )
+
+
+def left_out(toolpath: Toolpath, kinds: Collection[Kind], why: str) -> list[Finding]:
+    """One EVENT_LEFT_OUT when there are rows of `kinds`: how many of what, and `why`."""
+    rows = np.flatnonzero(np.isin(toolpath.kind, [int(kind) for kind in kinds]))
+    if not len(rows):
+        return []
+    names = ", ".join(dict.fromkeys(Kind(kind).name for kind in toolpath.kind[rows].tolist()))
+    return [
+        Finding(
+            Code.EVENT_LEFT_OUT,
+            Severity.WARNING,
+            f"{len(rows)} events were left out ({names}): {why}",
+            where=toolpath.place(int(rows[0])),
+        )
+    ]
 
 
 @dataclass(frozen=True)
