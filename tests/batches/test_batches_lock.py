@@ -1,6 +1,7 @@
 """Two batches never write to one folder, and a lock never outlives its process."""
 
 import errno
+import fcntl
 import os
 import signal
 import socket
@@ -12,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from camtool.batches import lock
 from camtool.batches.lock import NAME, alone_in
 from camtool.errors import OutputError
 from tests.waiting import HANG_S
@@ -74,15 +74,15 @@ def test_a_holder_that_was_killed_holds_nothing(tmp_path: Path) -> None:
 def test_a_file_that_was_taken_away_while_it_was_locked_is_no_lock(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, opened = lock._lock, []
+    real, opened = fcntl.flock, []
 
-    def late(handle: int) -> None:
+    def late(handle: int, mode: int) -> None:
         if not opened:
             (tmp_path / NAME).unlink()  # as who held it until now does
         opened.append(handle)
-        real(handle)
+        real(handle, mode)
 
-    monkeypatch.setattr(lock, "_lock", late)
+    monkeypatch.setattr(fcntl, "flock", late)
     with alone_in(tmp_path):
         assert (tmp_path / NAME).exists()
         with pytest.raises(OutputError, match="another batch"):
@@ -93,10 +93,10 @@ def test_a_file_that_was_taken_away_while_it_was_locked_is_no_lock(
 def test_a_file_system_without_locks_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def none(handle: int) -> None:
+    def none(handle: int, mode: int) -> None:
         raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(lock, "_lock", none)
+    monkeypatch.setattr(fcntl, "flock", none)
     with alone_in(tmp_path) as locked:
         assert not locked
     assert not any(tmp_path.iterdir())
@@ -106,10 +106,10 @@ def test_a_file_system_without_locks_is_told(
 def test_a_broken_disk_is_not_taken_for_another_batch(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: int
 ) -> None:
-    def broken(handle: int) -> None:
+    def broken(handle: int, mode: int) -> None:
         raise OSError(fault, os.strerror(fault))
 
-    monkeypatch.setattr(lock, "_lock", broken)
+    monkeypatch.setattr(fcntl, "flock", broken)
     with pytest.raises(OutputError, match=rf"{NAME}: cannot be written .{os.strerror(fault)}"):
         alone_in(tmp_path).__enter__()
 

@@ -13,7 +13,7 @@ from camtool.planning.plan import plan
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.verify import verify
 from tests.oracles.path_machine import path_machine
-from tests.planning.test_place import _box, drawing_of
+from tests.planning.test_place import drawing_of, rectangle
 
 pytestmark = pytest.mark.benchmark
 FEW, MANY = 250, 2000
@@ -24,7 +24,7 @@ ROUNDS = 3
 def passes(count: int) -> Toolpath:
     """A square in so many passes."""
     job = job_of(depth_mm=1.0, step_down_mm=1.0 / count, side="on")
-    return plan(drawing_of([_box(0, 0, 10, 10)]), job, path_machine())
+    return plan(drawing_of([rectangle(0, 0, 10, 10)]), job, path_machine())
 
 
 def test_a_pass_of_many_takes_as_long_as_one_of_few() -> None:

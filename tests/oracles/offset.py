@@ -202,9 +202,9 @@ def complaints(
     sag = max(sagitta(each, CHORD_RAD) for each in (p, *results))
     sag += abs(distance_mm) * (1.0 - math.cos(0.5 * CHORD_RAD))
     found += _place_complaints(results, p, distance_mm, sag, rng)
-    area = abs(sum(_area(each) for each in results))
+    area = abs(sum(area_of(each) for each in results))
     region = offset_region(p, distance_mm, CHORD_RAD)
-    length = sum(_length(each) for each in (p, *results))
+    length = sum(length_of(each) for each in (p, *results))
     if abs(area - region.area) > 1e-6 * region.area + length * (2.0 * sag + EXACT_MM):
         found.append(f"area of {area} mm² where shapely has {region.area} mm²")
     return found + _count_complaints(results, p, distance_mm, 4.0 * (sag + EXACT_MM))
@@ -245,13 +245,13 @@ def _count_complaints(
         len(rings(offset_region(p, distance_mm + change, CHORD_RAD), 2.0 * slack))
         for change in (-slack, 0.0, slack)
     }
-    wide = [each for each in results if abs(_area(each)) > slack * _length(each)]
+    wide = [each for each in results if abs(area_of(each)) > slack * length_of(each)]
     if len(counts) == 1 and counts != {len(wide)}:
         return [f"{len(wide)} rings where shapely has {counts}"]
     return []
 
 
-def _area(p: Polyline) -> float:
+def area_of(p: Polyline) -> float:
     """Signed area, arcs as arcs: the chords' and r²/2 (sweep − sin sweep) for each arc."""
     total = 0.0
     for a, b, arc in pieces(p):
@@ -261,7 +261,7 @@ def _area(p: Polyline) -> float:
     return float(total)
 
 
-def _length(p: Polyline) -> float:
+def length_of(p: Polyline) -> float:
     return sum(
         math.dist(a, b) if arc is None else arc.radius * abs(arc.sweep) for a, b, arc in pieces(p)
     )

@@ -18,17 +18,17 @@ from tests.oracles.offset import (
     EXACT_MM,
     GRID_MM,
     Arc,
+    area_of,
     chords,
     dense,
     distance,
     inside,
+    length_of,
     near_region,
     pieces,
     rings,
     sagitta,
 )
-from tests.oracles.offset import _area as area
-from tests.oracles.offset import _length as length
 
 CHORD_RAD = 0.05
 """Sweep of the chords that stand for arcs where shapely judges."""
@@ -105,9 +105,9 @@ def shape_complaints(
     sag = max(sagitta(each, CHORD_RAD) for each in (*paths, *results))
     sag += abs(d) * (1.0 - math.cos(0.5 * CHORD_RAD))
     region = shape_offset(paths, d, covered, CHORD_RAD)
-    total = sum(length(each) for each in (*paths, *results))
+    total = sum(length_of(each) for each in (*paths, *results))
     # Outer ones CCW and holes CW: the signed areas add up.
-    got = sum(area(each) for each in results)
+    got = sum(area_of(each) for each in results)
     if abs(got - region.area) > 1e-6 * region.area + total * (2.0 * sag + EXACT_MM):
         found.append(f"area of {got} mm² where shapely has {region.area} mm²")
     found += _place_complaints(results, paths, (d, covered), sag, rng)
@@ -197,7 +197,7 @@ def _count_complaints(
         holes = [shapely.Polygon(hole) for part in parts for hole in part.interiors]
         outer = [shapely.Polygon(part.exterior) for part in parts]
         counts.add((len(rings_of(outer, 2.0 * slack)), len(rings_of(holes, 2.0 * slack))))
-    wide = [area(each) for each in results if abs(area(each)) > slack * length(each)]
+    wide = [area_of(each) for each in results if abs(area_of(each)) > slack * length_of(each)]
     got = (sum(each > 0.0 for each in wide), sum(each < 0.0 for each in wide))
     return (
         [f"{got} outer rings and holes where shapely has {counts}"]

@@ -6,7 +6,7 @@ from camtool.errors import OptionError
 from camtool.planning.job import MOST_MOVES, Tabs, refuse_endless
 from camtool.planning.plan import plan
 from tests.oracles.path_machine import path_machine
-from tests.planning.test_place import _box, drawing_of, job_of
+from tests.planning.test_place import drawing_of, job_of, rectangle
 
 
 @pytest.mark.parametrize(
@@ -19,13 +19,13 @@ from tests.planning.test_place import _box, drawing_of, job_of
 )
 def test_too_much_work_is_refused(settings: dict[str, object], words: list[str]) -> None:
     with pytest.raises(OptionError) as caught:
-        plan(drawing_of([_box(0, 0, 1, 1)]), job_of(**settings), path_machine())
+        plan(drawing_of([rectangle(0, 0, 1, 1)]), job_of(**settings), path_machine())
     for word in words:
         assert word in str(caught.value), str(caught.value)
 
 
 def test_many_passes_of_much_are_too_much_where_few_of_little_are_not() -> None:
-    many = [_box(2 * k, 0, 2 * k + 1, 1) for k in range(60)]
+    many = [rectangle(2 * k, 0, 2 * k + 1, 1) for k in range(60)]
     settings = {"depth_mm": 1.0, "step_down_mm": 2e-4, "side": "on"}
     with pytest.raises(OptionError, match=r"key step_down: 5000 passes would make 1.2e\+06 moves"):
         plan(drawing_of(many), job_of(**settings), path_machine())

@@ -27,7 +27,7 @@ def _circle(x: float, y: float, radius: float) -> Polyline:
     return Polyline(np.array([[x - radius, y, 1.0], [x + radius, y, 1.0]]), closed=True)
 
 
-def _box(x0: float, y0: float, x1: float, y1: float) -> Polyline:
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> Polyline:
     return Polyline(np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0.0]]), True)
 
 
@@ -40,7 +40,7 @@ def _mark(x: float, y: float, layer: str = "0") -> Mark:
 
 
 def test_the_drawing_itself_when_nothing_changes() -> None:
-    made = drawing_of([_box(0, 0, 4, 3)])
+    made = drawing_of([rectangle(0, 0, 4, 3)])
     for same in ({}, {"origin": "drawing"}, {"origin": "lower-left"}, {"origin": (0.0, 0.0)}):
         assert place(made, job_of(**same)) is made
     assert place(made, job_of(rotate_rad=2.0 * math.pi, fit_mm=(4.0, 9.0))) is made
@@ -59,7 +59,7 @@ def test_the_drawing_itself_when_nothing_changes() -> None:
 def test_origins_take_the_chosen_paths(
     origin: str | tuple[float, float], shift: tuple[float, float]
 ) -> None:
-    made = drawing_of([_circle(5, 7, 2), _box(-50, -50, 50, 50)], ["CUT", "FRAME"])
+    made = drawing_of([_circle(5, 7, 2), rectangle(-50, -50, 50, 50)], ["CUT", "FRAME"])
     placed = place(made, job_of(origin=origin, layers=("CUT",)))
     expected = made.paths.vertices + np.array([*shift, 0.0])
     np.testing.assert_allclose(placed.paths.vertices, expected, atol=1e-14)
@@ -67,7 +67,9 @@ def test_origins_take_the_chosen_paths(
 
 def test_the_box_is_that_of_all_operations_and_of_the_marks_that_are_drilled() -> None:
     made = replace(
-        drawing_of([_circle(5, 7, 2), _box(-9, 0, 1, 1), _box(-50, 0, 1, 1)], ["A", "B", "C"]),
+        drawing_of(
+            [_circle(5, 7, 2), rectangle(-9, 0, 1, 1), rectangle(-50, 0, 1, 1)], ["A", "B", "C"]
+        ),
         colours=("", "#ff0000", ""),
         marks=(_mark(0, -4, "HOLES"), _mark(0, -40, "A")),
     )
@@ -155,13 +157,13 @@ def test_every_shape_stays_similar(
     [((8.0, 8.0), 2.0), ((8.0, 3.0), 1.0), ((8.0, 0.0), 2.0), ((0.0, 1.5), 0.5)],
 )
 def test_fit_takes_the_side_that_binds(fit: tuple[float, float], scale: float) -> None:
-    made = drawing_of([_box(1, 1, 5, 4), _box(-9, -9, 9, 9)], ["CUT", "FRAME"])
+    made = drawing_of([rectangle(1, 1, 5, 4), rectangle(-9, -9, 9, 9)], ["CUT", "FRAME"])
     placed = place(made, job_of(fit_mm=fit, layers=("CUT",)))
     np.testing.assert_allclose(placed.paths.vertices[:, :2], scale * made.paths.vertices[:, :2])
 
 
 def test_fit_takes_the_turned_drawing_and_one_copy() -> None:
-    made = drawing_of([_box(0, 0, 4, 2)])
+    made = drawing_of([rectangle(0, 0, 4, 2)])
     job = job_of(
         fit_mm=(8.0, 0.0),
         rotate_rad=math.radians(90),
@@ -185,7 +187,7 @@ def test_a_flat_drawing_fits_by_the_side_that_it_has() -> None:
 
 def test_copies_row_by_row_about_one_origin() -> None:
     made = replace(
-        drawing_of([_box(0, 0, 2, 1), _circle(1, 0.5, 0.25)], ["A", "B"]),
+        drawing_of([rectangle(0, 0, 2, 1), _circle(1, 0.5, 0.25)], ["A", "B"]),
         colours=("#ff0000", ""),
         line_types=("DASHED", ""),
         marks=(_mark(1, 1),),
@@ -208,14 +210,14 @@ def test_copies_row_by_row_about_one_origin() -> None:
 
 
 def test_the_centre_of_copies_is_that_of_all() -> None:
-    made = drawing_of([_box(0, 0, 2, 1)])
+    made = drawing_of([rectangle(0, 0, 2, 1)])
     placed = place(made, job_of(copies=(3, 1), pitch_mm=(4.0, 0.0), origin="centre"))
     assert extents(placed.paths).tolist() == [[-5.0, 5.0], [-0.5, 0.5]]
 
 
 def test_errors_gaps_and_doubtful_places_come_along() -> None:
     made: Drawing = replace(
-        drawing_of([_box(0, 0, 2, 1), _line(0, 0, 1, 1)]),
+        drawing_of([rectangle(0, 0, 2, 1), _line(0, 0, 1, 1)]),
         off_mm=np.tile([1e-3, 5e-4], (6, 1)),
         gaps=(Gap((1.0, 2.0), 0.5, "0"),),
         closed_gaps=(Gap((3.0, 4.0), 0.01, "0"),),
@@ -241,7 +243,7 @@ def test_errors_gaps_and_doubtful_places_come_along() -> None:
 
 def test_a_scale_that_leaves_no_shape_is_refused() -> None:
     with pytest.raises(OptionError, match="path 0, vertex 0") as caught:
-        place(drawing_of([_box(3, 3, 3.2, 3.2)]), job_of(scale=1e-6))
+        place(drawing_of([rectangle(3, 3, 3.2, 3.2)]), job_of(scale=1e-6))
     assert caught.value.where == "key scale"
     assert caught.value.mend
 
@@ -264,14 +266,14 @@ def test_what_is_larger_than_any_machine_is_refused_by_what_makes_it_so(
     settings: dict[str, Any], where: str
 ) -> None:
     with pytest.raises(OptionError, match="what is cut") as caught:
-        place(drawing_of([_box(0, 0, 1, 1)]), job_of(**settings))
+        place(drawing_of([rectangle(0, 0, 1, 1)]), job_of(**settings))
     assert caught.value.where == where
 
 
 def test_a_drawing_in_wrong_units_is_refused_and_one_far_from_its_zero_is_not() -> None:
     with pytest.raises(OptionError, match="--units"):
-        place(drawing_of([_box(0, 0, 2e5, 1)]), job_of())
-    far = drawing_of([_box(5e8, 5e8, 5e8 + 64, 5e8 + 32)])
+        place(drawing_of([rectangle(0, 0, 2e5, 1)]), job_of())
+    far = drawing_of([rectangle(5e8, 5e8, 5e8 + 64, 5e8 + 32)])
     with pytest.raises(OptionError, match="lower-left"):
         place(far, job_of())
     placed = place(far, job_of(origin="lower-left"))
@@ -280,7 +282,7 @@ def test_a_drawing_in_wrong_units_is_refused_and_one_far_from_its_zero_is_not() 
 
 def test_copies_beyond_all_measure_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_POINTS", 8)
-    made = drawing_of([_box(0, 0, 1, 1)])
+    made = drawing_of([rectangle(0, 0, 1, 1)])
     place(made, job_of(copies=(2, 1), pitch_mm=(2.0, 2.0)))
     with pytest.raises(OptionError, match="12 points") as caught:
         place(made, job_of(copies=(3, 1), pitch_mm=(2.0, 2.0)))
@@ -322,7 +324,7 @@ def _fine(count: int) -> Polyline:
 def test_points_that_the_scale_brings_together_are_one(
     scale: float, count: int, rotate: float
 ) -> None:
-    made = drawing_of([_fine(count), _box(10, 10, 11, 11)])
+    made = drawing_of([_fine(count), rectangle(10, 10, 11, 11)])
     job = job_of(scale=scale, rotate_rad=rotate)
     placed = place(made, job)
     assert len(placed.paths) == 2
@@ -338,9 +340,9 @@ def test_points_that_the_scale_brings_together_are_one(
 
 
 def test_paths_that_become_a_point_are_left_out_and_told() -> None:
-    speck = _box(5, 5, 5.00001, 5.00001)
+    speck = rectangle(5, 5, 5.00001, 5.00001)
     made = replace(
-        drawing_of([_box(0, 0, 2, 1), speck, _line(0, 0, 1, 1)]),
+        drawing_of([rectangle(0, 0, 2, 1), speck, _line(0, 0, 1, 1)]),
         layers=("A", "B", "C"),
         healing=Healing(
             crossings=(SelfCrossing((5.0, 5.0), 1, "B"), SelfCrossing((0.5, 0.5), 2, "C"))

@@ -69,8 +69,9 @@ def jobs(draw: st.DrawFn) -> Toolpath:
         elif kind == "dwell":
             b.event(Kind.DWELL, 0.5)
         else:
-            b.event(draw(st.sampled_from([Kind.HOME_XY, Kind.HOME_Z])))
-            if b._rows[-1][0] == Kind.HOME_XY:
+            home = draw(st.sampled_from([Kind.HOME_XY, Kind.HOME_Z]))
+            b.event(home)
+            if home == Kind.HOME_XY:
                 b.moved_to(0.01, -0.02, z)
             else:
                 b.moved_to(x, y, 0.03)
