@@ -18,7 +18,7 @@ from camtool.calibration.calibrate import Calibration
 from camtool.comparison import Comparison
 from camtool.errors import CamtoolError, MachineError, OptionError, ProgramError
 from camtool.geometry.drawing import Drawing
-from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE, Given, Key, layers
+from camtool.jobs.keys import field_value
 from camtool.machine.loader import extended_by
 from camtool.machine.registry import ListedTarget, LoadedTarget, list_target, target_names
 from camtool.pictures.picture import Picture
@@ -36,6 +36,7 @@ from camtool.verification.verify import Verification
 
 if TYPE_CHECKING:
     from camtool.calibration.measurements import Measurements
+    from camtool.importers.options import ReadOptions
     from camtool.machine.model import Machine
 
 
@@ -125,9 +126,15 @@ def read_drawing(
     one is given. Tolerances are of the part: give its `scale` where a job scales it. Raises
     DrawingError, and OptionError for a way of reading that cannot be. Source: docs/formats.md.
     """
+    from camtool.importers.read import read_drawing as read
+
+    return ShownDrawing.of(read(Path(file), options=_read_options(target, reading)))
+
+
+def _read_options(target: str | LoadedTarget | None, reading: Reading) -> ReadOptions:
+    """How a drawing is read; tolerances that are not given are those of the `target`."""
     from camtool.importers.options import ReadOptions, Selection
     from camtool.importers.pieces import colour_named
-    from camtool.importers.read import read_drawing as read
 
     settings: dict[str, Any] = {}
     if target is not None:
@@ -139,8 +146,7 @@ def read_drawing(
             settings[key] = parse_length(settings[key], name=key)
     chosen = {key: _patterns(settings.pop(key, ())) for key in _SELECTION}
     chosen["colours"] = tuple(colour_named(colour) for colour in chosen["colours"])
-    options = ReadOptions(**settings, select=Selection(**chosen))
-    return ShownDrawing.of(read(Path(file), options=options))
+    return ReadOptions(**settings, select=Selection(**chosen))
 
 
 def read_job(
@@ -172,20 +178,13 @@ def as_drawing(
     drawing: Drawing | str | Path, target: str | LoadedTarget | None, job: Job
 ) -> Drawing:
     """The drawing, or what is in its file on the layers that the job's operations take."""
-    from camtool.importers.pieces import NoMatchError
-    from camtool.jobs.drawing import layers_of, read_to_scale, refuse_unmatched, unmatched
+    from camtool.importers.read import content
+    from camtool.jobs.drawing import read_for_job
 
     if isinstance(drawing, Drawing):
         return drawing
-    try:
-        read = read_to_scale(
-            lambda scale: read_drawing(drawing, target=target, layers=layers_of(job), scale=scale),
-            job,
-        )
-    except NoMatchError as error:
-        raise unmatched(error, job) from error
-    refuse_unmatched(read, job)
-    return read
+    data, name = content(Path(drawing))
+    return ShownDrawing.of(read_for_job(data, name, _read_options(target, {}), job))
 
 
 def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
@@ -214,27 +213,7 @@ def job_of(**settings: Any) -> Job:
     the like. Other numbers are mm, rad, s and mm/min. TypeError for a name that none of them has,
     OptionError that names the field for a value that it cannot have.
     """
-    return made(**{name: _read(name, value) for name, value in settings.items()})
-
-
-def _read(name: str, value: Any) -> Any:
-    """The value of a field: texts, and what only a table of a job file can say, are read."""
-    key = _KEYS.get(name)
-    if name == "layers" and isinstance(value, str):
-        return layers(value)
-    if key is None or isinstance(value, bool):
-        return value
-    number_of_table = name in _TABLES and isinstance(value, int | float)
-    if number_of_table or isinstance(value, str | list | tuple | dict):
-        return key.read(Given(value, name))
-    return value
-
-
-_KEYS: dict[str, Key] = {
-    **{key.field: key for keys in (OPERATION, WHOLE, PLACE) for key in keys.values()},
-    **{f"tool_{key.field}": key for key in TOOL_KEYS.values()},
-}
-_TABLES = ("tabs", "lead_in", "lead_out", "entry")
+    return made(**{name: field_value(name, value) for name, value in settings.items()})
 
 
 # The machines that camtool knows.

@@ -29,21 +29,21 @@ COLOUR = {State.FAILED: "red", State.MADE: "yellow", State.UP_TO_DATE: "yellow"}
 """Of a row of the table: what was made stands there for its warnings."""
 
 
-class Talk(Protocol):
-    """Hears of every outcome as it comes."""
+class Display(Protocol):
+    """Shows every outcome as it comes."""
 
     def begins(self) -> None:
         """What is not up to date begins to be made."""
 
-    def heard(self, outcome: Outcome) -> None:
-        """Say so."""
+    def add(self, outcome: Outcome) -> None:
+        """Show one."""
 
-    def noted(self, text: str) -> None:
+    def note(self, text: str) -> None:
         """Say something else, unless quiet."""
 
 
 @dataclass(frozen=True)
-class Loudness:
+class Verbosity:
     """`--quiet`, `--verbose`."""
 
     quiet: bool
@@ -51,12 +51,12 @@ class Loudness:
 
 
 @contextmanager
-def talking(total: int, loudness: Loudness) -> Iterator[Talk]:
+def display(total: int, verbosity: Verbosity) -> Iterator[Display]:
     """The bar on a terminal, lines elsewhere."""
-    if loudness.quiet or not sys.stderr.isatty():
-        yield Lines(total, loudness)
+    if verbosity.quiet or not sys.stderr.isatty():
+        yield Lines(total, verbosity)
         return
-    bar = Bar(total, loudness)
+    bar = Bar(total, verbosity)
     try:
         yield bar
     finally:
@@ -66,35 +66,35 @@ def talking(total: int, loudness: Loudness) -> Iterator[Talk]:
 class Lines:
     """A line for each drawing."""
 
-    def __init__(self, total: int, loudness: Loudness) -> None:
+    def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total
-        self._loudness = loudness
+        self._verbosity = verbosity
         self._done = 0
 
     def begins(self) -> None:
         """Nothing: the first line will tell."""
 
-    def heard(self, outcome: Outcome) -> None:
+    def add(self, outcome: Outcome) -> None:
         """One line, and those of its findings."""
         self._done += 1
-        for line in said_of(outcome, self._loudness):
+        for line in said_of(outcome, self._verbosity):
             say(line, quiet=False)
-        if outcome.state is not State.UP_TO_DATE or self._loudness.verbose:
+        if outcome.state is not State.UP_TO_DATE or self._verbosity.verbose:
             place = f"{self._done:>{len(str(self._total))}}/{self._total}"
-            say(f"{place} {_line(outcome)}", quiet=self._loudness.quiet)
+            say(f"{place} {_line(outcome)}", quiet=self._verbosity.quiet)
 
-    def noted(self, text: str) -> None:
+    def note(self, text: str) -> None:
         """One line."""
-        say(f"camtool: {text}", quiet=self._loudness.quiet)
+        say(f"camtool: {text}", quiet=self._verbosity.quiet)
 
 
 class Bar:
     """A bar with rate and time left, once there is something to do; what goes wrong stands above
     it in one line, and in full in the table."""
 
-    def __init__(self, total: int, loudness: Loudness) -> None:
+    def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total
-        self._loudness = loudness
+        self._verbosity = verbosity
         self._done = 0
         self._failed = 0
         self._progress: Progress | None = None
@@ -103,7 +103,7 @@ class Bar:
         """Show the bar."""
         self._shown()
 
-    def heard(self, outcome: Outcome) -> None:
+    def add(self, outcome: Outcome) -> None:
         """One step further."""
         self._done += 1
         self._failed += outcome.state is State.FAILED
@@ -113,12 +113,12 @@ class Bar:
         if outcome.error is not None:
             line = f"failed: {one_line(outcome.source)}: {_why(outcome)}"
             progress.console.print(line, style="red", no_wrap=True, overflow="ellipsis", **_PLAIN)
-        for remark in outcome.remarks if self._loudness.verbose else ():
+        for remark in outcome.remarks if self._verbosity.verbose else ():
             progress.console.print(one_line(remark), **_PLAIN)
         failed = f"{self._failed} failed" if self._failed else ""
         progress.update(progress.task_ids[0], completed=self._done, failed=failed)
 
-    def noted(self, text: str) -> None:
+    def note(self, text: str) -> None:
         """One line above the bar."""
         self._shown().console.print(f"camtool: {one_line(text)}", **_PLAIN)
 
@@ -139,10 +139,10 @@ _PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False}
 """Text that comes from files is no markup."""
 
 
-def said_of(outcome: Outcome, loudness: Loudness) -> list[str]:
+def said_of(outcome: Outcome, verbosity: Verbosity) -> list[str]:
     """The lines for one drawing: its error always, its findings unless quiet."""
     lines = [] if outcome.error is None else [f"camtool: error: {outcome.error}"]
-    if loudness.verbose:
+    if verbosity.verbose:
         lines += [f"camtool: {remark}" for remark in outcome.remarks]
     return lines
 

@@ -11,12 +11,13 @@ from camtool import __version__
 from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
 from camtool.batches.run import Made, Task
 from camtool.cli.files import sealed
+from camtool.cli.first_run import SMALL_JOB
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
+from camtool.findings import Finding, Severity
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
-    from camtool.findings import Finding
     from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
     from camtool.run import Run
@@ -27,9 +28,6 @@ REMARKS = 20
 
 SVG = ".svg"
 """The pictures that may lie where a drawing is."""
-
-OWN_JOB = ".toml"
-"""`part.toml` beside `part.dxf` is its job."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,6 @@ class PostWork:
 
     def warm(self) -> None:
         """Load, and compile if nobody has yet, what every drawing needs."""
-        from camtool.cli.first_run import SMALL_JOB
         from camtool.importers.read import read_bytes
         from camtool.pipeline import post_drawing
         from camtool.planning.job import job_of
@@ -80,7 +77,7 @@ class PostWork:
         # Reports and pictures are UTF-8, which names of files need not be.
         name = task.source.encode("utf-8", "backslashreplace").decode()
         drawing = self.drawing.read(name, self.target.machine, order.job, data)
-        with JobFlags(order.file, (), {}).blamed():
+        with JobFlags(order.file).blamed():
             run = post_drawing(
                 drawing,
                 order.job,
@@ -123,19 +120,12 @@ class PostWork:
             yield ".json", run.report.to_json().encode()
 
 
-def own_job(source: Path) -> Path | None:
-    """The job file beside a drawing."""
-    beside = source.with_suffix(OWN_JOB)
-    return beside if beside.is_file() else None
-
-
 def _is_code(path: Path) -> bool:
     return path.suffix in (".py", ".toml") and path.is_file()
 
 
 def _said(task: Task, run: Run) -> Made:
     """The findings: the error of a drawing that must not be written, and the worst lines."""
-    from camtool.findings import Severity
 
     def lines(severity: Severity) -> list[Finding]:
         return [each for each in run.findings if each.severity == severity]

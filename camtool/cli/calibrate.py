@@ -8,7 +8,9 @@ from typing import Any
 import click
 
 from camtool.cli.files import STDOUT, check_places, write_all
-from camtool.cli.options import SectionedCommand, talk_options
+from camtool.cli.messages import say, show_text
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
+from camtool.plain import one_line, to_json
 
 
 @click.command(cls=SectionedCommand, short_help="A machine's numbers from measured coupons.")
@@ -38,9 +40,6 @@ def calibrate(
     from camtool.calibration.calibrate import outliers, to_data, to_text
     from camtool.calibration.machine_file import machine_file
     from camtool.calibration.measurements import read_measurements
-    from camtool.cli.messages import say, show_text
-    from camtool.cli.options import MachineFlags
-    from camtool.plain import one_line, to_json
 
     check_places([measurements, machine], [output, report])
     said = read_measurements(Path(measurements))

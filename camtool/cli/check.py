@@ -1,7 +1,4 @@
-"""The facts of a drawing as lines for people: `name      value`, one fact a line.
-
-Long lists show their first rows; the JSON has all of them.
-"""
+"""`camtool check`: what an importer sees in a drawing."""
 
 from __future__ import annotations
 
@@ -13,21 +10,131 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.files import STDOUT, check_places, write_all
-from camtool.cli.messages import DRAWING_MARKS, say_error, say_findings, say_first_run, show_facts
-from camtool.cli.options import (
-    DrawingFlags,
-    SectionedCommand,
-    drawing_options,
-    picture_name,
-    talk_options,
-)
-from camtool.cli.picture_options import DRAWING, PictureFlags, picture_options
+from camtool.cli.first_run import say_first_run
+from camtool.cli.messages import say_error, say_findings, show_facts
+from camtool.cli.options import DrawingFlags, SectionedCommand, drawing_options, talk_options
+from camtool.cli.picture_options import DRAWING, PictureFlags, picture_name, picture_options
 from camtool.errors import CamtoolError
+from camtool.findings import Severity, worst
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
+
+@click.command(cls=SectionedCommand, short_help="What is in a drawing.")
+@click.argument("sources", metavar="DRAWING...", nargs=-1, required=True)
+@click.option("--json", "report", metavar="FILE", help="The same as JSON; - is stdout.")
+@click.option(
+    "--preview",
+    metavar="FILE",
+    callback=picture_name,
+    help="Picture of the drawing, .svg, .png or .html.",
+)
+@picture_options
+@drawing_options
+@talk_options
+def check(
+    sources: tuple[str, ...],
+    report: str | None,
+    preview: str | None,
+    picture: PictureFlags,
+    drawing: DrawingFlags,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Say what an importer sees in each DRAWING (- is stdin).
+
+    Units and why, size, layers, entities used and not used, gaps, and the smallest features. Of
+    several drawings all are looked at, whatever is wrong with one of them.
+    """
+    picture.check([preview], DRAWING)
+    one = _Check(drawing, report, preview, picture, quiet, verbose)
+    if len(sources) == 1:
+        return one.checked(sources[0])
+    if report is not None or preview is not None:
+        raise click.UsageError("--json and --preview are of one drawing")
+    say_first_run(quiet=quiet)
+    return max(one.tried(source) for source in sources)
+
+
+@dataclass(frozen=True)
+class _Check:
+    """How drawings are read, and what the user wants to have of one."""
+
+    drawing: DrawingFlags
+    report: str | None
+    preview: str | None
+    picture: PictureFlags
+    quiet: bool
+    verbose: bool
+
+    def tried(self, source: str) -> int:
+        """One of several drawings; the exit code of an error is a result like another."""
+        try:
+            return self.checked(source)
+        except CamtoolError as error:
+            say_error(error)
+            return error.exit_code
+
+    def checked(self, source: str) -> int:
+        """The facts of one drawing, and whether any of them is an error."""
+        check_places([source], [self.report, self.preview])
+        say_first_run(quiet=self.quiet)
+        read = self.drawing.read(source)
+        facts = _facts(read)
+        files: dict[str, bytes] = {}
+        if self.report is not None:
+            files[self.report] = to_json(facts).encode()
+        if self.preview is not None:
+            from camtool.pictures.scene import scene_of_drawing
+
+            title = Path(read.file).name
+            painted = self.picture.painter(
+                lambda: [scene_of_drawing(read, title)], quiet=self.quiet
+            )
+            files[self.preview] = painted(self.preview)
+        write_all(files)
+        if self.report != STDOUT and not self.quiet:
+            show_facts(_table(facts, verbose=self.verbose), NAME_WIDTH, MARKS)
+        say_findings(read.findings, quiet=self.quiet, verbose=self.verbose)
+        return 1 if worst(read.findings) >= Severity.ERROR else 0
+
+
+def _facts(drawing: Drawing) -> dict[str, Any]:
+    """Everything worth knowing, in the order in which it is shown; lengths in mm."""
+    from camtool.geometry.facts import drawing_extents, drawing_facts
+
+    (left, right), (bottom, top) = drawing_extents(drawing).tolist()
+    return {
+        "file": drawing.file,
+        "units": {
+            "name": drawing.units.name,
+            "mm_per_unit": drawing.units.mm_per_unit,
+            "why": drawing.units.why,
+        },
+        "size_mm": [right - left, top - bottom],
+        "extents_mm": {"x": [left, right], "y": [bottom, top]},
+        **drawing_facts(drawing),
+        "fit_um": {"max": drawing.fit.max_mm * 1000.0, "rms": drawing.fit.rms_mm * 1000.0},
+        "entities_used": drawing.used,
+        "entities_not_used": [
+            {"kind": item.kind, "count": item.count, "reason": item.reason}
+            for item in drawing.skipped
+        ],
+        "findings": [
+            {
+                "code": finding.code.name,
+                "severity": finding.severity.name.lower(),
+                "message": finding.message,
+                "where": finding.where,
+            }
+            for finding in drawing.findings
+        ],
+    }
+
+
+# The facts as lines for people. Long lists show their first rows; the JSON has all of them.
 
 SHOWN = 10
 """So many rows of a list are shown, unless asked for all."""
@@ -35,9 +142,12 @@ SHOWN = 10
 NAME_WIDTH = 10
 """Columns before the values."""
 
+MARKS = dict.fromkeys(("not used", "gap", "branch", "crossing", "open"), "warning")
+"""What in the facts of a drawing somebody should look at."""
 
-def table(facts: dict[str, Any], *, verbose: bool) -> str:
-    """The facts of `camtool check`; `verbose` shows long lists whole."""
+
+def _table(facts: dict[str, Any], *, verbose: bool) -> str:
+    """The facts as lines of a name and a value; `verbose` shows long lists whole."""
     most = None if verbose else SHOWN
     rows = [*_head(facts), *_layers(facts, most), *_entities(facts), *_places(facts, most)]
     return "\n".join(one_line(f"{name:<{NAME_WIDTH}}{value}".rstrip()) for name, value in rows)
@@ -143,119 +253,3 @@ def _more(name: str, items: Any, most: int | None) -> _Rows:
     """One line for the rows that are not shown."""
     if most is not None and len(items) > most:
         yield name, f"and {len(items) - most} more (-v shows all)"
-
-
-# `camtool check`: what an importer sees in a drawing.
-
-
-@click.command(cls=SectionedCommand, short_help="What is in a drawing.")
-@click.argument("sources", metavar="DRAWING...", nargs=-1, required=True)
-@click.option("--json", "report", metavar="FILE", help="The same as JSON; - is stdout.")
-@click.option(
-    "--preview",
-    metavar="FILE",
-    callback=picture_name,
-    help="Picture of the drawing, .svg, .png or .html.",
-)
-@picture_options
-@drawing_options
-@talk_options
-def check(
-    sources: tuple[str, ...],
-    report: str | None,
-    preview: str | None,
-    picture: PictureFlags,
-    drawing: DrawingFlags,
-    quiet: bool,
-    verbose: bool,
-) -> int:
-    """Say what an importer sees in each DRAWING (- is stdin).
-
-    Units and why, size, layers, entities used and not used, gaps, and the smallest features. Of
-    several drawings all are looked at, whatever is wrong with one of them.
-    """
-    picture.check([preview], DRAWING)
-    asked = Asked(report, preview, picture, quiet, verbose)
-    if len(sources) == 1:
-        return _checked(sources[0], drawing, asked)
-    if report is not None or preview is not None:
-        raise click.UsageError("--json and --preview are of one drawing")
-    say_first_run(quiet=quiet)
-    return max(_tried(source, drawing, asked) for source in sources)
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What the user wants to have of a drawing."""
-
-    report: str | None
-    preview: str | None
-    looks: PictureFlags
-    quiet: bool
-    verbose: bool
-
-
-def _tried(source: str, drawing: DrawingFlags, asked: Asked) -> int:
-    """One of several drawings; the exit code of an error is a result like another."""
-    try:
-        return _checked(source, drawing, asked)
-    except CamtoolError as error:
-        say_error(error)
-        return error.exit_code
-
-
-def _checked(source: str, drawing: DrawingFlags, asked: Asked) -> int:
-    """The facts of one drawing, and whether any of them is an error."""
-    from camtool.findings import Severity, worst
-
-    check_places([source], [asked.report, asked.preview])
-    say_first_run(quiet=asked.quiet)
-    read = drawing.read(source)
-    facts = _facts(read)
-    files: dict[str, bytes] = {}
-    if asked.report is not None:
-        files[asked.report] = to_json(facts).encode()
-    if asked.preview is not None:
-        from camtool.pictures.scene import scene_of_drawing
-
-        title = Path(read.file).name
-        painted = asked.looks.painter(lambda: [scene_of_drawing(read, title)], quiet=asked.quiet)
-        files[asked.preview] = painted(asked.preview)
-    write_all(files)
-    if asked.report != STDOUT and not asked.quiet:
-        show_facts(table(facts, verbose=asked.verbose), NAME_WIDTH, DRAWING_MARKS)
-    say_findings(read.findings, quiet=asked.quiet, verbose=asked.verbose)
-    return 1 if worst(read.findings) >= Severity.ERROR else 0
-
-
-def _facts(drawing: Drawing) -> dict[str, Any]:
-    """Everything worth knowing, in the order in which it is shown; lengths in mm."""
-    from camtool.geometry.facts import drawing_extents, drawing_facts
-
-    (left, right), (bottom, top) = drawing_extents(drawing).tolist()
-    return {
-        "file": drawing.file,
-        "units": {
-            "name": drawing.units.name,
-            "mm_per_unit": drawing.units.mm_per_unit,
-            "why": drawing.units.why,
-        },
-        "size_mm": [right - left, top - bottom],
-        "extents_mm": {"x": [left, right], "y": [bottom, top]},
-        **drawing_facts(drawing),
-        "fit_um": {"max": drawing.fit.max_mm * 1000.0, "rms": drawing.fit.rms_mm * 1000.0},
-        "entities_used": drawing.used,
-        "entities_not_used": [
-            {"kind": item.kind, "count": item.count, "reason": item.reason}
-            for item in drawing.skipped
-        ],
-        "findings": [
-            {
-                "code": finding.code.name,
-                "severity": finding.severity.name.lower(),
-                "message": finding.message,
-                "where": finding.where,
-            }
-            for finding in drawing.findings
-        ],
-    }

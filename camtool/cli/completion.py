@@ -1,4 +1,8 @@
-"""What the three shells run to complete camtool's lines, and how it is answered.
+"""`camtool completion`: the script that completes commands, flags and values in a shell.
+
+The shell asks camtool itself, which answers in `main` before any command runs. What flags take is
+told there by their place: `complete_values` gives each parameter the type that completes it, so
+that commands need not know of shells. No answer compiles a kernel or loads a library of drawings.
 
 The scripts are ours and not click's, for those take names apart at spaces, commas and backslashes,
 and `--target=pi` is nothing to them or is replaced whole. A script hands over its line up to the
@@ -19,7 +23,28 @@ import click
 from click.shell_completion import CompletionItem, ShellComplete, add_completion_class
 from click.types import StringParamType
 
+from camtool.cli.targets import flat, target_items
 from camtool.errors import CamtoolError
+
+VARIABLE = "_CAMTOOL_COMPLETE"
+"""Where the shell says what it asks."""
+
+MAX_SCANNED_BYTES = 20_000_000
+"""Layers of larger drawings are not looked for: the answer would take longer than typing."""
+
+UNREADABLE = "\ufffd"
+"""What stands for bytes that are not UTF-8."""
+
+_FILES = {"FILE", "DRAWING", "DRAWINGS", "PROGRAM", "PICTURE", "MEASUREMENTS"}
+_FOLDERS = {"FOLDER"}
+_TARGET_FLAGS = {"--target", "--from", "--to", "--extends"}
+_LAYER_FLAGS = {"--layer", "--exclude-layer"}
+_PICTURE_FLAGS = {"--layers", "--no-layer"}
+_DRAWINGS = ("source", "sources", "against")
+_Answer = Callable[[click.Context, str], Iterable[CompletionItem]]
+
+
+# The shells.
 
 LINE = "COMP_WORDS"
 """Where a script puts its line up to the cursor."""
@@ -142,12 +167,6 @@ class Fish(_Shell):
 SHELLS: dict[str, type[_Shell]] = {kind.name: kind for kind in (Bash, Zsh, Fish)}
 
 
-def take_over() -> None:
-    """Let click answer these shells in our way; for a process that does nothing else."""
-    for kind in SHELLS.values():
-        add_completion_class(kind)
-
-
 def _help(item: CompletionItem[Any]) -> str:
     return " ".join((item.help or "").split())
 
@@ -165,31 +184,6 @@ def _split(line: str) -> list[str]:
     return words
 
 
-# `camtool completion`: the script that completes commands, flags and values in a shell.
-#
-# The shell asks camtool itself, which answers in `main` before any command runs. What flags take
-# is told there by their place: `values_told` gives each parameter the type that completes it, so
-# that commands need not know of shells. No answer compiles a kernel or loads a library of
-# drawings.
-
-VARIABLE = "_CAMTOOL_COMPLETE"
-"""Where the shell says what it asks."""
-
-MAX_SCANNED_BYTES = 20_000_000
-"""Layers of larger drawings are not looked for: the answer would take longer than typing."""
-
-UNREADABLE = "\ufffd"
-"""What stands for bytes that are not UTF-8."""
-
-_FILES = {"FILE", "DRAWING", "DRAWINGS", "PROGRAM", "PICTURE", "MEASUREMENTS"}
-_FOLDERS = {"FOLDER"}
-_TARGET_FLAGS = {"--target", "--from", "--to", "--extends"}
-_LAYER_FLAGS = {"--layer", "--exclude-layer"}
-_PICTURE_FLAGS = {"--layers", "--no-layer"}
-_DRAWINGS = ("source", "sources", "against")
-_Answer = Callable[[click.Context, str], Iterable[CompletionItem]]
-
-
 @click.command(short_help="Completion for bash, zsh or fish.")
 @click.argument("shell", type=click.Choice(tuple(SHELLS)))
 def completion(shell: str) -> int:
@@ -204,7 +198,25 @@ def completion(shell: str) -> int:
     return 0
 
 
-class Told(StringParamType):
+def answer_shells(command: click.Command) -> None:
+    """Let click answer our shells about this command; for a process that does nothing else."""
+    complete_values(command)
+    for kind in SHELLS.values():
+        add_completion_class(kind)
+
+
+def complete_values(command: click.Command) -> None:
+    """Give every parameter of plain text, of this command and those under it, its completion."""
+    for param in command.params:
+        answer = _answer_for(param)
+        if answer is not None and type(param.type) is StringParamType:
+            param.type = _Completed(answer)
+    if isinstance(command, click.Group):
+        for each in command.commands.values():
+            complete_values(each)
+
+
+class _Completed(StringParamType):
     """Text of which a shell may be told what it can be; taken as it is."""
 
     def __init__(self, answer: _Answer) -> None:
@@ -218,17 +230,6 @@ class Told(StringParamType):
             return list(self._answer(ctx, incomplete))
         except (CamtoolError, OSError):
             return []
-
-
-def values_told(command: click.Command) -> None:
-    """Give every parameter of plain text, of this command and those under it, its completion."""
-    for param in command.params:
-        answer = _answer_for(param)
-        if answer is not None and type(param.type) is StringParamType:
-            param.type = Told(answer)
-    if isinstance(command, click.Group):
-        for each in command.commands.values():
-            values_told(each)
 
 
 def _answer_for(param: click.Parameter) -> _Answer | None:
@@ -249,19 +250,6 @@ def _answer_for(param: click.Parameter) -> _Answer | None:
     if metavar in _FILES:
         return lambda ctx, incomplete: [CompletionItem(incomplete, type="file")]
     return None
-
-
-def target_items(incomplete: str) -> Iterator[CompletionItem]:
-    """The machines, each with its title."""
-    from camtool.machine.registry import list_target, target_names
-
-    for name in target_names():
-        if name.startswith(incomplete):
-            try:
-                title = list_target(name).target.title
-            except CamtoolError:  # a broken plug-in harms nothing else
-                continue
-            yield CompletionItem(name, help=title)
 
 
 def _targets(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
@@ -328,18 +316,9 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     target = ctx.params.get("target")
     if isinstance(target, str):
         values: dict[str, Any] = msgspec.to_builtins(load_target(target).machine)
-        for key in _flat("", values):
+        for key, _ in flat("", values):
             if key.startswith(incomplete):
                 yield CompletionItem(f"{key}=")
-
-
-def _flat(prefix: str, values: dict[str, Any]) -> Iterator[str]:
-    for key, value in values.items():
-        name = f"{prefix}{key}"
-        if isinstance(value, dict):
-            yield from _flat(f"{name}.", value)
-        else:
-            yield name
 
 
 def _effects(ctx: click.Context, incomplete: str) -> list[CompletionItem]:

@@ -5,9 +5,15 @@ from __future__ import annotations
 import click
 
 from camtool.cli.files import read_bytes, shown
-from camtool.cli.messages import say_first_run
-from camtool.cli.options import MachineFlags, SectionedCommand, feed, picture_name, talk_options
-from camtool.cli.picture_options import RESULT, UNVERIFIED, PictureFlags, picture_options
+from camtool.cli.first_run import say_first_run
+from camtool.cli.options import MachineFlags, SectionedCommand, feed, talk_options
+from camtool.cli.picture_options import (
+    RESULT,
+    UNVERIFIED,
+    PictureFlags,
+    picture_name,
+    picture_options,
+)
 from camtool.cli.post import Asked, finish
 from camtool.cli.report import flags_given, pictures_asked, report_option
 

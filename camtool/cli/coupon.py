@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.messages import say
 from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import OptionError
+from camtool.units import parse_length
 
 if TYPE_CHECKING:
     from camtool.calibration.coupons import Kind
@@ -26,8 +28,6 @@ def _size(
     ctx: click.Context, param: click.Parameter, value: str | None
 ) -> tuple[float, float] | None:
     """`40x30mm` as two lengths in mm."""
-    from camtool.units import parse_length
-
     if value is None:
         return None
     match = re.fullmatch(r"([\d.]+)[x×]([\d.]+)([a-zA-Zµμ\"]*)", value)
@@ -90,7 +90,6 @@ def coupon(
     """
     from camtool.calibration import coupons
     from camtool.calibration.coupons import sheet, skeleton
-    from camtool.cli.messages import say
 
     output = output or "coupon.dxf"
     if output != STDOUT and PurePath(output).suffix.lower() not in DRAWINGS:

@@ -1,4 +1,4 @@
-"""Writing results: all files of a command or none, and `-` for stdout.
+"""The files of a command: what it reads, and what it writes: all or none, `-` for a stream.
 
 Before any work the places are checked: no output is an input, and no two outputs are one file, by
 whatever names and links they are called. Then each file is written whole beside its place, under a
@@ -249,7 +249,7 @@ def _mode_for(place: Path) -> int:
         return 0o666 & ~mask
 
 
-# Programs as they come: files, or stdin for `-`.
+# Programs that are read.
 
 
 def shown(name: str) -> str:
@@ -277,14 +277,14 @@ def read_bytes(name: str) -> bytes:
 # drawings, which may be SVG too: only a picture that bears the seal of its maker, and is as it was
 # written, is replaced. The seal is a comment at the end of the SVG.
 
-_SEAL_BEGINS = b"<!-- camtool: sha256 "
+SEAL = b"<!-- camtool: sha256 "
 
 
 def sealed(svg: bytes, maker: str) -> bytes:
     """The picture with the seal of its maker, the name of a page or of a drawing's outputs."""
     name = os.fsencode(PurePath(maker).name)
     digest = hashlib.sha256(name + b"\n" + svg).hexdigest().encode()
-    return svg + _SEAL_BEGINS + digest + b" -->\n"
+    return svg + SEAL + digest + b" -->\n"
 
 
 def is_foreign(place: str | Path, maker: str) -> bool:
@@ -295,4 +295,4 @@ def is_foreign(place: str | Path, maker: str) -> bool:
         data = Path(place).read_bytes()
     except OSError:  # whatever it is, it is none of ours
         return True
-    return data != sealed(data[: data.rfind(_SEAL_BEGINS)], maker)
+    return data != sealed(data[: data.rfind(SEAL)], maker)

@@ -9,7 +9,6 @@ else was on stderr (LinuxCNC's manual, "Filter programs").
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import click
 
@@ -17,10 +16,7 @@ from camtool.cli.files import STDOUT
 from camtool.cli.messages import say
 from camtool.cli.options import SectionedCommand, talk_options
 from camtool.cli.picture_options import PictureFlags
-from camtool.cli.post import Asked, finish, posting_options
-
-if TYPE_CHECKING:
-    from camtool.cli.post import Posting
+from camtool.cli.post import Asked, Posting, finish, posting_options
 
 TARGET = "linuxcnc"
 BEGUN, READ, MADE, DONE = 1, 20, 95, 100

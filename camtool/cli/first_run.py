@@ -8,16 +8,41 @@ rest of the order. Neither compiles what the other one is at: it waits, and load
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
-from camtool.cli.messages import first_run, say_first_run
+from camtool.cli.messages import say
 
 SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">
 <circle cx="1" cy="1" r="0.2"/></svg>"""
 """A drawing of one contour: nothing is to be put into an order."""
+
+
+def say_first_run(*, quiet: bool, judging: bool = False) -> None:
+    """A word before the long silence of the first run; `judging` as below."""
+    if first_run(judging=judging):
+        say("camtool: first run: compiling the kernels, once, for some 12 s", quiet=quiet)
+
+
+def first_run(*, judging: bool = False) -> bool:
+    """Whether no kernel has been compiled yet; with `judging`, none of the judge's: most of the
+    time goes there, and reading a drawing compiles others.
+
+    Their compiled form lies beside them or in NUMBA_CACHE_DIR; where their folder cannot be
+    written numba keeps it elsewhere, and then we cannot tell: False.
+    """
+    import camtool.kernels
+
+    folder = Path(str(camtool.kernels.__file__)).parent
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given is None and not os.access(folder, os.W_OK):
+        return False
+    kept = Path(given) if given else folder / "__pycache__"
+    return not any(kept.rglob("judge*.nbi" if judging else "*.nbi"))
 
 
 @contextmanager

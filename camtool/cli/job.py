@@ -7,6 +7,9 @@ from typing import Any
 
 import click
 
+from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.first_run import say_first_run
+from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import (
     DrawingFlags,
     JobFlags,
@@ -16,6 +19,7 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
+from camtool.plain import one_line, to_json
 
 MOST_GROUPS = 12
 """So many groups of contours of an operation are printed."""
@@ -50,8 +54,6 @@ def new(
 
     It works as it is; every other key stands there as a comment.
     """
-    from camtool.cli.files import STDOUT, check_new, check_places, write_all
-    from camtool.cli.messages import say, say_findings, say_first_run
     from camtool.jobs.template import job_template
 
     output = output or "job.toml"
@@ -84,14 +86,11 @@ def check(
 ) -> None:
     """Check the job FILE, and say what each operation does; with --against, to which paths, on
     which side of them, and why."""
-    from camtool.cli.files import STDOUT, check_places, write_all
-    from camtool.cli.messages import say_findings, show_text
     from camtool.jobs.description import described
-    from camtool.plain import one_line, to_json
 
-    reads = [*JobFlags(file, (), {}).files(), against, *machine.files()]
+    reads = [*JobFlags(file).files(), against, *machine.files()]
     check_places(reads, [report])
-    said = JobFlags(file, (), {}).job(drawing)
+    said = JobFlags(file).job(drawing)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(against, target, said) if against is not None else None
     facts, findings = described(said, read, target)

@@ -24,7 +24,7 @@ from camtool import __version__
 from camtool.cli.batch import batch
 from camtool.cli.calibrate import calibrate
 from camtool.cli.check import check
-from camtool.cli.completion import VARIABLE, completion, take_over, values_told
+from camtool.cli.completion import VARIABLE, answer_shells, completion
 from camtool.cli.convert import convert
 from camtool.cli.coupon import coupon
 from camtool.cli.filter import filter_command
@@ -90,8 +90,7 @@ def main() -> NoReturn:
     _seldom_collected()
     sys.unraisablehook = _once_more
     if VARIABLE in os.environ:
-        values_told(cli)
-        take_over()
+        answer_shells(cli)
     code = _code(debug="--debug" in sys.argv[1:])
     # All is done: an interruption now would only print a traceback of Python's own end.
     with suppress(ValueError):  # not in the main thread

@@ -1,4 +1,9 @@
-"""What a command says to people: always on stderr, so that stdout stays for machines."""
+"""What a command says to people: messages and findings, summaries in colour, signs of life.
+
+Messages are always on stderr, so that stdout stays for machines. What is no terminal gets the same
+words without colours. Colours are click's and not rich's: loading rich takes a tenth of the time
+of a whole `verify`.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +16,15 @@ import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import click
 
+from camtool.errors import CamtoolError
+from camtool.findings import Finding, Severity, summed
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
-    from camtool.errors import CamtoolError
-    from camtool.findings import Finding
     from camtool.verification.contrast import ContrastRow
 
 
@@ -84,8 +88,6 @@ def tinted(text: str) -> str:
 def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
     """Errors always, warnings unless quiet, remarks when verbose; one line each, and one for all
     that are like those before, unless verbose."""
-    from camtool.findings import Severity, summed
-
     least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
     told = [finding for finding in findings if finding.severity >= least]
     for finding, more in [(each, 0) for each in told] if verbose else summed(told):
@@ -95,33 +97,7 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
             say(f"camtool: {name}: and {more} more (-v shows all)", quiet=False)
 
 
-def say_first_run(*, quiet: bool, judging: bool = False) -> None:
-    """A word before the long silence of the first run; `judging` as below."""
-    if first_run(judging=judging):
-        say("camtool: first run: compiling the kernels, once, for some 12 s", quiet=quiet)
-
-
-def first_run(*, judging: bool = False) -> bool:
-    """Whether no kernel has been compiled yet; with `judging`, none of the judge's: most of the
-    time goes there, and reading a drawing compiles others.
-
-    Their compiled form lies beside them or in NUMBA_CACHE_DIR; where their folder cannot be
-    written numba keeps it elsewhere, and then we cannot tell: False.
-    """
-    import camtool.kernels
-
-    folder = Path(str(camtool.kernels.__file__)).parent
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    if given is None and not os.access(folder, os.W_OK):
-        return False
-    kept = Path(given) if given else folder / "__pycache__"
-    return not any(kept.rglob("judge*.nbi" if judging else "*.nbi"))
-
-
-# Summaries and tables as a terminal shows them: names bold, what exceeds a limit in colour.
-#
-# What is no terminal gets the same words as they are. Colours are click's and not rich's: loading
-# rich takes a tenth of the time of a whole `verify`.
+# Summaries and tables: names bold, what exceeds a limit in colour.
 
 Marks = Mapping[str, str]
 """How bad the lines of these names are: "error", "warning" or "info"."""
@@ -131,9 +107,6 @@ LEAST_WIDTH = 20
 
 REPORT_NAMES = 11
 """Columns before the values in the summary of a report."""
-
-DRAWING_MARKS = dict.fromkeys(("not used", "gap", "branch", "crossing", "open"), "warning")
-"""What in the facts of a drawing somebody should look at."""
 
 _LINES = {
     "--max-error": "error",
@@ -194,10 +167,9 @@ def _way(line: str, row: ContrastRow, least: float | None) -> str:
     return click.style(line, fg="green") if best else line
 
 
-# A sign of life on a terminal, where a command works for longer than a few seconds.
-#
-# The sign is a short text that the next line overwrites; it counts the seconds. It stands still
-# while one compiled loop runs, which is seldom long: motion is judged in chunks.
+# Signs of life: on a terminal, a command that takes longer than a few seconds counts them, on a
+# line that the next one overwrites. The count stands still while one compiled loop runs, which is
+# seldom long: motion is judged in chunks.
 
 AFTER_S = 3.0
 """Whoever waits for less needs no sign."""

@@ -1,30 +1,45 @@
-"""Help in sections: a command of many options shows them under headings."""
+"""The flags that several commands share, each group of them as one record.
+
+    machine_options   MachineFlags    which machine
+    drawing_options   DrawingFlags    how a drawing is read, and which part of it
+    job_options       JobFlags        what is cut, and how: every key of a job file
+    gate_options      GateFlags       limits
+    talk_options                      --quiet, --verbose, --debug
+
+Each is a decorator that gives a command its flags and hands it the record. A job file says the
+same as the flags of the job (`camtool.jobs.keys` has both); flags override it. The flags of
+pictures are in `picture_options`.
+"""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
-from pathlib import Path, PurePath
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
 from camtool.errors import OptionError
-from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, TOOL_NAME, WHOLE, Given, Key, Table
+from camtool.importers.options import FORMATS, TEXTS
+from camtool.jobs.keys import FLAGS, Key, flag_name
 from camtool.units import parse_feed, parse_length, parse_time
 
 if TYPE_CHECKING:
-    from camtool.comparison import Way
     from camtool.geometry.drawing import Drawing
+    from camtool.importers.options import ReadOptions
     from camtool.machine.model import Machine
     from camtool.machine.registry import LoadedTarget
-    from camtool.pipeline import Judging
     from camtool.planning.job import Job
-    from camtool.simulation.motion import Effects
     from camtool.verification.report import Gates
 
+
+# Help in sections.
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+Option = Callable[..., Any]
 
 GENERAL = "Options"
 
@@ -52,15 +67,12 @@ class SectionedCommand(click.Command):
                 formatter.write_dl(rows)
 
 
-def option(section: str, *names: str, **settings: Any) -> Callable[..., Any]:
+def option(section: str, *names: str, **settings: Any) -> Option:
     """`click.option` under a heading."""
     return click.option(*names, cls=SectionOption, section=section, **settings)
 
 
-# Flags that belong together become one record: the machinery of the decorators in `options`.
-
-Command = TypeVar("Command", bound=Callable[..., Any])
-Option = Callable[..., Any]
+# Groups of flags as records.
 
 
 def gather(
@@ -91,69 +103,36 @@ def with_flags(
 ) -> Command:
     """The command with these options, which reach it as `record`, a dataclass whose fields are
     named after them."""
-    names = [field.name for field in fields(make)]
+    names = [each.name for each in fields(make)]
     return decorate(gather(record, make, names)(command), options)
 
 
-# Command-line values: lengths, feeds and picture names are checked at this door.
-#
-# These are click callbacks: text in, float (mm, mm/min) or name out, a usage error otherwise.
-
-PICTURES = (".svg", ".png", ".html")
-PAGES = (".html", ".md", ".json")
+# Values of flags, as callbacks of click: text in, a number out, a usage error otherwise.
 
 
-def length(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
-    """`0.2mm`, `1/8in`, `200um` or a bare number (mm) as mm."""
-    try:
-        return None if value is None else parse_length(value)
-    except OptionError as error:
-        raise click.BadParameter(str(error), ctx, param) from error
+def _number_by(parse: Callable[[str], float]) -> Callable[..., float | None]:
+    def value(ctx: click.Context, param: click.Parameter, text: str | None) -> float | None:
+        try:
+            return None if text is None else parse(text)
+        except OptionError as error:
+            raise click.BadParameter(str(error), ctx, param) from error
 
-
-def feed(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
-    """`0.8`, `0.8mm/min`, `0.01mm/s` as mm/min."""
-    try:
-        return None if value is None else parse_feed(value)
-    except OptionError as error:
-        raise click.BadParameter(str(error), ctx, param) from error
-
-
-def duration(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
-    """`90min`, `1h`, `200ms` or a bare number (s) as s."""
-    try:
-        return None if value is None else parse_time(value)
-    except OptionError as error:
-        raise click.BadParameter(str(error), ctx, param) from error
-
-
-def is_viewer(name: str) -> bool:
-    """Whether a picture of this name is a page to pan, zoom and play."""
-    return PurePath(name).suffix.lower() == ".html"
-
-
-def picture_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """The name of a picture that we can make."""
-    if value is not None and PurePath(value).suffix.lower() not in PICTURES:
-        raise click.BadParameter(f"{value!r} ends in none of .svg, .png and .html", ctx, param)
     return value
 
 
-def page_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """The name of a page that we can make; - is Markdown on stdout."""
-    if value not in (None, "-") and PurePath(str(value)).suffix.lower() not in PAGES:
-        raise click.BadParameter(f"{value!r} ends in none of {', '.join(PAGES)}", ctx, param)
-    return value
+length = _number_by(parse_length)
+"""`0.2mm`, `1/8in`, `200um` or a bare number (mm) as mm."""
+
+feed = _number_by(parse_feed)
+"""`0.8`, `0.8mm/min`, `0.01mm/s` as mm/min."""
+
+duration = _number_by(parse_time)
+"""`90min`, `1h`, `200ms` or a bare number (s) as s."""
 
 
-# The flags that several commands share, and what they stand for.
-#
-# Each is a decorator that gives the command one record: `machine_options` (which machine) here,
-# `job_options` (what is cut, and how) in `jobflags`, `drawing_options` (how a drawing is read) in
-# `drawing`. A job file says the same as the job flags; flags override it.
+# The machine.
 
 _MACHINE = "Machine"
-INTERPOLATORS = ("dsm", "dda", "stairs")
 
 
 @dataclass(frozen=True)
@@ -233,7 +212,7 @@ def talk_options(command: Command) -> Command:
     )
 
 
-# The flags that say how a program is judged: limits, parts of the mechanics, comparisons.
+# Limits.
 
 _LIMITS = "Limits (exit code 1 beyond them)"
 
@@ -292,39 +271,32 @@ def gate_options(command: Command) -> Command:
     )
 
 
-def ways_to_compare(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
-    """What `--compare SPEC` stands for; OptionError when it is nothing."""
-    from camtool.comparison import ways_of
+# How a drawing is read, and which part of it.
 
-    def load(more: Sequence[str]) -> LoadedTarget:
-        return replace(machine, settings=(*machine.settings, *more)).load()
-
-    return ways_of(spec, load, judging)
-
-
-def left_out(names: Sequence[str]) -> Effects:
-    """The mechanics without these effects; OptionError for others."""
-    from camtool.comparison import left_out as without
-
-    return without(names)
-
-
-# The flags that say how a drawing is read, and which part of it.
-
-FORMATS = ("dxf", "svg", "points", "solid")
 _READ, _CHOSEN = "How the drawing is read", "Which part of it"
-TEXTS = ("skip", "outline", "stroke")
 
 
 @dataclass(frozen=True)
 class DrawingFlags:
-    """How a drawing is read: `given` are fields of ReadOptions, None where no flag says."""
+    """Patterns of what is read (`--layer` to `--line-type`), and fields of ReadOptions, None where
+    no flag says."""
 
-    layers: tuple[str, ...]
-    exclude_layers: tuple[str, ...]
-    colours: tuple[str, ...]
-    line_types: tuple[str, ...]
-    given: dict[str, Any]
+    layer: tuple[str, ...] = ()
+    exclude_layer: tuple[str, ...] = ()
+    colour: tuple[str, ...] = ()
+    line_type: tuple[str, ...] = ()
+    format: str | None = None
+    units: str | None = None
+    dpi: float | None = None
+    tolerance_mm: float | None = None
+    gap_mm: float | None = None
+    across_layers: bool | None = None
+    recognise_arcs: bool | None = None
+    text: str | None = None
+    dimensions: bool | None = None
+    layout: str | None = None
+    section_z_mm: float | None = None
+    allow_scripts: bool | None = None
 
     def read(
         self,
@@ -335,66 +307,41 @@ class DrawingFlags:
     ) -> Drawing:
         """The drawing (`-` is stdin), of the layers that the job's operations take.
 
-        `data` is the file's content where it has been read already. Tolerances that no flag
-        gives are the machine's, or else the importer's; they are of the part, whose scale the
-        job says. OptionError for a layer or colour of
-        the job that the drawing has not, unless flags restrict it.
+        `data` is the file's content where it has been read already. OptionError for a layer or
+        colour of the job that the drawing has not, unless flags restrict it.
         """
-        from camtool.importers.options import ReadOptions, Selection
-        from camtool.importers.pieces import NoMatchError, colour_named
         from camtool.importers.read import content, read_bytes
-        from camtool.jobs.drawing import layers_of, read_to_scale, refuse_unmatched, unmatched
+        from camtool.jobs.drawing import read_for_job
 
-        settings: dict[str, Any] = {}
-        if machine is not None:
-            settings["tolerance_mm"] = machine.defaults.fit_tolerance_mm
-            settings["gap_mm"] = machine.defaults.gap_mm
-        settings.update({key: value for key, value in self.given.items() if value is not None})
-        settings["select"] = Selection(
-            layers=self.layers or (() if job is None else layers_of(job)),
-            exclude_layers=self.exclude_layers,
-            colours=tuple(colour_named(colour) for colour in self.colours),
-            line_types=self.line_types,
+        options = self._options(machine)
+        data, file = content(Path(name)) if data is None else (data, name)
+        if job is None:
+            return read_bytes(data, file, options)
+        return read_for_job(data, file, options, job)
+
+    def _options(self, machine: Machine | None) -> ReadOptions:
+        """Tolerances that no flag gives are the machine's, or else the importer's; they are of
+        the part, whose scale the job says."""
+        from camtool.importers.options import ReadOptions, Selection
+        from camtool.importers.pieces import colour_named
+
+        settings = asdict(self)
+        select = Selection(
+            layers=settings.pop("layer"),
+            exclude_layers=settings.pop("exclude_layer"),
+            colours=tuple(colour_named(colour) for colour in settings.pop("colour")),
+            line_types=settings.pop("line_type"),
         )
-        try:
-            options = ReadOptions(**settings)
-            data, file = content(Path(name)) if data is None else (data, name)
-            drawing = read_to_scale(
-                lambda scale: read_bytes(data, file, replace(options, scale=scale)), job
-            )
-        except NoMatchError as error:
-            if job is None or error.pattern not in layers_of(job) or self.layers:
-                raise
-            raise unmatched(error, job) from error
-        if job is not None and not (self.layers or self.exclude_layers or self.colours):
-            refuse_unmatched(drawing, job)
-        return drawing
+        given = {name: value for name, value in settings.items() if value is not None}
+        if machine is not None:
+            given.setdefault("tolerance_mm", machine.defaults.fit_tolerance_mm)
+            given.setdefault("gap_mm", machine.defaults.gap_mm)
+        return ReadOptions(**given, select=select)
 
 
 def drawing_options(command: Command) -> Command:
     """Adds `drawing: DrawingFlags`."""
-    names = (*_SELECTION_FLAGS, *_READ_FIELDS)
-    wrapped = gather("drawing", _make_drawing, names)(command)
-    return decorate(wrapped, [*_read_flags(), *_selection_flags()])
-
-
-def _make_drawing(
-    layer: tuple[str, ...],
-    exclude_layer: tuple[str, ...],
-    colour: tuple[str, ...],
-    line_type: tuple[str, ...],
-    **given: Any,
-) -> DrawingFlags:
-    return DrawingFlags(layer, exclude_layer, colour, line_type, given)
-
-
-def _read_flags() -> list[Callable[..., Any]]:
-    """How geometry is read."""
-    tolerance, gap = (
-        "How near arcs come to curves of the part.",
-        "Ends nearer than this are joined.",
-    )
-    return [
+    options = [
         option(_READ, "--format", type=click.Choice(FORMATS), help="Do not guess it."),
         option(_READ, "--units", metavar="UNIT", help="Unit of the drawing: mm, in, um, px ..."),
         option(
@@ -404,13 +351,25 @@ def _read_flags() -> list[Callable[..., Any]]:
             help="Pixels per inch of an SVG.  [96, or what its program took]",
         ),
         option(
-            _READ, "--tolerance", "tolerance_mm", callback=length, metavar="LENGTH", help=tolerance
+            _READ,
+            "--tolerance",
+            "tolerance_mm",
+            callback=length,
+            metavar="LENGTH",
+            help="How near arcs come to curves of the part.",
         ),
-        option(_READ, "--gap", "gap_mm", callback=length, metavar="LENGTH", help=gap),
-        _switch("--across-layers", "across_layers", "Join ends of different layers too."),
-        _switch("--recognise-arcs", "recognise_arcs", "Chords on one circle become arcs again."),
+        option(
+            _READ,
+            "--gap",
+            "gap_mm",
+            callback=length,
+            metavar="LENGTH",
+            help="Ends nearer than this are joined.",
+        ),
+        _switch("--across-layers", "Join ends of different layers too."),
+        _switch("--recognise-arcs", "Chords on one circle become arcs again."),
         option(_READ, "--text", type=click.Choice(TEXTS), help="What to do with text.  [skip]"),
-        _switch("--dimensions", "dimensions", "Read the lines of dimensions too."),
+        _switch("--dimensions", "Read the lines of dimensions too."),
         option(_READ, "--layout", metavar="NAME", help="A layout of a DXF, not model space."),
         option(
             _READ,
@@ -420,54 +379,25 @@ def _read_flags() -> list[Callable[..., Any]]:
             metavar="HEIGHT",
             help="Cut a solid at this height.",
         ),
-        _switch("--allow-scripts", "allow_scripts", "Run a build123d script, with your rights."),
-    ]
-
-
-def _selection_flags() -> list[Callable[..., Any]]:
-    """What of it is read."""
-    return [
+        _switch("--allow-scripts", "Run a build123d script, with your rights."),
         _patterns("--layer", "Only these layers (CUT, ENG*)."),
         _patterns("--exclude-layer", "Not these layers."),
         _patterns("--colour", "Only this colour (#ff0000, red, or 1 to 255)."),
         _patterns("--line-type", "Only these line types (DASHED, CENTER*)."),
     ]
+    return with_flags(command, "drawing", DrawingFlags, options)
 
 
-def _switch(flag: str, name: str, text: str) -> Callable[..., Any]:
+def _switch(flag: str, text: str) -> Option:
     """A flag that is None unless given, so that a default stays one."""
-    return option(_READ, flag, name, is_flag=True, default=None, help=text)
+    return option(_READ, flag, is_flag=True, default=None, help=text)
 
 
-def _patterns(flag: str, text: str) -> Callable[..., Any]:
+def _patterns(flag: str, text: str) -> Option:
     return option(_CHOSEN, flag, multiple=True, metavar="PATTERN", help=text)
 
 
-_SELECTION_FLAGS = ("layer", "exclude_layer", "colour", "line_type")
-_READ_FIELDS = (
-    "format",
-    "units",
-    "dpi",
-    "tolerance_mm",
-    "gap_mm",
-    "across_layers",
-    "recognise_arcs",
-    "text",
-    "dimensions",
-    "layout",
-    "section_z_mm",
-    "allow_scripts",
-)
-
-
-# The flags that say what a job file says: each key by its name with hyphens for underscores.
-
-_JOB = "Job (every key of docs/jobs.md is a flag)"
-_PLACE = "Where the drawing lies, in this order"
-_TOOL = "Tool"
-_CUT = "How it is cut"
-
-_RENAMED = {"tool_tip_angle": "--tool-angle"}
+# The job: each key of a job file by its name with hyphens for underscores.
 
 
 @dataclass(frozen=True)
@@ -475,33 +405,28 @@ class JobFlags:
     """`--job`, `--operation` and the flags that say the same as keys; `given` holds the values of
     those that were given."""
 
-    file: str | None
-    operations: tuple[str, ...]
-    given: Mapping[str, Any]
+    file: str | None = None
+    operations: tuple[str, ...] = ()
+    given: Mapping[str, Any] = field(default_factory=dict)
 
     def job(self, drawing: DrawingFlags) -> Job:
         """The job of the file, with the given flags over it.
 
         `--layer` restricts the drawing; a job of one operation takes just that of it.
         """
-        from camtool.jobs.build import Said, build_job, read_job_file
+        from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of_flags
 
-        file = Said() if self.file is None else read_job_file(Path(self.file))
-        flags = Said(
-            whole=self._table(WHOLE),
-            place=self._table(PLACE),
-            defaults=self._table({**OPERATION, TOOL_NAME: None, **TOOL_KEYS}),
-        )
-        job = build_job(file, flags, self.operations)
-        if drawing.layers and len(job.operations) == 1:
-            return replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
+        file = JobTables() if self.file is None else read_job_file(Path(self.file))
+        job = build_job(file, tables_of_flags(self.given), self.operations)
+        if drawing.layer and len(job.operations) == 1:
+            return replace(job, operations=(replace(job.operations[0], layers=drawing.layer),))
         return job
 
     def files(self) -> list[str]:
         """The job file, and its tool table."""
-        return [file for file in (self.file, self.tool_table()) if file is not None]
+        return [file for file in (self.file, self._tool_table()) if file is not None]
 
-    def tool_table(self) -> str | None:
+    def _tool_table(self) -> str | None:
         """The file of the tool table that the flag or the job file names; None without any, and
         where the job file cannot be read: `job` says why."""
         if self.file is None or "tool_table" in self.given:
@@ -524,73 +449,53 @@ class JobFlags:
                 error.file = self.file
             raise
 
-    def _table(self, keys: Mapping[str, Key | None]) -> Table:
-        return Table(
-            {
-                name: Given(value, flag_name(name))
-                for name, value in self.given.items()
-                if name in keys
-            }
-        )
+
+OWN_JOB = ".toml"
+"""`part.toml` beside `part.dxf` is its job."""
+
+
+def own_job(drawing: Path) -> Path | None:
+    """The job file beside a drawing; None without one."""
+    if not drawing.name:  # the folder ., which is an error later
+        return None
+    beside = drawing.with_suffix(OWN_JOB)
+    return beside if beside.is_file() else None
 
 
 def job_options(command: Command) -> Command:
     """Adds `job: JobFlags`."""
-    wrapped = gather("job", _make_job, ("job", "operation", *_NAMES))(command)
-    return decorate(wrapped, [*_file_flags(), *_key_flags()])
 
+    def made(job: str | None, operation: tuple[str, ...], **keys: Any) -> JobFlags:
+        given = {name: value for name, value in keys.items() if value is not None}
+        return JobFlags(job, operation, given)
 
-def _make_job(job: str | None, operation: tuple[str, ...], **given: Any) -> JobFlags:
-    return JobFlags(
-        job, operation, {name: value for name, value in given.items() if value is not None}
-    )
-
-
-def _file_flags() -> list[Any]:
-    return [
-        option(_JOB, "--job", metavar="FILE", help="A TOML file that says what these flags say."),
+    names = ["job", "operation", *(name for keys in FLAGS.values() for name in keys)]
+    of_job = next(iter(FLAGS))
+    options = [
         option(
-            _JOB,
+            of_job, "--job", metavar="FILE", help="A TOML file that says what these flags say."
+        ),
+        option(
+            of_job,
             "--operation",
             multiple=True,
             metavar="NAME",
             help="Only this operation of the file, by name or number.",
         ),
+        *(
+            _key_flag(head, name, key)
+            for head, keys in FLAGS.items()
+            for name, key in keys.items()
+        ),
     ]
+    return decorate(gather("job", made, names)(command), options)
 
 
-def _key_flags() -> list[Any]:
-    tool = option(_TOOL, "--tool", metavar="NAME", help="A tool of the file, or its number.")
-    return [
-        *(_key_flag(_JOB, name, key) for name, key in WHOLE.items()),
-        *(_key_flag(_PLACE, name, key) for name, key in _ACTING.items()),
-        tool,
-        *(_key_flag(_TOOL, name, key) for name, key in TOOL_KEYS.items()),
-        *(_key_flag(_CUT, name, key) for name, key in OPERATION.items() if key.help),
-    ]
-
-
-def _key_flag(section: str, name: str, key: Key) -> Any:
+def _key_flag(section: str, name: str, key: Key) -> Option:
     """The flag of a key; None unless given, so that a default stays one."""
-    import click
-
-    if key.choices:
-        choice = click.Choice(key.choices)
-        return option(section, flag_name(name), name, type=choice, help=key.help)
-    if not key.metavar:
-        return option(section, flag_name(name), name, is_flag=True, default=None, help=key.help)
-    return option(section, flag_name(name), name, metavar=key.metavar, help=key.help)
-
-
-def flag_name(name: str) -> str:
-    return _RENAMED.get(name, f"--{name.replace('_', '-')}")
-
-
-_ACTING = {name: PLACE[name] for name in (*(n for n in PLACE if n != "origin"), "origin")}
-_NAMES = (
-    *WHOLE,
-    *_ACTING,
-    TOOL_NAME,
-    *TOOL_KEYS,
-    *(name for name, key in OPERATION.items() if key.help),
-)
+    settings: dict[str, Any] = {"is_flag": True, "default": None}
+    if key.value.choices:
+        settings = {"type": click.Choice(key.value.choices)}
+    elif key.value.metavar:
+        settings = {"metavar": key.value.metavar}
+    return option(section, flag_name(name), name, help=key.help, **settings)

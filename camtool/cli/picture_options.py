@@ -1,16 +1,21 @@
-"""Draws the pictures of a command: of scenes that are made when the first one is asked for."""
+"""The flags that say how a picture looks, and the pictures of a command drawn by them.
+
+A command says with a `Canvas` what its pictures can show. What a picture cannot honour is refused
+by name before any work is done; a layer that was named and turns out to hold nothing is told.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import click
 
 from camtool.cli.messages import say
-from camtool.cli.options import Command, is_viewer, option, with_flags
+from camtool.cli.options import Command, option, with_flags
 from camtool.errors import OptionError
 from camtool.pictures.options import LAYERS, NOT_UNDER_PATH, OF_DRAWINGS, OF_PREDICTIONS, chosen
 from camtool.units import parse_length
@@ -19,58 +24,6 @@ if TYPE_CHECKING:
     from camtool.pictures.options import Options
     from camtool.pictures.scene import Scene
 
-
-KIND = "closeup.svg"
-"""A name that says which kind of picture a close-up is."""
-
-
-@dataclass(frozen=True)
-class Painter:
-    """`make` makes the scenes, several stand side by side; `told` hears of them once."""
-
-    make: Callable[[], Sequence[Scene]]
-    looks: Callable[[], Options]
-    told: Callable[[Sequence[Scene]], None]
-
-    @cached_property
-    def scenes(self) -> Sequence[Scene]:
-        """What is drawn."""
-        found = self.make()
-        self.told(found)
-        return found
-
-    def __call__(self, name: str) -> bytes:
-        """The picture, for a file of this name."""
-        drawn, options = self.scenes, self.looks()
-        if not judged(drawn):  # the findings say why; the picture shows what there is
-            options = replace(options, polar=None)
-        if len(drawn) > 1:
-            from camtool.pictures.beside import render_beside
-
-            return render_beside(drawn, name, options)
-        from camtool.pictures.draw import render
-
-        return render(drawn[0], name, options)
-
-    def closeups(self) -> Iterator[tuple[str, bytes]]:
-        """Caption and SVG of what a page shows besides; of the last scene, which is the result."""
-        from camtool.pictures.draw import render
-        from camtool.pictures.picture import closeups
-
-        for caption, options in closeups(self.scenes[-1], self.looks()):
-            yield caption, render(self.scenes[-1], KIND, options)
-
-
-def judged(scenes: Sequence[Scene]) -> bool:
-    """Whether all have a predicted path."""
-    return all(scene.trace_points is not None for scene in scenes)
-
-
-# The flags that say how a picture looks, for every command that makes one.
-#
-# A command says with a `Canvas` what its pictures can show. What a picture cannot honour is
-# refused by name before any work is done; a layer that was named and turns out to hold nothing is
-# told.
 
 _PICTURE = "Picture"
 OF_ALL = ("--size", "--crop", "--dark")
@@ -82,6 +35,21 @@ HINTS = {
     "drawing": "; there is no drawing in it",
 }
 """Why a layer is empty, where that has a reason that is not in the drawing."""
+
+PICTURES = (".svg", ".png", ".html")
+"""Kinds of pictures, by the ends of their names."""
+
+
+def is_viewer(name: str) -> bool:
+    """Whether a picture of this name is a page to pan, zoom and play."""
+    return PurePath(name).suffix.lower() == ".html"
+
+
+def picture_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The name of a picture that we can make."""
+    if value is not None and PurePath(value).suffix.lower() not in PICTURES:
+        raise click.BadParameter(f"{value!r} ends in none of .svg, .png and .html", ctx, param)
+    return value
 
 
 @dataclass(frozen=True)
@@ -187,29 +155,7 @@ class PictureFlags:
     def painter(self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False) -> Painter:
         """What draws the scenes, several side by side, as a picture file of a name. Says what of
         the flags they turn out not to show."""
-
-        def told(found: Sequence[Scene]) -> None:
-            for line in self._not_shown(found):
-                say(f"camtool: warning: {line}", quiet=quiet)
-
-        return Painter(scenes, self.options, told)
-
-    def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
-        """What to say of layers that hold nothing, and where nothing could be judged."""
-        for name in self._missing(scenes):
-            yield f"--layers {name}: nothing in this picture{HINTS.get(name, '')}"
-        for flag in ("--exaggerate", "--polar"):
-            if flag in self.given and not judged(scenes):
-                yield f"{flag}: the part cannot be judged; the picture shows what is planned"
-
-    def _missing(self, scenes: Sequence[Scene]) -> list[str]:
-        if not self.named:
-            return []
-        from camtool.pictures.content import missing_layers
-
-        options = self.options()
-        empty = [missing_layers(scene, options, self.named) for scene in scenes]
-        return [name for name in self.named if all(name in names for names in empty)]
+        return Painter(scenes, self, quiet)
 
 
 FLAGS = tuple(field.name for field in fields(PictureFlags))
@@ -292,3 +238,69 @@ def _crop(
     if len(lengths) != 4:
         raise click.BadParameter(f"{value!r} is not X,Y,WIDTH,HEIGHT", ctx, param)
     return lengths[0], lengths[1], lengths[2], lengths[3]
+
+
+CLOSEUP = "closeup.svg"
+"""A name that says which kind of picture a close-up is."""
+
+
+@dataclass(frozen=True)
+class Painter:
+    """Draws the pictures of a command, of the scenes that `make` makes when the first picture is
+    asked for; several stand side by side."""
+
+    make: Callable[[], Sequence[Scene]]
+    flags: PictureFlags
+    quiet: bool
+
+    @cached_property
+    def scenes(self) -> Sequence[Scene]:
+        """What is drawn. Says which of the flags it cannot show."""
+        scenes = self.make()
+        for line in self._not_shown(scenes):
+            say(f"camtool: warning: {line}", quiet=self.quiet)
+        return scenes
+
+    def __call__(self, name: str) -> bytes:
+        """The picture, for a file of this name."""
+        scenes, options = self.scenes, self.flags.options()
+        if not _judged(scenes):  # the findings say why; the picture shows what there is
+            options = replace(options, polar=None)
+        if len(scenes) > 1:
+            from camtool.pictures.beside import render_beside
+
+            return render_beside(scenes, name, options)
+        from camtool.pictures.draw import render
+
+        return render(scenes[0], name, options)
+
+    def closeups(self) -> Iterator[tuple[str, bytes]]:
+        """Caption and SVG of what a page shows besides; of the last scene, which is the result."""
+        from camtool.pictures.draw import render
+        from camtool.pictures.picture import closeups
+
+        for caption, options in closeups(self.scenes[-1], self.flags.options()):
+            yield caption, render(self.scenes[-1], CLOSEUP, options)
+
+    def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
+        """What to say of layers that hold nothing, and where nothing could be judged."""
+        for name in self._missing(scenes):
+            yield f"--layers {name}: nothing in this picture{HINTS.get(name, '')}"
+        for flag in ("--exaggerate", "--polar"):
+            if flag in self.flags.given and not _judged(scenes):
+                yield f"{flag}: the part cannot be judged; the picture shows what is planned"
+
+    def _missing(self, scenes: Sequence[Scene]) -> list[str]:
+        named = self.flags.named
+        if not named:
+            return []
+        from camtool.pictures.content import missing_layers
+
+        options = self.flags.options()
+        empty = [missing_layers(scene, options, named) for scene in scenes]
+        return [name for name in named if all(name in names for names in empty)]
+
+
+def _judged(scenes: Sequence[Scene]) -> bool:
+    """Whether all have a predicted path."""
+    return all(scene.trace_points is not None for scene in scenes)

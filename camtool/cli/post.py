@@ -1,4 +1,4 @@
-"""The flags with which a drawing becomes a program, as one record: for `post` and its like."""
+"""`camtool post`: drawing to verified program; `filter` and `stale` post as it does."""
 
 from __future__ import annotations
 
@@ -31,20 +31,23 @@ from camtool.cli.options import (
     decorate,
     drawing_options,
     gate_options,
-    gather,
     job_options,
     machine_options,
-    picture_name,
+    own_job,
     talk_options,
+    with_flags,
 )
 from camtool.cli.picture_options import (
     RESULT,
     UNVERIFIED,
+    Painter,
     PictureFlags,
     check_beside,
+    picture_name,
     picture_options,
 )
 from camtool.cli.report import (
+    Flags,
     Subject,
     flags_given,
     linked_picture,
@@ -57,14 +60,9 @@ from camtool.cli.report import (
 from camtool.errors import CamtoolError, OptionError
 
 if TYPE_CHECKING:
-    from camtool.cli.picture_options import Painter
-    from camtool.cli.report import Flags
     from camtool.machine.registry import LoadedTarget
     from camtool.pictures.scene import Scene
     from camtool.run import Run
-
-
-JOB_ENDING = ".toml"
 
 
 def scenes_of(run: Run, *, before: bool) -> list[Scene]:
@@ -135,34 +133,29 @@ class Posting:
         return [source, *self.job.files(), *self.machine.files()]
 
     def of(self, source: str) -> Posting:
-        """The same with the drawing's own job file, `part.toml` beside `part.dxf`, if it has one.
-
-        Its own job takes the place of `--job`; flags are laid over either.
-        """
-        if not Path(source).name:  # the folder ., which is an error later
-            return self
-        own = Path(source).with_suffix(JOB_ENDING)
-        if not own.is_file():
-            return self
-        return replace(self, job=replace(self.job, file=str(own)))
+        """The same with the drawing's own job file if it has one, in the place of `--job`; flags
+        are laid over either."""
+        own = own_job(Path(source))
+        return self if own is None else replace(self, job=replace(self.job, file=str(own)))
 
 
 def posting_options(command: Command) -> Command:
     """Adds `posting: Posting`."""
-    names = ("machine", "gates", "job", "drawing", "no_verify", "compensate")
-    inner = drawing_options(gather("posting", Posting, names)(command))
-    verify, bend = (
-        click.option("--no-verify", is_flag=True, help="Write without simulating the machine."),
-        click.option(
-            "--compensate",
-            is_flag=True,
-            help="Bend the path against the machine's play, scale and squareness.",
-        ),
+    inner = with_flags(command, "posting", Posting, [])
+    inner = machine_options(gate_options(job_options(drawing_options(inner))))
+    return decorate(
+        inner,
+        [
+            click.option(
+                "--no-verify", is_flag=True, help="Write without simulating the machine."
+            ),
+            click.option(
+                "--compensate",
+                is_flag=True,
+                help="Bend the path against the machine's play, scale and squareness.",
+            ),
+        ],
     )
-    return decorate(machine_options(gate_options(job_options(inner))), [verify, bend])
-
-
-# `camtool post`: the main job, drawing to verified program.
 
 
 @click.command(cls=SectionedCommand, short_help="Drawing to verified program.")
@@ -336,11 +329,9 @@ def _page(run: Run, asked: Asked, picture: Painter, target: LoadedTarget) -> dic
     return report_files(str(asked.page), subject, picture, preview=asked.preview)
 
 
-# `--watch`: the same again whenever one of its files has changed.
-#
-# Files are looked at by their content, so that a save without a change does nothing and no clock
-# of a network drive matters. A change counts when it has settled: an editor may write in several
-# goes.
+# `--watch`: the same again whenever one of its files has changed. Files are looked at by their
+# content, so that a save without a change does nothing and no clock of a network drive matters. A
+# change counts when it has settled: an editor may write in several goes.
 
 POLL_S = 0.4
 """Files are looked at so often."""

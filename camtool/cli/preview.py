@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.files import STDOUT, check_places, read_bytes, write_all
-from camtool.cli.messages import say, say_findings, say_first_run
+from camtool.cli.first_run import say_first_run
+from camtool.cli.messages import say, say_findings
 from camtool.cli.options import (
     DrawingFlags,
     JobFlags,
     MachineFlags,
     SectionedCommand,
     drawing_options,
-    is_viewer,
     job_options,
     machine_options,
-    picture_name,
     talk_options,
 )
 from camtool.cli.picture_options import (
@@ -28,12 +27,14 @@ from camtool.cli.picture_options import (
     Canvas,
     PictureFlags,
     check_beside,
+    is_viewer,
+    picture_name,
     picture_options,
 )
 from camtool.errors import CamtoolError, DrawingError
+from camtool.findings import Finding
 
 if TYPE_CHECKING:
-    from camtool.findings import Finding
     from camtool.machine.registry import LoadedTarget
     from camtool.pictures.scene import Scene
 
@@ -136,7 +137,7 @@ class Seen:
         """Whether a file's content says that it is none: then it is a program of the target."""
         from camtool.importers.read import file_bytes, find_format
 
-        if source == STDOUT or self.drawing.given.get("format") is not None:
+        if source == STDOUT or self.drawing.format is not None:
             return False
         data = file_bytes(Path(source))
         try:

@@ -17,17 +17,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.files import STDOUT, is_foreign, sealed
-from camtool.cli.options import is_viewer, page_name
 from camtool.cli.picture_options import FLAGS as PICTURE_FLAGS
+from camtool.cli.picture_options import Painter, is_viewer
 from camtool.errors import OutputError
+from camtool.findings import Finding
+from camtool.plain import one_line
 
 if TYPE_CHECKING:
-    from camtool.cli.picture_options import Painter
-    from camtool.findings import Finding
     from camtool.machine.registry import LoadedTarget
     from camtool.verification.report import Page, Report, Setup
 
 Flags = tuple[tuple[str, str], ...]
+PAGES = (".html", ".md", ".json")
 EMBEDDED = "picture.svg"
 """The picture within a page of HTML."""
 
@@ -54,8 +55,15 @@ class Subject:
 def report_option(command: Any) -> Any:
     """Adds `page: str | None`, the name of the page that `--report` asks for."""
     text = "A page: summary, picture, tables, findings; .html, .md or .json; - is Markdown."
-    add = click.option("--report", "page", metavar="FILE", callback=page_name, help=text)
+    add = click.option("--report", "page", metavar="FILE", callback=_page_name, help=text)
     return add(command)
+
+
+def _page_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The name of a page that we can make; - is Markdown on stdout."""
+    if value not in (None, STDOUT) and PurePath(str(value)).suffix.lower() not in PAGES:
+        raise click.BadParameter(f"{value!r} ends in none of {', '.join(PAGES)}", ctx, param)
+    return value
 
 
 def flags_given() -> Flags:
@@ -143,7 +151,6 @@ def _from(page_name: str, picture_name: str) -> str:
 
 
 def _page(subject: Subject, pictures: tuple[tuple[str, str], ...]) -> Page:
-    from camtool.plain import one_line
     from camtool.verification.report import Page, reported
 
     findings = reported(subject.findings)

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.messages import say
-from camtool.cli.options import SectionedCommand, talk_options
-from camtool.cli.post import JOB_ENDING, posting_options
+from camtool.cli.options import OWN_JOB, SectionedCommand, talk_options
+from camtool.cli.post import Posting, posting_options
 from camtool.errors import CamtoolError, InputError
 from camtool.findings import Severity
 
 if TYPE_CHECKING:
-    from camtool.cli.post import Posting
     from camtool.machine.registry import LoadedTarget
     from camtool.toolpath.program import Program
 
@@ -132,7 +131,7 @@ def _beside(name: Path) -> list[Path]:
 
 def _has_program(name: Path) -> bool:
     """Whether anything lies there that may be a program: a dialect may have several endings."""
-    return any(file.suffix.lower() not in (*DRAWINGS, JOB_ENDING) for file in _beside(name))
+    return any(file.suffix.lower() not in (*DRAWINGS, OWN_JOB) for file in _beside(name))
 
 
 def _posted(

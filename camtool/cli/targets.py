@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,6 +14,7 @@ import click
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.messages import in_colour, say, show_text
 from camtool.cli.options import talk_options
+from camtool.errors import CamtoolError, MachineError
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
@@ -30,8 +32,6 @@ class _Targets(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """The commands and the targets."""
-        from camtool.cli.completion import target_items
-
         return [*super().shell_complete(ctx, incomplete), *target_items(incomplete)]
 
 
@@ -94,8 +94,22 @@ def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool)
     say(f"written: {where}; take the # away from what differs", quiet=quiet)
 
 
+def target_items(incomplete: str) -> Iterator[CompletionItem]:
+    """The machines, each with its title."""
+    from click.shell_completion import CompletionItem
+
+    from camtool.machine.registry import list_target, target_names
+
+    for name in target_names():
+        if name.startswith(incomplete):
+            try:
+                title = list_target(name).target.title
+            except CamtoolError:  # a broken plug-in harms nothing else
+                continue
+            yield CompletionItem(name, help=title)
+
+
 def _list(as_json: bool) -> None:
-    from camtool.errors import MachineError
     from camtool.machine.registry import list_target, target_names
 
     rows: list[dict[str, Any]] = []
@@ -139,8 +153,6 @@ def _table(rows: list[dict[str, Any]]) -> None:
 
 
 def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bool) -> None:
-    from pathlib import Path
-
     import msgspec
 
     from camtool.machine.registry import load_target
@@ -150,7 +162,7 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     if as_json:
         write_all({STDOUT: to_json(values).encode()})
         return
-    for key, value in _flat("", values):
+    for key, value in flat("", values):
         show_text(f"{key} = {to_json(value, indent=0)}".rstrip("\n"))
     for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
         if cells is not None:
@@ -185,10 +197,10 @@ def _speed(mm_min: float) -> str:
     return f"{mm_min:.4g} mm/min" if math.isfinite(mm_min) else "not said"
 
 
-def _flat(prefix: str, table: dict[str, Any]) -> list[tuple[str, Any]]:
+def flat(prefix: str, table: dict[str, Any]) -> list[tuple[str, Any]]:
     """Nested tables as `axes.x.travel_mm` lines, as --set takes them."""
     rows: list[tuple[str, Any]] = []
     for key, value in table.items():
         name = f"{prefix}.{key}" if prefix else key
-        rows.extend(_flat(name, value) if isinstance(value, dict) else [(name, value)])
+        rows.extend(flat(name, value) if isinstance(value, dict) else [(name, value)])
     return rows

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
 
 from camtool.cli.files import STDOUT, check_places, read_bytes, shown, write_all
+from camtool.cli.first_run import say_first_run
 from camtool.cli.messages import (
     REPORT_NAMES,
     report_marks,
     say,
     say_findings,
-    say_first_run,
     show_compared,
     show_facts,
     show_text,
 )
 from camtool.cli.options import (
-    INTERPOLATORS,
     DrawingFlags,
     GateFlags,
     JobFlags,
@@ -28,19 +28,17 @@ from camtool.cli.options import (
     SectionedCommand,
     drawing_options,
     gate_options,
-    is_viewer,
     job_options,
-    left_out,
     machine_options,
-    picture_name,
     talk_options,
-    ways_to_compare,
 )
 from camtool.cli.picture_options import (
     OVERLAY,
     RESULT,
     PictureFlags,
     check_beside,
+    is_viewer,
+    picture_name,
     picture_options,
 )
 from camtool.cli.report import (
@@ -167,6 +165,9 @@ def compared(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
 # `camtool verify`: simulate and judge any program of a machine.
 
 
+INTERPOLATORS = ("dsm", "dda", "stairs")
+
+
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")
 @click.argument("program", metavar="PROGRAM")
 @machine_options
@@ -255,6 +256,7 @@ def verify(
     )
     refuse_foreign_picture(page, preview)
 
+    from camtool.comparison import left_out
     from camtool.pictures.scene import points_for
     from camtool.pipeline import Judging
 
@@ -273,8 +275,18 @@ def verify(
     case = Case(target, judging, read, wanted)
     with job.blamed():
         if compare is not None:
-            return compared(program, ways_to_compare(compare, machine, judging), case, wishes)
+            return compared(program, _ways(compare, machine, judging), case, wishes)
         return judged(program, case, wishes)
+
+
+def _ways(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
+    """What `--compare SPEC` stands for; OptionError when it is nothing."""
+    from camtool.comparison import ways_of
+
+    def load(more: Sequence[str]) -> LoadedTarget:
+        return replace(machine, settings=(*machine.settings, *more)).load()
+
+    return ways_of(spec, load, judging)
 
 
 def _check(wishes: Wishes, *, comparing: bool, gated: bool) -> None:

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 
 from camtool.errors import OptionError
-from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.units import MM_PER_UNIT
 
 FORMATS = ("dxf", "svg", "points", "solid")
@@ -110,6 +109,8 @@ class ReadOptions:
 
         A tolerance does not come below POSITION_EPS_MM by that: positions nearer than this are
         one."""
+        from camtool.geometry.polylines import POSITION_EPS_MM
+
         return replace(
             self,
             tolerance_mm=max(

@@ -9,13 +9,13 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
+from camtool.findings import Finding
 from camtool.geometry.facts import drawing_extents
 from camtool.planning.gouges import by_uncut
 from camtool.planning.place import place
 from camtool.planning.sides import Sides, choose, runs_beside
 
 if TYPE_CHECKING:
-    from camtool.findings import Finding
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.items import Chosen

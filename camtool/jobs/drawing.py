@@ -1,16 +1,23 @@
-"""A drawing read as finely as the part needs that a job makes of it."""
+"""The drawing that a job is for: read as finely as the part needs, of the layers that are cut.
+
+A layer or colour of an operation that chooses nothing is an error that names what there is: a
+misspelt layer must not leave a part of the work undone.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
 from camtool.importers.pieces import NAMED, NoMatchError
+from camtool.importers.read import read_bytes
 from camtool.patterns import guess, matches
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
+    from camtool.importers.options import ReadOptions
     from camtool.planning.job import Job, Operation
 
 
@@ -19,11 +26,28 @@ MOST_LOOKS = 4
 known within the tolerance of the look before."""
 
 
-def read_to_scale(read: Callable[[float], Drawing], job: Job | None) -> Drawing:
+def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Drawing:
+    """The drawing in the content of a file, of the layers that the job's operations take, or of
+    those that `options` select. OptionError for a layer or colour of the job that the drawing has
+    not, unless `options` select some."""
+    chosen, wanted = options.select, layers_of(job)
+    options = replace(options, select=replace(chosen, layers=chosen.layers or wanted))
+    try:
+        drawing = read_to_scale(
+            lambda scale: read_bytes(data, file, replace(options, scale=scale)), job
+        )
+    except NoMatchError as error:
+        if chosen.layers or error.pattern not in wanted:
+            raise
+        raise _unmatched(error, job) from error
+    if not (chosen.layers or chosen.exclude_layers or chosen.colours):
+        refuse_unmatched(drawing, job)
+    return drawing
+
+
+def read_to_scale(read: Callable[[float], Drawing], job: Job) -> Drawing:
     """The drawing that `read` gives for the scale of the part, which is the job's; where the job
     fits the drawing into a size, that follows from a first look at what is drawn."""
-    if job is None:
-        return read(1.0)
     if job.placement.fit_mm is None:
         return read(job.placement.scale)
     from camtool.planning.place import SCALE_SHARE, part_scale
@@ -38,12 +62,6 @@ def read_to_scale(read: Callable[[float], Drawing], job: Job | None) -> Drawing:
             return drawing
         drawing = read(scale)
     return drawing
-
-
-# The layers and colours of a job's operations, and what of them a drawing has.
-#
-# A pattern that chooses nothing is an error that names what there is: a misspelt layer must not
-# leave a part of the work undone.
 
 
 def layers_of(job: Job) -> tuple[str, ...]:
@@ -72,7 +90,7 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
                     )
 
 
-def unmatched(error: NoMatchError, job: Job) -> OptionError:
+def _unmatched(error: NoMatchError, job: Job) -> OptionError:
     """The reader's complaint about a layer of the job, with the operation that wants it."""
     rows = enumerate(job.operations, start=1)
     called = next(_called(each, n) for n, each in rows if error.pattern in each.layers)

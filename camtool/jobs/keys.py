@@ -1,17 +1,21 @@
-"""What a user gave, with the place where it was given, and records made of it.
+"""The keys of job files: what each may be, which field it fills, and the flag that says the same.
 
-A `Given` is a value of a job file or a flag. A `Table` holds several by key; the `Key` of each
-says which field of a record it fills, and how its text becomes a number. Whatever is wrong is an
-OptionError that names the file, the table and the key (or the flag), and the mend.
+    Given     a value as a file or a flag gave it, with its place
+    Table     several of them by key: one table of a file, or flags
+    Key       the field that a key fills, its Value, the help of its flag, an example
+    WHOLE, PLACE, STOCK, TOOL, OPERATION: every key, table by table; FLAGS: those that are flags
+
+Whatever is wrong is an OptionError that names the file, the table and the key (or the flag), and
+the mend. docs/jobs.md explains the keys; a test keeps the page and these tables equal.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from camtool.errors import OptionError
 from camtool.patterns import guess
@@ -33,10 +37,6 @@ from camtool.planning.job import (
     Tabs,
 )
 from camtool.units import parse_angle, parse_feed, parse_length, parse_time
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 
 _T = TypeVar("_T")
 
@@ -63,22 +63,35 @@ class Given:
 
 
 @dataclass(frozen=True)
-class Key:
-    """How a key is read: the `field` of its record that it fills, and `read`, which makes the
-    field's value of what was given.
+class Value:
+    """What a key may be: `read` makes the field's value of what was given. The help of its flag
+    shows `metavar` or `choices`; a switch has neither. Some may be `tables` of their own."""
 
-    `kinds`: the kinds of operations that know it. `only`: another key of the table, and the
-    values of it without which this one has no effect. `help`, and `metavar` or `choices`, are
-    those of the flag that says the same; a key without `help` has none.
+    read: Callable[[Given], Any]
+    metavar: str = ""
+    choices: tuple[str, ...] = ()
+    tables: bool = False
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a table: the `field` of its record that it fills, and what its `value` may be.
+
+    `help` is that of the flag that says the same; a key without has none. `example` stands in the
+    files that `camtool job new` begins. `kinds`: the kinds of operations that know it. `only`:
+    another key of the table, and the values of it without which this one has no effect.
     """
 
     field: str
-    read: Callable[[Given], Any]
+    value: Value
     help: str = ""
-    metavar: str = ""
-    choices: tuple[str, ...] = ()
+    example: str = ""
     kinds: tuple[str, ...] = ()
     only: tuple[str, tuple[str, ...]] | None = None
+
+    def read(self, given: Given) -> Any:
+        """The field's value."""
+        return self.value.read(given)
 
 
 @dataclass(frozen=True)
@@ -118,16 +131,6 @@ def table_of(values: object, known: Iterable[str], where: str, file: str) -> Tab
         if name not in known:
             raise given[name].refused("unknown key", _meant(name, known))
     return Table(given, where, file)
-
-
-def part_of(given: Given, known: Iterable[str]) -> Table:
-    """A table that is the value of a key, such as `entry = {kind = "ramp"}`."""
-    parts = {}
-    for name, value in given.value.items():
-        parts[name] = Given(value, f"{given.where}.{name}", given.file)
-        if name not in known:
-            raise parts[name].refused("unknown key", _meant(name, known))
-    return Table(parts, given.where, given.file)
 
 
 def record_of(
@@ -188,11 +191,8 @@ def _listed(known: Iterable[str]) -> str:
     return ", ".join(known)
 
 
-# Values of job files and flags: what TOML or the command line gives becomes numbers and records.
-#
-# Lengths, angles, feeds and times take units in texts; bare numbers are mm, degrees, mm/min and s.
-
-Read = Callable[[Given], Any]
+# How values are read: what TOML or the command line gives becomes numbers and records. Lengths,
+# angles, feeds and times take units in texts; bare numbers are mm, degrees, mm/min and s.
 
 _PAIR = re.compile(r"(.+?)\s*[x×]\s*([-+.\d].*)")
 _UNIT = re.compile(r"[^\d\s.+/-].*$")
@@ -200,7 +200,7 @@ _COUNT = re.compile(r"\s*\d+\s*(:|$)")
 _WILD = re.compile(r"[*?\[]")
 
 
-def plain(convert: Callable[[object], Any]) -> Read:
+def plain(convert: Callable[[object], Any]) -> Callable[[Given], Any]:
     """Reads a value by a function that knows nothing of its place."""
 
     def read(given: Given) -> Any:
@@ -267,7 +267,7 @@ def text(value: object) -> str:
     return value
 
 
-def word(known: Sequence[str]) -> Read:
+def word(known: Sequence[str]) -> Callable[[Given], Any]:
     """One of the words that are known, with a guess which one was meant."""
 
     def convert(value: object) -> str:
@@ -367,10 +367,20 @@ def _record(make: Callable[..., _T], keys: Mapping[str, Key], table: Table) -> _
     return record
 
 
+def _part_of(given: Given, known: Iterable[str]) -> Table:
+    """A table that is the value of a key, such as `entry = {kind = "ramp"}`."""
+    parts = {}
+    for name, value in given.value.items():
+        parts[name] = Given(value, f"{given.where}.{name}", given.file)
+        if name not in known:
+            raise parts[name].refused("unknown key", _meant(name, known))
+    return Table(parts, given.where, given.file)
+
+
 def _parts(given: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table:
     """The keys of a table that is a value, or of a text "a:b:c" that gives `names` in order."""
     if isinstance(given.value, dict):
-        return part_of(given, keys)
+        return _part_of(given, keys)
     with given.blamed():
         texts = _number_text(given.value).split(":")
         if len(texts) > len(names):
@@ -412,189 +422,249 @@ def _number_text(value: object) -> str:
     return value if isinstance(value, str) else repr(value)
 
 
+# The values of keys.
+
+LENGTH = Value(plain(length), "LENGTH")
+ANGLE = Value(plain(angle), "ANGLE")
+FEED = Value(plain(feed), "FEED")
+TIME = Value(plain(time), "TIME")
+COUNT = Value(plain(whole))
+FACTOR = Value(plain(number), "FACTOR")
+TEXT = Value(plain(text))
+PATTERNS_OF_NAMES = Value(plain(patterns))
+SWITCH = Value(plain(switch))
+
+
+def one_of(known: tuple[str, ...]) -> Value:
+    """One of these words."""
+    return Value(word(known), choices=known)
+
+
+# Tables that are values: `entry`, `lead_in` and `lead_out`, `tabs`.
+
 ENTRY = {
-    "kind": Key("kind", word(ENTRIES)),
-    "angle": Key("angle_rad", plain(angle), only=("kind", ("ramp", "helix"))),
-    "radius": Key("radius_mm", plain(length), only=("kind", ("helix",))),
+    "kind": Key("kind", one_of(ENTRIES)),
+    "angle": Key("angle_rad", ANGLE, only=("kind", ("ramp", "helix"))),
+    "radius": Key("radius_mm", LENGTH, only=("kind", ("helix",))),
 }
-"""Keys of `entry`."""
-
 LEAD = {
-    "kind": Key("kind", word(LEADS)),
-    "length": Key("length_mm", plain(length), only=("kind", ("line", "arc"))),
+    "kind": Key("kind", one_of(LEADS)),
+    "length": Key("length_mm", LENGTH, only=("kind", ("line", "arc"))),
 }
-"""Keys of `lead_in` and `lead_out`."""
-
 TABS = {
-    "count": Key("count", plain(whole)),
-    "spacing": Key("spacing_mm", plain(length)),
-    "width": Key("width_mm", plain(length)),
-    "height": Key("height_mm", plain(length)),
-    "ramped": Key("ramped", plain(switch)),
+    "count": Key("count", COUNT),
+    "spacing": Key("spacing_mm", LENGTH),
+    "width": Key("width_mm", LENGTH),
+    "height": Key("height_mm", LENGTH),
+    "ramped": Key("ramped", SWITCH),
 }
-"""Keys of `tabs`."""
 
-
-# The keys of job files, table by table; each is a flag too, by the same name with hyphens.
-#
-# docs/jobs.md explains them; a test keeps the page and these tables equal.
+# The keys, table by table.
 
 UNITS_OF_TABLES = ("mm", "in")
 """Units that the lengths of a tool table may have."""
 
-_LINES = ("profile", "pocket", "engrave")
-_LAYERED = ("profile", "pocket", "engrave", "vcarve")
-_CLEARING = ("profile", "pocket")
-_PROFILE = ("profile",)
-_POCKET = ("pocket",)
-_DRILL = ("drill",)
-_MIRRORS = ("x", "y")
-
 WHOLE = {
-    "safe_z": Key("safe_z_mm", plain(length), "Height of rapids above Z0.", "LENGTH"),
+    "safe_z": Key("safe_z_mm", LENGTH, "Height of rapids above Z0.", '"1mm"'),
     "minimise": Key(
         "minimise",
-        word(GOALS),
+        one_of(GOALS),
         "Order and starts for short rapids, or few reversals while cutting.",
-        choices=GOALS,
+        '"reversals"',
     ),
-    "approach": Key("approach", plain(switch), "Take up the play of X and Y before every cut."),
+    "approach": Key("approach", SWITCH, "Take up the play of X and Y before every cut.", "true"),
     "frames": Key(
         "frames",
-        plain(layers),
+        Value(plain(layers), "PATTERNS"),
         "Layers that hold no edges of parts: frames, stock.",
-        "PATTERNS",
+        '["SHEET"]',
     ),
-    "tool_table": Key("tool_table", plain(text), "LinuxCNC's tool table.", "FILE"),
+    "tool_table": Key(
+        "tool_table", Value(plain(text), "FILE"), "LinuxCNC's tool table.", '"tool.tbl"'
+    ),
     "tool_table_units": Key(
-        "tool_table_units", word(UNITS_OF_TABLES), "Of its lengths.  [mm]", choices=UNITS_OF_TABLES
+        "tool_table_units", one_of(UNITS_OF_TABLES), "Of its lengths.  [mm]", '"mm"'
     ),
 }
 """Keys of the job as a whole."""
 
 PLACE = {
     "origin": Key(
-        "origin", plain(origin), "Part zero: drawing, lower-left, centre, or x,y.", "PLACE"
+        "origin",
+        Value(plain(origin), "PLACE"),
+        "Part zero: drawing, lower-left, centre, or x,y.",
     ),
-    "mirror": Key("mirror", word(_MIRRORS), "Turn the sign of x, or of y.", choices=_MIRRORS),
-    "rotate": Key("rotate_rad", plain(angle), "Counterclockwise, in degrees.", "ANGLE"),
-    "scale": Key("scale", plain(number), "Times as large.", "FACTOR"),
-    "fit": Key("fit_mm", plain(lengths), "As large as fits (8x6mm; 0: any).", "WxH"),
-    "copies": Key("copies", plain(counts), "Columns and rows of copies.", "NxM"),
-    "pitch": Key("pitch_mm", plain(lengths), "From copy to copy (12x9mm).", "DXxDY"),
+    "mirror": Key("mirror", one_of(("x", "y")), "Turn the sign of x, or of y.", '"x"'),
+    "rotate": Key("rotate_rad", ANGLE, "Counterclockwise, in degrees.", '"90deg"'),
+    "scale": Key("scale", FACTOR, "Times as large."),
+    "fit": Key(
+        "fit_mm", Value(plain(lengths), "WxH"), "As large as fits (8x6mm; 0: any).", '"8x6mm"'
+    ),
+    "copies": Key("copies", Value(plain(counts), "NxM"), "Columns and rows of copies.", '"3x2"'),
+    "pitch": Key(
+        "pitch_mm", Value(plain(lengths), "DXxDY"), "From copy to copy (12x9mm).", '"12x9mm"'
+    ),
 }
 """Keys of `[place]`, in the order in which they act, but that the origin comes last."""
 
 STOCK = {
-    "corner": Key("corner_mm", plain(lengths)),
-    "size": Key("size_mm", plain(lengths)),
-    "thickness": Key("thickness_mm", plain(length)),
-    "spoilboard": Key("spoilboard_mm", plain(length)),
+    "corner": Key("corner_mm", Value(plain(lengths))),
+    "size": Key("size_mm", Value(plain(lengths))),
+    "thickness": Key("thickness_mm", LENGTH),
+    "spoilboard": Key("spoilboard_mm", LENGTH),
 }
 """Keys of `[stock]`: all but the last must be there."""
 
-_TIPS = ("v", "drill")
 TOOL = {
-    "diameter": Key("diameter_mm", plain(length), "0 for a point (default).", "LENGTH"),
-    "kind": Key("kind", word(TOOL_KINDS), "Its shape.", choices=TOOL_KINDS),
+    "diameter": Key("diameter_mm", LENGTH, "0 for a point (default)."),
+    "kind": Key("kind", one_of(TOOL_KINDS), "Its shape.", '"v"'),
     "tip_angle": Key(
-        "tip_angle_rad", plain(angle), "Of a V bit or drill.", "ANGLE", only=("kind", _TIPS)
+        "tip_angle_rad", ANGLE, "Of a V bit or drill.", '"60deg"', only=("kind", ("v", "drill"))
     ),
     "tip_diameter": Key(
-        "tip_diameter_mm", plain(length), "Of a V bit cut off.", "LENGTH", only=("kind", ("v",))
+        "tip_diameter_mm", LENGTH, "Of a V bit cut off.", '"0.1mm"', only=("kind", ("v",))
     ),
-    "number": Key("number", plain(whole)),
+    "number": Key("number", COUNT, example="1"),
 }
 """Keys of `[tools.NAME]`; with `tool_` before them, keys of an operation."""
+
+TOOL_NAME = "tool"
+"""Key of an operation: the name of a tool of the file, or its number."""
 
 TOOL_KEYS = {f"tool_{name}": key for name, key in TOOL.items() if name != "number"}
 """The tool of an operation that names none, key by key."""
 
+_LINES = ("profile", "pocket", "engrave")
+_LAYERED = ("profile", "pocket", "engrave", "vcarve")
+_CLEARING = ("profile", "pocket")
+_ALONG = ("profile", "engrave")
+_PROFILE = ("profile",)
+_POCKET = ("pocket",)
+_DRILL = ("drill",)
+
 OPERATION = {
-    "name": Key("name", plain(text), kinds=KINDS),
-    "kind": Key("kind", word(KINDS), "What is done.  [profile]", choices=KINDS, kinds=KINDS),
-    "layers": Key("layers", plain(patterns), kinds=KINDS),
-    "colours": Key("colours", plain(colours), kinds=KINDS),
+    "name": Key("name", TEXT, kinds=KINDS),
+    "kind": Key("kind", one_of(KINDS), "What is done.  [profile]", kinds=KINDS),
+    "layers": Key("layers", PATTERNS_OF_NAMES, kinds=KINDS),
+    "colours": Key("colours", Value(plain(colours)), kinds=KINDS),
     "side": Key(
         "side",
-        word(SIDES),
+        Value(word(SIDES), choices=("auto", "on", "outside", "inside")),
         "Where the tool runs; auto: outside of parts, inside of holes.",
-        choices=("auto", "on", "outside", "inside"),
-        kinds=_PROFILE,
+        '"auto"',
+        _PROFILE,
     ),
-    "direction": Key(
-        "direction", word(DIRECTIONS), "Which way round.", choices=DIRECTIONS, kinds=_CLEARING
+    "direction": Key("direction", one_of(DIRECTIONS), "Which way round.", '"climb"', _CLEARING),
+    "allowance": Key("allowance_mm", LENGTH, "Left on the wall.", '"0.1mm"', _CLEARING),
+    "feed": Key("feed_mm_min", FEED, "In mm/min.", '"90mm/min"', KINDS),
+    "plunge_feed": Key("plunge_feed_mm_min", FEED, "In mm/min.", '"30mm/min"', KINDS),
+    "spindle": Key(
+        "spindle_rpm", Value(plain(number), "SPEED"), "In rev/min; none: off.", "12000", KINDS
     ),
-    "allowance": Key(
-        "allowance_mm", plain(length), "Left on the wall.", "LENGTH", kinds=_CLEARING
-    ),
-    "feed": Key("feed_mm_min", plain(feed), "In mm/min.", "FEED", kinds=KINDS),
-    "plunge_feed": Key("plunge_feed_mm_min", plain(feed), "In mm/min.", "FEED", kinds=KINDS),
-    "spindle": Key("spindle_rpm", plain(number), "In rev/min; none: off.", "SPEED", kinds=KINDS),
-    "depth": Key("depth_mm", plain(length), "Depth of cut below Z0.", "LENGTH", kinds=KINDS),
-    "step_down": Key("step_down_mm", plain(length), "Depth of a pass.", "LENGTH", kinds=_LAYERED),
-    "last_pass": Key(
-        "last_pass_mm", plain(length), "Depth of the last pass.", "LENGTH", kinds=_LAYERED
-    ),
+    "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"', KINDS),
+    "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"', _LAYERED),
+    "last_pass": Key("last_pass_mm", LENGTH, "Depth of the last pass.", '"0.1mm"', _LAYERED),
     "entry": Key(
-        "entry", entry, "plunge, ramp:3deg, or helix:3deg:1mm in pockets.", "ENTRY", kinds=_LINES
+        "entry",
+        Value(entry, "ENTRY", tables=True),
+        "plunge, ramp:3deg, or helix:3deg:1mm in pockets.",
+        '"ramp:3deg"',
+        _LINES,
     ),
-    "lead_in": Key("lead_in", lead, "none, line:1mm or arc:1mm.", "LEAD", kinds=_PROFILE),
-    "lead_out": Key("lead_out", lead, "The same at the end.", "LEAD", kinds=_PROFILE),
-    "overlap": Key(
-        "overlap_mm",
-        plain(length),
-        "Cut beyond the start.",
-        "LENGTH",
-        kinds=("profile", "engrave"),
+    "lead_in": Key(
+        "lead_in",
+        Value(lead, "LEAD", tables=True),
+        "none, line:1mm or arc:1mm.",
+        '"arc:1mm"',
+        _PROFILE,
     ),
+    "lead_out": Key(
+        "lead_out",
+        Value(lead, "LEAD", tables=True),
+        "The same at the end.",
+        '"arc:1mm"',
+        _PROFILE,
+    ),
+    "overlap": Key("overlap_mm", LENGTH, "Cut beyond the start.", '"0.2mm"', _ALONG),
     "start": Key(
         "start",
-        plain(start),
+        Value(plain(start), "START"),
         "nearest, longest-line, corner, or x,y.",
-        "START",
-        kinds=("profile", "engrave"),
+        '"longest-line"',
+        _ALONG,
     ),
     "tabs": Key(
-        "tabs", tabs, "How many (4), or how far apart (20mm); 4:2mm:0.5mm.", "TABS", kinds=_PROFILE
+        "tabs",
+        Value(tabs, "TABS", tables=True),
+        "How many (4), or how far apart (20mm); 4:2mm:0.5mm.",
+        '"4:2mm:0.5mm"',
+        _PROFILE,
     ),
-    "corners": Key(
-        "corners", word(CORNERS), "Relief of inner corners.", choices=CORNERS, kinds=_PROFILE
-    ),
+    "corners": Key("corners", one_of(CORNERS), "Relief of inner corners.", '"dogbone"', _PROFILE),
     "joins": Key(
-        "joins", word(JOINS), "The tool's way round outer corners.", choices=JOINS, kinds=_PROFILE
+        "joins", one_of(JOINS), "The tool's way round outer corners.", '"mitre"', _PROFILE
     ),
     "mitre_limit": Key(
         "mitre_limit",
-        plain(number),
+        FACTOR,
         "How long a mitre may be.",
-        "FACTOR",
-        kinds=_PROFILE,
+        "2.0",
+        _PROFILE,
         only=("joins", ("mitre",)),
     ),
-    "pattern": Key(
-        "pattern", word(PATTERNS), "How a pocket is cleared.", choices=PATTERNS, kinds=_POCKET
-    ),
+    "pattern": Key("pattern", one_of(PATTERNS), "How a pocket is cleared.", kinds=_POCKET),
     "step_over": Key(
-        "step_over", plain(fraction), "Part of the diameter (0.4, 40%).", "PART", kinds=_POCKET
-    ),
-    "angle": Key(
-        "angle_rad",
-        plain(angle),
-        "Of a zigzag.",
-        "ANGLE",
+        "step_over",
+        Value(plain(fraction), "PART"),
+        "Part of the diameter (0.4, 40%).",
         kinds=_POCKET,
-        only=("pattern", ("zigzag",)),
     ),
-    "peck": Key(
-        "peck_mm", plain(length), "How deep a drill goes at a time.", "LENGTH", kinds=_DRILL
-    ),
-    "dwell": Key("dwell_s", plain(time), "At the bottom, in s.", "TIME", kinds=_DRILL),
-    "max_hole": Key(
-        "max_hole_mm", plain(length), "The largest circle that is drilled.", "LENGTH", kinds=_DRILL
-    ),
+    "angle": Key("angle_rad", ANGLE, "Of a zigzag.", kinds=_POCKET, only=("pattern", ("zigzag",))),
+    "peck": Key("peck_mm", LENGTH, "How deep a drill goes at a time.", '"0.2mm"', _DRILL),
+    "dwell": Key("dwell_s", TIME, "At the bottom, in s.", '"0.5s"', _DRILL),
+    "max_hole": Key("max_hole_mm", LENGTH, "The largest circle that is drilled.", '"3mm"', _DRILL),
 }
 """Keys of an operation, but for its tool."""
 
-TOOL_NAME = "tool"
-"""Key of an operation: the name of a tool of the file, or its number."""
+# The same keys by other names: as flags, and as fields from Python.
+
+FLAGS: dict[str, dict[str, Key]] = {
+    "Job (every key of docs/jobs.md is a flag)": WHOLE,
+    "Where the drawing lies, in this order": {
+        **{name: key for name, key in PLACE.items() if name != "origin"},
+        "origin": PLACE["origin"],
+    },
+    "Tool": {
+        TOOL_NAME: Key("tool", Value(plain(text), "NAME"), "A tool of the file, or its number."),
+        **TOOL_KEYS,
+    },
+    "How it is cut": {name: key for name, key in OPERATION.items() if key.help},
+}
+"""The keys that are flags too, under the headings of the help."""
+
+_FLAGS_OF_OTHER_NAMES = {"tool_tip_angle": "--tool-angle"}
+
+_FIELDS: dict[str, Key] = {
+    **{key.field: key for keys in (OPERATION, WHOLE, PLACE) for key in keys.values()},
+    **{f"tool_{key.field}": key for key in TOOL_KEYS.values()},
+}
+
+
+def flag_name(name: str) -> str:
+    """The flag that says what a key says."""
+    return _FLAGS_OF_OTHER_NAMES.get(name, f"--{name.replace('_', '-')}")
+
+
+def field_value(name: str, value: Any) -> Any:
+    """The value of a field of Operation, Job, Placement or (with `tool_` before it) Tool: texts,
+    lists, and numbers where a record is wanted, are read as a job file has them."""
+    key = _FIELDS.get(name)
+    if name == "layers" and isinstance(value, str):
+        return layers(value)
+    if key is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str | list | tuple | dict) or (
+        key.value.tables and isinstance(value, int | float)
+    ):
+        return key.read(Given(value, name))
+    return value

@@ -22,7 +22,7 @@ from camtool.planning.drill import circle_of
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.geometry.polylines import Polyline
+    from camtool.geometry.polylines import Polyline, Polylines
     from camtool.machine.model import Machine
 
 SMALL_HOLE = 0.1
@@ -35,47 +35,6 @@ TOOL_NAME = "tool"
 _ORDER = ("drill", "engrave", "profile")
 _WIDTH = 36
 _SURROGATES = range(0xD800, 0xE000)
-
-_EXAMPLES = {
-    "safe_z": '"1mm"',
-    "minimise": '"reversals"',
-    "approach": "true",
-    "frames": '["SHEET"]',
-    "tool_table": '"tool.tbl"',
-    "tool_table_units": '"mm"',
-    "mirror": '"x"',
-    "rotate": '"90deg"',
-    "scale": "2.0",
-    "fit": '"8x6mm"',
-    "copies": '"3x2"',
-    "pitch": '"12x9mm"',
-    "kind": '"v"',
-    "tip_angle": '"60deg"',
-    "tip_diameter": '"0.1mm"',
-    "number": "1",
-    "side": '"auto"',
-    "direction": '"climb"',
-    "allowance": '"0.1mm"',
-    "feed": '"90mm/min"',
-    "plunge_feed": '"30mm/min"',
-    "spindle": "12000",
-    "depth": '"1mm"',
-    "step_down": '"0.5mm"',
-    "last_pass": '"0.1mm"',
-    "entry": '"ramp:3deg"',
-    "lead_in": '"arc:1mm"',
-    "lead_out": '"arc:1mm"',
-    "overlap": '"0.2mm"',
-    "start": '"longest-line"',
-    "tabs": '"4:2mm:0.5mm"',
-    "corners": '"dogbone"',
-    "joins": '"mitre"',
-    "mitre_limit": "2.0",
-    "peck": '"0.2mm"',
-    "dwell": '"0.5s"',
-    "max_hole": '"3mm"',
-}
-"""What stands behind the keys in comments; taken all together they are a job."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +58,11 @@ def job_template(drawing: Drawing, machine: Machine | None = None) -> str:
     )
     lines = [
         *_head(drawing, size, machine),
-        *_comments(WHOLE, WHOLE),
+        *_comments(WHOLE),
         "",
         "[place]",
         _row('origin = "lower-left"', PLACE["origin"].help),
-        *_comments(PLACE, [key for key in PLACE if key not in ("origin", "scale")]),
+        *_comments(PLACE),
         "",
         "# [stock]                           # its top is Z0; the corner is its lower left one",
         '# corner = ["0mm", "0mm"]',
@@ -113,7 +72,7 @@ def job_template(drawing: Drawing, machine: Machine | None = None) -> str:
         "",
         f"[tools.{TOOL_NAME}]",
         _row('diameter = "0mm"', TOOL["diameter"].help),
-        *_comments(TOOL, [key for key in TOOL if key != "diameter"]),
+        *_comments(TOOL),
     ]
     for _, text in operations:
         lines += ["", *text]
@@ -149,12 +108,12 @@ def _groups(drawing: Drawing) -> list[_Group]:
 
 
 def _by(names: Sequence[str], of_marks: Sequence[str], key: str) -> list[_Group]:
-    rows: dict[str, tuple[str, list[int], list[int]]] = {}
-    for column, every in ((1, names), (2, of_marks)):
-        for row, name in enumerate(every):
-            kept = rows.setdefault(name.casefold(), (name, [], []))
-            kept[column].append(row)  # type: ignore[union-attr]
-    return [_Group(name, key, tuple(paths), tuple(marks)) for name, paths, marks in rows.values()]
+    groups: dict[str, tuple[str, list[int], list[int]]] = {}
+    for row, name in enumerate(names):
+        groups.setdefault(name.casefold(), (name, [], []))[1].append(row)
+    for row, name in enumerate(of_marks):
+        groups.setdefault(name.casefold(), (name, [], []))[2].append(row)
+    return [_Group(name, key, tuple(rows), tuple(marks)) for name, rows, marks in groups.values()]
 
 
 def _extent(drawing: Drawing, group: _Group) -> float:
@@ -180,12 +139,8 @@ def _operation(drawing: Drawing, group: _Group, size_mm: float) -> tuple[str, li
     ]
     if marks and kind != "drill":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")
-    keys = [
-        name
-        for name, key in OPERATION.items()
-        if kind in key.kinds and name in _EXAMPLES and name != "kind"
-    ]
-    return kind, [*text, *_comments(OPERATION, keys)]
+    known = {name: key for name, key in OPERATION.items() if kind in key.kinds}
+    return kind, [*text, *_comments(known)]
 
 
 def _is_hole(path: Polyline, largest_mm: float) -> bool:
@@ -193,19 +148,18 @@ def _is_hole(path: Polyline, largest_mm: float) -> bool:
     return circle is not None and circle[1] <= largest_mm
 
 
-def _counted(lines: object) -> str:
-    closed = lines.closed  # type: ignore[attr-defined]
-    return f"{np.count_nonzero(closed)} closed and {np.count_nonzero(~closed)} open paths"
+def _counted(lines: Polylines) -> str:
+    closed = np.count_nonzero(lines.closed)
+    return f"{closed} closed and {len(lines.closed) - closed} open paths"
 
 
-def _comments(keys: Mapping[str, Key], names: Sequence[str] | Mapping[str, Key]) -> list[str]:
-    """Keys with their examples, commented out."""
-    return [_row(f"# {name} = {_EXAMPLES[name]}", _told(keys[name])) for name in names]
-
-
-def _told(key: Key) -> str:
-    """What a key means, and the words that it may be."""
-    return " ".join([key.help, *((", ".join(key.choices),) if key.choices else ())])
+def _comments(keys: Mapping[str, Key]) -> list[str]:
+    """Keys with their examples, commented out, and the words that each may be."""
+    return [
+        _row(f"# {name} = {key.example}", f"{key.help} {', '.join(key.value.choices)}".rstrip())
+        for name, key in keys.items()
+        if key.example
+    ]
 
 
 def _row(text: str, remark: str) -> str:

@@ -16,8 +16,7 @@ from pathlib import Path
 import click
 
 from camtool.cli.main import cli, main
-from camtool.cli.options import flag_name
-from camtool.jobs.keys import OPERATION, TOOL_KEYS
+from camtool.jobs.keys import OPERATION, TOOL_KEYS, flag_name
 from tests.waiting import HANG_S
 
 BAD = ("nan", "inf", "-inf", "-1", "0", "1e308", "1e-308", "", "9" * 5000, "\x1b[31m")

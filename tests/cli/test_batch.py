@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from camtool.batches import manifest as digests_module
 from camtool.batches.lock import alone_in
 from camtool.batches.run import Made, Pool, Task
 from camtool.cli import batch, batch_work
@@ -33,11 +32,11 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[HerePool]:
     """The drawings are made in this process; the pool of each run, to see what it was asked."""
     made: list[HerePool] = []
 
-    def here(batched: batch.Batched, note: object) -> Pool:
-        made.append(HerePool(batched.work))
+    def here(run: batch.BatchRun, note: object) -> Pool:
+        made.append(HerePool(run.work))
         return made[-1]
 
-    monkeypatch.setattr(batch.Batched, "_pool", here)
+    monkeypatch.setattr(batch, "pool_for", here)
     monkeypatch.setattr(batch_work, "code_digest", lambda files: "of no matter here")
     return made
 
@@ -272,10 +271,10 @@ def test_an_output_folder_within_the_drawings(camtool: Run, drawings: Path) -> N
 
 
 def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyPatch) -> None:
-    work = batch_work.PostWork(load_target("grbl"), DrawingFlags((), (), (), (), {}))
+    work = batch_work.PostWork(load_target("grbl"), DrawingFlags())
     other = {
         "target": load_target("grbl", settings=["axes.x.backlash_mm=0.2"]),
-        "drawing": DrawingFlags((), (), (), (), {"gap_mm": 0.5}),
+        "drawing": DrawingFlags(gap_mm=0.5),
         "gates": Gates(error_mm=0.1),
         "preview": ".svg",
         "reports": True,
@@ -285,7 +284,7 @@ def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyP
     }
     assert other.keys() == {field.name for field in fields(work)}, "a new field counts too"
     digests = [work.digest(), *(replace(work, **{key: other[key]}).digest() for key in other)]
-    monkeypatch.setattr(digests_module, "_version", lambda name: "another one")
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "another one")
     digests.append(work.digest())
     monkeypatch.undo()
     monkeypatch.setattr(batch_work, "code_digest", lambda files: "of other code")
@@ -331,7 +330,7 @@ def test_a_run_that_cannot_go_on_still_sums_up(
             yield from super().results(tasks[:1])
             raise CamtoolError("the scheduler was lost", where="--scheduler")
 
-    monkeypatch.setattr(batch.Batched, "_pool", lambda batched, note: Lost(batched.work))
+    monkeypatch.setattr(batch, "pool_for", lambda run, note: Lost(run.work))
     sources = ("drawings/letter.svg", "drawings/in/square.dxf")
     done = camtool("batch", *sources, *PIC, *QUICK, "--json", "-")
     assert done.returncode == 2

@@ -185,7 +185,7 @@ def test_the_first_run_says_why_it_is_silent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import camtool.kernels
-    from camtool.cli.messages import say_first_run
+    from camtool.cli.first_run import say_first_run
 
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(camtool.kernels, "__file__", str(tmp_path / "__init__.py"))

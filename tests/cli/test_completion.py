@@ -11,7 +11,7 @@ import click
 import pytest
 from click.shell_completion import CompletionItem, ShellComplete
 
-from camtool.cli.completion import VARIABLE, dxf_layers, values_told
+from camtool.cli.completion import VARIABLE, complete_values, dxf_layers
 from camtool.cli.main import cli
 
 LOGO = "samples/logo.dxf"
@@ -21,7 +21,7 @@ HEAVY = {"numba", "ezdxf", "shapely", "scipy", "build123d"}
 @pytest.fixture(scope="module")
 def told() -> click.Command:
     command = copy.deepcopy(cli)
-    values_told(command)
+    complete_values(command)
     return command
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.jobs.build import Said, build_job, read_job_file
+from camtool.jobs.build import JobTables, build_job, read_job_file
 from camtool.planning.job import Job
 from tests.cli.conftest import ROOT, Run
 
@@ -15,7 +15,7 @@ SAMPLES = ("logo.dxf", "logo.svg", "plate.dxf", "coupon.dxf", "star.csv")
 
 def loaded(text: str, folder: Path) -> Job:
     (folder / "made.toml").write_text(text, encoding="utf-8")
-    return build_job(read_job_file(folder / "made.toml"), Said())
+    return build_job(read_job_file(folder / "made.toml"), JobTables())
 
 
 @pytest.mark.parametrize("name", SAMPLES)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from camtool.cli.options import DrawingFlags, JobFlags
-from camtool.jobs.build import Said, build_job, read_job_file
+from camtool.jobs.build import JobTables, build_job, read_job_file
 from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE
 from camtool.planning.job import (
     Entry,
@@ -173,7 +173,7 @@ def job(
     (folder / "tool.tbl").write_text(TABLE)
     chosen = (only,) if only else ()
     given = JobFlags(str(folder / "job.toml"), chosen, flags)
-    return given.job(DrawingFlags(layers, (), (), (), {}))
+    return given.job(DrawingFlags(layers))
 
 
 def test_every_key_has_its_place(tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_every_key_has_its_place(tmp_path: Path) -> None:
 
 
 def test_an_empty_file_is_the_job_that_says_nothing(tmp_path: Path) -> None:
-    assert job(tmp_path, "") == job_of() == build_job(Said(), Said())
+    assert job(tmp_path, "") == job_of() == build_job(JobTables(), JobTables())
 
 
 def test_the_flat_form_is_one_operation_without_a_name(tmp_path: Path) -> None:
@@ -342,7 +342,7 @@ def test_paths_are_relative_to_the_file(tmp_path: Path, monkeypatch: pytest.Monk
     assert job(tmp_path / "sub", text).operations[0].tool.diameter_mm == 0.125
     monkeypatch.chdir(tmp_path / "sub")
     flags = JobFlags(None, (), {"tool": "3", "tool_table": "tool.tbl"})
-    made = flags.job(DrawingFlags((), (), (), (), {}))
+    made = flags.job(DrawingFlags())
     assert made.operations[0].tool == Tool(0.125, number=3, name="1/8 end mill")
 
 

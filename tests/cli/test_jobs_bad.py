@@ -288,7 +288,7 @@ _flags = sorted({*WHOLE, *PLACE, "tool", *TOOL_KEYS, *(n for n in OPERATION if O
 def test_whatever_a_flag_says_it_is_a_job_or_one_line(name: str, text: str) -> None:
     flag = "--tool-angle" if name == "tool_tip_angle" else f"--{name.replace('_', '-')}"
     try:
-        made: object = JobFlags(None, (), {name: text}).job(DrawingFlags((), (), (), (), {}))
+        made: object = JobFlags(None, (), {name: text}).job(DrawingFlags())
     except OptionError as error:
         made = str(error)
     assert isinstance(made, Job) or made.startswith((flag, "vcarve"))

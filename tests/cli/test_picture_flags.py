@@ -7,7 +7,6 @@ from xml.etree import ElementTree
 import click
 import pytest
 
-from camtool.cli.batch import Batched
 from camtool.cli.files import sealed
 from camtool.cli.main import cli
 from camtool.errors import OptionError
@@ -122,7 +121,7 @@ def test_every_command_draws_the_same_picture(drawing: str) -> None:
 def test_a_batch_draws_the_same_pictures_and_again_when_they_shall_look_otherwise(
     drawing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Batched, "_pool", lambda batched, note: HerePool(batched.work))
+    monkeypatch.setattr("camtool.cli.batch.pool_for", lambda run, note: HerePool(run.work))
     run("post", drawing, *POST, *LOOKS, "--preview", "a.svg")
     batch = ("batch", drawing, *POST[:-2], "-o", "build", "--preview", "svg")
     run(*batch, "--size", "300")

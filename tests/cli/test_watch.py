@@ -145,13 +145,14 @@ def test_an_error_is_said_and_watching_goes_on(file: Path, capsys) -> None:
 
 def test_a_tool_table_of_the_job_is_watched(tmp_path: Path) -> None:
     job = tmp_path / "job.toml"
-    flags = JobFlags(str(job), (), {})
-    assert flags.tool_table() is None
+    flags = JobFlags(str(job))
+    assert flags.files() == [str(job)]
     job.write_text("tool_table = [")
-    assert flags.tool_table() is None
+    assert flags.files() == [str(job)]
     job.write_text('tool_table = "my.tbl"')
-    assert flags.tool_table() == str(tmp_path / "my.tbl")
-    assert JobFlags(str(job), (), {"tool_table": "other.tbl"}).tool_table() == "other.tbl"
+    assert flags.files() == [str(job), str(tmp_path / "my.tbl")]
+    given = JobFlags(str(job), (), {"tool_table": "other.tbl"})
+    assert given.files() == [str(job), "other.tbl"]
 
 
 def test_a_file_that_is_named_anew_counts(file: Path, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.jobs.build import AT_THE_TOP, OF_OPERATIONS, Said, build_job, said_of
+from camtool.jobs.build import AT_THE_TOP, OF_OPERATIONS, JobTables, build_job, tables_of
 from camtool.jobs.keys import ENTRY, LEAD, PLACE, STOCK, TABS, TOOL
 from camtool.planning.job import ENTRIES, KINDS, LEADS, Job
 
@@ -53,7 +53,7 @@ def _files(draw: st.DrawFn) -> dict[str, Any]:
 @given(_files())
 def test_whatever_a_file_holds_it_is_a_job_or_one_line(file: dict[str, Any]) -> None:
     try:
-        made: object = build_job(said_of(file, Path("job.toml")), Said())
+        made: object = build_job(tables_of(file, Path("job.toml")), JobTables())
     except OptionError as error:
         made = str(error)
     assert isinstance(made, Job) or (made.startswith("job.toml: ") and "\n" not in made)

@@ -13,8 +13,8 @@ DRAWINGS = {"logo.toml": "logo.dxf", "plate.toml": "plate.dxf"}
 
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_it_is_the_commands_job(name: str) -> None:
-    flags = JobFlags(str(SAMPLES / name), (), {})
-    assert camtool.read_job(SAMPLES / name) == flags.job(DrawingFlags((), (), (), (), {}))
+    flags = JobFlags(str(SAMPLES / name))
+    assert camtool.read_job(SAMPLES / name) == flags.job(DrawingFlags())
     # And the drawing has all that its operations take.
     camtool.read_job(SAMPLES / name, drawing=SAMPLES / DRAWINGS[name], target="grbl")
 
