@@ -18,7 +18,7 @@ from camtool.arrays import Floats
 from camtool.errors import PostError
 from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
-from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
+from camtool.toolpath.lower import Lowered, arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 
@@ -72,32 +72,37 @@ class _Writer:
         self._dialect = dialect
         self._say = SAY[dialect.form]
         self._wanted = toolpath
+        self._notes = Notes()
         check_motion(toolpath, machine)
         # Refuses by the numbers of the rows that were given, before these are lowered.
         given = numbers_of(toolpath, machine, dialect)
         self._feed_finding = given.feed_finding
-        step_mm = slope_step_mm(machine)
-        far = far_arcs(toolpath, machine, dialect)
-        straight = arcs_to_lines(toolpath, far, LINE_SAGITTA * given.grids[0].resolution_mm)
-        stepped = helices_to_steps(straight.toolpath, step_mm)
-        lowered = stepped.after(straight)
-        beyond = ~given.grids[0].fits(lowered.toolpath.end[:, :2]).all(axis=1)
-        if beyond.any():
-            _refuse_chords(toolpath.place(int(lowered.row[beyond.argmax()])))
+        lowered = self._lowered(given.grids[0])
         self._toolpath, self._row = lowered.toolpath, lowered.row.tolist()
         self._numbers = numbers_of(lowered.toolpath, machine, dialect)
-        self._notes = Notes(split_step_mm=step_mm, far=int(far.sum()))
-        if far.any():
-            self._notes.far_place = toolpath.place(int(far.argmax()))
         self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
-        steps = np.bincount(stepped.row, minlength=len(straight.toolpath)) > 1
-        slopes = np.unique(straight.row[steps & straight.toolpath.is_feed])
-        if len(slopes):
-            self._notes.split = len(slopes)
-            self._notes.split_place = toolpath.place(int(slopes[0]))
         self._units = [0, 0, 0]
         self._steps = [0, 0, 0]
         self._starts = lowered.toolpath.starts[:, :2]
+
+    def _lowered(self, grid: Grid) -> Lowered:
+        """Arcs whose centre cannot be said as lines, slopes as steps; the notes tell of both."""
+        toolpath, notes = self._wanted, self._notes
+        far = far_arcs(toolpath, self._machine, self._dialect)
+        notes.far = int(far.sum())
+        notes.far_place = toolpath.place(int(far.argmax())) if notes.far else ""
+        straight = arcs_to_lines(toolpath, far, LINE_SAGITTA * grid.resolution_mm)
+        notes.split_step_mm = slope_step_mm(self._machine)
+        stepped = helices_to_steps(straight.toolpath, notes.split_step_mm)
+        steps = np.bincount(stepped.row, minlength=len(straight.toolpath)) > 1
+        slopes = np.unique(straight.row[steps & straight.toolpath.is_feed])
+        notes.split = len(slopes)
+        notes.split_place = toolpath.place(int(slopes[0])) if notes.split else ""
+        lowered = stepped.after(straight)
+        beyond = ~grid.fits(lowered.toolpath.end[:, :2]).all(axis=1)
+        if beyond.any():
+            _refuse_chords(toolpath.place(int(lowered.row[beyond.argmax()])))
+        return lowered
 
     @property
     def _grid(self) -> Grid:
