@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.polylines import Polylines, Segments
+from camtool.geometry.polylines import Segments
 
 PAIRS_AT_A_TIME = 1 << 16
 """How many pairs of boxes are handled at a time: it bounds the memory."""
@@ -107,26 +107,3 @@ def curve_rows_of(segments: Segments) -> Floats:
 
     columns = (segments.start, segments.end, segments.bulge)
     return curve_rows(*(np.ascontiguousarray(column) for column in columns))
-
-
-def meets_itself(lines: Polylines, eps_mm: float) -> bool:
-    """Whether closed paths have common points within `eps_mm`, other than between neighbours."""
-    from camtool.kernels.offset_meet import TA, TB, meetings_of, pairs_of
-
-    segments = Segments.of(lines)
-    curves = Curves.of(segments, margin_mm=eps_mm)
-    pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
-    met, at = meetings_of(curves.rows, curves.rows, pairs, eps_mm)
-    one, other = met.T
-    following = next_rows(lines)
-    a_first = (following[one] == other) & (at[:, TA] == 1.0) & (at[:, TB] == 0.0)
-    b_first = (following[other] == one) & (at[:, TA] == 0.0) & (at[:, TB] == 1.0)
-    apart: Bools = ~(a_first | b_first)
-    return bool(apart.any())
-
-
-def next_rows(lines: Polylines) -> Ints:
-    """The row of the segment that follows each one, of closed paths."""
-    following = np.arange(1, len(lines.vertices) + 1)
-    following[lines.offsets[1:] - 1] = lines.offsets[:-1]
-    return following

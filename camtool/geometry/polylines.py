@@ -291,30 +291,12 @@ def lines_reversed(lines: Polylines) -> Polylines:
     return Polylines._trusted(vertices, lines.offsets, lines.closed)
 
 
-def moved(p: Polyline, dx: float, dy: float) -> Polyline:
-    """The path moved by (dx, dy) mm."""
-    return Polyline(p.vertices + np.array([dx, dy, 0.0]), p.closed)
-
-
 def rotated(p: Polyline, angle_rad: float) -> Polyline:
     """The path turned about (0, 0), CCW positive."""
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     x, y, bulge = p.vertices.T
     turned = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, bulge])
     return Polyline(turned, p.closed)
-
-
-def mirrored(p: Polyline) -> Polyline:
-    """The path mirrored about the Y axis: x and every bulge change their sign."""
-    x, y, bulge = p.vertices.T
-    return Polyline(np.column_stack([0.0 - x, y, 0.0 - bulge]), p.closed)
-
-
-def scaled(p: Polyline, factor: float) -> Polyline:
-    """The path scaled about (0, 0) by a factor above 0; GeometryError for any other factor."""
-    if not (math.isfinite(factor) and factor > 0.0):
-        raise GeometryError(f"a scale of {factor} is not above 0", mend="mirror with mirrored()")
-    return Polyline(p.vertices * np.array([factor, factor, 1.0]), p.closed)
 
 
 def rolled(p: Polyline, start_index: int) -> Polyline:

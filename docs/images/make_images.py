@@ -17,7 +17,7 @@ import numpy as np
 
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.measure import point_at
-from camtool.geometry.offset import Slices, Way, shape_stages
+from camtool.geometry.offset import Offset, Slices, shape_stages
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.pictures.draw import render
 from camtool.pictures.scene import Scene
@@ -76,7 +76,7 @@ def pieces(elements: Segments, slices: Slices) -> list[Polyline]:
 def stages_picture() -> Scene:
     """The source; what was thrown away; what was kept."""
     source = shape()
-    stages = shape_stages(source, Way(DISTANCE_MM))
+    stages = shape_stages(source, Offset(DISTANCE_MM))
     elements = stages.trimmed.elements
     groups = {
         "drawn": list(source),

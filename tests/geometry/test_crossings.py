@@ -20,15 +20,8 @@ from camtool.geometry.intersect import (
     self_crossings_of,
 )
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import (
-    Polyline,
-    Polylines,
-    Segments,
-    mirrored,
-    reverse,
-    rolled,
-    rotated,
-)
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
+from tests.paths import mirrored
 from tests.strategies import contours, polylines
 
 

@@ -10,17 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.distance import approach, nearest, path_distance, points_to_segments
-from camtool.geometry.polylines import (
-    Polyline,
-    Segments,
-    mirrored,
-    moved,
-    reverse,
-    rolled,
-    rotated,
-    scaled,
-)
+from camtool.geometry.polylines import Polyline, Segments, reverse, rolled, rotated
 from tests.oracles.geometry import dense_points, line_string, sagitta
+from tests.paths import mirrored, moved, scaled
 from tests.strategies import coordinates, polylines
 
 N = 64

@@ -21,8 +21,9 @@ from camtool.geometry.facts import (
     smallest_contour,
     smallest_radius,
 )
-from camtool.geometry.polylines import Polyline, Polylines, Segments, moved
+from camtool.geometry.polylines import Polyline, Polylines, Segments
 from tests.drawings import drawing_of
+from tests.paths import moved
 from tests.strategies import contours, polylines
 
 

@@ -22,18 +22,9 @@ from camtool.geometry.measure import (
     signed_area,
     signed_areas,
 )
-from camtool.geometry.polylines import (
-    Polyline,
-    Polylines,
-    Segments,
-    mirrored,
-    moved,
-    reverse,
-    rolled,
-    rotated,
-    scaled,
-)
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
 from tests.oracles.geometry import chord_length, dense_points, polygon, sagitta
+from tests.paths import mirrored, moved, scaled
 from tests.strategies import contours, polylines
 
 N = 400

@@ -9,18 +9,9 @@ from hypothesis import strategies as st
 from shapely import Point
 
 from camtool.geometry.nesting import inside, nesting
-from camtool.geometry.polylines import (
-    Polyline,
-    Polylines,
-    Segments,
-    mirrored,
-    moved,
-    reverse,
-    rolled,
-    rotated,
-    scaled,
-)
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
 from tests.oracles.geometry import polygon, sagitta
+from tests.paths import mirrored, moved, scaled
 from tests.strategies import contours, coordinates, polylines
 
 

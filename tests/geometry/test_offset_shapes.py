@@ -12,19 +12,16 @@ from hypothesis import strategies as st
 from camtool.errors import GeometryError, OptionError
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.nesting import oriented
-from camtool.geometry.offset import OffsetOptions, offset, offset_open, offset_shape
+from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Polyline,
     Polylines,
     Segments,
     lines_reversed,
-    mirrored,
-    moved,
     reverse,
     rolled,
     rotated,
-    scaled,
 )
 from tests.oracles.contours import (
     CIRCLE,
@@ -47,6 +44,7 @@ from tests.oracles.contours import (
 )
 from tests.oracles.offset import distance_complaints
 from tests.oracles.offset_shapes import shape_complaints
+from tests.paths import mirrored, moved, offset, scaled
 
 FRAME = closed((-20, -20), (40, -20), (40, 40), (-20, 40))
 PLATE = [FRAME, CIRCLE, moved(SQUARE, 15, -5), moved(SLOT, 5, 20), closed((-2, 0, 1), (2, 0, 1))]
@@ -255,19 +253,6 @@ def test_mitres_are_where_lines_and_arcs_meet() -> None:
     assert sorted(np.abs(corners[:, 0])) == pytest.approx([11.0, 11.0], abs=1e-9)
 
 
-def test_open_paths_are_mitred_but_for_their_ends() -> None:
-    p = opened((0, 0), (10, 0), (10, 10))
-    (result,) = offset_open(p, -1.0, joins="mitre")
-    assert result.vertices[:, :2] == pytest.approx(
-        np.array([[0, -1], [11, -1], [11, 10]]), abs=1e-12
-    )
-    hook = opened((0, 0), (10, 0), (10, 3), (0.5, 3))
-    (result,) = offset_open(hook, -1.0, joins="sharp")
-    assert result.start == pytest.approx((0.0, -1.0), abs=1e-12)
-    assert result.end == pytest.approx((0.5, 4.0), abs=1e-12)
-    assert len(result) == 3
-
-
 # --- at random ---
 
 
@@ -418,12 +403,3 @@ def test_thousands_of_shapes(
     assume(apart(paths))
     lines, d = shape(paths), sign * share * size
     assert shape_complaints(list(offset_shape(lines, d)), list(lines), d, rng()) == []
-
-
-def test_options_are_taken() -> None:
-    coarse = OffsetOptions(sliver_eps_mm=0.3)
-    (fine,), (rough,) = (
-        offset(gear(40, 9.0, 10.0), 0.05),
-        offset(gear(40, 9.0, 10.0), 0.05, options=coarse),
-    )
-    assert len(rough) < len(fine)

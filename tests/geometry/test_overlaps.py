@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import path_lengths, sample
 from camtool.geometry.overlaps import SAME_LINE_MM, Unlapped, without_overlaps
-from camtool.geometry.polylines import Polyline, Polylines, Segments, mirrored, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotated
+from tests.paths import mirrored
 
 WITHIN = SAME_LINE_MM
 QUARTER = math.tan(math.pi / 8.0)

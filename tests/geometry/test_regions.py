@@ -11,8 +11,9 @@ from camtool.errors import GeometryError
 from camtool.geometry.measure import signed_areas
 from camtool.geometry.nesting import oriented, regions
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import Polyline, Polylines, moved, reverse, rolled, scaled
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
 from tests.oracles.contours import CIRCLE, OBLONG, SQUARE, closed, comb, opened
+from tests.paths import moved, scaled
 
 RINGS = [scaled(CIRCLE, k) for k in (4.0, 3.0, 2.0, 1.0)]
 

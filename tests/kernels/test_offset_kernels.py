@@ -9,24 +9,27 @@ from hypothesis import strategies as st
 
 from camtool.geometry.boxes import Curves, curve_rows_of
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.intersect import crossings, self_crossings
+from camtool.geometry.intersect import Crossings, crossings
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.offset import (
+    NODE_EPS_MM,
+    VALIDITY_EPS_MM,
+    Offset,
     Slices,
-    Way,
     merge_points,
-    offset,
     raw_offset,
     shape_stages,
+    source_arrays,
     trace_loops,
     without_dead_ends,
     without_doubles,
 )
-from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.kernels import offset_curves, offset_kites, offset_meet, offset_near
 from tests.oracles import offset_stages as twin
 from tests.oracles.contours import RANDOM, gear
 from tests.oracles.offset_shapes import kites
+from tests.paths import offset
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -93,7 +96,7 @@ def test_meetings(seed: int, grid: bool) -> None:
     eps = 1e-8
     a, b = Curves.of(one, margin_mm=eps), Curves.of(other, margin_mm=eps)
     for wanted, curves, own in (
-        (self_crossings(one, position_eps_mm=eps, neighbours=True), a, True),
+        (each_once(crossings(one, one, position_eps_mm=eps)), a, True),
         (crossings(one, other, position_eps_mm=eps), b, False),
     ):
         pairs = offset_meet.pairs_of(a.boxes, a.tree, curves.boxes, curves.tree, own)
@@ -106,6 +109,11 @@ def test_meetings(seed: int, grid: bool) -> None:
         near = 1e-3 if grid else 1e-6
         assert without_partner(got, want, near) == []
         assert without_partner(want, got, near) == []
+
+
+def each_once(found: Crossings) -> Crossings:
+    """The meetings of two different rows, not those of the same two the other way round."""
+    return found[found.row_a < found.row_b]
 
 
 def without_partner(some: np.ndarray, others: np.ndarray, near: float) -> list[list[float]]:
@@ -143,24 +151,24 @@ def test_stages(seed: int, kind: str, share: float, outward: bool) -> None:
     if drawn is None or len(drawn[0]) > 40:
         return
     p = Polyline(drawn[0].vertices * (1.0 if not outward else np.array([-1.0, 1.0, -1.0])), True)
-    way = Way(share * drawn[1])
-    stages = shape_stages(Polylines.of([p]), way)
-    elements, least = stages.trimmed.elements, way.distance_mm - way.options.validity_eps_mm
+    asked = Offset(share * drawn[1])
+    stages = shape_stages(Polylines.of([p]), asked)
+    elements, least = stages.trimmed.elements, asked.distance_mm - VALIDITY_EPS_MM
     wanted = twin.valid(stages.slices, elements, Segments.of(p), least)
     assert (stages.valid == wanted).all()
     kept = stages.slices[stages.valid]
-    eps = 2.0 * way.options.node_eps_mm
-    one = without_doubles(kept, elements, way.options)
+    eps = 2.0 * NODE_EPS_MM
+    one = without_doubles(kept, elements)
     other = twin.without_doubles(kept, elements, eps)
     assert one.element.tolist() == other.element.tolist()
     one, other = without_dead_ends(one), twin.without_dead_ends(other)
     assert (one.t0.tolist(), one.to_node.tolist()) == (other.t0.tolist(), other.to_node.tolist())
     loops, walked = trace_loops(one, elements), twin.trace_loops(other, elements)
     assert sorted(map(cycle, loops)) == sorted(map(cycle, walked))
-    eps = way.options.sliver_eps_mm
+    eps = POSITION_EPS_MM
     clean = [twin.without_slivers(twin.vertices_of(r, other, elements), eps) for r in walked]
     left = [each for each in clean if each is not None and len(each) > 1]
-    found = offset(p, way.distance_mm)
+    found = offset(p, asked.distance_mm)
     if len(found) == len(left):
         lengths = sorted(len(each) for each in left)
         assert sorted(len(each) for each in found) == lengths
@@ -196,11 +204,9 @@ def test_depth_in_kites(seed: int, limit: float) -> None:
     rng = np.random.default_rng(seed)
     p = gear(int(rng.integers(3, 9)), 6.0, 10.0)
     d = float(rng.uniform(0.1, 3.0))
-    raw = raw_offset(Polylines.of([p]), Way(d, limit))
+    raw = raw_offset(Polylines.of([p]), Offset(d, limit))
     wanted = [shapely.Polygon(kite) for kite in kites([p], d, limit)]
-    from camtool.geometry.offset import Near
-
-    _, _, own, tree = Near.of(Segments.of(p), raw.kites).arrays
+    _, _, own, tree = source_arrays(Segments.of(p), raw.kites)
     assert len(own) == len(wanted)
     for x, y in rng.uniform(-14.0, 14.0, (200, 2)):
         points = [shapely.Point(x, y)] * len(wanted)

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import sample
-from camtool.geometry.polylines import Polyline, Polylines, mirrored, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rotated
 from camtool.pictures.strokes import Chain, chains_box, chains_of, path_data, strokes_of
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.svg_page import Arc, Line, pieces
+from tests.paths import mirrored
 
 FULL = 2.0 * math.pi
 EQUAL_MM = 1e-6

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.distance import path_distance
 from camtool.geometry.nesting import oriented
-from camtool.geometry.polylines import Polyline, Polylines, moved, rotated, scaled
+from camtool.geometry.polylines import Polyline, Polylines, rotated
 from camtool.planning.items import Chosen, Feeds, Run, Setting, Work
 from camtool.planning.job import Operation, Tool
 from camtool.planning.pocket import pocket
@@ -33,6 +33,7 @@ from tests.oracles.contours import (
     gear,
     star,
 )
+from tests.paths import moved, scaled
 from tests.strategies import contours
 
 STARS = [moved(scaled(star(5, 4.0, 10.0), 0.25), x, y) for x in (5.0, 14.0) for y in (5.0, 14.0)]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camtool.geometry.polylines import Polyline, scaled
+from camtool.geometry.polylines import Polyline
 from camtool.machine.controllers import PathController, PicMmhController
 from camtool.machine.model import Machine, PlayCells, PlayMap
 from camtool.planning.items import Run
@@ -24,6 +24,7 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
 from camtool.simulation.simulate import simulate
 from camtool.verification.cuts import cut_moves
+from tests.paths import scaled
 from tests.planning.reversal_parts import run_of, square, toolpath, with_play
 from tests.strategies import contours, open_contours
 

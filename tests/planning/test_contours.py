@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 from camtool.findings import Code
 from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import Polyline, mirrored, reverse, rolled, rotated, scaled
+from camtool.geometry.polylines import Polyline, reverse, rolled, rotated
 from camtool.planning.items import Contour, Feeds, Run, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.settings import levels
 from tests.oracles.runs import cut_over, most_at_a_time, move_length, run_points, runs_of, steepest
+from tests.paths import mirrored, scaled
 from tests.strategies import contours, open_contours
 
 STEP = 0.05

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.findings import Code
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.polylines import Polyline, Polylines, Segments, moved, reverse, rolled
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Lead, Operation, Tool
 from camtool.planning.leads import (
@@ -27,6 +27,7 @@ from camtool.planning.leads import (
 from camtool.planning.paths import Along
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.oracles.runs import runs_of
+from tests.paths import moved
 from tests.strategies import contours, open_contours, polylines
 
 ARC, LINE = Lead("arc", 2.0), Lead("line", 2.0)

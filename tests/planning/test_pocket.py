@@ -15,16 +15,7 @@ from camtool.errors import OptionError
 from camtool.findings import Code, Severity
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import (
-    Polyline,
-    Polylines,
-    Segments,
-    mirrored,
-    moved,
-    reverse,
-    rotated,
-    scaled,
-)
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotated
 from camtool.planning.clearing import Cell, Steps, parts_of, ring_cells
 from camtool.planning.items import Fixed, Run
 from camtool.planning.job import Entry
@@ -33,6 +24,7 @@ from tests.oracles import swept
 from tests.oracles.contours import CIRCLE, DUMBBELL, OBLONG, SLOT, SQUARE, closed, comb, star
 from tests.oracles.contours import opened as open_path
 from tests.oracles.swept import at_depth, complaints, gouges
+from tests.paths import mirrored, moved, scaled
 from tests.planning.pocket_cases import (
     SHAPES,
     chosen_of,

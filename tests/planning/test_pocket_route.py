@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, point_at, sample
-from camtool.geometry.polylines import Polyline, Segments, moved, scaled
+from camtool.geometry.polylines import Polyline, Segments
 from camtool.planning.clearing import Rails, closest, outside_parts, route, scanned
 from camtool.planning.paths import Along
 from tests.oracles.contours import CIRCLE, DUMBBELL, ELL, SQUARE
 from tests.oracles.contours import opened as open_path
 from tests.oracles.offset import chords, dense, distance, inside
+from tests.paths import moved, scaled
 from tests.planning.pocket_cases import SHAPES, region_of, shapes
 from tests.strategies import polylines
 

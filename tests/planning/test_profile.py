@@ -15,13 +15,14 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import sample, signed_areas
-from camtool.geometry.polylines import Polyline, Polylines, Segments, moved, reverse, scaled
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse
 from camtool.planning.gouges import side_findings
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Job, job_of
 from camtool.planning.profile import profile
 from camtool.planning.sides import Sides, choose
 from tests.drawings import drawing_of
+from tests.paths import moved, scaled
 from tests.strategies import contours as star_contours
 
 R = 0.25

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
 from camtool.geometry.measure import signed_areas
-from camtool.geometry.polylines import Polyline, Polylines, mirrored, reverse, rotated, scaled
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rotated
 from camtool.planning.reach import opened, unreached
 from tests.oracles import swept
 from tests.oracles.contours import (
@@ -30,6 +30,7 @@ from tests.oracles.contours import (
 from tests.oracles.contours import (
     opened as open_path,
 )
+from tests.paths import mirrored, scaled
 from tests.planning.pocket_cases import LETTER_B, region_of, shapes
 
 FOOT = 1.0 - 0.25 * math.pi

@@ -10,18 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.geometry.polylines import (
-    Polyline,
-    Polylines,
-    mirrored,
-    moved,
-    reverse,
-    rolled,
-    rotated,
-    scaled,
-)
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled, rotated
 from camtool.planning.reliefs import RELIEF_LEAST_MM, relieved
 from tests.oracles.arcs import chain_distances
+from tests.paths import mirrored, moved, scaled
 
 R = 1.0
 POCKET = Polyline(np.array([[0, 0, 0], [10, 0, 0], [10, 6, 0], [0, 6, 0.0]]), True)

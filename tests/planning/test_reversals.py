@@ -15,16 +15,7 @@ from hypothesis import strategies as st
 from camtool.findings import Code, Severity
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import (
-    Polyline,
-    Segments,
-    mirrored,
-    moved,
-    reverse,
-    rolled,
-    rotated,
-    scaled,
-)
+from camtool.geometry.polylines import Polyline, Segments, reverse, rolled, rotated
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
@@ -33,6 +24,7 @@ from camtool.planning.job import Entry, Lead, Tabs, job_of
 from camtool.planning.order import must_precede
 from camtool.planning.reversing import fewer_reversals, reversals_of
 from tests.oracles.reversals import fewest_runs
+from tests.paths import mirrored, moved, scaled
 from tests.planning.reversal_parts import (
     PIC,
     circle,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from camtool.errors import CamtoolError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.polylines import Polyline, moved, scaled
+from camtool.geometry.polylines import Polyline
 from camtool.pipeline import Judging, post_drawing, verify_program
 from camtool.planning.job import Job, Placement, job_of
 from camtool.run import Run
@@ -19,6 +19,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.verify import Verification
 from tests.drawings import drawing_of
+from tests.paths import moved, scaled
 from tests.strategies import contours, open_contours
 from tests.verification.test_damage import CASES, NAMES, sound
 
