@@ -1,4 +1,9 @@
-"""Which boxes are near each other: the first, broad look before any exact one."""
+"""Which boxes are near each other: the first, broad look before any exact one.
+
+`BoxIndex` is asked which of its boxes touch others; `box_pairs` and `near_points` stand upon it.
+`touching_boxes` gives the pairs within one set, no more than a bound. `Curves` are segments as
+compiled loops take them, with the tree of boxes that those loops go down themselves.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +14,112 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.polylines import Segments
+from camtool.kernels.move_tree import hilbert_order
 
 PAIRS_AT_A_TIME = 1 << 16
 """How many pairs of boxes are handled at a time: it bounds the memory."""
 
+FAN = 16
+"""So many boxes are a block of an index."""
+
+BLOCKS_AT_A_TIME = PAIRS_AT_A_TIME // FAN
+"""So many blocks are looked into together."""
+
+IN_ORDER = 2048
+"""An index of no more boxes than this keeps their order: sorting takes longer than it saves."""
+
+NOWHERE = (np.inf, np.inf, -np.inf, -np.inf)
+"""A box that touches none."""
+
 MOST_LOOKS = 4_000_000_000
 """A sweep that would have to look at more pairs of boxes than this is shortened."""
+
+
+class BoxIndex:
+    """A packed tree over boxes (K, 4) xmin, ymin, xmax, ymax: which of them touch others?
+
+    `FAN` boxes that lie near each other are a block, `FAN` blocks one of the next level, up to a
+    single one; each level is four arrays, without pointers. A search goes down level by level, for
+    many boxes at once, into the blocks that they touch. Few boxes stay in the order in which they
+    are given, in which those of a path are neighbours; many are put into that of Hilbert's curve,
+    since paths that surround each other are not. The order decides on time alone.
+    """
+
+    def __init__(self, boxes: Floats) -> None:
+        self._count = len(boxes)
+        self._order = np.arange(len(boxes))
+        if len(boxes) > IN_ORDER:
+            self._order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))
+        level, self._levels = boxes[self._order], list[tuple[Floats, ...]]()
+        while not self._levels or len(level) > 1:
+            padded = np.full((max(-(-len(level) // FAN), 1) * FAN, 4), NOWHERE)
+            padded[: len(level)] = level
+            blocks = padded.reshape(-1, FAN, 4)
+            self._levels.insert(0, tuple(np.ascontiguousarray(blocks.transpose(2, 0, 1))))
+            low, high = blocks[:, :, :2].min(axis=1), blocks[:, :, 2:].max(axis=1)
+            level = np.concatenate([low, high], axis=1)
+
+    def touching(self, boxes: Floats) -> tuple[Ints, Ints]:
+        """Rows (J,), (J,), in order, of boxes (B, 4) and of the index that have a point in
+        common."""
+        found = [one * self._count + other for one, other in self.pairs(boxes)]
+        pairs = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *found]))
+        one, other = np.divmod(pairs, max(self._count, 1))
+        return one, other
+
+    def pairs(self, boxes: Floats) -> Iterator[tuple[Ints, Ints]]:
+        """The same in batches that bound the memory; rows of `boxes` never descend, those of the
+        index come in any order."""
+        columns = np.ascontiguousarray(boxes.T)
+        waiting = [(0, np.arange(len(boxes)), np.zeros(len(boxes), dtype=np.int64))]
+        while waiting:
+            depth, row, block = waiting.pop()
+            if depth == len(self._levels):
+                yield row, self._order[block]
+            elif len(row) > BLOCKS_AT_A_TIME:
+                for begin in reversed(range(0, len(row), BLOCKS_AT_A_TIME)):
+                    some = slice(begin, begin + BLOCKS_AT_A_TIME)
+                    waiting.append((depth, row[some], block[some]))
+            else:
+                low_x, low_y, high_x, high_y = self._levels[depth]
+                touch = low_x[block] <= columns[2][row, None]
+                touch &= high_x[block] >= columns[0][row, None]
+                touch &= low_y[block] <= columns[3][row, None]
+                touch &= high_y[block] >= columns[1][row, None]
+                one, inner = np.divmod(np.flatnonzero(touch), FAN)
+                waiting.append((depth + 1, row[one], block[one] * FAN + inner))
+
+
+def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[tuple[Ints, Ints]]:
+    """Rows (J,), (J,) of all boxes xmin, ymin, xmax, ymax no farther apart than `reach_mm`: by the
+    rows of `a`, and for each from left to right those of `b`, in batches that bound the memory."""
+    one, other = BoxIndex(boxes_b).touching(_widened(boxes_a, reach_mm))
+    low = np.maximum(boxes_a[one, :2], boxes_b[other, :2])
+    high = np.minimum(boxes_a[one, 2:], boxes_b[other, 2:])
+    near = (low <= high + reach_mm).all(axis=1)
+    one, other = one[near], other[near]
+    order = np.lexsort((boxes_b[other, 0], one))
+    for begin in range(0, len(order), PAIRS_AT_A_TIME):
+        some = order[begin : begin + PAIRS_AT_A_TIME]
+        yield one[some], other[some]
+
+
+def near_points(points: Floats, places: Floats, reach_mm: float | Floats) -> tuple[Ints, Ints]:
+    """Rows (J,), (J,), in order, of all points (P, 2) and places (K, 2) no farther apart than
+    `reach_mm`, which may differ from point to point (P,)."""
+    around = _widened(np.hstack([points, points]), reach_mm)
+    one, other = BoxIndex(np.hstack([places, places])).touching(around)
+    way = points[one] - places[other]
+    near = np.sqrt((way**2).sum(axis=1)) <= np.broadcast_to(reach_mm, len(points))[one]
+    return one[near], other[near]
+
+
+def _widened(boxes: Floats, reach_mm: float | Floats) -> Floats:
+    """Boxes wider by the reach all round, and by a last digit more, so that rounding leaves
+    nothing out."""
+    reach = np.reshape(reach_mm, (-1, 1))
+    low, high = boxes[:, :2] - reach, boxes[:, 2:] + reach
+    return np.concatenate([np.nextafter(low, -np.inf), np.nextafter(high, np.inf)], axis=1)
 
 
 def touching_boxes(
@@ -48,37 +153,6 @@ def _looks(boxes: Floats) -> int:
     return int(np.searchsorted(begins, boxes[:, 2], side="right").sum()) - int(
         np.arange(len(boxes), dtype=np.int64).sum()
     )
-
-
-def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[tuple[Ints, Ints]]:
-    """Rows (J,), (J,) of all boxes xmin, ymin, xmax, ymax no farther apart than `reach_mm`.
-
-    Boxes of `b` are sorted by xmin; the running maximum of their xmax is sorted too, so what may
-    reach a box of `a` is one stretch of them. Pairs come in batches that bound the memory.
-    """
-    order = np.argsort(boxes_b[:, 0], kind="stable")
-    sorted_b = boxes_b[order]
-    first = np.searchsorted(np.maximum.accumulate(sorted_b[:, 2]), boxes_a[:, 0] - reach_mm)
-    last = np.searchsorted(sorted_b[:, 0], boxes_a[:, 2] + reach_mm, side="right")
-    counts = np.maximum(last - first, 0)
-    ends = np.cumsum(counts)
-    begin = 0
-    while begin < len(boxes_a):
-        done = ends[begin - 1] if begin else 0
-        stop = int(np.searchsorted(ends, done + PAIRS_AT_A_TIME, side="right"))
-        stop = max(stop, begin + 1)
-        count = counts[begin:stop]
-        row_a = np.repeat(np.arange(begin, stop), count)
-        within = np.arange(len(row_a)) - np.repeat(np.cumsum(count) - count, count)
-        row_b = np.repeat(first[begin:stop], count) + within
-        low = np.maximum(boxes_a[row_a, :2], sorted_b[row_b, :2])
-        high = np.minimum(boxes_a[row_a, 2:], sorted_b[row_b, 2:])
-        near = (low <= high + reach_mm).all(axis=1)
-        yield row_a[near], order[row_b[near]]
-        begin = stop
-
-
-# Segments in the form the kernels of offsets take, with a tree of boxes over them.
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,7 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
+from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import path_lengths, point_at, segment_boxes, signed_areas
@@ -381,16 +382,14 @@ def spared(
     runs: Sequence[Run], operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
 ) -> Spared:
     """The runs of an operation, kept above all bridges."""
-    import shapely
-
     if not bridges or not runs:
         return Spared(tuple(runs), ())
     reach = operation.tool.radius_mm
-    tree = shapely.STRtree(shapely.box(*np.array([_box(bridge, reach) for bridge in bridges]).T))
+    index = BoxIndex(np.array([_box(bridge, reach) for bridge in bridges]))
     made, found = [], _Found()
     for run in runs:
-        low, high = _extent(run)
-        near = [bridges[k] for k in sorted(tree.query(shapely.box(*low, *high)).tolist())]
+        _, rows = index.touching(np.concatenate(_extent(run))[None])
+        near = [bridges[row] for row in rows.tolist()]
         made.append(_raised(run, near, operation.tool, feeds, found) if near else run)
     return Spared(tuple(made), tuple(found.told(operation)))
 

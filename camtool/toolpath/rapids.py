@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from camtool.arrays import Floats, Ints
+from camtool.geometry.boxes import BoxIndex
 from camtool.toolpath.lower import arcs_to_lines
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -139,7 +140,7 @@ class _Swarf:
         ends = np.stack([self._begin[:, :2], self._end[:, :2]])
         corners = np.concatenate([ends.min(axis=0), ends.max(axis=0)], axis=1)
         wide = (self._radius + tolerance_mm)[:, None] * np.array([-1.0, -1.0, 1.0, 1.0])
-        self._tree = shapely.STRtree(shapely.box(*(corners + wide).T))
+        self._index = BoxIndex(corners + wide)
         self._solid = None if reach.solid is None else shapely.box(*reach.solid)
 
     def uncut(self, begin: Floats, end: Floats, row: int) -> tuple[float, float] | None:
@@ -153,8 +154,8 @@ class _Swarf:
             needed = needed.intersection(self._solid)
         if needed.is_empty:
             return None
-        near = self._tree.query(needed)
-        near = np.sort(near[self._row[near] < row])
+        _, near = self._index.touching(np.array([needed.bounds]))
+        near = near[self._row[near] < row]
         cleared = [
             self._disc(shapely.MultiLineString(lines), radius + half)
             for radius, lines in self._deep(near, float(min(begin[2], end[2])))

@@ -20,6 +20,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
+from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.toolpath.moves import Kind, Toolpath
@@ -300,8 +301,6 @@ def _plunges(
 ) -> Iterator[Finding]:
     """EXTRA_CUT for feeds straight down to where nothing was asked to be cut; holes, which are
     compared as such, are left out."""
-    import shapely
-
     toolpath = mine.toolpath
     rows = np.flatnonzero(mine.plunges & ~alike.in_written)
     rows = rows[~_on(toolpath.end[rows, :2], mine.holes.at)]
@@ -310,9 +309,7 @@ def _plunges(
         ends = toolpath.end[rows]
         fine[other.target.within(ends[:, :2], ends[:, 2], limits)[0]] = True
         deep = other.toolpath.end[other.plunges]
-        tree = shapely.STRtree(shapely.points(deep[:, :2]))
-        places = shapely.points(ends[:, :2])
-        one, plunge = tree.query(places, predicate="dwithin", distance=limits[0])
+        one, plunge = near_points(ends[:, :2], deep[:, :2], limits[0])
         fine[one[deep[plunge, 2] <= ends[one, 2] + limits[1]]] = True
     bad = rows[~fine]
     for number, row in enumerate(bad.tolist()):

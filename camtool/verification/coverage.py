@@ -16,6 +16,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
+from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import Kind, Toolpath
@@ -210,8 +211,6 @@ def contours_drilled(
 
     A contour smaller than what a dialect can say comes out as a plunge, and cuts the same.
     """
-    import shapely
-
     drilled = np.zeros(cuts.contour_count, dtype=np.bool_)
     stands = np.zeros(len(holes), dtype=np.bool_)
     if not len(holes) or not len(drilled):
@@ -224,9 +223,7 @@ def contours_drilled(
     bottom = np.minimum.reduceat(cuts.z[:, 0], begin)
     room = limits_mm[0] - 0.5 * np.hypot(*(high - low).T)
     tiny = np.flatnonzero(room >= 0.0)
-    middles = shapely.points(0.5 * (low + high)[tiny])
-    tree = shapely.STRtree(shapely.points(holes.at))
-    one, hole = tree.query(middles, predicate="dwithin", distance=room[tiny])
+    one, hole = near_points(0.5 * (low + high)[tiny], holes.at, room[tiny])
     same = np.abs(bottom[tiny[one]] - holes.bottom_mm[hole]) <= limits_mm[1]
     drilled[contour[begin[tiny[one[same]]]]] = True
     stands[hole[same]] = True
@@ -272,16 +269,11 @@ def _unpaired(
 
 def _paired(holes: Holes, others: Holes, limits_mm: tuple[float, float]) -> tuple[Bools, Bools]:
     """(H,), (H,) which holes have another one at their place, and which one as deep too."""
-    import shapely
-
     here, same = np.zeros(len(holes), dtype=np.bool_), np.zeros(len(holes), dtype=np.bool_)
-    if len(holes) and len(others):
-        tree = shapely.STRtree(shapely.points(others.at))
-        points = shapely.points(holes.at)
-        mine, theirs = tree.query(points, predicate="dwithin", distance=limits_mm[0])
-        here[mine] = True
-        deep = np.abs(holes.bottom_mm[mine] - others.bottom_mm[theirs]) <= limits_mm[1]
-        same[mine[deep]] = True
+    mine, theirs = near_points(holes.at, others.at, limits_mm[0])
+    here[mine] = True
+    deep = np.abs(holes.bottom_mm[mine] - others.bottom_mm[theirs]) <= limits_mm[1]
+    same[mine[deep]] = True
     return here, same
 
 

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from camtool.arrays import Floats, Ints
+from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.verification.cuts import CutMoves
@@ -328,13 +329,13 @@ def boxes_of_pieces(segments: Segments, gap: float) -> tuple[Floats, Ints]:
 
 @dataclass(frozen=True, eq=False)
 class _Layer:
-    """Pieces of moves between two heights, mm, no steeper than `slope`: a tree of their boxes, and
-    whose they are (P,)."""
+    """Pieces of moves between two heights, mm, no steeper than `slope`: an index of their boxes,
+    and whose they are (P,)."""
 
     low: float
     high: float
     slope: float
-    tree: Any
+    index: BoxIndex
     whose: Ints
 
 
@@ -343,8 +344,6 @@ class Layers:
     slopes (K,), layer by layer."""
 
     def __init__(self, segments: Segments, z: Floats, slope: Floats, gap: float) -> None:
-        import shapely
-
         self._count = len(z)
         pieces, whose = boxes_of_pieces(segments, gap)
         level = levels_of(z)[whose]
@@ -358,7 +357,7 @@ class Layers:
                 float(z[whose[part], 0].min()),
                 float(z[whose[part], 1].max()),
                 float(slope[whose[part]].max()),
-                shapely.STRtree(shapely.box(*pieces[part].T)),
+                BoxIndex(pieces[part]),
                 whose[part],
             )
             for part in parts
@@ -368,17 +367,13 @@ class Layers:
         """Pairs (box, move), in order, of boxes (B, 4) that touch that of a piece of the move, in
         layers within the window (and more, on slopes) of the heights z (B, 2) low, high of the
         box. Moves of other heights may be among them."""
-        import shapely
-
-        shapes = shapely.box(*boxes.T)
         found = [np.empty(0, dtype=np.int64)]
         for layer in self._layers:
             window = window_mm * (1.0 + layer.slope)
             rows = np.flatnonzero(
                 (z[:, 0] - window <= layer.high) & (layer.low <= z[:, 1] + window)
             )
-            if len(rows):
-                row, piece = layer.tree.query(shapes[rows])
+            for row, piece in layer.index.pairs(boxes[rows]):
                 found.append(rows[row] * self._count + layer.whose[piece])
         pairs = np.sort(np.concatenate(found))
         return np.divmod(pairs[np.diff(pairs, prepend=-1) > 0], self._count)

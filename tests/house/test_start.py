@@ -59,7 +59,7 @@ def test_post_of_a_dxf_without_verification(output: str) -> None:
 
 def test_post_and_verify(output: str) -> None:
     loaded = warm("post", "samples/logo.dxf", *PIC, "-o", output)
-    assert loaded == {"ezdxf", "numba", "numpy", "shapely"}
+    assert loaded == {"ezdxf", "numba", "numpy"}
     assert warm("verify", output, *PIC) == {"numba", "numpy"}
 
 
@@ -71,7 +71,7 @@ def test_post_of_an_svg(output: str) -> None:
 def test_post_of_points(tmp_path: Path) -> None:
     output = str(tmp_path / "star.m")
     loaded = warm("post", "samples/star.csv", "-t", "matlab-router", "-q", "-o", output)
-    assert loaded == {"numba", "numpy", "shapely"}
+    assert loaded == {"numba", "numpy"}
 
 
 def heavy_of(code: str) -> set[str]:
