@@ -48,13 +48,35 @@ from camtool.geometry.offset import merge_points
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
-from camtool.planning.naming import key_of
+from camtool.planning.naming import at_place, key_of
+from camtool.planning.paths import backwards, joined
+from camtool.planning.ramps import feeds_along
 
 CROSSINGS_SHOWN = 3
 """So many places where paths cross are named."""
 
 CARVE_TOLERANCE_MM = 5e-4
 """A carved wall may be off its line by this much: half a micrometre."""
+
+
+LEVEL_EPS_MM = 1e-9
+"""A radius nearer than this to a limit is the limit: rounding, along walls that are parallel."""
+
+FIT_SHARE = 0.75
+"""Share of the tolerance for lines and arcs through samples of the axis; what lies between the
+samples takes less than the rest."""
+
+FEWEST_FOR_ARC = 5
+"""An arc is laid through three of at least so many samples."""
+
+LEAST_SWEEP_RAD = 1e-4
+"""What turns less is no arc: its centre would lie too far off to be counted with."""
+
+MOST_SWEEP_RAD = 2.0
+"""An arc of the axis that turns farther is divided."""
+
+MEET_MM = 1e-4
+"""Ends of pieces that are nearer than this meet."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +170,7 @@ def _crossings(chosen: Chosen) -> Iterator[Finding]:
             Severity.ERROR,
             f"{a} crosses {'itself' if a == b else b}: what is inside cannot be told; mend the"
             " drawing, or carve without it",
-            where=_at(a, x, y),
+            where=at_place(a, (x, y)),
         )
 
 
@@ -209,18 +231,9 @@ def _passed_by(pieces: list[Floats], point: Floats) -> float:
 
 
 def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
-    """The run along a path (n, 4) of x, y, rho, bulge.
-
-    On a slope the tip goes down and up no faster than in a plunge.
-    """
-    z = 0.0 - cone.depth_of(path[:, 2])
-    vertices = np.column_stack([path[:, :2], z, path[:, 3]])
-    heights = np.abs(np.diff(z))
-    slope = np.hypot(lengths_of(path), heights)
-    feeds = setting.feeds
-    steep = feeds.plunge_mm_min * slope / np.where(heights > 0.0, heights, np.inf)
-    limit = np.where(heights > 0.0, steep, np.inf)
-    return Run(vertices, np.minimum(feeds.cut_mm_min, limit), feeds.plunge_mm_min, name)
+    """The run along a path (n, 4) of x, y, rho, bulge."""
+    vertices = np.column_stack([path[:, :2], 0.0 - cone.depth_of(path[:, 2]), path[:, 3]])
+    return Run(vertices, feeds_along(vertices, setting.feeds), setting.feeds.plunge_mm_min, name)
 
 
 def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
@@ -234,7 +247,7 @@ def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
             Severity.WARNING,
             f"a flat tip of {tip:g} mm does not fit into this contour, which is {widest:.4g} mm"
             " wide: it is not carved",
-            where=_at(region.name, *region.lines[0].start.tolist()),
+            where=at_place(region.name, region.lines[0].start.tolist()),
             measured=widest,
             limit=tip,
             unit="mm",
@@ -248,7 +261,7 @@ def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
             Severity.WARNING,
             f"a flat tip of {tip:g} mm leaves {len(pieces)} corners or narrow places uncut,"
             f" {area:.4g} mm² in all: use a bit with a smaller tip",
-            where=_at(region.name, *pieces[0].at_mm),
+            where=at_place(region.name, pieces[0].at_mm),
             measured=area,
             unit="mm2",
         )
@@ -265,14 +278,10 @@ def _limited(
             Severity.WARNING,
             f"a floor of {area:.6g} mm² is left: up to {2.0 * trace.rho[row]:.4g} mm wide, bit and"
             f" depth allow {2.0 * limit_mm:.4g} mm; clear it with a pocket and a flat tool",
-            where=_at(region.name, float(trace.x[row]), float(trace.y[row])),
+            where=at_place(region.name, (float(trace.x[row]), float(trace.y[row]))),
             measured=area,
             unit="mm2",
         )
-
-
-def _at(name: str, x: float, y: float) -> str:
-    return f"{name} at X {x:.4f} Y {y:.4f}"
 
 
 # The pieces of a carved region: where the tip of a V bit runs, at the radius that it cuts.
@@ -281,22 +290,6 @@ def _at(name: str, x: float, y: float) -> str:
 # asks. `grooves` are stretches of the medial axis with low ≤ ρ ≤ high; where discs are larger than
 # `high`, the `walls` run beside the boundary at that distance. Together they are where the middle
 # of the largest disc allowed runs when it rolls along the boundary.
-
-LEVEL_EPS_MM = 1e-9
-"""A radius nearer than this to a limit is the limit: rounding, along walls that are parallel."""
-
-FIT_SHARE = 0.75
-"""Share of the tolerance for lines and arcs through samples of the axis; what lies between the
-samples takes less than the rest."""
-
-FEWEST_FOR_ARC = 5
-"""An arc is laid through three of at least so many samples."""
-
-LEAST_SWEEP_RAD = 1e-4
-"""What turns less is no arc: its centre would lie too far off to be counted with."""
-
-MOST_SWEEP_RAD = 2.0
-"""An arc of the axis that turns farther is divided."""
 
 
 @dataclass(frozen=True)
@@ -451,9 +444,6 @@ def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
 # piece (Hierholzer), and cut where the tool would jump. Short pieces between two such places are
 # walked twice instead, into a corner and back, which saves a jump each.
 
-MEET_MM = 1e-4
-"""Ends of pieces that are nearer than this meet."""
-
 
 @dataclass(frozen=True, eq=False)
 class Graph:
@@ -531,8 +521,9 @@ def walks(graph: Graph, again_mm: float) -> list[Floats]:
     result = []
     for circuit in _circuits(ends, len(graph.places)):
         for rows in _cut(circuit, len(graph.pieces)):
-            walk = _joined([_turned(graph.pieces[row], back) for row, back in rows])
-            result.append(_turned(walk, walk[-1, 2] < walk[0, 2]))
+            pieces = [(graph.pieces[row], back) for row, back in rows]
+            walk = joined([backwards(piece) if back else piece for piece, back in pieces])
+            result.append(backwards(walk) if walk[-1, 2] < walk[0, 2] else walk)
     return result
 
 
@@ -631,19 +622,3 @@ def _cut(circuit: list[tuple[int, bool]], count: int) -> list[list[tuple[int, bo
         else:
             parts[-1].append((row, back))
     return [part for part in parts if part]
-
-
-def _turned(piece: Floats, back: bool) -> Floats:
-    """The piece run backwards: the bulges move to the other ends and change their sign."""
-    if not back:
-        return piece
-    turned = piece[::-1].copy()
-    turned[:-1, 3] = 0.0 - piece[-2::-1, 3]
-    turned[-1, 3] = 0.0
-    return turned
-
-
-def _joined(pieces: list[Floats]) -> Floats:
-    """Pieces that meet, one after the other, as one."""
-    rows = [piece[:-1] for piece in pieces]
-    return np.concatenate([*rows, pieces[-1][-1:]])

@@ -40,7 +40,7 @@ from camtool.geometry.polylines import (
     reverse,
     rotated,
 )
-from camtool.planning.paths import Along
+from camtool.planning.paths import Along, joined, middles, runs_of_true
 
 SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Parts of the step that are tried where it leaves tips: rings alone make a calmer way."""
@@ -430,7 +430,7 @@ def _from_nearest(along: Along, here: Floats) -> tuple[float, float]:
 
 def _chained(parts: list[Floats]) -> Floats:
     """Open paths, each of which begins where the one before it ends, as one."""
-    return tidy(np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]]))
+    return tidy(joined(parts))
 
 
 # Ways for the tool between two places of a region, at depth, that never leave the region.
@@ -530,9 +530,8 @@ def _outside(start: Floats, end: Floats, rails: Rails) -> list[tuple[float, floa
     marks = np.unique(np.concatenate([[0.0, 1.0], found.ta]))
     middles = 0.5 * (marks[1:] + marks[:-1])
     points = point_at(line, np.zeros(len(middles), dtype=np.int64), middles)
-    outside = np.concatenate([[False], ~rails.holds(points), [False]]).astype(np.int64)
-    edges = marks[np.flatnonzero(np.diff(outside))]
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    first, last = runs_of_true(~rails.holds(points))
+    return list(zip(marks[first].tolist(), marks[last].tolist(), strict=True))
 
 
 def _along(along: Along, begin: float, end: float) -> Floats:
@@ -569,11 +568,10 @@ def parts_of(lines: Polylines) -> list[Polylines]:
     owner = np.full(len(lines), -1, dtype=np.int64)
     for hole in holes.tolist():
         ring = Segments.of(lines[hole])
-        rows = np.arange(len(ring))
-        middles = point_at(ring, rows, np.full(len(rows), 0.5))
+        points = middles(ring)
         for row in order.tolist():
             # Most of them, as a hole may touch its outer path.
-            if 2 * np.count_nonzero(inside(middles, Segments.of(lines[row]))) > len(middles):
+            if 2 * np.count_nonzero(inside(points, Segments.of(lines[row]))) > len(points):
                 owner[hole] = row
                 break
     return [lines.select([row, *np.flatnonzero(owner == row).tolist()]) for row in outer.tolist()]
@@ -634,10 +632,10 @@ def _runs(along: Along, marks: Floats, wanted: Bools) -> list[Polyline]:
             np.where(np.arange(len(begin)) < turn, begin + along.total_mm, begin), -turn
         )
         end = np.roll(np.where(np.arange(len(end)) < turn, end + along.total_mm, end), -turn)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], wanted.astype(np.int64), [0]])))
+    first, last = runs_of_true(wanted)
     return [
-        Polyline(along.piece(float(begin[first]), float(end[last - 1])))
-        for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+        Polyline(along.piece(low, high))
+        for low, high in zip(begin[first].tolist(), end[last - 1].tolist(), strict=True)
     ]
 
 

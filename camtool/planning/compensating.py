@@ -25,10 +25,25 @@ from camtool.planning.reversing import Residual, residual
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Bent, Kind, Move, Toolpath
 
-__all__ = ["compensated"]
+OVERSHOOT = 0.5
+"""The share of what the controller compensates too much that an axis overshoots at a reversal."""
 
+STILL_STEPS = 0.5
+"""An axis that goes less than this much of a coded step does not move."""
 
-# Both stages in their order.
+KICK_STEPS = 1.0
+"""The step back that makes the controller compensate, in coded steps."""
+
+AHEAD_MM = 1e-9
+"""Positions nearer than this are one."""
+
+LEAST_SHARE = 1e-9
+"""An edge nearer than this share of a stretch to its end is that end."""
+
+TURN_EPS_RAD = 1e-9
+"""A turning point nearer than this to an end of its arc is that end."""
+
+Point = tuple[float, float, float]
 
 
 def compensated(toolpath: Toolpath, machine: Machine) -> Bent:
@@ -36,35 +51,31 @@ def compensated(toolpath: Toolpath, machine: Machine) -> Bent:
     come out where `toolpath` says. Sources of the rows are kept; blocks are not.
 
     What remains: at a reversal that the controller compensates by too much, half of the excess
-    (see `take_up`), and the random part of the mechanics.
+    (see `_TakenUp`), and the random part of the mechanics.
     """
     motors = motor_path(toolpath, machine)
-    bent = taken_up(motors.toolpath, machine)
+    bent = _taken_up(motors.toolpath, machine)
     return Bent(bent.toolpath, motors.row[bent.row])
 
 
-# Scale and squareness undone: where the motors must go for the slides to be where wanted.
-#
-# A slide is where its motor is times s = `real_step_mm` / `coded_step_mm` of the axis, about part
-# zero, and Y leans by q (`camtool.simulation.mechanics`):
-#
-#     x = s_x m_x + s_y m_y tan q,  y = s_y m_y    so    m_y = y / s_y,  m_x = (x − y tan q) / s_x.
-#
-# An arc stays an arc where that changes its radius alike in all
-# directions, or by less than the machine's fit tolerance; else it becomes an ellipse, which is
-# fitted by arcs within that tolerance.
+def motor_path(toolpath: Toolpath, machine: Machine) -> Bent:
+    """Scale and squareness undone: the path of the motors for slides on `toolpath`; itself where
+    both are as they should.
 
+    A slide is where its motor is times s = `real_step_mm` / `coded_step_mm` of the axis, about
+    part zero, and Y leans by q (`camtool.simulation.mechanics`):
 
-def motor_matrix(machine: Machine) -> Floats:
-    """(3, 3): wanted mm to the mm that the motors must be sent to."""
+        x = s_x m_x + s_y m_y tan q,  y = s_y m_y,
+    so  m_x = (x − y tan q) / s_x,    m_y = y / s_y.
+
+    An arc stays an arc where that changes its radius alike in all directions, or by less than the
+    machine's fit tolerance; else it becomes an ellipse, which is fitted by arcs within that
+    tolerance.
+    """
     square = np.eye(3)
     square[0, 1] = -math.tan(machine.mechanics.squareness_rad)
-    return np.diag([axis.coded_step_mm / axis.real_step_mm for axis in machine.axes]) @ square
-
-
-def motor_path(toolpath: Toolpath, machine: Machine) -> Bent:
-    """The path of the motors for slides on `toolpath`; itself where both are as they should."""
-    matrix = motor_matrix(machine)
+    scale = np.diag([axis.coded_step_mm / axis.real_step_mm for axis in machine.axes])
+    matrix = scale @ square
     if np.array_equal(matrix, np.eye(3)):
         return Bent(toolpath, np.arange(len(toolpath)))
     return _Mapped(toolpath, matrix, machine.defaults.fit_tolerance_mm).bent()
@@ -90,11 +101,11 @@ class _Mapped:
             if move.kind == Kind.RAPID:
                 self._b.rapid(*end)
             elif move.kind == Kind.LINE:
-                self._b.line(*end, feed=_feed_of(move))
+                self._b.line(*end, feed=_feed(move))
             elif move.kind in (Kind.ARC_CW, Kind.ARC_CCW):
                 self._arc(move, end, float(sweeps[move.index]))
             else:
-                _event(self._b, move, self._toolpath)
+                _add_event(self._b, move, self._toolpath)
                 self._b.moved_to(*end)
             rows += [move.index] * (len(self._b) - len(rows))
         return Bent(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
@@ -115,16 +126,16 @@ class _Mapped:
         if radius * self._unround <= self._tolerance_mm or not level:
             x, y = middle.tolist()
             ccw = move.kind == Kind.ARC_CCW
-            self._b.arc(*end, centre=(x, y), ccw=ccw, feed=_feed_of(move))
+            self._b.arc(*end, centre=(x, y), ccw=ccw, feed=_feed(move))
             return
         angle = float(np.arctan2(spoke[1], spoke[0]))
         axes = plane * radius
         ellipse = EllipseCurve(middle, axes[:, 0], axes[:, 1], angle, angle + sweep)
         vertices = fit_curve(ellipse, self._tolerance_mm).vertices
-        add_vertices(self._b, vertices, end, _feed_of(move))
+        _add_vertices(self._b, vertices, end, _feed(move))
 
 
-def add_vertices(builder: ToolpathBuilder, vertices: Floats, end: Point, feed: float) -> None:
+def _add_vertices(builder: ToolpathBuilder, vertices: Floats, end: Point, feed: float) -> None:
     """The lines and arcs between vertices (n, 3) x, y, bulge, the last of which is `end`."""
     for (x0, y0, bulge), (x1, y1, _) in zip(
         vertices[:-1].tolist(), [*vertices[1:-1].tolist(), list(end)], strict=True
@@ -141,52 +152,16 @@ def add_vertices(builder: ToolpathBuilder, vertices: Floats, end: Point, feed: f
         builder.arc(x1, y1, centre=centre, ccw=bulge > 0.0, feed=feed)
 
 
-def _feed_of(move: Move) -> float:
-    return float("nan") if move.feed is None else move.feed
+def _feed(move: Move) -> float:
+    return math.nan if move.feed is None else move.feed
 
 
-def _event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None:
+def _add_event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None:
     """The same event; a message keeps its words."""
     if move.kind == Kind.MESSAGE and move.value is not None:
         builder.message(toolpath.texts[int(move.value)])
     else:
         builder.event(move.kind, move.value)
-
-
-# Play taken up at reversals, and what a controller compensates wrongly.
-#
-# Driven in the direction d = ±1 and engaged, a slide stands at an offset from where the controller
-# believes it to be (`camtool.planning.reversing`):
-#
-#     slide = position + e(d)        so a wanted x asks for the position x − e(d).
-#
-# When an axis reverses, that position jumps by e(−d) − e(d) =: J in the new direction d:
-#
-# - J > 0, less is compensated than the play: the axis goes on by J alone, a line on which the
-# slide does not move, and then along the path. Nothing is left over. - J < 0, the controller
-# compensates by r = −J too much: its first step back throws the slide r ahead. So the axis first
-# overshoots by `OVERSHOOT` · r, then makes one step back, which leaves the slide (1 − `OVERSHOOT`)
-# · r ahead, and holds until the path has come as far. With one half the largest error is r/2, at
-# the reversal only; without any of this it is r all the way back. An axis that still waits from
-# the reversal before stands out already, and overshoots by the rest. In the cut nothing does
-# better: the step throws the slide from one end of a length r to the other, wherever it is made,
-# and one of the two ends is r/2 or more off the place of the reversal.
-#
-# Where the play changes with the region of the table, e does too: a step towards d is taken alone,
-# one against it is waited for. Rapids and other moves in the air take up the play on their way. An
-# axis that does not move keeps what it has.
-
-OVERSHOOT = 0.5
-"""The share of what the controller compensates too much that an axis overshoots at a reversal."""
-
-STILL_STEPS = 0.5
-"""An axis that goes less than this much of a coded step does not move."""
-
-KICK_STEPS = 1.0
-"""The step back that makes the controller compensate, in coded steps."""
-
-AHEAD_MM = 1e-9
-"""Positions nearer than this are one."""
 
 
 @dataclass
@@ -220,17 +195,42 @@ class _Drive:
                 return
 
 
-def taken_up(toolpath: Toolpath, machine: Machine) -> Bent:
+def _taken_up(toolpath: Toolpath, machine: Machine) -> Bent:
     """The positions that a controller must be given for slides on `toolpath` (in motor mm); the
     same toolpath where there is neither play nor compensation."""
-    regions = Regions(machine)
+    regions = _Regions(machine)
     if not regions.matter:
         return Bent(toolpath, np.arange(len(toolpath)))
     return _TakenUp(toolpath, machine, regions).bent()
 
 
 class _TakenUp:
-    def __init__(self, toolpath: Toolpath, machine: Machine, regions: Regions) -> None:
+    """Play taken up at reversals, and what a controller compensates wrongly.
+
+    Driven in the direction d = ±1 and engaged, a slide stands at an offset from where the
+    controller believes it to be (`camtool.planning.reversing.Residual`):
+
+        slide = position + e(d)        so a wanted x asks for the position x − e(d).
+
+    When an axis reverses, that position jumps by e(−d) − e(d) =: J in the new direction d:
+
+    - J > 0, less is compensated than the play: the axis goes on by J alone, a line on which the
+      slide does not move, and then along the path. Nothing is left over.
+    - J < 0, the controller compensates by r = −J too much: its first step back throws the slide r
+      ahead. So the axis first overshoots by `OVERSHOOT` · r, then makes one step back, which
+      leaves the slide (1 − `OVERSHOOT`) · r ahead, and holds until the path has come as far. With
+      one half the largest error is r/2, at the reversal only; without any of this it is r all the
+      way back. An axis that still waits from the reversal before stands out already, and
+      overshoots by the rest. In the cut nothing does better: the step throws the slide from one
+      end of a length r to the other, wherever it is made, and one of the two ends is r/2 or more
+      off the place of the reversal.
+
+    Where the play changes with the region of the table, e does too: a step towards d is taken
+    alone, one against it is waited for. Rapids and other moves in the air take up the play on
+    their way. An axis that does not move keeps what it has.
+    """
+
+    def __init__(self, toolpath: Toolpath, machine: Machine, regions: _Regions) -> None:
         self._toolpath, self._regions = toolpath, regions
         self._home = machine.controller.machine_zero_mm
         first = 1 if machine.controller.start_direction == "+" else -1
@@ -338,10 +338,7 @@ class _TakenUp:
 
     def _event(self, move: Move) -> None:
         homes = {Kind.HOME_XY: (0, 1), Kind.HOME_Z: (2,)}.get(move.kind, ())
-        if move.kind == Kind.MESSAGE and move.value is not None:
-            self._b.message(self._toolpath.texts[int(move.value)])
-        else:
-            self._b.event(move.kind, move.value)
+        _add_event(self._b, move, self._toolpath)
         for index in homes:
             drive = self._drives[index]
             if drive.at != self._home[index]:
@@ -356,22 +353,14 @@ def _step_mm(axis: Axis) -> float:
     return max(1.0, float(steps)) * axis.coded_step_mm
 
 
-def _feed(move: Move) -> float:
-    return math.nan if move.feed is None else move.feed
+class _Regions:
+    """What play and compensation leave over in each region of the table; play is divided by the
+    scale, since the path is that of the motors.
 
-
-# What play and compensation leave over in each region of the table, seen from the motors.
-#
-# A wanted path is cut at the edges of the regions. They belong to positions of the controller,
-# which are the wanted ones but for the play: near an edge the play of the neighbour may be taken.
-
-LEAST_SHARE = 1e-9
-"""An edge nearer than this share of a stretch to its end is that end."""
-
-
-class Regions:
-    """The residuals of a machine by place; play is divided by the scale, since the path is that
-    of the motors."""
+    A wanted path is cut at the edges of the regions. They belong to positions of the controller,
+    which are the wanted ones but for the play: near an edge the play of the neighbour may be
+    taken.
+    """
 
     def __init__(self, machine: Machine) -> None:
         self._cells: tuple[PlayCells | None, ...] = machine.play_map.used
@@ -435,18 +424,11 @@ def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
     return residual(at_motor, machine.controller)
 
 
-# A stretch of a line or arc on which no axis turns back.
-
-Point = tuple[float, float, float]
-
-TURN_EPS_RAD = 1e-9
-"""A turning point nearer than this to an end of its arc is that end."""
-
-
 @dataclass(frozen=True)
 class Stretch:
-    """From `begin` to `end` mm, straight, or about `centre` (x, y) with `sweep_rad`, CCW positive
-    and at most a quarter turn; Z in proportion to the way."""
+    """A part of a line or arc on which no axis turns back: from `begin` to `end` mm, straight, or
+    about `centre` (x, y) with `sweep_rad`, CCW positive and at most a quarter turn; Z in
+    proportion to the way."""
 
     begin: Point
     end: Point

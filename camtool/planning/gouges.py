@@ -16,12 +16,13 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, near_paths, nearest
-from camtool.geometry.measure import extents, path_lengths, point_at, sample
+from camtool.geometry.measure import extents, path_lengths, sample
 from camtool.geometry.nesting import inside, nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Chosen, Contour, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, operation_name, told_together, tool_name
+from camtool.planning.paths import middles
 from camtool.planning.sides import Sides, runs_beside
 
 GOUGE_TOLERANCE_MM = 1e-4
@@ -103,9 +104,7 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
 
 def _witnesses(path: Polyline) -> Floats:
     """(P, 2) the vertices of a path and the middles of its segments."""
-    segments = Segments.of(path)
-    middles = point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
-    return np.concatenate([path.vertices[:, :2], middles])
+    return np.concatenate([path.vertices[:, :2], middles(Segments.of(path))])
 
 
 def _parts(path: Polyline, wall: Polyline) -> tuple[Bools, Floats]:

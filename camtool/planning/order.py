@@ -4,7 +4,8 @@ An item may be cut in several ways (`Choices`): a closed contour from each of it
 open one from either end. The order and the ways are searched together: nearest neighbours first,
 then reversals and moves of parts of the order as long as they make it shorter, and the best ways
 for that order, exactly, layer by layer (`camtool.kernels.tour`). What must be cut before what is
-kept by every step of the search. The same input always gives the same order.
+kept by every step of the search (`must_precede`: a part comes loose after everything within it
+has been cut). The same input always gives the same order.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, reverse, rolled
-from camtool.planning.items import Contour, Item, Run
-from camtool.planning.paths import joints
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
+from camtool.planning.items import Contour, Item
+from camtool.planning.paths import flat, joints
 
 if TYPE_CHECKING:
     from camtool.kernels.tour import Tour
@@ -45,6 +46,11 @@ MOST_PLACES = 8
 
 SHOWN_ITEMS = 5
 """An error message names no more items than this."""
+
+
+SPECK_MM = 1e-4
+"""A run that stays at one place (a drilled hole) lies in what holds a line of this length there:
+long enough to be a line, far shorter than any tool is wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,13 +273,6 @@ def _begins(item: Contour) -> Ints:
     return item.starts if len(item.starts) else np.flatnonzero(joints(item.path))
 
 
-# What must be cut before what: a part comes loose after everything within it has been cut.
-
-SPECK_MM = 1e-4
-"""A run that stays at one place (a drilled hole) lies in what holds a line of this length there:
-long enough to be a line, far shorter than any tool is wide."""
-
-
 def must_precede(items: Sequence[Item]) -> Ints:
     """Pairs (P, 2) of items, the first to be cut before the second, ascending.
 
@@ -309,19 +308,7 @@ def _shapes(item: Item) -> Iterator[Polyline]:
     elif item.outline is not None:
         yield Polyline(item.outline.vertices, closed=False)
     else:
-        yield from map(_trace, item.runs)
-
-
-def _trace(run: Run) -> Polyline:
-    """The run seen from above, without the moves that lead nowhere there."""
-    flat = run.vertices[:, [0, 1, 3]]
-    kept: list[Floats] = [flat[0]]
-    for vertex in flat[1:]:
-        if np.hypot(*(vertex[:2] - kept[-1][:2])) > POSITION_EPS_MM:
-            kept.append(vertex)
-        else:
-            kept[-1] = vertex  # it knows the bulge of the move that leads away
-    if len(kept) == 1:
-        x, y, _ = flat[0]
-        return Polyline(np.array([[x - SPECK_MM / 2, y, 0.0], [x + SPECK_MM / 2, y, 0.0]]))
-    return Polyline(np.array(kept))
+        for run in item.runs:
+            x, y = run.vertices[0, :2]
+            speck = np.array([[x - SPECK_MM / 2, y, 0.0], [x + SPECK_MM / 2, y, 0.0]])
+            yield flat(run.vertices) or Polyline(speck)

@@ -1,17 +1,18 @@
-"""A path told by the length along it: places, directions, and pieces cut out of it exactly.
+"""Paths by the length along them, pieces cut out of them exactly, and arcs put together again.
 
 A piece of a line or an arc keeps to it: with the bulge b of the whole, the part f of it has
 
     bulge = tan(f · atan b),
 
 because the bulge is tan(sweep/4) and the part f of the length has the part f of the sweep.
-Lengths may run below 0 and beyond the whole of a closed path: that is further round.
+Lengths may run below 0 and beyond the whole of a closed path: that is further round. Arcs that
+were split, since a polyline holds half circles at most, become one arc again (`joints`, `cuts`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +22,13 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turned
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments
+
+LARGEST_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
+"""Arcs are not put together beyond this, except a whole circle: an end near the start could be
+taken for the other side of it."""
+
+SLOPE_EPS = 1e-9
+"""Parts of a helix whose slopes (mm per mm) differ by no more than this go on in each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,21 +145,38 @@ class Along:
 
 
 def backwards(vertices: Floats) -> Floats:
-    """Vertices (k, 3) of x, y, bulge of an open path, travelled the other way."""
+    """Vertices (k, n) of an open path, the bulge in the last column, travelled the other way."""
     back = vertices[::-1].copy()
-    back[:-1, 2] = 0.0 - vertices[-2::-1, 2]
-    back[-1:, 2] = 0.0
+    back[:-1, -1] = 0.0 - vertices[-2::-1, -1]
+    back[-1:, -1] = 0.0
     return back
 
 
-# Arcs that were split (a polyline holds half circles at most) put together again.
+def joined(paths: Sequence[Floats]) -> Floats:
+    """Open paths (k, n), each of which begins where the one before it ends, as one."""
+    return np.concatenate([*(path[:-1] for path in paths[:-1]), paths[-1]])
 
-LARGEST_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
-"""Arcs are not put together beyond this, except a whole circle: an end near the start could be
-taken for the other side of it."""
 
-SLOPE_EPS = 1e-9
-"""Parts of a helix whose slopes (mm per mm) differ by no more than this go on in each other."""
+def middles(segments: Segments) -> Floats:
+    """(K, 2) the middles of lines and arcs."""
+    return point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
+
+
+def runs_of_true(values: Bools) -> tuple[Ints, Ints]:
+    """(J,), (J,): from which and up to which index values are true, the last one not included."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], values.astype(np.int64), [0]])))
+    return edges[::2], edges[1::2]
+
+
+def flat(vertices: Floats) -> Polyline | None:
+    """A run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere there;
+    None when it stays at one place."""
+    kept: list[Floats] = []
+    for vertex in vertices[:, [0, 1, 3]]:
+        if kept and np.hypot(*(vertex[:2] - kept[-1][:2])) <= POSITION_EPS_MM:
+            kept.pop()  # the later one knows the bulge of the move that leads away
+        kept.append(vertex)
+    return Polyline(np.array(kept)) if len(kept) > 1 else None
 
 
 @dataclass(frozen=True)

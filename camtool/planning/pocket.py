@@ -45,7 +45,7 @@ from camtool.planning.clearing import (
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, tool_name
-from camtool.planning.paths import Along
+from camtool.planning.paths import Along, joined
 from camtool.planning.ramps import feeds_along
 from camtool.planning.reach import unreached_findings
 
@@ -319,7 +319,7 @@ def _entry(
         across = link(helix[-1, :2], begin)
         if across is not None:
             flat = _at(across, level)
-            return _joined([np.insert(helix, 2, _sloping(helix, heights), axis=1), flat])
+            return joined([np.insert(helix, 2, _sloping(helix, heights), axis=1), flat])
     if above == 0.0:
         return np.array([[*begin, level, 0.0]])
     return np.array([[*begin, above, 0.0], [*begin, level, 0.0]])
@@ -344,7 +344,7 @@ def _ramp(way: Floats, length: float, heights: tuple[float, float]) -> Floats:
     laps = max(1, math.ceil(0.5 * length / along.total_mm))
     reach = 0.5 * length / laps
     forth = along.piece(0.0, reach)
-    flat = _joined([forth, along.piece(reach, 0.0)] * laps)
+    flat = joined([forth, along.piece(reach, 0.0)] * laps)
     return np.insert(flat, 2, _sloping(flat, heights), axis=1)
 
 
@@ -366,13 +366,8 @@ def _at(flat: Floats, z: float) -> Floats:
     return np.insert(flat, 2, z, axis=1)
 
 
-def _joined(parts: list[Floats]) -> Floats:
-    """Open paths, each of which begins where the one before it ends, as one."""
-    return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
-
-
 def _run(parts: list[Floats], setting: Setting, name: str) -> Run:
-    vertices = _joined(parts)
+    vertices = joined(parts)
     feeds = setting.feeds
     return Run(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, name)
 

@@ -17,12 +17,12 @@ import numpy as np
 from camtool.arrays import Ints
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.distance import approach, near_paths, nearest
-from camtool.geometry.measure import extents, point_at, signed_areas
+from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Chosen, Contour, Setting, Work
 from camtool.planning.naming import at_place, told_together, tool_name
-from camtool.planning.paths import joints
+from camtool.planning.paths import joints, middles
 from camtool.planning.sides import runs_beside
 
 ROOM_TOLERANCE_MM = 1e-4
@@ -165,10 +165,8 @@ def _away(setting: Setting) -> float:
 def _sources(path: Polyline, shape: Polylines) -> tuple[int, ...]:
     """The paths of the shape to which the segments of an offset path are nearest, the one that
     is nearest to most of them first."""
-    segments = Segments.of(path)
-    middles = point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
     source = Segments.of(shape)
-    of = source.path[nearest(middles, source).segment]
+    of = source.path[nearest(middles(Segments.of(path)), source).segment]
     which, count = np.unique(of, return_counts=True)
     return tuple(which[np.argsort(-count, kind="stable")].tolist())
 
@@ -179,8 +177,7 @@ def _is_double(shape: Polylines, place: int) -> bool:
     mine, earlier = segments[segments.path == place], segments[segments.path < place]
     if len(earlier) == 0:
         return False
-    middles = point_at(mine, np.arange(len(mine)), np.full(len(mine), 0.5))
-    points = np.concatenate([mine.start, middles])
+    points = np.concatenate([mine.start, middles(mine)])
     return bool((nearest(points, earlier).distance <= POSITION_EPS_MM).all())
 
 

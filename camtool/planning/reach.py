@@ -27,7 +27,7 @@ from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Setting
 from camtool.planning.naming import MOST_PLACES, tool_name
-from camtool.planning.paths import Along
+from camtool.planning.paths import Along, runs_of_true
 
 TOGETHER_MM = 5e-6
 """Two boundaries nearer than this run together: above the error of two offsets in a row."""
@@ -150,13 +150,11 @@ class _Parts:
         if self.wanted.all():
             return [path]
         turn = int(np.argmin(self.wanted))
-        length, away, wanted = (
-            np.roll(column, -turn) for column in (self.length, self.away, self.wanted)
-        )
+        length, away = np.roll(self.length, -turn), np.roll(self.away, -turn)
         begin = np.concatenate([[0.0], np.cumsum(length)]) + self.length[:turn].sum()
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], wanted.astype(np.int64), [0]])))
-        first, last = edges[::2], edges[1::2]
+        first, last = runs_of_true(np.roll(self.wanted, -turn))
         # The path begins with a part that is not wanted, so that every other stretch is wanted.
+        edges = np.column_stack([first, last]).ravel()
         farthest = np.maximum.reduceat(np.append(away, 0.0), edges)[::2]
         large = 2.0 * (begin[last] - begin[first]) * farthest >= least_mm2
         along = Along.of(path)

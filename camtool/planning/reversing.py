@@ -3,13 +3,16 @@
 Each change of an axis's direction makes its slide cross the play, costs a compensation, and
 leaves an error where it happens. The PIC thesis saw parts fail above 16 of them (L3052-3057,
 L3207-3211) and saved them by machining in mirror halves (L2816-2841). So each contour is divided
-where an axis turns (`mirror`), the runs are cut in the directions that leave the smaller error,
-and every run is approached so that its axes are engaged (`approach`): all reversals happen in the
-air.
+where an axis turns (`Division`), the runs are cut in the directions that leave the smaller error,
+and every run is approached so that its axes are engaged (`Approaches`): all reversals happen in
+the air.
 
 A contour stays in one piece where the job asks for what only a whole one can have: leads, tabs,
 a ramp, a start by rule or by hand. Of the others of those, only the start is chosen. What cuts
 climb or conventionally keeps its direction, divided or not.
+
+    path ──parts_of──▶ parts, each of one direction in x and one in y ──turns_of──▶ turns
+    parts, turns ──▶ places where it may be divided ──▶ the cheapest division ──▶ pieces
 """
 
 from __future__ import annotations
@@ -32,33 +35,23 @@ from camtool.machine.controllers import Controller
 from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.planning.items import Contour, Fixed, Item, Run
 from camtool.planning.job import Operation
+from camtool.planning.paths import flat
 from camtool.units import UM_PER_MM
 
-LEAST_TURN_MM = 1e-6
-"""How far back an axis must come for a reversal, where no machine says how fine its steps are."""
+ALIKE_MM = 1e-4
+"""Predicted errors that differ by less are alike: a tenth of a micrometre, below a step."""
 
+SAMPLES = 9
+"""So many points of each part are moved by the error, to see how far from the path they come: on
+a quarter of a circle the greatest distance is then found within 0.5 %."""
 
-def reversals_of(cut: Polyline | Run, machine: Machine | None = None) -> tuple[int, int]:
-    """How often X and Y turn round between the first point of a path or run and its last one.
+APPROACH_MARGIN_MM = 0.05
+"""An approach is longer by this much than what compensation leaves of the play: the play is not
+the same all over a table (that of the PIC machine by 14 µm in X and 28 µm in Y, L2370-2373)."""
 
-    What comes back by less than half a step of the machine (`LEAST_TURN_MM` without one) is no
-    reversal; nor is the first motion, which an approach takes care of.
-    """
-    path = flat(cut.vertices) if isinstance(cut, Run) else cut
-    if path is None:
-        return 0, 0
-    parts = parts_of(path)
-    least = (LEAST_TURN_MM,) * 2
-    if machine is not None:
-        least = least_turn_mm(machine.axes.x), least_turn_mm(machine.axes.y)
-    x, y = (turns_of(parts.places[:, axis], path.closed, least[axis]) for axis in (0, 1))
-    return _within(x, parts), _within(y, parts)
-
-
-def _within(turns: Turns, parts: Parts) -> int:
-    """Turns of a way from the first place to the last: those at the start of a closed path are
-    no part of it."""
-    return int(((turns.first > 0) & (turns.last < len(parts))).sum())
+REVERSAL_STEPS = 0.5
+"""An axis has turned round when it came back by this much of a coded step, as the simulation of
+controllers that follow paths has it."""
 
 
 @dataclass
@@ -116,7 +109,7 @@ def _runs_of(
     division = Division.of(parts, turns, residual, either_way=not _keeps_direction(contour))
     closed, levels = contour.path.closed, len(contour.setting.levels_mm)
     count, error_mm = len(turns[0]) + len(turns[1]), drawn_error_mm(division)
-    at_start = count - sum(_within(each, parts) for each in turns)
+    at_start = count - sum(each.within(len(parts)) for each in turns)
     runs = 1 if closed or contour.reversible else levels
     counts.before.add(runs, count * levels - at_start, error_mm)
     reason = _stays_whole(contour.setting.operation)
@@ -244,29 +237,6 @@ def _no_play(machine: Machine) -> Finding:
     )
 
 
-# A path divided into runs in which no axis turns round, each in the direction that errs less.
-#
-#     parts, turns ──▶ places where it may be divided ──▶ the cheapest division ──▶ pieces
-#
-# On the PIC machine a contour cut in one go showed errors that vanished when it was cut as two
-# halves, both from one point («maquinado en espejo», L2816-2841, L3200-3202): each half drives
-# each axis in one direction only, so that the play stays taken up. Here every contour becomes such
-# runs.
-#
-# Each turn of an axis must be divided somewhere on its stretch; one place may serve both axes (the
-# corner of a square). Only the ends of stretches need to be tried. Of all divisions the one with
-# the smallest greatest error is taken; then with the fewest runs; then that which drives the axes
-# in one direction throughout, as far as it can, so that the error is the same all over the part;
-# then with the smallest error over its length: two passes of dynamic programming along the path.
-
-ALIKE_MM = 1e-4
-"""Predicted errors that differ by less are alike: a tenth of a micrometre, below a step."""
-
-SAMPLES = 9
-"""So many points of each part are moved by the error, to see how far from the path they come: on
-a quarter of a circle the greatest distance is then found within 0.5 %."""
-
-
 @dataclass(frozen=True)
 class Piece:
     """From place `first` to place `last` of the parts (beyond their number on a closed path), cut
@@ -283,8 +253,22 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Division:
-    """What a division is chosen by: the parts of a path, the turns of both axes along them, the
-    residual errors of both axes; `either_way`: pieces may be cut backward."""
+    """A path to be divided into runs in which no axis turns round, each in the direction that errs
+    less: its parts, the turns of both axes along them, the residual errors of both axes;
+    `either_way`: pieces may be cut backward.
+
+    On the PIC machine a contour cut in one go showed errors that vanished when it was cut as two
+    halves, both from one point («maquinado en espejo», L2816-2841, L3200-3202): each half drives
+    each axis in one direction only, so that the play stays taken up. Here every contour becomes
+    such runs.
+
+    Each turn of an axis must be divided somewhere on its stretch; one place may serve both axes
+    (the corner of a square). Only the ends of stretches need to be tried. Of all divisions the one
+    with the smallest greatest error is taken; then with the fewest runs; then that which drives
+    the axes in one direction throughout, as far as it can, so that the error is the same all over
+    the part; then with the smallest error over its length: two passes of dynamic programming along
+    the path.
+    """
 
     parts: Parts
     turns: tuple[Turns, Turns]
@@ -437,21 +421,10 @@ def _places(division: Division, begin: int, end: int) -> list[int]:
     return sorted(place for place in found if begin <= place <= end)
 
 
-# Where an axis turns round on the way along a path.
-#
-#     path ──parts_of──▶ parts, each of one direction in x and one in y ──turns_of──▶ turns
-#
-# A part is a line, or an arc within one quadrant: arcs are split where their tangent lies along an
-# axis. Along each axis the way then is a list of values, and it turns at its highest and lowest
-# ones. What comes back by less than a least way is no turn: the controller may never see it.
-#
-# A turn is not a point but a stretch: a line across the axis lies on the extreme as a whole, and
-# whether it belongs to the way up or to the way down is free.
-
-
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """A path as A parts in its order: part i goes from place i to place i + 1 of `places`
+    """A path as A parts in its order, each a line, or an arc within one quadrant: arcs are split
+    where their tangent lies along an axis. Part i goes from place i to place i + 1 of `places`
     (A+1, 2) mm (the last is the first when closed), and is the share `begin` to `end` (A,) of the
     segment `row` (A,) of the path."""
 
@@ -534,6 +507,11 @@ def parts_of(path: Polyline) -> Parts:
 class Turns:
     """Turns of one axis along A parts.
 
+    The way along the axis is a list of values, and it turns at its highest and lowest ones. What
+    comes back by less than a least way is no turn: the controller may never see it. A turn is not
+    a point but a stretch: a line across the axis lies on the extreme as a whole, and whether it
+    belongs to the way up or to the way down is free.
+
     `sense` (A,): the direction ±1 in which the axis is driven on each part; 0 on the stretches of
     turns, before the first motion and after the last one. `first`, `last` (T,): the places at the
     two ends of each turn's stretch; `last` goes on beyond A where the stretch of a closed path
@@ -548,6 +526,11 @@ class Turns:
 
     def __len__(self) -> int:
         return len(self.first)
+
+    def within(self, count: int) -> int:
+        """How many lie between the first of `count` parts' places and the last: those at the start
+        of a closed path do not."""
+        return int(((self.first > 0) & (self.last < count)).sum())
 
 
 def no_turns(count: int) -> Turns:
@@ -616,39 +599,19 @@ def _flat(values: list[float], knot: int, closed: bool, least_mm: float) -> tupl
     return low, high
 
 
-# Where the tool comes from, so that no axis has play left in front of it when a cut begins.
-#
-# The tool goes down where it last moved to in XY. If each axis came there in the direction in
-# which the cut first drives it, and over more than its play, its slide is engaged from the first
-# step of the cut on, and the controller has nothing to compensate. An axis that the cut does not
-# drive comes in the direction that leaves the smaller error: always the same one, so that holes
-# and lines along the other axis keep their distances. All of this happens above the stock.
-
-APPROACH_MARGIN_MM = 0.05
-"""An approach is longer by this much than what compensation leaves of the play: the play is not
-the same all over a table (that of the PIC machine by 14 µm in X and 28 µm in Y, L2370-2373)."""
-
-REVERSAL_STEPS = 0.5
-"""An axis has turned round when it came back by this much of a coded step, as the simulation of
-controllers that follow paths has it."""
-
-Point = tuple[float, float]
-
-
-def approach_from(run: Run, machine: Machine) -> Point | None:
-    """Where the tool goes first (x, y) mm, at safe z, on its way to the first point of a run.
-
-    None where neither axis has play or compensation. The place lies beside the run, nearer than
-    the play and `APPROACH_MARGIN_MM` on each axis. Nothing keeps it within the travel: a nearer
-    one would not do, and the toolpath that holds it is checked as a whole.
-    """
-    return Approaches(machine)(run)
-
-
 class Approaches:
-    """`approach_from` for runs that are cut one after the other, with nothing between them but
-    the way up, across and down (a tool change needs a fresh one): an axis that still stands
-    engaged from the run before goes straight to the start. Play is the largest of all regions."""
+    """Where the tool comes from, so that no axis has play left in front of it when a cut begins.
+
+    The tool goes down where it last moved to in XY. If each axis came there in the direction in
+    which the cut first drives it, and over more than its play, its slide is engaged from the first
+    step of the cut on, and the controller has nothing to compensate. An axis that the cut does not
+    drive comes in the direction that leaves the smaller error: always the same one, so that holes
+    and lines along the other axis keep their distances. All of this happens above the stock.
+
+    It is asked run by run, with nothing between them but the way up, across and down (a tool
+    change needs a fresh one): an axis that still stands engaged from the run before goes straight
+    to the start. Play is the largest of all regions.
+    """
 
     def __init__(self, machine: Machine) -> None:
         self._drives = [
@@ -656,8 +619,14 @@ class Approaches:
             for axis, residual in zip(loosest(machine), residuals(machine), strict=True)
         ]
 
-    def __call__(self, run: Run) -> Point | None:
-        """Where the tool goes first; None: straight to the first point of the run."""
+    def __call__(self, run: Run) -> tuple[float, float] | None:
+        """Where the tool goes first (x, y) mm, at safe z; None: straight to the first point of the
+        run, as always where neither axis has play or compensation.
+
+        The place lies beside the run, nearer than the play and `APPROACH_MARGIN_MM` on each axis.
+        Nothing keeps it within the travel: a nearer one would not do, and the toolpath that holds
+        it is checked as a whole.
+        """
         path = flat(run.vertices)
         places = run.vertices[:1, :2] if path is None else parts_of(path).places
         x, y = (
@@ -714,39 +683,24 @@ def least_turn_mm(axis: Axis) -> float:
     return REVERSAL_STEPS * axis.coded_step_mm
 
 
-def flat(vertices: Floats) -> Polyline | None:
-    """A run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere there;
-    None when it stays at one place."""
-    kept: list[Floats] = []
-    for vertex in vertices[:, [0, 1, 3]]:
-        if kept and np.hypot(*(vertex[:2] - kept[-1][:2])) <= POSITION_EPS_MM:
-            kept.pop()  # the later one knows the bulge of the move that leads away
-        kept.append(vertex)
-    return Polyline(np.array(kept)) if len(kept) > 1 else None
-
-
-# What play and its compensation leave over: how far off the slides stand, by direction.
-#
-# An axis that has been driven in one direction for longer than its play stands at a fixed distance
-# from where the controller believes it to be. With the play operator of `camtool.kernels.play`,
-# low ≤ slide − motor ≤ high, and c added at each reversal from the direction engaged at first:
-#
-#     in the first direction:   motor = position,       in the other one:   motor = position ∓ c,
-#     driven towards +:         slide = motor + low,    towards −:          slide = motor + high.
-#
-# The difference of the two is |play − c|. Compensation as exact as the play would leave none; the
-# PIC machine's leaves 11.5 µm in X and 9.5 µm in Y (docs/decisions/0005-play.md).
-#
-# Where the play changes with the region of the table, an axis is taken with the one that leaves
-# most over: where a contour is divided then hangs on its shape alone, not on where it lies, and
-# what is told to be left over is left nowhere else.
-
-
 @dataclass(frozen=True)
 class Residual:
-    """One axis: the error of its slide in mm when driven towards − and towards +; `matters`:
-    there is play or compensation; `better`: the direction ±1 of the smaller error (where both are
-    alike, the one in which the axis is engaged at first)."""
+    """What play and its compensation leave over on one axis: the error of its slide in mm when
+    driven towards − and towards +; `matters`: there is play or compensation; `better`: the
+    direction ±1 of the smaller error (where both are alike, the one in which the axis is engaged
+    at first).
+
+    An axis that has been driven in one direction for longer than its play stands at a fixed
+    distance from where the controller believes it to be. With the play operator of
+    `camtool.kernels.play`, low ≤ slide − motor ≤ high, and c added at each reversal from the
+    direction engaged at first:
+
+        in the first direction:   motor = position,       in the other one:   motor = position ∓ c,
+        driven towards +:         slide = motor + low,    towards −:          slide = motor + high.
+
+    The difference of the two is |play − c|. Compensation as exact as the play would leave none;
+    the PIC machine's leaves 11.5 µm in X and 9.5 µm in Y (docs/decisions/0005-play.md).
+    """
 
     minus_mm: float
     plus_mm: float
@@ -773,7 +727,9 @@ def loosest(machine: Machine) -> tuple[Axis, Axis]:
 
 
 def residuals(machine: Machine) -> tuple[Residual, Residual]:
-    """X and Y of a machine, each in the region where compensation leaves most over."""
+    """X and Y of a machine, each in the region where compensation leaves most over: where a
+    contour is divided then hangs on its shape alone, not on where it lies, and what is told to be
+    left over is left nowhere else."""
     x, y, _ = (
         max(
             (

@@ -17,6 +17,13 @@ FEED_TOLERANCE = 1e-9
 """A feed may exceed the highest one by this part of it: by rounding alone."""
 
 
+PASS_SLACK = 1e-9
+"""Steps may exceed the step down by this part of it, by rounding, before a pass is added."""
+
+MOST_PASSES = 10_000
+"""More passes than this are taken as a mistake."""
+
+
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     """The operation with the machine's numbers where it is silent; OptionError when too fast,
     and for passes that cannot be."""
@@ -105,15 +112,6 @@ def _sayable(highest_mm_min: float, machine: Machine) -> float:
     unit = machine.feed.unit_mm_min
     units = math.floor(highest_mm_min / unit * (1.0 + FEED_TOLERANCE))
     return units * unit or highest_mm_min
-
-
-# At which depths a contour or a carving is cut: the z of its passes.
-
-PASS_SLACK = 1e-9
-"""Steps may exceed the step down by this part of it, by rounding, before a pass is added."""
-
-MOST_PASSES = 10_000
-"""More passes than this are taken as a mistake."""
 
 
 def levels(

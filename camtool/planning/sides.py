@@ -1,5 +1,6 @@
-"""Sides by nesting: what of a drawing is part and what is hole, whatever an operation takes of it.
+"""What an operation takes of a drawing, and its sides: what is part and what is hole.
 
+Sides follow from the nesting of the whole drawing, whatever an operation takes of it.
 A closed contour that an even number of others hold is the rim of a part, which stays; one that an
 odd number hold is the rim of a hole. All closed contours of the file are nested, those of other
 operations and those that nobody cuts too, or a window cut by itself would be taken for a part.
@@ -25,12 +26,13 @@ from camtool.errors import OptionError
 from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.measure import path_extents, point_at
+from camtool.geometry.measure import path_extents
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.patterns import matches
 from camtool.planning.items import Chosen
 from camtool.planning.job import Job, Operation
+from camtool.planning.paths import middles
 
 SAME_CONTOUR_MM = 0.01
 """A contour that nobody cuts, and that runs along one that is cut so near, is that one again."""
@@ -203,12 +205,8 @@ def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
 
 def _runs_along(path: Polyline, other: Polyline) -> bool:
     segments = Segments.of(path)
-    middles = point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
-    points = np.concatenate([segments.start, middles])
+    points = np.concatenate([segments.start, middles(segments)])
     return bool((nearest(points, Segments.of(other)).distance <= SAME_CONTOUR_MM).all())
-
-
-# Which paths and points of a placed drawing an operation takes.
 
 
 def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:

@@ -15,13 +15,34 @@ from camtool.machine.registry import load_target
 from camtool.planning.items import Contour, Feeds, Item, Run, Setting
 from camtool.planning.job import Operation
 from camtool.planning.link import Worked, link
-from camtool.planning.reversing import Approaches
+from camtool.planning.paths import flat
+from camtool.planning.reversing import Approaches, least_turn_mm, parts_of, turns_of
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
 from camtool.verification.verify import verify
 
 DEPTH_MM = 0.02
 PIC = load_target("pic-mmh")
+
+LEAST_TURN_MM = 1e-6
+"""How far back an axis must come for a reversal, where no machine says how fine its steps are."""
+
+
+def reversals_of(cut: Polyline | Run, machine: Machine | None = None) -> tuple[int, int]:
+    """How often X and Y turn round between the first point of a path or run and its last one.
+
+    What comes back by less than half a step of the machine (`LEAST_TURN_MM` without one) is no
+    reversal; nor is the first motion, which an approach takes care of.
+    """
+    path = flat(cut.vertices) if isinstance(cut, Run) else cut
+    if path is None:
+        return 0, 0
+    parts = parts_of(path)
+    least = (LEAST_TURN_MM,) * 2
+    if machine is not None:
+        least = least_turn_mm(machine.axes.x), least_turn_mm(machine.axes.y)
+    x, y = (turns_of(parts.places[:, axis], path.closed, least[axis]) for axis in (0, 1))
+    return x.within(len(parts)), y.within(len(parts))
 
 
 def setting(levels: int = 1, **operation: Any) -> Setting:

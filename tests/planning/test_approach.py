@@ -15,17 +15,15 @@ from camtool.planning.items import Run
 from camtool.planning.reversing import (
     APPROACH_MARGIN_MM,
     Approaches,
-    approach_from,
     approach_mm,
     residuals,
-    reversals_of,
 )
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
 from camtool.simulation.simulate import simulate
 from camtool.verification.cuts import cut_moves
 from tests.paths import scaled
-from tests.planning.reversal_parts import run_of, square, toolpath, with_play
+from tests.planning.reversal_parts import reversals_of, run_of, square, toolpath, with_play
 from tests.strategies import contours, open_contours
 
 
@@ -51,21 +49,21 @@ MARGIN = APPROACH_MARGIN_MM
 def test_both_axes_come_as_they_go_on(
     machine: Machine, run: Run, from_x: float, from_y: float, why: str
 ) -> None:
-    assert approach_from(run, machine) == pytest.approx((1 + from_x, 2 + from_y)), why
+    assert Approaches(machine)(run) == pytest.approx((1 + from_x, 2 + from_y)), why
 
 
 def test_a_hole_is_always_reached_from_one_side(machine: Machine) -> None:
     hole = Run(np.array([[1, 2, -1.0, 0], [1, 2, 0.5, 0]]), np.array([5.0]), 5.0, "hole")
-    assert approach_from(hole, machine) == pytest.approx((1 - MARGIN, 2 - MARGIN))
+    assert Approaches(machine)(hole) == pytest.approx((1 - MARGIN, 2 - MARGIN))
 
 
 def test_the_way_is_what_compensation_leaves_of_the_play(machine: Machine) -> None:
     bare = with_play(machine, backlash_mm=0.3, compensation_mm=0.1)
     assert approach_mm(bare.axes.x) == pytest.approx(0.2 + MARGIN)
     one = with_play(machine, backlash_mm=0.3, compensation_mm=0.0, y_backlash_mm=0.0)
-    assert approach_from(line((1, 2), (3, 4)), one) == pytest.approx((1 - 0.3 - MARGIN, 2))
+    assert Approaches(one)(line((1, 2), (3, 4))) == pytest.approx((1 - 0.3 - MARGIN, 2))
     none = with_play(machine, backlash_mm=0.0, compensation_mm=0.0)
-    assert approach_from(line((1, 2), (3, 4)), none) is None
+    assert Approaches(none)(line((1, 2), (3, 4))) is None
 
 
 def test_of_a_map_of_play_the_regions_that_are_worst_count(machine: Machine) -> None:
@@ -77,7 +75,7 @@ def test_of_a_map_of_play_the_regions_that_are_worst_count(machine: Machine) -> 
     x, y = residuals(mapped)
     assert abs(x.plus_mm - x.minus_mm) == pytest.approx(0.13)
     assert abs(y.plus_mm - y.minus_mm) == pytest.approx(0.0)
-    come = approach_from(line((1, 2), (3, 4)), mapped)
+    come = Approaches(mapped)(line((1, 2), (3, 4)))
     assert come == pytest.approx((1 - MARGIN - 0.05, 2 - MARGIN))
 
 

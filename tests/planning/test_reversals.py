@@ -22,7 +22,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.items import Contour, Fixed, Item
 from camtool.planning.job import Entry, Lead, Tabs, job_of
 from camtool.planning.order import must_precede
-from camtool.planning.reversing import fewer_reversals, reversals_of
+from camtool.planning.reversing import fewer_reversals
 from tests.oracles.reversals import fewest_runs
 from tests.paths import mirrored, moved, scaled
 from tests.planning.reversal_parts import (
@@ -37,6 +37,7 @@ from tests.planning.reversal_parts import (
     letter_v,
     paths_of,
     polygon,
+    reversals_of,
     run_of,
     setting,
     square,

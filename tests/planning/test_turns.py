@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline, Segments
-from camtool.planning.reversing import parts_of, reversals_of, turns_of
+from camtool.planning.reversing import parts_of, turns_of
 from tests.oracles.reversals import dense, turns
-from tests.planning.reversal_parts import circle, gear, run_of, square
+from tests.planning.reversal_parts import circle, gear, reversals_of, run_of, square
 from tests.strategies import contours, polylines
 
 LEAST_MM = 7.3e-4
