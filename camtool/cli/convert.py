@@ -15,7 +15,7 @@ from camtool.cli.picture_options import (
     picture_options,
 )
 from camtool.cli.post import Asked, finish
-from camtool.cli.report import flags_given, pictures_asked, report_option
+from camtool.cli.report import Outputs, report_option
 
 
 @click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")
@@ -64,12 +64,13 @@ def convert(
     The moves that the first controller decodes are written for the second one, read back,
     simulated and compared with them. Exit code 1 (and no file) when something is wrong.
     """
-    picture.check(pictures_asked(page, preview), UNVERIFIED if no_verify else RESULT)
+    outputs = Outputs(preview, report, page)
+    picture.check(outputs.pictures, UNVERIFIED if no_verify else RESULT)
     before = MachineFlags(source, from_machine, from_set).load()
     after = MachineFlags(target, machine, settings).load()
     reads = [program, str(before.file), str(after.file)]
     reads += [file for file in (from_machine, machine) if file is not None]
-    asked = Asked(program, output, report, preview, page, flags_given(), reads)
+    asked = Asked(program, output, outputs, reads)
     asked.check(after.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import convert_program
@@ -83,11 +84,5 @@ def convert(
         feed_mm_min=feed_mm_min,
         check=not no_verify,
     )
-    return finish(
-        run,
-        asked,
-        quiet=quiet,
-        verbose=verbose,
-        picture=picture.painter(lambda: [run.scene()], quiet=quiet),
-        target=after,
-    )
+    painter = picture.painter(lambda: [run.scene()], quiet=quiet)
+    return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)

@@ -48,11 +48,10 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
     _progress(MADE)
     code = finish(
         run,
-        Asked(source, STDOUT, None, reads=[*posting.files(source), str(target.file)]),
+        Asked(source, STDOUT, reads=[*posting.files(source), str(target.file)]),
+        picture=PictureFlags().painter(lambda: [run.scene()], quiet=quiet),
         quiet=quiet,
         verbose=verbose,
-        picture=PictureFlags().painter(lambda: [run.scene()], quiet=quiet),
-        target=target,
     )
     if code == 0:
         _progress(DONE)

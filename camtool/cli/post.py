@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.files import STDOUT, write_all
 from camtool.cli.first_run import compiled_beside
 from camtool.cli.messages import (
     REPORT_NAMES,
@@ -46,17 +46,7 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
-from camtool.cli.report import (
-    Flags,
-    Subject,
-    flags_given,
-    linked_picture,
-    picture_beside,
-    pictures_asked,
-    refuse_foreign_picture,
-    report_files,
-    report_option,
-)
+from camtool.cli.report import Outputs, report_option
 from camtool.errors import CamtoolError, OptionError
 
 if TYPE_CHECKING:
@@ -199,28 +189,21 @@ def post(
     """
     if watching and STDOUT in (source, output, report, page):
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
-    pictures = pictures_asked(page, preview)
-    picture.check(pictures, UNVERIFIED if posting.no_verify else RESULT)
+    outputs = Outputs(preview, report, page)
+    picture.check(outputs.pictures, UNVERIFIED if posting.no_verify else RESULT)
     if before_after:
         if posting.no_verify:
             raise click.UsageError("--before-after needs the predicted path; drop --no-verify")
-        check_beside("--before-after", pictures)
-    flags = flags_given()
+        check_beside("--before-after", outputs.pictures)
 
     def once() -> int:
         target = posting.load()
         reads = [*posting.files(source), str(target.file)]
-        asked = Asked(source, output, report, preview, page, flags, reads)
+        asked = Asked(source, output, outputs, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
         run = posting.make(source, target, quiet=quiet, preview=preview)
-        return finish(
-            run,
-            asked,
-            quiet=quiet,
-            verbose=verbose,
-            picture=picture.painter(lambda: scenes_of(run, before=before_after), quiet=quiet),
-            target=target,
-        )
+        painter = picture.painter(lambda: scenes_of(run, before=before_after), quiet=quiet)
+        return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)
 
     return watch(once, lambda: posting.files(source), quiet=quiet) if watching else once()
 
@@ -233,29 +216,22 @@ ANY_MACHINE = "travel, rates and backlash are placeholders: camtool targets new 
 
 @dataclass(frozen=True)
 class Asked:
-    """What the user wants written; `source` names what it is made of, None is not wanted.
-
-    `reads` are all files that are read for it.
-    """
+    """What the user wants written; `source` names what it is made of, and `output` the program.
+    `reads` are all files that are read for it."""
 
     source: str
     output: str | None
-    report: str | None
-    preview: str | None = None
-    page: str | None = None
-    flags: Flags = ()
+    outputs: Outputs = field(default_factory=Outputs)
     reads: Sequence[str] = ()
 
     def check(self, extension: str, *, verified: bool) -> None:
         """OutputError, before any work is done, when a place cannot be written."""
-        for flag, name in (("--json", self.report), ("--report", self.page)):
+        for flag, name in (("--json", self.outputs.report), ("--report", self.outputs.page)):
             if name is not None and not verified:
                 raise click.UsageError(
                     f"{flag} is the report of the verification that --no-verify leaves out"
                 )
-        outputs = [self.program(extension), self.preview, self.report, self.page]
-        check_places(self.reads, [*outputs, picture_beside(self.page, self.preview)])
-        refuse_foreign_picture(self.page, self.preview)
+        self.outputs.check(self.reads, self.program(extension))
 
     def program(self, extension: str) -> str:
         """The program's name; when none is given the source's, here; stdin goes to stdout."""
@@ -264,24 +240,16 @@ class Asked:
         return STDOUT if self.source == STDOUT else Path(self.source).stem + extension
 
 
-def finish(
-    run: Run,
-    asked: Asked,
-    *,
-    quiet: bool,
-    verbose: bool,
-    picture: Painter,
-    target: LoadedTarget,
-) -> int:
+def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bool) -> int:
     """Writes what was made and says so; the exit code. `picture` draws the ones that were asked.
 
     Where something is wrong only the page that was asked for is written: it says what.
     """
+    outputs = asked.outputs
     say_findings(run.findings, quiet=quiet, verbose=verbose)
     if run.failed or run.program is None:
-        if asked.page is not None:
-            write_all(_page_alone(run, asked, picture, target))
-        no = "nothing" if asked.page is None else "no program"
+        write_all(_page_alone(run, outputs, picture))
+        no = "nothing" if outputs.page is None else "no program"
         say(
             f"camtool: error: {asked.source}: {no} was written; mend the errors above",
             quiet=False,
@@ -290,43 +258,21 @@ def finish(
     # A dialect of several forms (binary, listing) says only now which extension it takes.
     asked.check(run.program.extension, verified=True)
     output = asked.program(run.program.extension)
-    files = {output: run.program.data}
-    if asked.preview is not None:
-        files[asked.preview] = picture(asked.preview)
-    if asked.report is not None and run.report is not None:
-        files[asked.report] = run.report.to_json().encode()
-    if asked.page is not None:
-        files.update(_page(run, asked, picture, target))
-    write_all(files)
+    write_all({output: run.program.data, **outputs.files(run, picture)})
     if run.report is not None and not quiet:
         said = run.report.to_text(findings=False)
-        if target.any_machine:
-            said += f"\n{'machine':<10} {ANY_MACHINE.format(target.machine.target.name)}"
+        if run.target.any_machine:
+            said += f"\n{'machine':<10} {ANY_MACHINE.format(run.target.machine.target.name)}"
         show_facts(said, REPORT_NAMES, report_marks(run.findings), err=True)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(run.program.data)} bytes)", quiet=quiet)
     return 0
 
 
-def _page_alone(
-    run: Run, asked: Asked, picture: Painter, target: LoadedTarget
-) -> dict[str, bytes]:
+def _page_alone(run: Run, outputs: Outputs, picture: Painter) -> dict[str, bytes]:
     """The files of the page, and the picture of `--preview` if that is what the page shows."""
-    files, linked = _page(run, asked, picture, target), linked_picture(asked.page, asked.preview)
+    files, linked = outputs.page_files(run, picture), outputs.linked
     return files if linked is None or linked in files else {**files, linked: picture(linked)}
-
-
-def _page(run: Run, asked: Asked, picture: Painter, target: LoadedTarget) -> dict[str, bytes]:
-    """The files of the page that was asked for."""
-    subject = Subject(
-        title=Path(asked.source).name if asked.source != STDOUT else "<stdin>",
-        target=target,
-        report=run.report,
-        findings=run.findings,
-        program=run.program.data if run.program is not None else None,
-        flags=asked.flags,
-    )
-    return report_files(str(asked.page), subject, picture, preview=asked.preview)
 
 
 # `--watch`: the same again whenever one of its files has changed. Files are looked at by their

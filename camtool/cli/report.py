@@ -1,8 +1,8 @@
-"""`--report`: a page about a program, as HTML, Markdown or JSON, with its picture.
+"""What is written about a program: its picture, its report as JSON, and a page.
 
-HTML holds its picture. Markdown links to a picture beside it: the one of `--preview`, or else an
-SVG of the page's own name, which never takes the place of a file that the page did not bring
-along; Markdown on stdout has none.
+A page (`--report`) is HTML, Markdown or JSON. HTML holds its picture. Markdown links to a picture
+beside it: the one of `--preview`, or else an SVG of the page's own name, which never takes the
+place of a file that the page did not bring along; Markdown on stdout has none.
 """
 
 from __future__ import annotations
@@ -10,24 +10,23 @@ from __future__ import annotations
 import base64
 import hashlib
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.files import STDOUT, is_foreign, sealed
+from camtool.cli.files import STDOUT, check_places, is_foreign, sealed
 from camtool.cli.picture_options import FLAGS as PICTURE_FLAGS
 from camtool.cli.picture_options import Painter, is_viewer
 from camtool.errors import OutputError
-from camtool.findings import Finding
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
-    from camtool.machine.registry import LoadedTarget
-    from camtool.verification.report import Page, Report, Setup
+    from camtool.run import Run
+    from camtool.verification.report import Page, Setup
 
-Flags = tuple[tuple[str, str], ...]
 PAGES = (".html", ".md", ".json")
 EMBEDDED = "picture.svg"
 """The picture within a page of HTML."""
@@ -38,18 +37,6 @@ _LOOKS = (*PICTURE_FLAGS, "beside", "before_after")
 _NOT_TOLD = frozenset((*_PLACES, *_LOOKS, "quiet", "verbose", "watching"))
 """What says where things are, how pictures look and how much is said; the machine tells of
 itself."""
-
-
-@dataclass(frozen=True)
-class Subject:
-    """What a page is about; `report` None where nothing could be judged."""
-
-    title: str
-    target: LoadedTarget
-    report: Report | None
-    findings: tuple[Finding, ...]
-    program: bytes | None
-    flags: Flags = ()
 
 
 def report_option(command: Any) -> Any:
@@ -66,7 +53,111 @@ def _page_name(ctx: click.Context, param: click.Parameter, value: str | None) ->
     return value
 
 
-def flags_given() -> Flags:
+@dataclass(frozen=True)
+class Outputs:
+    """What the user wants written about a program: a picture, the report as JSON, a page (as named
+    by `--preview`, `--json` and `--report`); None is not wanted."""
+
+    preview: str | None = None
+    report: str | None = None
+    page: str | None = None
+
+    @property
+    def linked(self) -> str | None:
+        """The picture that the page links to: the one of `--preview`, unless that is a viewer, or
+        one of the page's own name. None where it links to none."""
+        if self.page in (None, STDOUT) or PurePath(str(self.page)).suffix.lower() != ".md":
+            return None
+        if self.preview is not None and not is_viewer(self.preview):
+            return self.preview
+        return str(PurePath(str(self.page)).with_suffix(".svg"))
+
+    @property
+    def beside(self) -> str | None:
+        """The picture that the page brings along, which nobody asked for by name."""
+        return None if self.linked == self.preview else self.linked
+
+    @property
+    def pictures(self) -> list[str]:
+        """The pictures to be made, by names of their kind."""
+        held = self.page is not None and self.page.lower().endswith(".html")
+        names = (self.preview, self.beside, EMBEDDED if held else None)
+        return [each for each in names if each is not None]
+
+    def check(self, reads: Iterable[str | None], *others: str) -> None:
+        """OutputError, before any work is done, when a place of these or of `others` cannot be
+        written, is one of `reads`, or holds a picture that the page did not bring along."""
+        names = [*others, self.preview, self.report, self.page, self.beside]
+        check_places(reads, names)
+        if self.beside is not None and is_foreign(self.beside, str(self.page)):
+            raise OutputError(
+                f"is there, and is not the picture that {self.page} brought along",
+                file=self.beside,
+                mend="give the page another name, or its picture a name with --preview",
+            )
+
+    def files(self, run: Run, picture: Painter) -> dict[str, bytes]:
+        """All of them; `picture` draws the ones that were asked."""
+        files: dict[str, bytes] = {}
+        if self.preview is not None:
+            files[self.preview] = picture(self.preview)
+        if self.report is not None and run.report is not None:
+            files[self.report] = run.report.to_json().encode()
+        return {**files, **self.page_files(run, picture)}
+
+    def page_files(self, run: Run, picture: Painter) -> dict[str, bytes]:
+        """The page, and the picture beside it where it has one of its own."""
+        from camtool.verification.report import html, markdown, page_json
+
+        if self.page is None:
+            return {}
+        name, suffix = self.page, PurePath(self.page).suffix.lower()
+        if name != STDOUT and suffix == ".json":
+            return {name: page_json(_page(run, ())).encode()}
+        if name != STDOUT and suffix == ".html":
+            pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
+            shown = tuple((caption, _held(data)) for caption, data in pictures)
+            return {name: html(_page(run, shown)).encode()}
+        links = () if self.linked is None else ((_CAPTION, _from(name, self.linked)),)
+        files = {name: markdown(_page(run, links)).encode()}
+        if self.beside is None:
+            return files
+        return {**files, self.beside: sealed(picture(self.beside), name)}
+
+
+def _held(svg: bytes) -> str:
+    """The address of a picture that the page itself holds."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+
+
+def _from(page_name: str, picture_name: str) -> str:
+    """The picture's address as the page sees it, with forward slashes."""
+    folder = PurePath(page_name).parent
+    return PurePath(os.path.relpath(picture_name, folder)).as_posix()
+
+
+def _page(run: Run, pictures: tuple[tuple[str, str], ...]) -> Page:
+    from camtool.verification.report import Page, reported
+
+    title = one_line(PurePath(run.source).name)
+    return Page(title, run.report, reported(run.findings), _setup(run), pictures)
+
+
+def _setup(run: Run) -> Setup:
+    from camtool.machine.registry import changed_values, machine_digest
+    from camtool.verification.report import Changed, Setup
+
+    machine, program = run.target.machine, run.program
+    return Setup(
+        machine=f"{machine.target.name}: {machine.target.title}",
+        machine_sha256=machine_digest(machine),
+        program_sha256=None if program is None else hashlib.sha256(program.data).hexdigest(),
+        changed=tuple(Changed(*change) for change in changed_values(run.target)),
+        flags=_flags_given(),
+    )
+
+
+def _flags_given() -> tuple[tuple[str, str], ...]:
     """The flags of the running command that say how a program is made or judged, as given."""
     context = click.get_current_context()
     given = click.core.ParameterSource.COMMANDLINE
@@ -84,88 +175,3 @@ def _said(context: click.Context, name: str) -> str:
     if isinstance(value, tuple):
         return ", ".join(map(str, value))
     return "yes" if value is True else str(value)
-
-
-def linked_picture(name: str | None, preview: str | None) -> str | None:
-    """The picture that a page of this name links to: the one of `--preview`, unless that is a
-    viewer, or one of the page's own name. None where it links to none."""
-    if name is None or name == STDOUT or PurePath(name).suffix.lower() != ".md":
-        return None
-    if preview is not None and not is_viewer(preview):
-        return preview
-    return str(PurePath(name).with_suffix(".svg"))
-
-
-def picture_beside(name: str | None, preview: str | None) -> str | None:
-    """The same where nobody else writes it."""
-    linked = linked_picture(name, preview)
-    return None if linked == preview else linked
-
-
-def refuse_foreign_picture(name: str | None, preview: str | None) -> None:
-    """OutputError when the picture that a page of this name brings along, which nobody asked for
-    by name, would take the place of a file that is no picture of that page."""
-    beside = picture_beside(name, preview)
-    if beside is not None and is_foreign(beside, str(name)):
-        raise OutputError(
-            f"is there, and is not the picture that {name} brought along",
-            file=beside,
-            mend="give the page another name, or its picture a name with --preview",
-        )
-
-
-def pictures_asked(name: str | None, preview: str | None) -> list[str]:
-    """The pictures to be made for a page and a `--preview`, by names of their kind."""
-    held = EMBEDDED if name is not None and name.lower().endswith(".html") else None
-    return [each for each in (preview, picture_beside(name, preview), held) if each is not None]
-
-
-def report_files(
-    name: str, subject: Subject, picture: Painter, *, preview: str | None
-) -> dict[str, bytes]:
-    """The page of this name, and the picture beside it where it has one of its own."""
-    from camtool.verification.report import html, markdown, page_json
-
-    suffix = PurePath(name).suffix.lower()
-    if name != STDOUT and suffix == ".json":
-        return {name: page_json(_page(subject, ())).encode()}
-    if name != STDOUT and suffix == ".html":
-        pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
-        shown = tuple((caption, _held(data)) for caption, data in pictures)
-        return {name: html(_page(subject, shown)).encode()}
-    beside, linked = picture_beside(name, preview), linked_picture(name, preview)
-    links = () if linked is None else ((_CAPTION, _from(name, linked)),)
-    files = {name: markdown(_page(subject, links)).encode()}
-    return files if beside is None else {**files, beside: sealed(picture(beside), name)}
-
-
-def _held(svg: bytes) -> str:
-    """The address of a picture that the page itself holds."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
-
-
-def _from(page_name: str, picture_name: str) -> str:
-    """The picture's address as the page sees it, with forward slashes."""
-    folder = PurePath(page_name).parent
-    return PurePath(os.path.relpath(picture_name, folder)).as_posix()
-
-
-def _page(subject: Subject, pictures: tuple[tuple[str, str], ...]) -> Page:
-    from camtool.verification.report import Page, reported
-
-    findings = reported(subject.findings)
-    return Page(one_line(subject.title), subject.report, findings, _setup(subject), pictures)
-
-
-def _setup(subject: Subject) -> Setup:
-    from camtool.machine.registry import changed_values, machine_digest
-    from camtool.verification.report import Changed, Setup
-
-    machine, program = subject.target.machine, subject.program
-    return Setup(
-        machine=f"{machine.target.name}: {machine.target.title}",
-        machine_sha256=machine_digest(machine),
-        program_sha256=None if program is None else hashlib.sha256(program).hexdigest(),
-        changed=tuple(Changed(*change) for change in changed_values(subject.target)),
-        flags=subject.flags,
-    )

@@ -1,15 +1,14 @@
-"""What `verify` gives: the verdict on one program, or the table of several ways to run it."""
+"""`camtool verify`: simulate and judge any program of a machine, one way or several."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
 
-from camtool.cli.files import STDOUT, check_places, read_bytes, shown, write_all
+from camtool.cli.files import STDOUT, read_bytes, shown, write_all
 from camtool.cli.first_run import say_first_run
 from camtool.cli.messages import (
     REPORT_NAMES,
@@ -41,15 +40,7 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
-from camtool.cli.report import (
-    Subject,
-    flags_given,
-    picture_beside,
-    pictures_asked,
-    refuse_foreign_picture,
-    report_files,
-    report_option,
-)
+from camtool.cli.report import Outputs, report_option
 
 if TYPE_CHECKING:
     from camtool.comparison import Way
@@ -60,109 +51,6 @@ if TYPE_CHECKING:
     from camtool.pipeline import Judging
     from camtool.planning.job import Job
     from camtool.run import Run
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """What the user wants to have; `beside` is another program for the picture."""
-
-    preview: str | None
-    looks: PictureFlags
-    report: str | None
-    page: str | None
-    beside: str | None
-    quiet: bool
-    verbose: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """How programs are judged: on which machine, by what, against which drawing."""
-
-    target: LoadedTarget
-    judging: Judging
-    drawing: Drawing | None
-    job: Job
-
-    def judge(self, file: str) -> Run:
-        """The program in a file, run and judged."""
-        from camtool.pipeline import verify_program
-
-        return verify_program(
-            read_bytes(file),
-            self.target,
-            source=shown(file),
-            drawing=self.drawing,
-            job=self.job,
-            judging=self.judging,
-        )
-
-
-def _subject(run: Run) -> Subject:
-    """What the page of a program is about."""
-    return Subject(
-        title=Path(run.source).name,
-        target=run.target,
-        report=run.report,
-        findings=run.findings,
-        program=None if run.program is None else run.program.data,
-        flags=flags_given(),
-    )
-
-
-def judged(file: str, case: Case, wishes: Wishes) -> int:
-    """The verdict on one program, in words and files; the exit code."""
-    one = case.judge(file)
-    report, findings = one.report, one.findings
-    assert report is not None
-
-    def scenes() -> list[Scene]:
-        return [one.scene(), *([case.judge(wishes.beside).scene()] if wishes.beside else [])]
-
-    painted = wishes.looks.painter(scenes, quiet=wishes.quiet)
-    files: dict[str, bytes] = {}
-    if wishes.preview is not None:
-        files[wishes.preview] = painted(wishes.preview)
-    if wishes.report is not None:
-        files[wishes.report] = report.to_json().encode()
-    if wishes.page is not None:
-        files.update(report_files(wishes.page, _subject(one), painted, preview=wishes.preview))
-    write_all(files)
-    if STDOUT not in (wishes.report, wishes.page) and not wishes.quiet:
-        show_facts(report.to_text(findings=False), REPORT_NAMES, report_marks(findings))
-        if case.judging.worst:
-            show_text(report.worst_text())
-    say_findings(findings, quiet=wishes.quiet, verbose=wishes.verbose)
-    if not one.failed:
-        return 0
-    say(f"camtool: error: {one.source}: the errors above would spoil the part", quiet=False)
-    return 1
-
-
-def compared(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
-    """The table of all ways to run a program, and their picture; the exit code."""
-    from camtool.comparison import compare_program
-    from camtool.verification.contrast import to_json
-
-    found = compare_program(
-        read_bytes(file), ways, source=shown(file), drawing=case.drawing, job=case.job
-    )
-    files: dict[str, bytes] = {}
-    if wishes.preview is not None:
-        from camtool.pictures.overlay import render_overlay
-
-        files[wishes.preview] = render_overlay(
-            found.scene(), wishes.preview, wishes.looks.options()
-        )
-    if wishes.report is not None:
-        files[wishes.report] = to_json(found.rows).encode()
-    write_all(files)
-    if wishes.report != STDOUT and not wishes.quiet:
-        show_compared(str(found), found.rows)
-    return 0
-
-
-# `camtool verify`: simulate and judge any program of a machine.
 
 
 INTERPOLATORS = ("dsm", "dda", "stairs")
@@ -248,13 +136,9 @@ def verify(
     as far as the flags name them; clearance of rapids; its end. Exit code 1 when a finding is an
     error.
     """
-    wishes = Wishes(preview, picture, report, page, beside, quiet, verbose)
-    _check(wishes, comparing=compare is not None, gated=gates.given)
-    check_places(
-        [program, against, beside, *machine.files(), *job.files()],
-        [preview, report, page, picture_beside(page, preview)],
-    )
-    refuse_foreign_picture(page, preview)
+    wishes = Wishes(Outputs(preview, report, page), picture, beside, quiet, verbose)
+    wishes.check(comparing=compare is not None, gated=gates.given)
+    wishes.outputs.check([program, against, beside, *machine.files(), *job.files()])
 
     from camtool.comparison import left_out
     from camtool.pictures.scene import points_for
@@ -275,8 +159,8 @@ def verify(
     case = Case(target, judging, read, wanted)
     with job.blamed():
         if compare is not None:
-            return compared(program, _ways(compare, machine, judging), case, wishes)
-        return judged(program, case, wishes)
+            return _compare(program, _ways(compare, machine, judging), case, wishes)
+        return _judge(program, case, wishes)
 
 
 def _ways(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
@@ -289,20 +173,97 @@ def _ways(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
     return ways_of(spec, load, judging)
 
 
-def _check(wishes: Wishes, *, comparing: bool, gated: bool) -> None:
-    """A usage error for flags that contradict each other."""
-    pictures = pictures_asked(wishes.page, wishes.preview)
-    if not comparing:
-        wishes.looks.check(pictures, RESULT)
-        if wishes.beside is not None:
-            check_beside("--beside", pictures)
-        return
-    if wishes.page is not None:
-        raise click.UsageError("--report is of one way to run a program; drop --compare")
-    if gated:
-        raise click.UsageError("limits hold for one way to run a program; drop --compare")
-    if wishes.beside is not None:
-        raise click.UsageError("--beside is for one way to run a program; drop --compare")
-    if wishes.preview is not None and is_viewer(wishes.preview):
-        raise click.UsageError("--compare draws .svg and .png alone")
-    wishes.looks.check(pictures, OVERLAY)
+@dataclass(frozen=True)
+class Wishes:
+    """What the user wants to have, and how pictures look; `beside` is another program for the
+    picture."""
+
+    outputs: Outputs
+    looks: PictureFlags
+    beside: str | None
+    quiet: bool
+    verbose: bool
+
+    def check(self, *, comparing: bool, gated: bool) -> None:
+        """A usage error for flags that contradict each other."""
+        outputs = self.outputs
+        if not comparing:
+            self.looks.check(outputs.pictures, RESULT)
+            if self.beside is not None:
+                check_beside("--beside", outputs.pictures)
+            return
+        if outputs.page is not None:
+            raise click.UsageError("--report is of one way to run a program; drop --compare")
+        if gated:
+            raise click.UsageError("limits hold for one way to run a program; drop --compare")
+        if self.beside is not None:
+            raise click.UsageError("--beside is for one way to run a program; drop --compare")
+        if outputs.preview is not None and is_viewer(outputs.preview):
+            raise click.UsageError("--compare draws .svg and .png alone")
+        self.looks.check(outputs.pictures, OVERLAY)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """How programs are judged: on which machine, by what, against which drawing."""
+
+    target: LoadedTarget
+    judging: Judging
+    drawing: Drawing | None
+    job: Job
+
+    def judged(self, file: str) -> Run:
+        """The program in a file, run and judged."""
+        from camtool.pipeline import verify_program
+
+        return verify_program(
+            read_bytes(file),
+            self.target,
+            source=shown(file),
+            drawing=self.drawing,
+            job=self.job,
+            judging=self.judging,
+        )
+
+
+def _judge(file: str, case: Case, wishes: Wishes) -> int:
+    """The verdict on one program, in words and files; the exit code."""
+    run, outputs = case.judged(file), wishes.outputs
+
+    def scenes() -> list[Scene]:
+        return [run.scene(), *([case.judged(wishes.beside).scene()] if wishes.beside else [])]
+
+    write_all(outputs.files(run, wishes.looks.painter(scenes, quiet=wishes.quiet)))
+    to_stdout = STDOUT in (outputs.report, outputs.page)
+    if run.report is not None and not to_stdout and not wishes.quiet:
+        show_facts(run.report.to_text(findings=False), REPORT_NAMES, report_marks(run.findings))
+        if case.judging.worst:
+            show_text(run.report.worst_text())
+    say_findings(run.findings, quiet=wishes.quiet, verbose=wishes.verbose)
+    if not run.failed:
+        return 0
+    say(f"camtool: error: {run.source}: the errors above would spoil the part", quiet=False)
+    return 1
+
+
+def _compare(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
+    """The table of all ways to run a program, and their picture; the exit code."""
+    from camtool.comparison import compare_program
+    from camtool.verification.contrast import to_json
+
+    found = compare_program(
+        read_bytes(file), ways, source=shown(file), drawing=case.drawing, job=case.job
+    )
+    files: dict[str, bytes] = {}
+    if wishes.outputs.preview is not None:
+        from camtool.pictures.overlay import render_overlay
+
+        files[wishes.outputs.preview] = render_overlay(
+            found.scene(), wishes.outputs.preview, wishes.looks.options()
+        )
+    if wishes.outputs.report is not None:
+        files[wishes.outputs.report] = to_json(found.rows).encode()
+    write_all(files)
+    if wishes.outputs.report != STDOUT and not wishes.quiet:
+        show_compared(str(found), found.rows)
+    return 0
