@@ -194,7 +194,7 @@ class _Face:
 
 
 @lru_cache(maxsize=1)
-def _installed() -> tuple[_Face, ...]:
+def installed_fonts() -> tuple[_Face, ...]:
     """All outline fonts, in an order that does not depend on the file system."""
     import json
 
@@ -210,18 +210,18 @@ def _named(wanted: Wanted) -> _Face | None:
     if wanted.family and (found := _of_family(wanted.family, wanted)) is not None:
         return found
     name = PurePath(wanted.file.replace("\\", "/")).name.lower()
-    return next((f for f in _installed() if PurePath(f.path).name.lower() == name), None)
+    return next((f for f in installed_fonts() if PurePath(f.path).name.lower() == name), None)
 
 
 def _of_family(family: str, wanted: Wanted) -> _Face | None:
-    faces = [f for f in _installed() if f.family.lower() == family.lower()]
+    faces = [f for f in installed_fonts() if f.family.lower() == family.lower()]
     return min(faces, key=lambda face: face.distance(wanted), default=None)
 
 
 def _substitutes(wanted: Wanted) -> list[_Face]:
     """Fonts to try in place of the wanted one, the best first."""
     best = [face for name in SUBSTITUTES if (face := _of_family(name, wanted)) is not None]
-    others = sorted(_installed(), key=lambda face: face.distance(wanted))
+    others = sorted(installed_fonts(), key=lambda face: face.distance(wanted))
     return best + others[:_FONTS_KEPT]
 
 

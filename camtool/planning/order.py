@@ -143,7 +143,7 @@ def best_order(
     rows = nearest_first(tree, ends, first, after_first, after, waits, start)
     if len(rows) < len(choices):
         raise _circle(set(range(len(choices))) - set(choices.owner[rows].tolist()))
-    tour = _tour(choices, before, rows, start, goal)
+    tour = tour_of(choices, before, rows, start, goal)
     settled(tour)
     kicks = min(max(KICKS_EACH * len(choices), LEAST_KICKS), MOST_KICKS)
     kicked(tour, kicks, SEED)
@@ -154,7 +154,7 @@ def best_order(
             return tour.row[order]
 
 
-def _tour(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
+def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
     """The tour of these rows, with all that the search wants to know."""
     from camtool.kernels.tour import Tour
     from camtool.kernels.tour_start import neighbours

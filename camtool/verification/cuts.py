@@ -279,7 +279,7 @@ class _Way:
         length = np.concatenate([[0.0], np.cumsum(self._length[rows])]).tolist()
         area = np.concatenate([[0.0], np.cumsum(self._area[rows])]).tolist()
         best, most = (NO_LOOP, NO_LOOP), 0.0
-        for low, high in _returns(places, gap_mm):
+        for low, high in returns_to_itself(places, gap_mm):
             long = length[high] - length[low]
             (ax, ay), (bx, by) = places[high], places[low]
             around = area[high] - area[low] + 0.5 * (ax * by - ay * bx)
@@ -289,7 +289,7 @@ class _Way:
         return best
 
 
-def _returns(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
+def returns_to_itself(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
     """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it.
 
     Places lie in square cells as wide as the gap. The latest place before another one in each of

@@ -325,7 +325,7 @@ def no_fonts(monkeypatch: pytest.MonkeyPatch) -> Any:
     def none_installed() -> tuple[()]:
         return ()
 
-    monkeypatch.setattr(text_fonts, "_installed", none_installed)
+    monkeypatch.setattr(text_fonts, "installed_fonts", none_installed)
     font_for.cache_clear()
     yield
     font_for.cache_clear()

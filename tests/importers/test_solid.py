@@ -385,9 +385,9 @@ def test_complaints_of_the_reader_are_told(monkeypatch: pytest.MonkeyPatch) -> N
     says = "print('\\x1b[32;1m*** ERR StepFile : Fails Count : 1 ***\\x1b[0m');"
     answers = "open(json.load(open(sys.argv[1]))['answer'], 'w').write('{}')"
     wanted = {"kind": "step", "file": "f", "height": None, "tolerance": 1e-3}
-    monkeypatch.setattr(solid_process, "_START", f"import json, sys; {says} {answers}")
+    monkeypatch.setattr(solid_process, "START", f"import json, sys; {says} {answers}")
     assert outlined(b"", wanted, "f") == {"complaint": "ERR StepFile : Fails Count : 1"}
-    monkeypatch.setattr(solid_process, "_START", f"import json, sys; print('fine'); {answers}")
+    monkeypatch.setattr(solid_process, "START", f"import json, sys; print('fine'); {answers}")
     assert outlined(b"", wanted, "f") == {"complaint": ""}
 
 
@@ -395,10 +395,10 @@ def test_a_worker_that_dies_or_hangs_is_a_clean_error(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     wanted = {"kind": "step", "file": "f", "height": None, "tolerance": 1e-3}
-    monkeypatch.setattr(solid_process, "_START", "import os; os.abort()")
+    monkeypatch.setattr(solid_process, "START", "import os; os.abort()")
     with pytest.raises(DrawingError, match="damaged so badly that OpenCASCADE fails"):
         outlined(b"", wanted, "f")
-    monkeypatch.setattr(solid_process, "_START", "import time; time.sleep(60)")
+    monkeypatch.setattr(solid_process, "START", "import time; time.sleep(60)")
     monkeypatch.setattr(solid_process, "FILE_SECONDS", 0.2)
     with pytest.raises(DrawingError, match="is not read after 0 s"):
         outlined(b"", wanted, "f")

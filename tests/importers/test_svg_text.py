@@ -269,7 +269,7 @@ def test_resvg_puts_its_ink_there(body: str, zoomed: str) -> None:
     page = 'xmlns="http://www.w3.org/2000/svg" width="120" height="80"'
     style = f"font-family: '{FAMILY}'; font-kerning: none"
     svg = f'<svg {page}><g style="{style}" {zoomed}>{body}</g></svg>'
-    (path,) = {f.path for f in text_fonts._installed() if f.path.endswith(f"/{OUTLINE_FONT}")}
+    (path,) = {f.path for f in text_fonts.installed_fonts() if f.path.endswith(f"/{OUTLINE_FONT}")}
     wanted = ink(svg, 10, (path,)).extents
     drawing = read(svg.encode(), "text.svg", ReadOptions(text="outline"))
     (left, right), (bottom, top) = box(drawing) * 96.0 / 25.4
@@ -378,7 +378,7 @@ def test_a_part_that_is_hidden_keeps_its_place_and_is_counted() -> None:
 
 
 def test_weights_that_fonts_are_not_asked_for_are_told() -> None:
-    if not text_fonts._installed():
+    if not text_fonts.installed_fonts():
         pytest.skip("no outline font is installed")
     found = drawn('<text y="9" font-weight="300">A</text>', "outline")
     assert [f.message for f in found.findings if f.code is Code.NOT_APPLIED] == [

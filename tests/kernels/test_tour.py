@@ -14,7 +14,7 @@ from camtool.kernels.tour_rows import best_rows
 from camtool.kernels.tour_search import kicked, settled
 from camtool.kernels.tour_start import neighbours
 from camtool.kernels.tour_tree import nearest_owners, nearest_row, switch, tree_of
-from camtool.planning.order import Choices, _tour, travel_mm
+from camtool.planning.order import Choices, tour_of, travel_mm
 from tests.oracles import tours
 
 
@@ -84,7 +84,7 @@ def layout(seed: int, count: int) -> tuple[Choices, np.ndarray, np.ndarray]:
 def made(seed: int, count: int, *, stays: bool = False) -> tuple[Choices, np.ndarray, Tour]:
     choices, before, rows = layout(seed, count)
     goal = np.full(2, np.nan) if stays else np.ones(2)
-    return choices, before, _tour(choices, before, rows, np.zeros(2), goal)
+    return choices, before, tour_of(choices, before, rows, np.zeros(2), goal)
 
 
 def length(choices: Choices, tour: Tour) -> float:

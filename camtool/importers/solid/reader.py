@@ -160,7 +160,7 @@ CHATTER_BYTES = 1 << 16
 """So much of what OpenCASCADE prints is looked through for complaints."""
 
 # -P: nothing that lies in the working directory is taken for a module.
-_START = (
+START = (
     "import json, sys; request = json.load(open(sys.argv[1], encoding='utf-8'));"
     "sys.path[:] = request['path'];"
     "from camtool.importers.solid.worker import main; main(request)"
@@ -199,7 +199,7 @@ def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
     """The exit code of the worker, whose words go to this file descriptor."""
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "-c", _START, str(request)],
+            [sys.executable, "-P", "-c", START, str(request)],
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
