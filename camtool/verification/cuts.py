@@ -220,6 +220,9 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
 AS_LONG = 0.98
 """A loop of at least this part of the longest one's length is as good, if it comes later."""
 
+FEW_PLACES = 48
+"""So many places of a contour are compared each with each: cells take longer to make."""
+
 NO_LOOP = -1
 """First and last row of a contour without a loop."""
 
@@ -290,12 +293,23 @@ class _Way:
 
 
 def returns_to_itself(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
-    """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it.
+    """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it."""
+    latest = (_latest_of_few if len(places) <= FEW_PLACES else _latest_before)(places, gap_mm)
+    later = np.flatnonzero(latest >= 0)
+    yield from zip(latest[later].tolist(), later.tolist(), strict=True)
 
-    Places lie in square cells as wide as the gap. The latest place before another one in each of
+
+def _latest_of_few(places: Floats, gap_mm: float) -> Ints:
+    """(P,) the latest place before each that is the same one, −1: none. Each with each."""
+    off = places[:, None] - places[None]
+    near = np.tril(np.hypot(off[:, :, 0], off[:, :, 1]) <= gap_mm, -1)
+    return np.asarray(np.where(near, np.arange(len(places)), -1).max(axis=1, initial=-1))
+
+
+def _latest_before(places: Floats, gap_mm: float) -> Ints:
+    """The same in square cells as wide as the gap. The latest place before another one in each of
     the nine cells about it is looked at, and what lies before that only where it is too far away:
-    a thousand passes over one place are not compared each with each.
-    """
+    a thousand passes over one place are not compared each with each."""
     count = len(places)
     cell = np.floor(places / gap_mm).astype(np.int64)
     cell -= cell.min(axis=0) - 1
@@ -318,5 +332,4 @@ def returns_to_itself(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]
                 near = np.hypot(off[:, 0], off[:, 1]) <= gap_mm
                 latest[rows[near]] = before[near]
                 rows, at = rows[~near], at[~near] - 1
-    later = np.flatnonzero(latest >= 0)
-    yield from zip(latest[later].tolist(), later.tolist(), strict=True)
+    return latest

@@ -23,7 +23,7 @@ def literally(places: np.ndarray, gap_mm: float) -> list[tuple[int, int]]:
     return found
 
 
-@given(st.integers(1, 40), st.sampled_from([0.1, 0.5, 1.0, 3.0]), st.integers(0, 1000))
+@given(st.integers(1, 100), st.sampled_from([0.1, 0.5, 1.0, 3.0]), st.integers(0, 1000))
 def test_returns_are_those_of_all_pairs(count: int, gap_mm: float, seed: int) -> None:
     places = np.random.default_rng(seed).uniform(-3.0, 3.0, (count, 2))
     places[::3] = np.round(places[::3])
