@@ -1,7 +1,12 @@
-"""What a stage noticed: enumerated, collected, never raised at the first.
+"""The catalogue of findings: every code with its severity and explanation, and every sentence that
+is said of one.
 
-Every code is explained in docs/findings.md (a test keeps the two equal). Numbers are stable:
-add, never renumber. Hundreds: 1xx drawing, 2xx planning, 3xx program, 4xx motion and result.
+Findings are collected, never raised at the first. Whoever finds something calls a sentence with
+the numbers (`yield HOLE_SIZE(where=…, measured=…, limit=…)`); how they are written stands here.
+Sentences that only one machine says stand in that machine's own `findings.py`; a plug-in adds
+codes of its own there too (`TargetCode`). docs/findings.md is made from all of them. Numbers are
+stable: add, never renumber. Hundreds: 1xx drawing, 2xx planning, 3xx program, 4xx motion and
+result.
 """
 
 from __future__ import annotations
@@ -9,7 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol, TypeVar
+from string import Formatter
+from typing import Any, Final, Protocol, Self, TypeVar
 
 from camtool.plain import one_line
 
@@ -22,86 +28,550 @@ class Severity(IntEnum):
     ERROR = 2
 
 
+INFO: Final = Severity.INFO
+WARNING: Final = Severity.WARNING
+ERROR: Final = Severity.ERROR
+
+
 class Code(IntEnum):
-    """What was noticed; see docs/findings.md."""
+    """A code: number, severity (of several the usual one first), what it means, what to do."""
 
-    UNITLESS = 101
-    IMPLAUSIBLE_SIZE = 102
-    ENTITY_SKIPPED = 103
-    GAP_OPEN = 104
-    FILE_REPAIRED = 105
-    GAP_CLOSED = 106
-    NOTHING_DRAWN = 107
-    SELF_CROSSING = 108
-    BRANCHED = 109
-    DRAWN_TWICE = 110
-    TINY_MERGED = 111
-    ARCS_RECOGNISED = 112
-    FONT_SUBSTITUTED = 113
-    SECTION_CHOSEN = 114
-    NOT_APPLIED = 115
-    UNIT_GUESSED = 116
-    POINTS_MERGED = 117
+    severities: tuple[Severity, ...]
+    means: str
+    mend: str
 
-    CONTOUR_TOO_SMALL = 201
-    OPEN_CONTOUR_ON_LINE = 202
-    GOUGE = 203
-    OUT_OF_TRAVEL = 204
-    UNREACHED = 205
-    OUT_OF_STOCK = 206
-    RAPID_IN_STOCK = 207
-    SLOT_AS_WIDE = 208
-    TAB_LEFT_OUT = 209
-    LEAD_LEFT_OUT = 210
-    ENTRY_CHANGED = 211
-    DEPTH_LIMITED = 212
-    REVERSALS_IN_AIR = 213
-    NOT_RELIEVED = 214
-    MARKS_NOT_CUT = 215
-    NOT_DRILLED = 216
-    HOLE_SIZE = 217
-    TOOL_NOT_SAID = 218
-    SIDE_BY_UNCUT = 219
-    CUT_DOUBTFUL = 220
-    TAB_SHARED = 225
-    CORNER_FAR = 226
+    def __new__(
+        cls, number: int, severity: Severity | tuple[Severity, ...], means: str, mend: str
+    ) -> Self:
+        """A code is its number, and carries what is known of it."""
+        code = int.__new__(cls, number)
+        code._value_ = number
+        code.severities = severity if isinstance(severity, tuple) else (severity,)
+        code.means, code.mend = means, mend
+        return code
 
-    BLOCK_TOO_LONG = 301
-    FEED_ROUNDED = 302
-    ARC_MENDED = 303
-    MOVE_COLLAPSED = 304
-    MOVE_SPLIT = 305
-    FEED_ABOVE_LIMIT = 306
-    VALUE_ROUNDED = 307
-    EVENT_LEFT_OUT = 308
-    COORDINATES_SCALED = 309
-    PLACES_SNAPPED = 310
-    EXECUTED_OTHERWISE = 311
-    WORDS_PASSED_OVER = 312
-    ARC_END_UNSURE = 316
-    SPINDLE_SPEED_NOT_SAID = 319
-    NEVER_READ = 320
-    FEED_TOO_SLOW = 321
-    FEED_HELD = 322
-    READ_TWO_WAYS = 323
+    UNITLESS = (
+        101,
+        WARNING,
+        "the file names no unit; a guess was made and is shown with the size",
+        "give `--units`",
+    )
+    IMPLAUSIBLE_SIZE = (
+        102,
+        WARNING,
+        "the drawing is smaller or larger than anything these machines make: probably wrong units",
+        "give `--units`",
+    )
+    ENTITY_SKIPPED = (
+        103,
+        (WARNING, INFO),
+        "entities that are no lines or curves, or lie on hidden layers, were left out; kind, "
+        "count and reason are listed; a remark for what has no length",
+        "convert them to curves in CAD if they are to be cut",
+    )
+    GAP_OPEN = (
+        104,
+        WARNING,
+        "an open end lies near another one: perhaps meant closed; place and size are given",
+        "mend the drawing or raise `--gap`",
+    )
+    FILE_REPAIRED = (
+        105,
+        WARNING,
+        "the file was damaged and could be read after repairs",
+        "check the picture with `camtool preview`",
+    )
+    GAP_CLOSED = (
+        106,
+        INFO,
+        "ends nearer than `--gap` were joined; place and size are given",
+        "none, or lower `--gap`",
+    )
+    NOTHING_DRAWN = (
+        107,
+        ERROR,
+        "nothing in the drawing can be cut",
+        "look at what was not used: `camtool check`",
+    )
+    SELF_CROSSING = (
+        108,
+        (WARNING, ERROR),
+        "a contour crosses itself: inside and outside are not clear there; places are given; "
+        "an error where it is to be carved (`vcarve`), there also for contours that cross each "
+        "other",
+        "mend the drawing, or cut it with `--side on`",
+    )
+    BRANCHED = (
+        109,
+        WARNING,
+        "more than two ends meet at a point, so that lines could be joined in several ways; "
+        "the straightest was taken",
+        "look at the picture of `camtool check --preview`",
+    )
+    DRAWN_TWICE = (
+        110,
+        INFO,
+        "lines that lie on others, wholly or in part, were left out; count and length are given",
+        "none",
+    )
+    TINY_MERGED = (
+        111,
+        INFO,
+        "segments too short to matter were merged into their neighbours",
+        "none",
+    )
+    ARCS_RECOGNISED = (
+        112,
+        INFO,
+        "chords on one circle became arcs again, as `--recognise-arcs` asks",
+        "none",
+    )
+    FONT_SUBSTITUTED = (
+        113,
+        WARNING,
+        "the font of a text is not installed; another one stands for it",
+        "install the font, or turn the text into curves in CAD",
+    )
+    SECTION_CHOSEN = (
+        114,
+        INFO,
+        "which face or section of a solid became the drawing",
+        "give `--section-z`",
+    )
+    NOT_APPLIED = (
+        115,
+        WARNING,
+        "something that changes how the drawing looks was left out (a clip path, a mask, a "
+        "width), so more or less is cut than is shown",
+        "apply it in the program that made the drawing",
+    )
+    UNIT_GUESSED = (
+        116,
+        (INFO, WARNING),
+        "the unit was taken from a hint of the file, not from its word for it; a warning where "
+        "a wrong guess would change the size",
+        "compare the size that is shown, or give `--units` (`--dpi`)",
+    )
+    POINTS_MERGED = (
+        117,
+        (INFO, WARNING),
+        "the scale brings points together that were apart in the drawing: they became one; a "
+        "warning where whole paths became a point and are left out",
+        "none, or a larger scale",
+    )
 
-    ARC_MISSES_END = 401
-    CONTOUR_MISSING = 402
-    EXTRA_CUT = 403
-    MANY_REVERSALS = 404
-    PLAY_NOT_KNOWN = 405
-    NO_MOTION = 406
-    RETURN_TO_MACHINE_ZERO = 407
-    ABOVE_GATE = 408
-    END_NOT_REACHED = 409
-    FIT_COARSE = 410
-    OVERCUT = 412
-    FEED_DIFFERS = 414
-    SPINDLE_DIFFERS = 415
-    CUT_OTHER_WAY = 416
-    CLEARANCE_LOW = 417
-    END_DIFFERS = 418
-    SETTING_DIFFERS = 419
+    CONTOUR_TOO_SMALL = (
+        201,
+        WARNING,
+        "the tool does not fit into a contour, which is left uncut; place and area are given",
+        "use a smaller tool",
+    )
+    OPEN_CONTOUR_ON_LINE = (
+        202,
+        WARNING,
+        "an open contour has no inside: it is cut on the line",
+        "close it, or give `--side on`",
+    )
+    GOUGE = (
+        203,
+        (WARNING, ERROR),
+        "the tool beside one contour cuts into another one, or into the allowance that is left "
+        "on it, or a pocket clears away what another operation keeps; place and amount are "
+        "given. A warning where nobody cuts the other contour, and, where the job names the "
+        "side, for contours of the same operation and such as cross",
+        'use a smaller tool, `side = "auto"`, or the right side; draw islands on a layer of '
+        "the pocket",
+    )
+    OUT_OF_TRAVEL = (
+        204,
+        ERROR,
+        "the path, part zero included, spans more than an axis can travel",
+        "what the message names, because it helps: `--origin lower-left`, `--rotate 90`, a "
+        "lower `safe_z`, a smaller drawing; or the travel of the machine that you have",
+    )
+    UNREACHED = (
+        205,
+        (INFO, WARNING),
+        "part of the shape is narrower than the tool, or is the foot of a corner: it stays "
+        "uncut, with its place and area",
+        "use a smaller tool, or reliefs (`corners`)",
+    )
+    OUT_OF_STOCK = (
+        206,
+        (INFO, WARNING, ERROR),
+        "info: a cut goes through the stock into what lies below, as far as `spoilboard` in "
+        "`[stock]` lets it; error: farther; warning: something is cut wholly beside the stock",
+        "mend `[stock]`, the origin or the depth",
+    )
+    RAPID_IN_STOCK = (
+        207,
+        ERROR,
+        "a rapid runs through material below the stock top that is not yet cleared",
+        "raise `safe_z`",
+    )
+    SLOT_AS_WIDE = (
+        208,
+        INFO,
+        "a slot is as wide as the tool: it is cut along its middle",
+        "none",
+    )
+    TAB_LEFT_OUT = (
+        209,
+        WARNING,
+        "a tab does not fit where it should stand, or a hole is drilled through it; or "
+        "(counted, in one) holes, open paths and contours that are too short go without tabs "
+        "beside parts that have them",
+        "fewer or narrower tabs; another operation for holes that are to have some",
+    )
+    LEAD_LEFT_OUT = (
+        210,
+        WARNING,
+        "a lead-in or lead-out would cut into material that is wanted, and was shortened or "
+        "left out",
+        "a shorter lead, or another start",
+    )
+    ENTRY_CHANGED = (
+        211,
+        WARNING,
+        "a ramp or helix does not fit: it is steeper, smaller, or a plunge",
+        "a smaller tool, or a plunge",
+    )
+    DEPTH_LIMITED = (
+        212,
+        WARNING,
+        "carving with a V bit would go deeper than allowed: the bottom is flat there",
+        "a greater depth, or a wider bit",
+    )
+    REVERSALS_IN_AIR = (
+        213,
+        INFO,
+        "reversals were moved from cuts into the air, with the predicted error before and "
+        "after; or contours that turn back stay in one piece, and why",
+        "none ([reversals.md](reversals.md))",
+    )
+    NOT_RELIEVED = (
+        214,
+        WARNING,
+        "an inner corner got no relief because it would cut into material that is wanted",
+        "a smaller tool",
+    )
+    MARKS_NOT_CUT = (
+        215,
+        WARNING,
+        "single points are drawn, and no operation drills them",
+        "an operation of the kind `drill`",
+    )
+    NOT_DRILLED = (
+        216,
+        WARNING,
+        "a path that `drill` takes is no circle, or a circle larger than `max_hole`: it is "
+        "left out",
+        "another operation for it, or a larger `max_hole`",
+    )
+    HOLE_SIZE = (
+        217,
+        WARNING,
+        "circles are drawn with another diameter than that of the drill",
+        "the right drill, or none if that is meant",
+    )
+    TOOL_NOT_SAID = (
+        218,
+        ERROR,
+        "an operation has another tool than the one before it, and no number by which the "
+        "program could ask for it",
+        "number the tools, or write a program for each",
+    )
+    SIDE_BY_UNCUT = (
+        219,
+        (WARNING, INFO),
+        "contours are cut inside, or outside, because they lie in a contour that nobody cuts; "
+        "or (info) in spite of one on the layer of a frame",
+        "name the layers that are no edges of parts (`--frames`), or give the side "
+        "([toolpaths.md](toolpaths.md))",
+    )
+    CUT_DOUBTFUL = (
+        220,
+        WARNING,
+        "something of the cut looks forgotten or too bold, and the program does it: no spindle "
+        "speed, a tool of no width on closed contours, a plunge at the feed of the cut (these "
+        "where the program starts the spindle), a pass deeper than the tool is wide",
+        "the flag that is named, or none if that is meant",
+    )
+    TAB_SHARED = (
+        225,
+        (INFO, WARNING),
+        "a cut was raised over the bridge of a tab that it would have cut away: round a "
+        "neighbour, on the other side of a narrow contour, on a lead; a warning where the "
+        "operation has no tabs itself, for something of it stays there",
+        "none; wider spacing if neighbours should not hold each other",
+    )
+    CORNER_FAR = (
+        226,
+        WARNING,
+        "sharp or mitred joins take the tool more than five times its distance from the wall "
+        "beyond a needle-like corner",
+        '`joins = "round"`, or `"mitre"` with a low `mitre_limit`',
+    )
+
+    BLOCK_TOO_LONG = (
+        301,
+        (INFO, WARNING),
+        "blocks are longer than the controller's buffer; a remark where nobody has said how "
+        "long that is",
+        "for `pic-mmh`: `--set dialect.form=annex`",
+    )
+    FEED_ROUNDED = (
+        302,
+        (INFO, WARNING),
+        "the dialect cannot say the feed; the next lower one is used, or (a warning) the "
+        "machine's only speed",
+        "none, or choose a feed that it can say",
+    )
+    ARC_MENDED = (
+        303,
+        INFO,
+        "arcs that would not have ended where wanted end on a step that the controller passes, "
+        "and a short line mends the rest; in G-code, arcs that the controller would refuse by "
+        "their rounded numbers are re-centred, split or become lines",
+        "none",
+    )
+    MOVE_COLLAPSED = (
+        304,
+        (INFO, WARNING),
+        "moves shorter than a step of the machine, or than the last decimal, were left out, "
+        "and arcs as flat became lines; a warning where something drawn is not cut at all",
+        "none",
+    )
+    MOVE_SPLIT = (
+        305,
+        (INFO, WARNING),
+        "moves of X, Y and Z at once became small steps, flat and then down or up and then "
+        "flat, because the machine moves XY or Z: nowhere deeper than the slope, and higher by "
+        "the given step at most",
+        "none",
+    )
+    FEED_ABOVE_LIMIT = (
+        306,
+        (ERROR, WARNING),
+        "a feed that the machine, its link or (on a slope) its Z axis cannot keep up with; a "
+        "warning in a program whose controller holds the move to what it can do (which is what "
+        "is simulated), where `convert` writes the second machine's highest feed, and where a "
+        "job asks for more than the rates of the axes: it is lowered to that",
+        "lower the feed, or slope less",
+    )
+    VALUE_ROUNDED = (
+        307,
+        INFO,
+        "a dwell or a spindle speed was rounded to what the dialect can say",
+        "none",
+    )
+    EVENT_LEFT_OUT = (
+        308,
+        (WARNING, INFO),
+        "the machine cannot switch the spindle (or whatever the message names), so the program "
+        "does not say it; a remark where it is a tool or a speed",
+        "do it by hand",
+    )
+    COORDINATES_SCALED = (
+        309,
+        WARNING,
+        "the numbers of the program are millimetres times a scale, because what the machine "
+        "makes of a unit is contradictory",
+        "measure a move of known length, then say the scale: `--set dialect.coord_scale=…`",
+    )
+    PLACES_SNAPPED = (
+        310,
+        WARNING,
+        "vertices were moved to the grid that the machine executes; the largest move is given",
+        "none if that is fine enough, else scale the drawing up",
+    )
+    EXECUTED_OTHERWISE = (
+        311,
+        WARNING,
+        "the machine makes something else of the program than its numbers say (distances cut "
+        "short, a start that is ignored, lines bent by whole speeds)",
+        "look at the predicted error; the message names the option",
+    )
+    WORDS_PASSED_OVER = (
+        312,
+        INFO,
+        "a program switches coolant or waits for the operator (M0, M1): that moves nothing, "
+        "and no other dialect is told of it",
+        "none",
+    )
+    ARC_END_UNSURE = (
+        316,
+        WARNING,
+        "arcs of a foreign program stop on their ends by some readings of the controller's "
+        "stop test and not by others; what becomes of them by each is said",
+        "post the drawing with camtool, whose arcs end by every reading; or try the arc on the "
+        "machine and set `controller.arc_end`",
+    )
+    SPINDLE_SPEED_NOT_SAID = (
+        319,
+        WARNING,
+        "a program starts the spindle (M3, M4) before any S word: controllers take it, and one "
+        "that sets the speed turns the spindle at 0",
+        "say S, or set the speed by hand",
+    )
+    NEVER_READ = (
+        320,
+        WARNING,
+        "lines behind the end of a program (M2, M30, the second `%`), which its controller "
+        "never reads",
+        "move the end behind them, or take them out",
+    )
+    FEED_TOO_SLOW = (
+        321,
+        WARNING,
+        "cuts slower than the controller can step: it makes them faster than the program says, "
+        "which is what is simulated",
+        "a higher feed",
+    )
+    FEED_HELD = (
+        322,
+        (INFO, WARNING),
+        "cuts that the machine makes slower than the program says, because a timer's shortest "
+        "period holds them; a warning where they get less than half of it",
+        "another feed, or a shorter period (the message names the option)",
+    )
+    READ_TWO_WAYS = (
+        323,
+        WARNING,
+        "a program says something that its machine's thesis leaves two readings for, and they "
+        "lead to different places",
+        "post again (what camtool writes means the same in both), or set the option where you "
+        "know",
+    )
+
+    ARC_MISSES_END = (
+        401,
+        (ERROR, WARNING),
+        "the controller never stands on the end of an arc (or of another move): the real "
+        "machine would run on; a warning where it would stop beside it",
+        "post the drawing again with `camtool post`",
+    )
+    CONTOUR_MISSING = (
+        402,
+        ERROR,
+        "part of what was wanted is not cut by the program; for a contour smaller than a "
+        "dialect can say, a plunge stands",
+        "post again; give `camtool verify` the flags of the post",
+    )
+    EXTRA_CUT = (
+        403,
+        ERROR,
+        "the program cuts where nothing was wanted",
+        "post again; give `camtool verify` the flags of the post",
+    )
+    MANY_REVERSALS = (
+        404,
+        WARNING,
+        "more reversals than parts of this size were seen to survive (`limits.small_part_mm`); "
+        "each leaves an error",
+        "cut larger, or simplify the drawing",
+    )
+    PLAY_NOT_KNOWN = (
+        405,
+        (INFO, WARNING),
+        "an axis that moves has no known play, so its error is not predicted; a warning where "
+        "fewer reversals were asked for and neither X nor Y has any",
+        "measure it: `--set axes.z.backlash_mm=...`",
+    )
+    NO_MOTION = (
+        406,
+        WARNING,
+        "the program moves nothing",
+        "check that it is the right file",
+    )
+    RETURN_TO_MACHINE_ZERO = (
+        407,
+        INFO,
+        "the program goes to machine zero, whose place is taken from the machine file",
+        "set `controller.machine_zero_mm`",
+    )
+    ABOVE_GATE = (
+        408,
+        ERROR,
+        "the part would come out worse, turn back more often or take longer than "
+        "`--max-error`, `--max-reversals` or `--max-time` allow",
+        "another machine setting, fewer reversals ([reversals.md](reversals.md)), or a wider "
+        "limit",
+    )
+    END_NOT_REACHED = (
+        409,
+        (INFO, WARNING),
+        "the controller leaves moves beside their programmed ends (as blending does); how "
+        "many, and how far at most; a warning when that is far",
+        "other settings of the controller ([its page](controllers/path.md)), or the predicted "
+        "error is accepted",
+    )
+    FIT_COARSE = (
+        410,
+        WARNING,
+        "from Python: a drawing was read for a smaller part than the job makes of it, so its "
+        "curves were fitted more coarsely than the tolerance asks; how far they lie off is "
+        "given, and is in the error",
+        "read it with `scale=…`, or give its file instead of the drawing",
+    )
+    OVERCUT = (
+        412,
+        ERROR,
+        "the tool, as wide as it is at its depth, goes beyond the drawn wall on the planned "
+        "path itself, and no `GOUGE` says so: a fault in camtool, found before anything is cut",
+        "report it, with the drawing; another tool or depth",
+    )
+    FEED_DIFFERS = (
+        414,
+        (WARNING, ERROR),
+        "moves run at another feed than the job names; a warning where it names none and the "
+        "machine's own is meant",
+        "post again, or give `camtool verify` the flags of the post",
+    )
+    SPINDLE_DIFFERS = (
+        415,
+        (INFO, ERROR),
+        "moves cut with the spindle off, turning the other way or at another speed than the "
+        "job names; told where it names none",
+        "post again; give `camtool verify` the flags of the post",
+    )
+    CUT_OTHER_WAY = (
+        416,
+        ERROR,
+        "a contour is cut the other way round: climb for conventional, or against the way it "
+        "is drawn",
+        "post again; give `camtool verify` the flags of the post",
+    )
+    CLEARANCE_LOW = (
+        417,
+        (WARNING, ERROR),
+        "rapids in XY run lower than `safe_z`; an error where the job names it, and on the stock",
+        "raise the rapids",
+    )
+    END_DIFFERS = (
+        418,
+        (INFO, WARNING, ERROR),
+        "the program lacks its end, or the tool ends lower than it should; told where it ends "
+        "at another place in XY",
+        "end the program, with the tool up",
+    )
+    SETTING_DIFFERS = (
+        419,
+        (INFO, ERROR),
+        "moves cut with another tool than the job asks for, the tool waits less than it asks "
+        "for, or corners are rounded farther than the machine file lets them (`G64 P`)",
+        "post again; give `camtool verify` the flags of the post",
+    )
+
+
+@dataclass(frozen=True)
+class TargetCode:
+    """A code of one target's own findings; its name begins with the target's: `mill.TOO_HOT`."""
+
+    name: str
+    severities: tuple[Severity, ...]
+    means: str
+    mend: str
 
 
 @dataclass(frozen=True)
@@ -111,7 +581,7 @@ class Finding:
     `unit` belongs to both `measured` and `limit` ("mm", "um", "chars", "mm_min", ...).
     """
 
-    code: Code
+    code: Code | TargetCode
     severity: Severity
     message: str
     where: str = ""
@@ -124,6 +594,67 @@ class Finding:
         return one_line(f"{self.severity.name.lower()} {self.code.name}{place}: {self.message}")
 
 
+@dataclass(frozen=True)
+class Sentence:
+    """What is said of a code; called with the numbers, it makes a finding.
+
+    `text` is a format string. `{measured}` and `{limit}` are those of the finding, both in `unit`
+    ("mm", "um", "chars", "mm_min", ...); all other names are given as keywords. A choice by number
+    is written `{count:one|many}` or `{count:none|one|many}`, with `#` for the number itself (true
+    is one, false none).
+    `severity` stands where the code has several and the sentence one; else the caller may say it.
+
+    >>> some = Sentence(Code.HOLE_SIZE, "{measured:# hole is|# holes are} wider than {drill:g} mm")
+    >>> print(some(measured=1, drill=3.0, where="layer 0"))
+    warning HOLE_SIZE [layer 0]: 1 hole is wider than 3 mm
+    """
+
+    code: Code | TargetCode
+    text: str
+    unit: str = ""
+    severity: Severity | None = None
+
+    def __call__(
+        self,
+        *,
+        where: str = "",
+        measured: float | None = None,
+        limit: float | None = None,
+        severity: Severity | None = None,
+        **values: float | str,
+    ) -> Finding:
+        """The finding with its sentence."""
+        given = self.severity if severity is None else severity
+        return Finding(
+            self.code,
+            self.code.severities[0] if given is None else given,
+            _TEXTS.vformat(self.text, (), {**values, "measured": measured, "limit": limit}),
+            where=where,
+            measured=None if measured is None else float(measured),
+            limit=None if limit is None else float(limit),
+            unit=self.unit,
+        )
+
+    def said(self, **values: float | str) -> str:
+        """The sentence alone, where several are said in one finding."""
+        return _TEXTS.vformat(self.text, (), values)
+
+
+class _Texts(Formatter):
+    """Format strings that know the choice by number."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """One value as the text has it."""
+        if "|" not in format_spec:
+            return format(value, format_spec)
+        *none, one, many = format_spec.split("|")
+        words = none[0] if none and value == 0 else one if value == 1 else many
+        return words.replace("#", f"{value:.0f}")
+
+
+_TEXTS: Final = _Texts()
+
+
 MOST_ALIKE = 3
 """So many findings of one code and severity are told one by one where people read them."""
 
@@ -132,7 +663,7 @@ class Noticed(Protocol):
     """What a finding is, here or in a report."""
 
     @property
-    def code(self) -> Code | str:
+    def code(self) -> Code | TargetCode | str:
         """What was noticed."""
 
     @property
@@ -161,3 +692,650 @@ def summed(findings: Iterable[_N]) -> list[tuple[_N, int]]:
 def worst(findings: tuple[Finding, ...] | list[Finding]) -> Severity:
     """The gravest severity present; INFO when there is no finding."""
     return max((f.severity for f in findings), default=Severity.INFO)
+
+
+def _and_more(noun: str) -> str:
+    """The end of a sentence of which only the first are listed; `more` is how many are not."""
+    return f"{{more:|; and # more {noun}|; and # more {noun}}}"
+
+
+# What is said of drawings.
+
+UNITLESS = Sentence(
+    Code.UNITLESS,
+    "the file names no unit ({said}): read as mm; if that is wrong, say it with --units",
+)
+UNITLESS_PX = Sentence(
+    Code.UNITLESS,
+    "{why}: read as px, {px_an_inch:g} an inch; if that is wrong, name the unit of a user unit "
+    "with --units, or give --dpi",
+)
+IMPLAUSIBLE_SIZE = Sentence(
+    Code.IMPLAUSIBLE_SIZE,
+    "the drawing is {width:.6g} x {height:.6g} mm with unit {drawn_in} ({why}); if that is "
+    "wrong, name the unit with --units",
+    "mm",
+)
+ENTITY_SKIPPED = Sentence(Code.ENTITY_SKIPPED, "{measured} {kind} left out: {reason}")
+GAP_OPEN = Sentence(Code.GAP_OPEN, "two open ends are {size_um:.4g} µm apart and stay open", "mm")
+GAP_OPEN_MORE = Sentence(
+    Code.GAP_OPEN, "{count} more gaps stay open, of {least_um:.4g} to {most_um:.4g} µm", "mm"
+)
+FILE_REPAIRED = Sentence(
+    Code.FILE_REPAIRED,
+    "the file is faulty and was repaired ({measured}): {repairs}{more:|; and # more|; and # more}",
+)
+FILE_REPAIRED_BODIES = Sentence(
+    Code.FILE_REPAIRED,
+    "{measured} of {bodies} bodies have faces or edges that do not fit together",
+)
+FILE_REPAIRED_IN_PART = Sentence(
+    Code.FILE_REPAIRED, "the file is damaged, something may be missing: {complaint}"
+)
+GAP_CLOSED = Sentence(Code.GAP_CLOSED, "a gap of {size_um:.4g} µm was closed", "mm")
+GAP_CLOSED_MORE = Sentence(
+    Code.GAP_CLOSED, "{count} more gaps were closed, of {least_um:.4g} to {most_um:.4g} µm", "mm"
+)
+NOTHING_DRAWN = Sentence(Code.NOTHING_DRAWN, "no contour is left to cut")
+NOTHING_DRAWN_BUT_PATHS = Sentence(
+    Code.NOTHING_DRAWN, "no contour is left to cut: use a smaller tool, or --side on"
+)
+NOTHING_DRAWN_TO_DRILL = Sentence(
+    Code.NOTHING_DRAWN,
+    "there is no hole to drill: no single point, and no circle that is small enough",
+)
+SELF_CROSSING = Sentence(
+    Code.SELF_CROSSING,
+    "a closed contour crosses itself{measured:| at # places}",
+    severity=WARNING,
+)
+SELF_CROSSING_MORE = Sentence(
+    Code.SELF_CROSSING, "{measured} more closed contours cross themselves", severity=WARNING
+)
+SELF_CROSSING_CARVED = Sentence(
+    Code.SELF_CROSSING,
+    "{contour} crosses {other}: what is inside cannot be told; mend the drawing, or carve "
+    "without it",
+    severity=ERROR,
+)
+SELF_CROSSING_NO_REGION = Sentence(
+    Code.SELF_CROSSING, "{fault}: what is inside cannot be carved; {mend}", severity=ERROR
+)
+BRANCHED = Sentence(Code.BRANCHED, "{measured} ends meet; the straightest were joined")
+BRANCHED_MORE = Sentence(Code.BRANCHED, "more than two ends meet at {measured} more places")
+DRAWN_TWICE = Sentence(
+    Code.DRAWN_TWICE,
+    "{doubles} drawn twice and {overlaps} lying on others in whole or in part: {measured:.6g} mm "
+    "left out",
+    "mm",
+)
+TINY_MERGED = Sentence(Code.TINY_MERGED, "{measured} segments too short to matter were merged")
+ARCS_RECOGNISED = Sentence(Code.ARCS_RECOGNISED, "chords became {measured} arcs")
+FONT_SUBSTITUTED = Sentence(Code.FONT_SUBSTITUTED, "{measured} texts: {what}")
+SECTION_CHOSEN = Sentence(
+    Code.SECTION_CHOSEN,
+    "the section at z = {heights} mm is drawn; the model spans z = {bottom:.6g} to {top:.6g} mm; "
+    "--section-z chooses another height",
+    "mm",
+)
+SECTION_CHOSEN_FACES = Sentence(
+    Code.SECTION_CHOSEN,
+    "the highest level face of each solid at z = {heights} mm is drawn; the model spans z = "
+    "{bottom:.6g} to {top:.6g} mm; --section-z chooses another height",
+    "mm",
+)
+NOT_APPLIED = Sentence(Code.NOT_APPLIED, "{measured} {what} {why}")
+NOT_APPLIED_TO_ENTITY = Sentence(Code.NOT_APPLIED, "{measured} {kind}: {what} is not applied")
+UNIT_GUESSED = Sentence(
+    Code.UNIT_GUESSED,
+    "the file names no unit ({why}): read as {taken}; if that is wrong, name the unit with "
+    "--units",
+)
+UNIT_GUESSED_BY_PROGRAM = Sentence(
+    Code.UNIT_GUESSED,
+    "{program} wrote the file, which took {px_an_inch:g} px an inch, and it was read so; if it "
+    "comes out too large, give --dpi {usual:g}",
+    severity=WARNING,
+)
+POINTS_MERGED = Sentence(
+    Code.POINTS_MERGED,
+    "at this scale {measured} points lie within {near_nm:g} nm of the one before them and were "
+    "merged{paths:|; # paths are no longer than that and are left out|; # paths are no longer "
+    "than that and are left out}",
+)
+
+# What planning says.
+
+CONTOUR_TOO_SMALL = Sentence(
+    Code.CONTOUR_TOO_SMALL,
+    "{tool} does not fit into this contour of {measured:.6g} mm²: it is not cut",
+    "mm2",
+)
+CONTOUR_TOO_SMALL_ROUND = Sentence(
+    Code.CONTOUR_TOO_SMALL,
+    "{tool} does not fit round this contour of {measured:.6g} mm²: it is not cut",
+    "mm2",
+)
+CONTOUR_TOO_SMALL_POCKET = Sentence(
+    Code.CONTOUR_TOO_SMALL,
+    "{tool} does not fit into this pocket of {measured:.6g} mm²: it is not cut",
+    "mm2",
+)
+CONTOUR_TOO_SMALL_FOR_TIP = Sentence(
+    Code.CONTOUR_TOO_SMALL,
+    "a flat tip of {limit:g} mm does not fit into this contour, which is {measured:.4g} mm wide: "
+    "it is not carved",
+    "mm",
+)
+OPEN_CONTOUR_ON_LINE = Sentence(
+    Code.OPEN_CONTOUR_ON_LINE, "an open contour has no {side}: the tool runs on the line"
+)
+GOUGE = Sentence(Code.GOUGE, "{tool} beside {contour} cuts {amount:.4g} mm into {other}", "mm")
+GOUGE_OF_UNCUT = Sentence(
+    Code.GOUGE,
+    "{tool} beside {contour} cuts {amount:.4g} mm into {other}, which nobody cuts",
+    "mm",
+)
+GOUGE_OF_ALLOWANCE = Sentence(
+    Code.GOUGE,
+    "{tool} beside {contour} cuts {amount:.4g} mm into the allowance on {other}",
+    "mm",
+)
+GOUGE_MORE = Sentence(Code.GOUGE, "{measured} more places like this")
+GOUGE_BY_POCKET = Sentence(
+    Code.GOUGE,
+    "the pocket {pocket} clears away {contour}, {measured:.4g} mm wide, which another operation "
+    "keeps: let the pocket take its layer too, as an island",
+    "mm",
+    ERROR,
+)
+GOUGE_BY_POCKET_MORE = Sentence(Code.GOUGE, "{measured} more contours like this")
+OUT_OF_TRAVEL = Sentence(
+    Code.OUT_OF_TRAVEL,
+    "{axis} spans {measured:.4f} mm with part zero, more than its travel of {limit:g} mm: {mend}",
+    "mm",
+)
+OUT_OF_TRAVEL_IN_PROGRAM = Sentence(
+    Code.OUT_OF_TRAVEL,
+    "the program spans {measured:.3f} mm of {axis}, the axis has {limit:g} mm: {mend}",
+    "mm",
+)
+UNREACHED = Sentence(
+    Code.UNREACHED,
+    "{tool} is too wide for this place: {measured:.4g} mm² stay uncut",
+    "mm2",
+    WARNING,
+)
+UNREACHED_MORE = Sentence(
+    Code.UNREACHED,
+    "{tool} is too wide for {places} more places: {measured:.4g} mm² stay uncut",
+    "mm2",
+    WARNING,
+)
+UNREACHED_CORNERS = Sentence(
+    Code.UNREACHED,
+    "{corners:an inner corner keeps|# inner corners keep} {measured:.4g} mm² that {tool} does "
+    "not reach",
+    "mm2",
+    INFO,
+)
+UNREACHED_BY_TIP = Sentence(
+    Code.UNREACHED,
+    "a flat tip of {tip:g} mm leaves {places} corners or narrow places uncut, {measured:.4g} mm² "
+    "in all: use a bit with a smaller tip",
+    "mm2",
+    WARNING,
+)
+UNREACHED_BETWEEN = Sentence(
+    Code.UNREACHED,
+    "{tool} does not fit between {one} and {other}, {measured:.4g} mm apart: they stay joined",
+    "mm",
+    WARNING,
+)
+UNREACHED_BETWEEN_MORE = Sentence(
+    Code.UNREACHED, "{measured} more pairs of contours that stay joined", severity=WARNING
+)
+OUT_OF_STOCK = Sentence(
+    Code.OUT_OF_STOCK,
+    "the tool cuts {measured:.4g} mm deep into a stock of {thickness:g} mm, more than "
+    "{allowed:g} mm into what lies below: cut less deep, or say with spoilboard in [stock] how "
+    "far it may",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_AS_ALLOWED = Sentence(
+    Code.OUT_OF_STOCK,
+    "the tool goes {through:.4g} mm through the stock of {thickness:g} mm into what lies below; "
+    "up to {allowed:g} mm are allowed",
+    "mm",
+    INFO,
+)
+OUT_OF_STOCK_BESIDE = Sentence(
+    Code.OUT_OF_STOCK,
+    "{measured} cuts lie wholly beside the stock: check its corner, its size and the origin",
+    "cuts",
+    WARNING,
+)
+RAPID_IN_STOCK = Sentence(
+    Code.RAPID_IN_STOCK,
+    "a rapid runs through the stock, {depth:.4g} mm below its top" + _and_more("rapids"),
+    "mm",
+)
+RAPID_IN_STOCK_IN_PROGRAM = Sentence(
+    Code.RAPID_IN_STOCK,
+    "a rapid runs through the stock, {depth:.3f} mm below its top" + _and_more("rapids"),
+    "mm",
+)
+SLOT_AS_WIDE = Sentence(
+    Code.SLOT_AS_WIDE, "{tool} is as wide as this contour: it runs in its middle"
+)
+SLOT_AS_WIDE_IN_POCKET = Sentence(
+    Code.SLOT_AS_WIDE, "a slot as wide as {tool} is cut along its middle", "mm"
+)
+TAB_LEFT_OUT = Sentence(
+    Code.TAB_LEFT_OUT, "there is no room for a tab of this width: the contour has one less"
+)
+TAB_LEFT_OUT_DRILLED = Sentence(
+    Code.TAB_LEFT_OUT, "a hole is drilled through this tab of {contour}: it may not hold"
+)
+TAB_LEFT_OUT_OF_ALL = Sentence(
+    Code.TAB_LEFT_OUT,
+    "{measured} contours go without tabs: {kinds}; an operation of their own may give them some",
+    "contours",
+)
+LEAD_LEFT_OUT = Sentence(
+    Code.LEAD_LEFT_OUT,
+    "the {lead} is left out instead of {limit:g} mm: there is no room for it beside what is to "
+    "stay",
+    "mm",
+)
+LEAD_LEFT_OUT_IN_PART = Sentence(
+    Code.LEAD_LEFT_OUT,
+    "the {lead} is {measured:.4g} mm instead of {limit:g} mm: there is no room for it beside "
+    "what is to stay",
+    "mm",
+)
+ENTRY_CHANGED = Sentence(
+    Code.ENTRY_CHANGED,
+    "a ramp of {measured:.4g} mm along a contour of {length:.4g} mm: the tool plunges",
+    "mm",
+)
+ENTRY_CHANGED_IN_POCKET = Sentence(
+    Code.ENTRY_CHANGED, "the tool goes down by {change}, which does not fit"
+)
+DEPTH_LIMITED = Sentence(
+    Code.DEPTH_LIMITED,
+    "a floor of {measured:.6g} mm² is left: up to {width:.4g} mm wide, bit and depth allow "
+    "{allowed:.4g} mm; clear it with a pocket and a flat tool",
+    "mm2",
+)
+REVERSALS_IN_AIR = Sentence(
+    Code.REVERSALS_IN_AIR,
+    "{limit} reversals while cutting become {measured}: {runs_before} runs are cut as "
+    "{runs_after}; what play leaves over is at most {after_um:.3g} µm, not {before_um:.3g} µm",
+)
+REVERSALS_IN_AIR_NOT = Sentence(
+    Code.REVERSALS_IN_AIR,
+    "{measured} contours that turn back are cut in one piece: {reason}",
+)
+NOT_RELIEVED = Sentence(Code.NOT_RELIEVED, "{tool} finds no room for a relief at this corner")
+MARKS_NOT_CUT = Sentence(
+    Code.MARKS_NOT_CUT, "{measured} single points are not cut: a profile follows lines"
+)
+NOT_DRILLED = Sentence(
+    Code.NOT_DRILLED,
+    "only full circles and single points are drilled: {measured} other paths are not",
+)
+NOT_DRILLED_TOO_LARGE = Sentence(
+    Code.NOT_DRILLED,
+    "circles of more than {limit:g} mm are not drilled: {count}, up to {measured:.6g} mm",
+    "mm",
+)
+HOLE_SIZE = Sentence(
+    Code.HOLE_SIZE,
+    "{count} circles of {limit:g} mm are drilled with a drill of {measured:g} mm",
+    "mm",
+)
+TOOL_NOT_SAID = Sentence(
+    Code.TOOL_NOT_SAID,
+    "it has another tool than the operation before and no number, so the program cannot ask for "
+    "it: number the tools, or write a program for each",
+)
+TOOL_NOT_SAID_APART = Sentence(
+    Code.TOOL_NOT_SAID,
+    "it has another tool than the operation before and the same number {number}, so the program "
+    "cannot ask for it: number the tools, or write a program for each",
+)
+SIDE_BY_UNCUT = Sentence(
+    Code.SIDE_BY_UNCUT,
+    "{measured:# contour|# contours} would be cut on the other side without {uncut}, which "
+    "nobody cuts: {first} is cut {side}; if that is no edge of a part, give --frames {layer!r}, "
+    "or the side",
+    "contours",
+    WARNING,
+)
+SIDE_BY_UNCUT_FRAME = Sentence(
+    Code.SIDE_BY_UNCUT,
+    "{measured:# contour|# contours} would be cut on the other side if {uncut}, on the layer of "
+    "a frame, were the edge of a part: {first} is cut {side}; --frames says which layers are none",
+    "contours",
+    INFO,
+)
+CUT_DOUBTFUL = Sentence(Code.CUT_DOUBTFUL, "{doubts}")
+CUT_DOUBTFUL_SPEED = Sentence(
+    Code.CUT_DOUBTFUL, "nobody says how fast the spindle turns, so it stays off (--spindle)"
+)
+CUT_DOUBTFUL_WIDTH = Sentence(
+    Code.CUT_DOUBTFUL,
+    "the tool has no width, so it runs on the line of closed contours (--tool-diameter, or "
+    "--side on)",
+)
+CUT_DOUBTFUL_DEPTH = Sentence(
+    Code.CUT_DOUBTFUL,
+    "a pass of {depth:.4g} mm is deeper than the tool of {width:g} mm is wide (--step-down)",
+)
+CUT_DOUBTFUL_PLUNGE = Sentence(
+    Code.CUT_DOUBTFUL,
+    "the tool plunges at the feed of the cut, {feed:g} mm/min (--plunge-feed)",
+)
+TAB_SHARED = Sentence(
+    Code.TAB_SHARED,
+    "cuts are raised over {measured} tabs, which they would have cut away: the first over one of "
+    "{contour}",
+    "tabs",
+    WARNING,
+)
+TAB_SHARED_WITH_OWN = Sentence(
+    Code.TAB_SHARED,
+    "cuts are raised over {measured} its own and its neighbours' tabs, which they would have cut "
+    "away: the first over one of {contour}",
+    "tabs",
+    INFO,
+)
+CORNER_FAR = Sentence(
+    Code.CORNER_FAR,
+    "{joins} joins take the tool {measured:.4g} mm beyond a needle-like corner: use joins = "
+    '"round", or "mitre" with a low limit',
+    "mm",
+)
+CORNER_FAR_MORE = Sentence(Code.CORNER_FAR, "{measured} more corners")
+
+# What is said of programs.
+
+FEED_ABOVE_LIMIT = Sentence(
+    Code.FEED_ABOVE_LIMIT,
+    "the tool moves at {measured:.4g} mm/min {direction}, {limit:.4g} is the highest of "
+    "{machine}: lower the feed",
+    "mm_min",
+    ERROR,
+)
+FEED_ABOVE_LIMIT_ON_SLOPE = Sentence(
+    Code.FEED_ABOVE_LIMIT,
+    "the tool moves at {measured:.4g} mm/min {direction}, {limit:.4g} is the highest of "
+    "{machine}: lower the feed, or slope less",
+    "mm_min",
+    ERROR,
+)
+FEED_ABOVE_LIMIT_IN_JOB = Sentence(
+    Code.FEED_ABOVE_LIMIT,
+    "the {feed} of {measured:g} mm/min becomes {lowered:g}, as fast as the axes of {machine} are "
+    "said to be: {mend}",
+    "mm_min",
+    WARNING,
+)
+FEED_ABOVE_LIMIT_LOWERED = Sentence(
+    Code.FEED_ABOVE_LIMIT,
+    "{cuts} cuts of up to {measured:g} mm/min are written at {limit:g}, the highest feed of "
+    "{machine}",
+    "mm_min",
+    WARNING,
+)
+
+# What verification says.
+
+ARC_MISSES_END = Sentence(
+    Code.ARC_MISSES_END,
+    "the {move} does not stop at its end, passing it {measured:.1f} steps away: the real machine "
+    "would run on" + _and_more("arcs"),
+    "steps",
+    ERROR,
+)
+ARC_MISSES_END_FAR = Sentence(
+    Code.ARC_MISSES_END,
+    "the {move} does not stop at its end: the real machine would run on" + _and_more("arcs"),
+    "steps",
+    ERROR,
+)
+CONTOUR_MISSING = Sentence(
+    Code.CONTOUR_MISSING,
+    "{share:.0%} of {contour} is not cut by the program: up to {measured:.3f} mm from every "
+    "decoded cutting move" + _and_more("contours"),
+    "mm",
+)
+CONTOUR_MISSING_AT_DEPTH = Sentence(
+    Code.CONTOUR_MISSING,
+    "{share:.0%} of {contour} is not cut by the program: up to {measured:.3f} mm from every "
+    "decoded cutting move, and none is at its depth" + _and_more("contours"),
+    "mm",
+)
+CONTOUR_MISSING_NO_CUTS = Sentence(
+    Code.CONTOUR_MISSING,
+    "{share:.0%} of {contour} is not cut by the program: there are no decoded cutting moves at "
+    "all" + _and_more("contours"),
+    "mm",
+)
+CONTOUR_MISSING_ELSEWHERE = Sentence(
+    Code.CONTOUR_MISSING,
+    "cut {measured:.4f} mm beside what was asked" + _and_more("contours"),
+    "mm",
+)
+CONTOUR_MISSING_OTHER_DEPTH = Sentence(
+    Code.CONTOUR_MISSING,
+    "what was asked is cut at another depth" + _and_more("contours"),
+    "mm",
+)
+CONTOUR_MISSING_NOTHING_CUT = Sentence(
+    Code.CONTOUR_MISSING,
+    "the program cuts nothing" + _and_more("contours"),
+    "mm",
+)
+CONTOUR_MISSING_HOLE = Sentence(
+    Code.CONTOUR_MISSING,
+    "a hole {measured:.3f} mm deep is not drilled by the program" + _and_more("holes"),
+    "mm",
+)
+CONTOUR_MISSING_HOLE_DEPTH = Sentence(
+    Code.CONTOUR_MISSING,
+    "a hole {measured:.3f} mm deep is not drilled by the program: there is one of another depth"
+    + _and_more("holes"),
+    "mm",
+)
+EXTRA_CUT = Sentence(
+    Code.EXTRA_CUT,
+    "{share:.0%} of a cut was not wanted: up to {measured:.3f} mm from every wanted cutting move"
+    + _and_more("cuts"),
+    "mm",
+)
+EXTRA_CUT_AT_DEPTH = Sentence(
+    Code.EXTRA_CUT,
+    "{share:.0%} of a cut was not wanted: up to {measured:.3f} mm from every wanted cutting "
+    "move, and none is at its depth" + _and_more("cuts"),
+    "mm",
+)
+EXTRA_CUT_NONE_WANTED = Sentence(
+    Code.EXTRA_CUT,
+    "{share:.0%} of a cut was not wanted: there are no wanted cutting moves at all"
+    + _and_more("cuts"),
+    "mm",
+)
+EXTRA_CUT_ELSEWHERE = Sentence(
+    Code.EXTRA_CUT,
+    "a cut lies {measured:.4f} mm beside what was asked" + _and_more("contours"),
+    "mm",
+)
+EXTRA_CUT_OTHER_DEPTH = Sentence(
+    Code.EXTRA_CUT,
+    "a cut is at another depth than was asked" + _and_more("contours"),
+    "mm",
+)
+EXTRA_CUT_NOTHING_ASKED = Sentence(
+    Code.EXTRA_CUT,
+    "nothing was asked to be cut" + _and_more("contours"),
+    "mm",
+)
+EXTRA_CUT_PLUNGE = Sentence(
+    Code.EXTRA_CUT,
+    "a plunge to {measured:.3f} mm was not asked for" + _and_more("plunges"),
+    "mm",
+)
+EXTRA_CUT_AGAIN = Sentence(
+    Code.EXTRA_CUT,
+    "a move is cut {measured} times, asked for {limit} times" + _and_more("moves"),
+    "times",
+)
+EXTRA_CUT_HOLE = Sentence(
+    Code.EXTRA_CUT,
+    "a hole {measured:.3f} mm deep was not wanted" + _and_more("holes"),
+    "mm",
+)
+EXTRA_CUT_HOLE_DEPTH = Sentence(
+    Code.EXTRA_CUT,
+    "a hole {measured:.3f} mm deep was not wanted: there is one of another depth"
+    + _and_more("holes"),
+    "mm",
+)
+MANY_REVERSALS = Sentence(
+    Code.MANY_REVERSALS,
+    "X and Y reverse {measured} times while cutting a part of {size:.3g} mm; small parts were "
+    "seen to fail above {limit}",
+    "reversals",
+)
+PLAY_NOT_KNOWN = Sentence(
+    Code.PLAY_NOT_KNOWN,
+    "the machine file gives {axis} no play: its error is predicted as if it had none",
+    severity=INFO,
+)
+PLAY_NOT_KNOWN_TO_SAVE = Sentence(
+    Code.PLAY_NOT_KNOWN,
+    "{machine} has no play in X and Y, so that fewer reversals would gain nothing: give it with "
+    "--set axes.x.backlash_mm=...",
+    severity=WARNING,
+)
+NO_MOTION = Sentence(Code.NO_MOTION, "the program moves nothing")
+NO_MOTION_BELOW = Sentence(
+    Code.NO_MOTION, "the program cuts nothing: no feed move goes along below the stock top"
+)
+RETURN_TO_MACHINE_ZERO = Sentence(
+    Code.RETURN_TO_MACHINE_ZERO,
+    "the program returns to machine zero, which is taken to lie at ({zero}) mm from part zero "
+    "(controller.machine_zero_mm)",
+)
+ABOVE_GATE = Sentence(
+    Code.ABOVE_GATE,
+    "the predicted error is {measured:.2f} µm at most; {limit:.2f} µm is allowed",
+    "um",
+)
+ABOVE_GATE_UNKNOWN = Sentence(
+    Code.ABOVE_GATE,
+    "no error is known, since nothing was compared: the limit cannot be kept",
+    "um",
+)
+ABOVE_GATE_REVERSALS = Sentence(
+    Code.ABOVE_GATE,
+    "X and Y reverse {measured} times while cutting; {limit} are allowed",
+    "reversals",
+)
+ABOVE_GATE_TIME = Sentence(Code.ABOVE_GATE, "the program takes {takes}; {allowed} is allowed", "s")
+END_NOT_REACHED = Sentence(
+    Code.END_NOT_REACHED,
+    "the controller leaves {count} moves beside their ends, up to {measured:.2f} µm",
+    "um",
+)
+FIT_COARSE = Sentence(
+    Code.FIT_COARSE,
+    "the drawing was read for a part {read:.4g} times its size and is scaled {scale:.4g} times: "
+    "its curves lie up to {off_um:.4g} µm off; read it with scale={scale:.6g}",
+    "mm",
+)
+OVERCUT = Sentence(
+    Code.OVERCUT, "the cut itself goes {measured:.4g} mm beyond what is drawn", "mm"
+)
+FEED_DIFFERS = Sentence(
+    Code.FEED_DIFFERS,
+    "{moves:# move runs|# moves run} at another feed: {measured:g} mm/min, where {limit:g} is "
+    "asked for",
+    "mm_min",
+    ERROR,
+)
+FEED_DIFFERS_OWN = Sentence(
+    Code.FEED_DIFFERS,
+    "{moves:# move runs|# moves run} at another feed: {measured:g} mm/min, where {limit:g} is "
+    "the machine's own",
+    "mm_min",
+    WARNING,
+)
+SPINDLE_DIFFERS = Sentence(
+    Code.SPINDLE_DIFFERS,
+    "{moves:# move runs|# moves run} with {turning}, where {wanted} is asked for",
+    "rev_min",
+    ERROR,
+)
+SPINDLE_DIFFERS_UNASKED = Sentence(
+    Code.SPINDLE_DIFFERS,
+    "{moves:# move runs|# moves run} with {turning}, where {wanted} is nobody asked for it",
+    "rev_min",
+    INFO,
+)
+CUT_OTHER_WAY = Sentence(
+    Code.CUT_OTHER_WAY,
+    "the cut runs the other way round than was asked" + _and_more("contours"),
+)
+CLEARANCE_LOW = Sentence(
+    Code.CLEARANCE_LOW,
+    "{rapids} rapids run lower than Z {limit:g} mm, asked for: down to Z {measured:g} mm",
+    "mm",
+)
+CLEARANCE_LOW_OWN = Sentence(
+    Code.CLEARANCE_LOW,
+    "{rapids} rapids run lower than Z {limit:g} mm, the machine's own: down to Z {measured:g} mm",
+    "mm",
+)
+END_DIFFERS = Sentence(
+    Code.END_DIFFERS,
+    "the tool ends at Z {measured:g} mm, where Z {limit:g} mm is asked for",
+    "mm",
+)
+END_DIFFERS_NO_END = Sentence(
+    Code.END_DIFFERS, "the program has no end: no block says that it is over", severity=ERROR
+)
+END_DIFFERS_PLACE = Sentence(
+    Code.END_DIFFERS, "the tool ends at {end}; camtool would end at {wanted}", severity=INFO
+)
+SETTING_DIFFERS_TOOL = Sentence(
+    Code.SETTING_DIFFERS,
+    "{moves:# move runs|# moves run} with tool {measured:g}, where tool {limit:g} is asked for",
+    severity=ERROR,
+)
+SETTING_DIFFERS_TOOL_UNASKED = Sentence(
+    Code.SETTING_DIFFERS,
+    "{moves:# move runs|# moves run} with tool {measured:g}, where no tool is asked for",
+    severity=INFO,
+)
+SETTING_DIFFERS_CORNERS = Sentence(
+    Code.SETTING_DIFFERS,
+    "{moves:# move runs|# moves run} with corners rounded {room}, where {limit:g} mm is asked for",
+    "mm",
+    ERROR,
+)
+SETTING_DIFFERS_NO_CORNERS = Sentence(
+    Code.SETTING_DIFFERS,
+    "{moves:# move runs|# moves run} with corners rounded {room}, where none is to be rounded",
+    "mm",
+    ERROR,
+)
+SETTING_DIFFERS_DWELL = Sentence(
+    Code.SETTING_DIFFERS,
+    "the tool waits {measured:g} s, where {limit:g} s are asked for; at {places} places",
+    "s",
+    ERROR,
+)

@@ -21,7 +21,24 @@ from dataclasses import replace
 import numpy as np
 
 from camtool.errors import DrawingError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    ARCS_RECOGNISED,
+    BRANCHED,
+    BRANCHED_MORE,
+    DRAWN_TWICE,
+    ENTITY_SKIPPED,
+    FONT_SUBSTITUTED,
+    GAP_CLOSED,
+    GAP_CLOSED_MORE,
+    GAP_OPEN,
+    GAP_OPEN_MORE,
+    IMPLAUSIBLE_SIZE,
+    SELF_CROSSING,
+    SELF_CROSSING_MORE,
+    TINY_MERGED,
+    Finding,
+    Severity,
+)
 from camtool.geometry.drawing import (
     Drawing,
     Gap,
@@ -34,9 +51,10 @@ from camtool.geometry.drawing import (
 )
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.importers.healing import DRAWN_TWICE, cleaned, gap_of, healed, is_placed, off_drawn
+from camtool.importers.healing import IS_DRAWN_TWICE, cleaned, gap_of, healed, is_placed, off_drawn
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, selected
+from camtool.units import UM_PER_MM
 
 __all__ = ["MAX_COORDINATE_MM", "Piece", "assemble"]
 
@@ -90,7 +108,7 @@ def assemble(
         made_for=options.scale,
     )
     # What is drawn twice has a finding of its own.
-    once = [item for item in clean.skipped if item.reason != DRAWN_TWICE]
+    once = [item for item in clean.skipped if item.reason != IS_DRAWN_TWICE]
     noticed = [*findings, *skip_findings(skipped, [*unwanted, *once, *repeated])]
     return replace(drawing, findings=(*noticed, *_judged(drawing, options)))
 
@@ -190,7 +208,7 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
             continue
         seen.add((mark.layer, column, row))
         kept.append(mark)
-    return tuple(kept), [Skipped(kind, count, DRAWN_TWICE) for kind, count in gone.items()]
+    return tuple(kept), [Skipped(kind, count, IS_DRAWN_TWICE) for kind, count in gone.items()]
 
 
 # What the importers tell of a drawing besides its lines: findings, each with its place.
@@ -219,12 +237,7 @@ def counted(skipped: Sequence[Skipped]) -> list[Skipped]:
 def skip_findings(skipped: Sequence[Skipped], dropped: Sequence[Skipped]) -> list[Finding]:
     """What was left out: the reader's part as warnings, what has no length as information."""
     return [
-        Finding(
-            Code.ENTITY_SKIPPED,
-            severity,
-            f"{item.count} {item.kind} left out: {item.reason}",
-            measured=float(item.count),
-        )
+        ENTITY_SKIPPED(severity=severity, measured=item.count, kind=item.kind, reason=item.reason)
         for severity, items in ((Severity.WARNING, skipped), (Severity.INFO, dropped))
         for item in counted(items)
     ]
@@ -232,15 +245,7 @@ def skip_findings(skipped: Sequence[Skipped], dropped: Sequence[Skipped]) -> lis
 
 def font_findings(lacking: Counter[str]) -> list[Finding]:
     """FONT_SUBSTITUTED for what texts wanted and could not have, and how many texts did."""
-    return [
-        Finding(
-            Code.FONT_SUBSTITUTED,
-            Severity.WARNING,
-            f"{count} texts: {what}",
-            measured=float(count),
-        )
-        for what, count in lacking.items()
-    ]
+    return [FONT_SUBSTITUTED(measured=count, what=what) for what, count in lacking.items()]
 
 
 def size_findings(drawing: Drawing) -> list[Finding]:
@@ -254,50 +259,38 @@ def size_findings(drawing: Drawing) -> list[Finding]:
         return []
     small = longest < SMALLEST_MM
     return [
-        Finding(
-            Code.IMPLAUSIBLE_SIZE,
-            Severity.WARNING,
-            f"the drawing is {width:.6g} x {height:.6g} mm with unit {units.name} ({units.why}); "
-            "if that is wrong, name the unit with --units",
+        IMPLAUSIBLE_SIZE(
             measured=longest,
             limit=SMALLEST_MM if small else LARGEST_MM,
-            unit="mm",
+            width=width,
+            height=height,
+            drawn_in=units.name,
+            why=units.why,
         )
     ]
 
 
 def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Finding]:
     """A finding for each gap, largest first, and one for all that are more than are read."""
-    code, severity = (
-        (Code.GAP_CLOSED, Severity.INFO) if closed else (Code.GAP_OPEN, Severity.WARNING)
-    )
     ranked = sorted(gaps, key=lambda gap: -gap.size_mm if closed else gap.size_mm)
     found = [
-        Finding(
-            code,
-            severity,
-            f"a gap of {gap.size_mm * 1000.0:.4g} µm was closed"
-            if closed
-            else f"two open ends are {gap.size_mm * 1000.0:.4g} µm apart and stay open",
+        (GAP_CLOSED if closed else GAP_OPEN)(
             where=_where(gap.layer, gap.at_mm),
             measured=gap.size_mm,
             limit=gap_mm,
-            unit="mm",
+            size_um=gap.size_mm * UM_PER_MM,
         )
         for gap in ranked[:MAX_GAP_FINDINGS]
     ]
-    rest = ranked[MAX_GAP_FINDINGS:]
-    if rest:
-        verb = "were closed" if closed else "stay open"
+    sizes = [gap.size_mm for gap in ranked[MAX_GAP_FINDINGS:]]
+    if sizes:
         found.append(
-            Finding(
-                code,
-                severity,
-                f"{len(rest)} more gaps {verb}, of {min(g.size_mm for g in rest) * 1000.0:.4g} to "
-                f"{max(g.size_mm for g in rest) * 1000.0:.4g} µm",
-                measured=max(gap.size_mm for gap in rest),
+            (GAP_CLOSED_MORE if closed else GAP_OPEN_MORE)(
+                measured=max(sizes),
                 limit=gap_mm,
-                unit="mm",
+                count=len(sizes),
+                least_um=min(sizes) * UM_PER_MM,
+                most_um=max(sizes) * UM_PER_MM,
             )
         )
     return found
@@ -309,35 +302,12 @@ def healing_findings(healed: Healing, tolerance_mm: float) -> list[Finding]:
     if healed.duplicates or healed.overlaps:
         length = healed.duplicates_mm + healed.overlaps_mm
         found.append(
-            Finding(
-                Code.DRAWN_TWICE,
-                Severity.INFO,
-                f"{healed.duplicates} drawn twice and {healed.overlaps} lying on others in whole "
-                f"or in part: {length:.6g} mm left out",
-                measured=length,
-                unit="mm",
-            )
+            DRAWN_TWICE(measured=length, doubles=healed.duplicates, overlaps=healed.overlaps)
         )
     if healed.tiny_merged:
-        found.append(
-            Finding(
-                Code.TINY_MERGED,
-                Severity.INFO,
-                f"{healed.tiny_merged} segments too short to matter were merged",
-                measured=float(healed.tiny_merged),
-                limit=tolerance_mm,
-            )
-        )
+        found.append(TINY_MERGED(measured=healed.tiny_merged, limit=tolerance_mm))
     if healed.arcs_recognised:
-        found.append(
-            Finding(
-                Code.ARCS_RECOGNISED,
-                Severity.INFO,
-                f"chords became {healed.arcs_recognised} arcs",
-                measured=float(healed.arcs_recognised),
-                limit=tolerance_mm,
-            )
-        )
+        found.append(ARCS_RECOGNISED(measured=healed.arcs_recognised, limit=tolerance_mm))
     return [*found, *_branch_findings(healed), *_crossing_findings(healed.crossings)]
 
 
@@ -345,20 +315,12 @@ def _branch_findings(healed: Healing) -> list[Finding]:
     """Branches where the most ends meet first, the rest counted."""
     ranked = sorted(healed.branches, key=lambda branch: -branch.ends)
     found = [
-        Finding(
-            Code.BRANCHED,
-            Severity.WARNING,
-            f"{branch.ends} ends meet; the straightest were joined",
-            where=_where(branch.layer, branch.at_mm),
-            measured=float(branch.ends),
-            limit=2.0,
-        )
+        BRANCHED(where=_where(branch.layer, branch.at_mm), measured=branch.ends, limit=2.0)
         for branch in ranked[:MAX_PLACES]
     ]
     more = len(ranked) - MAX_PLACES
     if more > 0:
-        message = f"more than two ends meet at {more} more places"
-        found.append(Finding(Code.BRANCHED, Severity.WARNING, message, measured=float(more)))
+        found.append(BRANCHED_MORE(measured=more))
     return found
 
 
@@ -369,21 +331,10 @@ def _crossing_findings(crossings: Sequence[SelfCrossing]) -> list[Finding]:
     found = []
     for path, count in sorted(times.items())[:MAX_PLACES]:
         at = first[path]
-        often = "" if count == 1 else f" at {count} places"
-        found.append(
-            Finding(
-                Code.SELF_CROSSING,
-                Severity.WARNING,
-                f"a closed contour crosses itself{often}",
-                where=_where(at.layer, at.at_mm),
-                measured=float(count),
-                limit=0.0,
-            )
-        )
+        found.append(SELF_CROSSING(where=_where(at.layer, at.at_mm), measured=count, limit=0.0))
     more = len(times) - MAX_PLACES
     if more > 0:
-        message = f"{more} more closed contours cross themselves"
-        found.append(Finding(Code.SELF_CROSSING, Severity.WARNING, message, measured=float(more)))
+        found.append(SELF_CROSSING_MORE(measured=more))
     return found
 
 

@@ -32,7 +32,7 @@ from camtool.geometry.simplify import without_tiny
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import MAX_COORDINATE_MM, Piece
 
-DRAWN_TWICE = "is drawn twice"
+IS_DRAWN_TWICE = "is drawn twice"
 """Why a piece went that is another one again."""
 
 
@@ -77,7 +77,7 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     return Cleaned(
         lines=lines.select(np.flatnonzero(once)),
         piece=rows[once],
-        skipped=(*gone, *points, *_kinds(pieces, twice, DRAWN_TWICE)),
+        skipped=(*gone, *points, *_kinds(pieces, twice, IS_DRAWN_TWICE)),
         duplicates=int(np.count_nonzero(~once)),
         duplicates_mm=float(lengths[~once].sum()),
     )

@@ -29,7 +29,14 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    CONTOUR_TOO_SMALL_FOR_TIP,
+    DEPTH_LIMITED,
+    SELF_CROSSING_CARVED,
+    SELF_CROSSING_NO_REGION,
+    UNREACHED_BY_TIP,
+    Finding,
+)
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import MOST_PAIRS, meetings
@@ -165,21 +172,14 @@ def _crossings(chosen: Chosen) -> Iterator[Finding]:
     for row in np.flatnonzero(crosses).tolist():
         a, b = (chosen.names[segments.path[i[row]]] for i in (meets.row_a, meets.row_b))
         x, y = meets.point[row].tolist()
-        yield Finding(
-            Code.SELF_CROSSING,
-            Severity.ERROR,
-            f"{a} crosses {'itself' if a == b else b}: what is inside cannot be told; mend the"
-            " drawing, or carve without it",
-            where=at_place(a, (x, y)),
+        yield SELF_CROSSING_CARVED(
+            where=at_place(a, (x, y)), contour=a, other="itself" if a == b else b
         )
 
 
 def _no_region(region: _Region, error: GeometryError) -> Finding:
-    return Finding(
-        Code.SELF_CROSSING,
-        Severity.ERROR,
-        f"{error.message}: what is inside cannot be carved; {error.mend}",
-        where=f"{region.name} at {error.where}",
+    return SELF_CROSSING_NO_REGION(
+        where=f"{region.name} at {error.where}", fault=error.message, mend=error.mend
     )
 
 
@@ -242,28 +242,19 @@ def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
 
     tip, widest = 2.0 * cone.tip_mm, 2.0 * float(trace.rho.max())
     if widest <= tip:
-        yield Finding(
-            Code.CONTOUR_TOO_SMALL,
-            Severity.WARNING,
-            f"a flat tip of {tip:g} mm does not fit into this contour, which is {widest:.4g} mm"
-            " wide: it is not carved",
+        yield CONTOUR_TOO_SMALL_FOR_TIP(
             where=at_place(region.name, region.lines[0].start.tolist()),
             measured=widest,
             limit=tip,
-            unit="mm",
         )
         return
     pieces = unreached(region.lines, cone.tip_mm)
     if pieces:
-        area = sum(piece.area_mm2 for piece in pieces)
-        yield Finding(
-            Code.UNREACHED,
-            Severity.WARNING,
-            f"a flat tip of {tip:g} mm leaves {len(pieces)} corners or narrow places uncut,"
-            f" {area:.4g} mm² in all: use a bit with a smaller tip",
+        yield UNREACHED_BY_TIP(
             where=at_place(region.name, pieces[0].at_mm),
-            measured=area,
-            unit="mm2",
+            measured=sum(piece.area_mm2 for piece in pieces),
+            tip=tip,
+            places=len(pieces),
         )
 
 
@@ -272,15 +263,11 @@ def _limited(
 ) -> Iterator[Finding]:
     if floor:
         row = int(np.argmax(trace.rho))
-        area = floor_area(floor)
-        yield Finding(
-            Code.DEPTH_LIMITED,
-            Severity.WARNING,
-            f"a floor of {area:.6g} mm² is left: up to {2.0 * trace.rho[row]:.4g} mm wide, bit and"
-            f" depth allow {2.0 * limit_mm:.4g} mm; clear it with a pocket and a flat tool",
+        yield DEPTH_LIMITED(
             where=at_place(region.name, (float(trace.x[row]), float(trace.y[row]))),
-            measured=area,
-            unit="mm2",
+            measured=floor_area(floor),
+            width=2.0 * trace.rho[row],
+            allowed=2.0 * limit_mm,
         )
 
 

@@ -15,7 +15,23 @@ from itertools import pairwise
 import numpy as np
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    CUT_DOUBTFUL,
+    CUT_DOUBTFUL_DEPTH,
+    CUT_DOUBTFUL_PLUNGE,
+    CUT_DOUBTFUL_SPEED,
+    CUT_DOUBTFUL_WIDTH,
+    FEED_ABOVE_LIMIT,
+    FEED_ABOVE_LIMIT_ON_SLOPE,
+    OUT_OF_STOCK,
+    OUT_OF_STOCK_AS_ALLOWED,
+    OUT_OF_STOCK_BESIDE,
+    OUT_OF_TRAVEL,
+    RAPID_IN_STOCK,
+    TOOL_NOT_SAID,
+    TOOL_NOT_SAID_APART,
+    Finding,
+)
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.planning.items import Setting, Step
@@ -61,15 +77,12 @@ def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
         span = high - low
         if axis.travel_mm is None or span <= axis.travel_mm + POSITION_EPS_MM:
             continue
-        yield Finding(
-            Code.OUT_OF_TRAVEL,
-            Severity.ERROR,
-            f"{name} spans {span:.4f} mm with part zero, more than its travel of"
-            f" {axis.travel_mm:g} mm: {_into_travel(toolpath, machine, name)}",
+        yield OUT_OF_TRAVEL(
             where=f"axis {name}, from {low:.4f} to {high:.4f} mm",
             measured=span,
             limit=axis.travel_mm,
-            unit="mm",
+            axis=name,
+            mend=_into_travel(toolpath, machine, name),
         )
 
 
@@ -101,27 +114,21 @@ def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     depth = STOCK_TOP_MM - float(low.min())
     through = depth - stock.thickness_mm
     if POSITION_EPS_MM < through <= stock.through_mm + POSITION_EPS_MM:
-        yield Finding(
-            Code.OUT_OF_STOCK,
-            Severity.INFO,
-            f"the tool goes {through:.4g} mm through the stock of {stock.thickness_mm:g} mm into"
-            f" what lies below; up to {stock.through_mm:g} mm are allowed",
+        yield OUT_OF_STOCK_AS_ALLOWED(
             where=_place(toolpath, deepest),
             measured=depth,
             limit=stock.thickness_mm + stock.through_mm,
-            unit="mm",
+            through=through,
+            thickness=stock.thickness_mm,
+            allowed=stock.through_mm,
         )
     elif through > POSITION_EPS_MM:
-        yield Finding(
-            Code.OUT_OF_STOCK,
-            Severity.ERROR,
-            f"the tool cuts {depth:.4g} mm deep into a stock of {stock.thickness_mm:g} mm, more"
-            f" than {stock.through_mm:g} mm into what lies below: cut less deep, or say with"
-            " spoilboard in [stock] how far it may",
+        yield OUT_OF_STOCK(
             where=_place(toolpath, deepest),
             measured=depth,
             limit=stock.thickness_mm + stock.through_mm,
-            unit="mm",
+            thickness=stock.thickness_mm,
+            allowed=stock.through_mm,
         )
     if stock.box_mm is None:
         return
@@ -131,15 +138,11 @@ def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     within = np.unique(stay[cuts & ~beside])
     outside = cuts & ~np.isin(stay, within)
     if outside.any():
-        row, count = int(outside.argmax()), len(np.unique(stay[outside]))
+        row = int(outside.argmax())
         x, y = toolpath.end[row, :2].tolist()
-        yield Finding(
-            Code.OUT_OF_STOCK,
-            Severity.WARNING,
-            f"{count} cuts lie wholly beside the stock: check its corner, its size and the origin",
+        yield OUT_OF_STOCK_BESIDE(
             where=f"{_place(toolpath, row)} near ({x:.3f}, {y:.3f}) mm",
-            measured=float(count),
-            unit="cuts",
+            measured=len(np.unique(stay[outside])),
         )
 
 
@@ -168,14 +171,11 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
         one, other = before.tool, operation.tool
         if _shape(one) == _shape(other) or other.number not in (None, one.number):
             continue
-        number = "no number" if other.number is None else f"the same number {other.number}"
-        yield Finding(
-            Code.TOOL_NOT_SAID,
-            Severity.ERROR,
-            f"it has another tool than the operation before and {number}, so the program cannot"
-            " ask for it: number the tools, or write a program for each",
-            where=operation_name(operation),
-        )
+        where = operation_name(operation)
+        if other.number is None:
+            yield TOOL_NOT_SAID(where=where)
+        else:
+            yield TOOL_NOT_SAID_APART(where=where, number=other.number)
 
 
 def _shape(tool: Tool) -> tuple[object, ...]:
@@ -210,17 +210,13 @@ def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     found = rapids_through_stock(toolpath, Reach(cuts, sweeps, solid))
     more = len(found) - MOST_LISTED
     for number, one in enumerate(found[:MOST_LISTED], 1):
-        depth = STOCK_TOP_MM - one.z_mm
-        rest = f"; and {more} more rapids" if more > 0 and number == MOST_LISTED else ""
         x, y = one.at_mm
-        yield Finding(
-            Code.RAPID_IN_STOCK,
-            Severity.ERROR,
-            f"a rapid runs through the stock, {depth:.4g} mm below its top{rest}",
+        yield RAPID_IN_STOCK(
             where=f"{_place(toolpath, one.row)} near ({x:.3f}, {y:.3f}) mm",
             measured=one.z_mm,
             limit=STOCK_TOP_MM,
-            unit="mm",
+            depth=STOCK_TOP_MM - one.z_mm,
+            more=max(more, 0) if number == MOST_LISTED else 0,
         )
 
 
@@ -241,15 +237,12 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
         if len(speed) == 0 or speed.max() <= limit * (1.0 + FEED_TOLERANCE):
             continue
         row = int(speed.argmax())
-        yield Finding(
-            Code.FEED_ABOVE_LIMIT,
-            Severity.ERROR,
-            f"the tool moves at {speed[row]:.4g} mm/min {what}, {limit:.4g} is the highest of"
-            f" {machine.target.name}: lower the feed" + (", or slope less" if across[row] else ""),
+        yield (FEED_ABOVE_LIMIT_ON_SLOPE if across[row] else FEED_ABOVE_LIMIT)(
             where=_place(toolpath, row),
-            measured=float(speed[row]),
+            measured=speed[row],
             limit=limit,
-            unit="mm_min",
+            direction=what,
+            machine=machine.target.name,
         )
 
 
@@ -292,7 +285,7 @@ def doubts(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
     for doubt, of in said.items():
         names = ", ".join(operation_name(step.operation) for step in of)
         parts.append(doubt if len(of) == len(cutting) else f"{names}: {doubt}")
-    return [Finding(Code.CUT_DOUBTFUL, Severity.WARNING, "; ".join(parts))]
+    return [CUT_DOUBTFUL(doubts="; ".join(parts))]
 
 
 def _of(step: Step, starts_spindle: bool) -> Iterator[str]:
@@ -300,27 +293,18 @@ def _of(step: Step, starts_spindle: bool) -> Iterator[str]:
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = tool.radius_mm + operation.allowance_mm > 0.0
     if starts_spindle and operation.spindle_rpm is None:
-        yield "nobody says how fast the spindle turns, so it stays off (--spindle)"
+        yield CUT_DOUBTFUL_SPEED.said()
     on_line = operation.kind == "profile" and operation.side != "on" and not wide
     if starts_spindle and on_line and step.chosen.lines.closed.any():
-        yield (
-            "the tool has no width, so it runs on the line of closed contours (--tool-diameter,"
-            " or --side on)"
-        )
+        yield CUT_DOUBTFUL_WIDTH.said()
     deepest = deepest_pass(step.setting)
     mills = operation.kind in IN_PASSES and tool.kind == "flat" and tool.radius_mm > 0.0
     if mills and deepest > tool.diameter_mm + POSITION_EPS_MM:
-        yield (
-            f"a pass of {deepest:.4g} mm is deeper than the tool of {tool.diameter_mm:g} mm is"
-            " wide (--step-down)"
-        )
+        yield CUT_DOUBTFUL_DEPTH.said(depth=deepest, width=tool.diameter_mm)
     plunges = operation.kind in IN_PASSES and operation.entry.kind == "plunge"
     fast = operation.plunge_feed_mm_min is None and feeds.plunge_mm_min >= feeds.cut_mm_min
     if starts_spindle and plunges and fast:
-        yield (
-            f"the tool plunges at the feed of the cut, {feeds.plunge_mm_min:g} mm/min"
-            " (--plunge-feed)"
-        )
+        yield CUT_DOUBTFUL_PLUNGE.said(feed=feeds.plunge_mm_min)
 
 
 def deepest_pass(setting: Setting) -> float:

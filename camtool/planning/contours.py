@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import ENTRY_CHANGED, Finding
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
 from camtool.planning.items import Bridge, Contour, Run
 from camtool.planning.leads import KeepOut, Leads, leads_of
@@ -153,14 +153,11 @@ def _slope(contour: Contour, along: Along) -> tuple[float | None, list[Finding]]
     ramp = -contour.setting.levels_mm[-1] / math.tan(angle)
     if ramp <= MOST_LAPS * along.total_mm:
         return angle, []
-    finding = Finding(
-        Code.ENTRY_CHANGED,
-        Severity.WARNING,
-        f"a ramp of {ramp:.4g} mm along a contour of {along.total_mm:.4g} mm: the tool plunges",
+    finding = ENTRY_CHANGED(
         where=at_place(contour.name, along.path.start.tolist()),
         measured=ramp,
         limit=MOST_LAPS * along.total_mm,
-        unit="mm",
+        length=along.total_mm,
     )
     return None, [finding]
 

@@ -16,7 +16,13 @@ from itertools import pairwise
 import numpy as np
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    HOLE_SIZE,
+    NOT_DRILLED,
+    NOT_DRILLED_TOO_LARGE,
+    NOTHING_DRAWN_TO_DRILL,
+    Finding,
+)
 from camtool.geometry.measure import path_extents, sample
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
@@ -195,28 +201,17 @@ def _largest(operation: Operation) -> float:
 
 def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:
     if holes:
-        largest = max(hole.diameter_mm or 0.0 for hole in holes)
-        yield Finding(
-            Code.NOT_DRILLED,
-            Severity.WARNING,
-            f"circles of more than {limit:g} mm are not drilled: {len(holes)}, up to"
-            f" {largest:.6g} mm",
+        yield NOT_DRILLED_TOO_LARGE(
             where=_named([hole.name for hole in holes]),
-            measured=largest,
+            measured=max(hole.diameter_mm or 0.0 for hole in holes),
             limit=limit,
-            unit="mm",
+            count=len(holes),
         )
 
 
 def _no_circles(names: list[str]) -> Iterator[Finding]:
     if names:
-        yield Finding(
-            Code.NOT_DRILLED,
-            Severity.WARNING,
-            f"only full circles and single points are drilled: {len(names)} other paths are not",
-            where=_named(names),
-            measured=float(len(names)),
-        )
+        yield NOT_DRILLED(where=_named(names), measured=len(names))
 
 
 def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
@@ -227,25 +222,12 @@ def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
         if wanted and hole.diameter_mm and abs(hole.diameter_mm - wanted) > HOLE_SIZE_MM:
             by_size.setdefault(round(hole.diameter_mm, 3), []).append(hole.name)
     for size, names in sorted(by_size.items()):
-        yield Finding(
-            Code.HOLE_SIZE,
-            Severity.WARNING,
-            f"{len(names)} circles of {size:g} mm are drilled with a drill of {wanted:g} mm",
-            where=_named(names),
-            measured=wanted,
-            limit=size,
-            unit="mm",
-        )
+        yield HOLE_SIZE(where=_named(names), measured=wanted, limit=size, count=len(names))
 
 
 def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
     if not holes:
-        yield Finding(
-            Code.NOTHING_DRAWN,
-            Severity.ERROR,
-            "there is no hole to drill: no single point, and no circle that is small enough",
-            where=operation_name(operation),
-        )
+        yield NOTHING_DRAWN_TO_DRILL(where=operation_name(operation))
 
 
 def _named(names: list[str]) -> str:

@@ -14,7 +14,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    GOUGE,
+    GOUGE_BY_POCKET,
+    GOUGE_BY_POCKET_MORE,
+    GOUGE_MORE,
+    GOUGE_OF_ALLOWANCE,
+    GOUGE_OF_UNCUT,
+    SIDE_BY_UNCUT,
+    SIDE_BY_UNCUT_FRAME,
+    Finding,
+    Severity,
+)
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, path_lengths, sample
 from camtool.geometry.nesting import inside, nesting
@@ -35,11 +46,11 @@ SAMPLES_ROUND = 500
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
     """What is said of the sides of an operation: gouges, and sides that nobody's cut decides."""
     if operation.kind == "pocket":
-        return told_together(list(_cleared_away(chosen, sides, operation)), "contours like this")
+        return told_together(list(_cleared_away(chosen, sides, operation)), GOUGE_BY_POCKET_MORE)
     if not runs_beside(operation):
         return []
     gouges = list(_gouges(work, chosen, sides, operation))
-    found = told_together(gouges, "places like this")
+    found = told_together(gouges, GOUGE_MORE)
     if operation.side == "auto":
         found += by_uncut(sides, operation, chosen.source[chosen.lines.closed])
     return found
@@ -70,16 +81,15 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         near = approach(item.path, wall)
         if near.distance >= radius - GOUGE_TOLERANCE_MM:
             if other in own and near.distance < radius + allowance - GOUGE_TOLERANCE_MM:
-                left = radius + allowance - near.distance
-                yield Finding(
-                    Code.GOUGE,
-                    Severity.WARNING,
-                    f"{tool_name(operation.tool)} beside {item.name} cuts {left:.4g} mm into the"
-                    f" allowance on {sides.names[other]}",
+                yield GOUGE_OF_ALLOWANCE(
                     where=at_place(item.name, near.point),
                     measured=near.distance,
                     limit=radius + allowance,
-                    unit="mm",
+                    severity=Severity.WARNING,
+                    tool=tool_name(operation.tool),
+                    contour=item.name,
+                    amount=radius + allowance - near.distance,
+                    other=sides.names[other],
                 )
             continue
         drawn = sides.lines[item.source]
@@ -90,15 +100,15 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         amount = radius - near.distance
         if near.distance <= POSITION_EPS_MM:
             amount = radius + _beyond(item.path, wall, drawn)
-        yield Finding(
-            Code.GOUGE,
-            Severity.ERROR if kept and not told else Severity.WARNING,
-            f"{tool_name(operation.tool)} beside {item.name} cuts {amount:.4g} mm into"
-            f" {sides.names[other]}" + ("" if kept else ", which nobody cuts"),
+        yield (GOUGE if kept else GOUGE_OF_UNCUT)(
             where=at_place(item.name, near.point),
             measured=near.distance,
             limit=radius,
-            unit="mm",
+            severity=Severity.ERROR if kept and not told else Severity.WARNING,
+            tool=tool_name(operation.tool),
+            contour=item.name,
+            amount=amount,
+            other=sides.names[other],
         )
 
 
@@ -157,15 +167,12 @@ def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[F
     for row in rows[nest.depth[rows] % 2 == 1].tolist():
         holder = sides.names[int(nest.parent[row])]
         width = float(np.ptp(extents(sides.lines.select([row])), axis=1).min())
-        yield Finding(
-            Code.GOUGE,
-            Severity.ERROR,
-            f"the pocket {holder} clears away {sides.names[row]}, {width:.4g} mm wide, which"
-            " another operation keeps: let the pocket take its layer too, as an island",
+        yield GOUGE_BY_POCKET(
             where=at_place(sides.names[row], sides.lines[row].start.tolist()),
             measured=width,
             limit=0.0,
-            unit="mm",
+            pocket=holder,
+            contour=sides.names[row],
         )
 
 
@@ -173,9 +180,9 @@ def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding
     """What follows from closed contours that nobody cuts, for those of the operation (`rows`):
     some have their side because of them, others in spite of those on the layers of frames."""
     seen = sides.seen_by(operation)
-    for severity, turned, around in (
-        (Severity.WARNING, seen.by_uncut, sides.uncut),
-        (Severity.INFO, seen.by_frames, sides.frames),
+    for sentence, turned, around in (
+        (SIDE_BY_UNCUT, seen.by_uncut, sides.uncut),
+        (SIDE_BY_UNCUT_FRAME, seen.by_frames, sides.frames),
     ):
         found = rows[turned[rows]]
         if len(found) == 0:
@@ -183,21 +190,11 @@ def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding
         parent = nesting(sides.lines, around).parent
         first = int(found[0])
         name = sides.names[int(parent[first])]
-        side = "outside" if seen.rim[first] else "inside"
-        many = "1 contour" if len(found) == 1 else f"{len(found)} contours"
-        if severity == Severity.WARNING:
-            layer = name.partition("/")[0]
-            why = f"without {name}, which nobody cuts"
-            mend = f"if that is no edge of a part, give --frames {layer!r}, or the side"
-        else:
-            why = f"if {name}, on the layer of a frame, were the edge of a part"
-            mend = "--frames says which layers are none"
-        yield Finding(
-            Code.SIDE_BY_UNCUT,
-            severity,
-            f"{many} would be cut on the other side {why}: {sides.names[first]} is cut {side};"
-            f" {mend}",
+        yield sentence(
             where=operation_name(operation),
-            measured=float(len(found)),
-            unit="contours",
+            measured=len(found),
+            uncut=name,
+            layer=name.partition("/")[0],
+            first=sides.names[first],
+            side="outside" if seen.rim[first] else "inside",
         )

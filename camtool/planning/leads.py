@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import LEAD_LEFT_OUT, LEAD_LEFT_OUT_IN_PART, Finding
 from camtool.geometry.distance import nearest, paired_distances, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import Frames, dot, point_at, signed_area
@@ -244,14 +244,6 @@ def left_of(path: Polyline, points: Floats) -> Floats:
 
 
 def _shortened(name: str, lead: Lead, size: float, where: str) -> Finding:
-    what = f"is {size:.4g} mm" if size else "is left out"
-    return Finding(
-        Code.LEAD_LEFT_OUT,
-        Severity.WARNING,
-        f"the {name} {what} instead of {lead.length_mm:g} mm: there is no room for it beside what"
-        " is to stay",
-        where=where,
-        measured=size,
-        limit=lead.length_mm,
-        unit="mm",
+    return (LEAD_LEFT_OUT_IN_PART if size else LEAD_LEFT_OUT)(
+        where=where, measured=size, limit=lead.length_mm, lead=name
     )

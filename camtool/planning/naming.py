@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-from camtool.findings import Finding
+from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
 from camtool.planning.job import Operation, Tool
 
@@ -43,17 +42,9 @@ def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
     )
 
 
-def told_together(findings: Sequence[Finding], what: str) -> list[Finding]:
+def told_together(findings: Sequence[Finding], more: Sentence) -> list[Finding]:
     """The first `MOST_PLACES` of findings of one kind, and one more that counts the others."""
     told, rest = list(findings[:MOST_PLACES]), findings[MOST_PLACES:]
     if rest:
-        told.append(
-            replace(
-                rest[0],
-                message=f"{len(rest)} more {what}",
-                measured=float(len(rest)),
-                limit=None,
-                unit="",
-            )
-        )
+        told.append(more(where=rest[0].where, measured=len(rest), severity=rest[0].severity))
     return told

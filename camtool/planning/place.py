@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError, OptionError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import POINTS_MERGED, Finding, Severity
 from camtool.geometry.drawing import Drawing, Gap, Healing, Unchosen
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, encloses, without_repeats
@@ -107,16 +107,13 @@ def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
     if not points:
         return []
     return [
-        Finding(
-            Code.POINTS_MERGED,
-            Severity.WARNING if paths else Severity.INFO,
-            f"at this scale {points} points lie within {POSITION_EPS_MM * 1e6:g} nm of the one "
-            "before them and were merged"
-            + (f"; {paths} paths are no longer than that and are left out" if paths else ""),
+        POINTS_MERGED(
+            severity=Severity.WARNING if paths else Severity.INFO,
             where=drawing.file,
-            measured=float(points),
+            measured=points,
             limit=POSITION_EPS_MM,
-            unit="",
+            near_nm=POSITION_EPS_MM * 1e6,
+            paths=paths,
         )
     ]
 

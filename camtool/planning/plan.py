@@ -18,7 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    FIT_COARSE,
+    MARKS_NOT_CUT,
+    NOTHING_DRAWN,
+    NOTHING_DRAWN_BUT_PATHS,
+    Finding,
+)
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polylines
@@ -113,15 +119,12 @@ def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:
         return
     scale = placed.fit.max_mm / drawing.fit.max_mm
     if scale > drawing.made_for * (1.0 + SCALE_SHARE):
-        yield Finding(
-            Code.FIT_COARSE,
-            Severity.WARNING,
-            f"the drawing was read for a part {drawing.made_for:.4g} times its size and is scaled"
-            f" {scale:.4g} times: its curves lie up to {placed.fit.max_mm * 1000.0:.4g} µm off;"
-            f" read it with scale={scale:.6g}",
+        yield FIT_COARSE(
             where=placed.file,
             measured=placed.fit.max_mm,
-            unit="mm",
+            read=drawing.made_for,
+            scale=scale,
+            off_um=placed.fit.max_mm * 1000.0,
         )
 
 
@@ -311,22 +314,9 @@ def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
         and not any(operation.takes(mark.layer, mark.colour) for operation in drills)
     ]
     if left:
-        found.append(
-            Finding(
-                Code.MARKS_NOT_CUT,
-                Severity.WARNING,
-                f"{len(left)} single points are not cut: a profile follows lines",
-                measured=float(len(left)),
-            )
-        )
+        found.append(MARKS_NOT_CUT(measured=len(left)))
     if not cuts and (len(placed.paths) or placed.marks):
         found.append(
-            Finding(
-                Code.NOTHING_DRAWN,
-                Severity.ERROR,
-                "no contour is left to cut"
-                + (": use a smaller tool, or --side on" if len(placed.paths) else ""),
-                where=placed.file,
-            )
+            (NOTHING_DRAWN_BUT_PATHS if len(placed.paths) else NOTHING_DRAWN)(where=placed.file)
         )
     return found

@@ -22,7 +22,12 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    CONTOUR_TOO_SMALL_POCKET,
+    ENTRY_CHANGED_IN_POCKET,
+    SLOT_AS_WIDE_IN_POCKET,
+    Finding,
+)
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import meetings, self_crossings
 from camtool.geometry.measure import extents, signed_areas
@@ -201,35 +206,24 @@ def _check_step(chosen: Chosen, operation: Operation) -> None:
 
 
 def _too_small(each: Pocket, operation: Operation) -> Finding:
-    area = float(signed_areas(each.region).sum())
-    return Finding(
-        Code.CONTOUR_TOO_SMALL,
-        Severity.WARNING,
-        f"{tool_name(operation.tool)} does not fit into this pocket of {area:.6g} mm²:"
-        " it is not cut",
+    return CONTOUR_TOO_SMALL_POCKET(
         where=at_place(each.name, extents(each.region).mean(axis=1).tolist()),
-        measured=area,
-        unit="mm2",
+        measured=float(signed_areas(each.region).sum()),
+        tool=tool_name(operation.tool),
     )
 
 
 def _changed(each: Pocket, change: str, run: Run) -> Finding:
-    return Finding(
-        Code.ENTRY_CHANGED,
-        Severity.WARNING,
-        f"the tool goes down by {change}, which does not fit",
-        where=at_place(each.name, run.vertices[0, :2].tolist()),
+    return ENTRY_CHANGED_IN_POCKET(
+        where=at_place(each.name, run.vertices[0, :2].tolist()), change=change
     )
 
 
 def _slot(each: Pocket, slot: Floats, operation: Operation) -> Finding:
-    return Finding(
-        Code.SLOT_AS_WIDE,
-        Severity.INFO,
-        f"a slot as wide as {tool_name(operation.tool)} is cut along its middle",
+    return SLOT_AS_WIDE_IN_POCKET(
         where=at_place(each.name, slot[0, :2].tolist()),
         measured=operation.tool.diameter_mm,
-        unit="mm",
+        tool=tool_name(operation.tool),
     )
 
 

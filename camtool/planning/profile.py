@@ -15,7 +15,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from camtool.arrays import Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    CONTOUR_TOO_SMALL,
+    CONTOUR_TOO_SMALL_ROUND,
+    CORNER_FAR,
+    CORNER_FAR_MORE,
+    NOT_RELIEVED,
+    OPEN_CONTOUR_ON_LINE,
+    SLOT_AS_WIDE,
+    UNREACHED_BETWEEN,
+    UNREACHED_BETWEEN_MORE,
+    Code,
+    Finding,
+)
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.nesting import nesting
@@ -71,7 +83,7 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
             _alone(chosen, k, setting, found)
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if operation.joins != "round":
-        found.findings += told_together(list(_far(chosen, setting, found.lines)), "corners")
+        found.findings += told_together(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
     items = [_beside(line, chosen, setting) for line in found.lines]
@@ -111,7 +123,7 @@ def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> No
     _round(chosen, of, shape, setting, found)
     made = found.lines[before:]
     joined = [each for line in made for each in _joined(chosen, line.of, setting)]
-    found.findings += told_together(joined, "pairs of contours that stay joined")
+    found.findings += told_together(joined, UNREACHED_BETWEEN_MORE)
     free = Polylines.of(reverse(path) for path in shape)
     as_wide = any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
     hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
@@ -182,25 +194,14 @@ def _is_double(shape: Polylines, place: int) -> bool:
 
 
 def _as_wide(chosen: Chosen, k: int, setting: Setting) -> Finding:
-    return Finding(
-        Code.SLOT_AS_WIDE,
-        Severity.INFO,
-        f"{tool_name(setting.operation.tool)} is as wide as this contour: it runs in its middle",
-        where=_middle(chosen, k),
-    )
+    return SLOT_AS_WIDE(where=_middle(chosen, k), tool=tool_name(setting.operation.tool))
 
 
 def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:
-    area = abs(float(signed_areas(chosen.lines.select([k]))[0]))
-    way = "round" if outer else "into"
-    return Finding(
-        Code.CONTOUR_TOO_SMALL,
-        Severity.WARNING,
-        f"{tool_name(setting.operation.tool)} does not fit {way} this contour of {area:.6g} mm²:"
-        " it is not cut",
+    return (CONTOUR_TOO_SMALL_ROUND if outer else CONTOUR_TOO_SMALL)(
         where=_middle(chosen, k),
-        measured=area,
-        unit="mm2",
+        measured=abs(float(signed_areas(chosen.lines.select([k]))[0])),
+        tool=tool_name(setting.operation.tool),
     )
 
 
@@ -219,15 +220,13 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
         near = approach(lines[one], lines[other])
         if near.distance >= room - ROOM_TOLERANCE_MM:
             continue
-        yield Finding(
-            Code.UNREACHED,
-            Severity.WARNING,
-            f"{tool_name(setting.operation.tool)} does not fit between {chosen.names[of[one]]}"
-            f" and {chosen.names[of[other]]}, {near.distance:.4g} mm apart: they stay joined",
+        yield UNREACHED_BETWEEN(
             where=at_place(chosen.names[of[one]], near.point),
             measured=near.distance,
             limit=room,
-            unit="mm",
+            tool=tool_name(setting.operation.tool),
+            one=chosen.names[of[one]],
+            other=chosen.names[of[other]],
         )
 
 
@@ -243,12 +242,7 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
         done = relieved(path, chosen.lines[k], tool.radius_mm, kind, keep_out)
         path = done.path
         findings += (
-            Finding(
-                Code.NOT_RELIEVED,
-                Severity.WARNING,
-                f"{tool_name(tool)} finds no room for a relief at this corner",
-                where=at_place(chosen.names[k], corner),
-            )
+            NOT_RELIEVED(where=at_place(chosen.names[k], corner), tool=tool_name(tool))
             for corner in done.left.tolist()
         )
     return replace(line, path=path, plain=line.path)
@@ -293,11 +287,8 @@ def _on_line(chosen: Chosen, k: int, setting: Setting) -> Contour:
 
 
 def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
-    return Finding(
-        Code.OPEN_CONTOUR_ON_LINE,
-        Severity.WARNING,
-        f"an open contour has no {side}: the tool runs on the line",
-        where=at_place(chosen.names[k], chosen.lines[k].start.tolist()),
+    return OPEN_CONTOUR_ON_LINE(
+        where=at_place(chosen.names[k], chosen.lines[k].start.tolist()), side=side
     )
 
 
@@ -312,13 +303,9 @@ def _far(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Findi
         corners = line.path.vertices[:, :2]
         distance = nearest(corners, drawn).distance
         for k in np.flatnonzero(distance > most).tolist():
-            yield Finding(
-                Code.CORNER_FAR,
-                Severity.WARNING,
-                f"{setting.operation.joins} joins take the tool {distance[k]:.4g} mm beyond a"
-                ' needle-like corner: use joins = "round", or "mitre" with a low limit',
+            yield CORNER_FAR(
                 where=at_place(chosen.names[line.of[0]], corners[k].tolist()),
-                measured=float(distance[k]),
+                measured=distance[k],
                 limit=most,
-                unit="mm",
+                joins=setting.operation.joins,
             )

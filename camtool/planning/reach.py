@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import UNREACHED, UNREACHED_CORNERS, UNREACHED_MORE, Finding
 from camtool.geometry.boxes import Curves
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, extents, point_at, segment_lengths, signed_areas
@@ -280,39 +280,19 @@ def unreached_findings(
 
 def _places(pieces: Sequence[Unreached], called: str) -> Iterator[Finding]:
     for piece in pieces[:MOST_PLACES]:
-        yield Finding(
-            Code.UNREACHED,
-            Severity.WARNING,
-            f"{called} is too wide for this place: {piece.area_mm2:.4g} mm² stay uncut",
-            where=_where(piece),
-            measured=piece.area_mm2,
-            unit="mm2",
-        )
+        yield UNREACHED(where=_where(piece), measured=piece.area_mm2, tool=called)
     rest = pieces[MOST_PLACES:]
     if rest:
         area = sum(piece.area_mm2 for piece in rest)
-        yield Finding(
-            Code.UNREACHED,
-            Severity.WARNING,
-            f"{called} is too wide for {len(rest)} more places: {area:.4g} mm² stay uncut",
-            where=_where(rest[0]),
-            measured=area,
-            unit="mm2",
-        )
+        yield UNREACHED_MORE(where=_where(rest[0]), measured=area, tool=called, places=len(rest))
 
 
 def _corners(pieces: Sequence[Unreached], called: str) -> Iterator[Finding]:
     if not pieces:
         return
     area = sum(piece.area_mm2 for piece in pieces)
-    many = "an inner corner keeps" if len(pieces) == 1 else f"{len(pieces)} inner corners keep"
-    yield Finding(
-        Code.UNREACHED,
-        Severity.INFO,
-        f"{many} {area:.4g} mm² that {called} does not reach",
-        where=_where(pieces[0]),
-        measured=area,
-        unit="mm2",
+    yield UNREACHED_CORNERS(
+        where=_where(pieces[0]), measured=area, tool=called, corners=len(pieces)
     )
 
 

@@ -27,7 +27,12 @@ import msgspec
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    PLAY_NOT_KNOWN_TO_SAVE,
+    REVERSALS_IN_AIR,
+    REVERSALS_IN_AIR_NOT,
+    Finding,
+)
 from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments, reverse
@@ -208,33 +213,20 @@ def _begun_at_turns(
 def _told(counts: _Counts) -> Iterator[Finding]:
     before, after = counts.before, counts.after
     if before.reversals:
-        yield Finding(
-            Code.REVERSALS_IN_AIR,
-            Severity.INFO,
-            f"{before.reversals} reversals while cutting become {after.reversals}: {before.runs}"
-            f" runs are cut as {after.runs}; what play leaves over is at most"
-            f" {after.error_mm * UM_PER_MM:.3g} µm, not {before.error_mm * UM_PER_MM:.3g} µm",
-            measured=float(after.reversals),
-            limit=float(before.reversals),
+        yield REVERSALS_IN_AIR(
+            measured=after.reversals,
+            limit=before.reversals,
+            runs_before=before.runs,
+            runs_after=after.runs,
+            after_um=after.error_mm * UM_PER_MM,
+            before_um=before.error_mm * UM_PER_MM,
         )
     for reason, names in counts.whole.items():
-        yield Finding(
-            Code.REVERSALS_IN_AIR,
-            Severity.INFO,
-            f"{len(names)} contours that turn back are cut in one piece: {reason}",
-            where=names[0],
-            measured=float(len(names)),
-        )
+        yield REVERSALS_IN_AIR_NOT(where=names[0], measured=len(names), reason=reason)
 
 
 def _no_play(machine: Machine) -> Finding:
-    return Finding(
-        Code.PLAY_NOT_KNOWN,
-        Severity.WARNING,
-        f"{machine.target.name} has no play in X and Y, so that fewer reversals would gain"
-        " nothing: give it with --set axes.x.backlash_mm=...",
-        where="axes x, y",
-    )
+    return PLAY_NOT_KNOWN_TO_SAVE(where="axes x, y", machine=machine.target.name)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import FEED_ABOVE_LIMIT_IN_JOB, Finding
 from camtool.machine.model import Machine
 from camtool.planning.items import Feeds, Setting
 from camtool.planning.job import Job, Operation
@@ -90,16 +90,14 @@ def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
                 continue
             told.add((name, said))
             slow = [n for n in which if _above(said, getattr(axes, n).max_rate_mm_min or said)]
-            yield Finding(
-                Code.FEED_ABOVE_LIMIT,
-                Severity.WARNING,
-                f"the {name} of {said:g} mm/min becomes {_sayable(highest, machine):g}, as fast as"
-                f" the axes of {machine.target.name} are said to be: "
-                + own_numbers(machine, [f"axes.{n}.max_rate_mm_min={said:g}" for n in slow]),
+            yield FEED_ABOVE_LIMIT_IN_JOB(
                 where=operation_name(operation),
                 measured=said,
                 limit=highest,
-                unit="mm_min",
+                feed=name,
+                lowered=_sayable(highest, machine),
+                machine=machine.target.name,
+                mend=own_numbers(machine, [f"axes.{n}.max_rate_mm_min={said:g}" for n in slow]),
             )
 
 

@@ -27,7 +27,14 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    TAB_LEFT_OUT,
+    TAB_LEFT_OUT_DRILLED,
+    TAB_LEFT_OUT_OF_ALL,
+    TAB_SHARED,
+    TAB_SHARED_WITH_OWN,
+    Finding,
+)
 from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import crossings
@@ -105,15 +112,10 @@ def with_tabs(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], list[Finding]]
     opens = sum(not each.path.closed for each in bare.values())
     holes = sum(each.path.closed and _is_hole(each) for each in bare.values())
     kinds = ((holes, "holes"), (opens, "open"), (len(bare) - holes - opens, "too short for them"))
-    finding = Finding(
-        Code.TAB_LEFT_OUT,
-        Severity.WARNING,
-        f"{len(bare)} contours go without tabs: "
-        + ", ".join(f"{count} {kind}" for count, kind in kinds if count)
-        + "; an operation of their own may give them some",
+    finding = TAB_LEFT_OUT_OF_ALL(
         where=operation_name(asked[0].setting.operation),
-        measured=float(len(bare)),
-        unit="contours",
+        measured=len(bare),
+        kinds=", ".join(f"{count} {kind}" for count, kind in kinds if count),
     )
     return tuple(_bare(each) if id(each) in bare else each for each in items), [finding]
 
@@ -325,12 +327,7 @@ def _stays(along: Along, tab: Tab) -> bool:
 
 
 def _left_out(contour: Contour, along: Along, length: float) -> Finding:
-    return Finding(
-        Code.TAB_LEFT_OUT,
-        Severity.WARNING,
-        "there is no room for a tab of this width: the contour has one less",
-        where=at_place(contour.name, along.at(np.array([length]))[0].tolist()),
-    )
+    return TAB_LEFT_OUT(where=at_place(contour.name, along.at(np.array([length]))[0].tolist()))
 
 
 # The bridges that tabs leave stay whole: whatever else is cut keeps above them.
@@ -404,22 +401,14 @@ class _Found:
     def told(self, operation: Operation) -> Iterator[Finding]:
         if self.shared:
             bridge, name = next(iter(self.shared.values()))
-            whose = "its own and its neighbours' tabs" if operation.tabs else "tabs"
-            yield Finding(
-                Code.TAB_SHARED,
-                Severity.INFO if operation.tabs else Severity.WARNING,
-                f"cuts are raised over {len(self.shared)} {whose}, which they would have cut away:"
-                f" the first over one of {bridge.name}",
+            yield (TAB_SHARED_WITH_OWN if operation.tabs else TAB_SHARED)(
                 where=at_place(name, bridge.middle.tolist()),
-                measured=float(len(self.shared)),
-                unit="tabs",
+                measured=len(self.shared),
+                contour=bridge.name,
             )
         for bridge, name in self.drilled.values():
-            yield Finding(
-                Code.TAB_LEFT_OUT,
-                Severity.WARNING,
-                f"a hole is drilled through this tab of {bridge.name}: it may not hold",
-                where=at_place(name, bridge.middle.tolist()),
+            yield TAB_LEFT_OUT_DRILLED(
+                where=at_place(name, bridge.middle.tolist()), contour=bridge.name
             )
 
 

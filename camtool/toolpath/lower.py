@@ -24,7 +24,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError, PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import FEED_ABOVE_LIMIT_LOWERED
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Arms, Kind, Toolpath
 
@@ -217,14 +217,8 @@ def within_feeds(toolpath: Toolpath, machine: Machine) -> Toolpath:
     if not fast.any():
         return toolpath
     most = float(toolpath.feed[fast].max())
-    found = Finding(
-        Code.FEED_ABOVE_LIMIT,
-        Severity.WARNING,
-        f"{int(fast.sum())} cuts of up to {most:g} mm/min are written at {limit:g}, the highest "
-        f"feed of {machine.target.name}",
-        measured=most,
-        limit=limit,
-        unit="mm_min",
+    found = FEED_ABOVE_LIMIT_LOWERED(
+        measured=most, limit=limit, cuts=int(fast.sum()), machine=machine.target.name
     )
     return replace(
         toolpath,

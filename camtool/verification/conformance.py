@@ -19,7 +19,34 @@ from functools import cached_property
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    CLEARANCE_LOW,
+    CLEARANCE_LOW_OWN,
+    CONTOUR_MISSING_ELSEWHERE,
+    CONTOUR_MISSING_NOTHING_CUT,
+    CONTOUR_MISSING_OTHER_DEPTH,
+    END_DIFFERS,
+    END_DIFFERS_NO_END,
+    END_DIFFERS_PLACE,
+    EXTRA_CUT_AGAIN,
+    EXTRA_CUT_ELSEWHERE,
+    EXTRA_CUT_NOTHING_ASKED,
+    EXTRA_CUT_OTHER_DEPTH,
+    EXTRA_CUT_PLUNGE,
+    FEED_DIFFERS,
+    FEED_DIFFERS_OWN,
+    SETTING_DIFFERS_CORNERS,
+    SETTING_DIFFERS_DWELL,
+    SETTING_DIFFERS_NO_CORNERS,
+    SETTING_DIFFERS_TOOL,
+    SETTING_DIFFERS_TOOL_UNASKED,
+    SPINDLE_DIFFERS,
+    SPINDLE_DIFFERS_UNASKED,
+    Code,
+    Finding,
+    Sentence,
+    Severity,
+)
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM
@@ -265,35 +292,25 @@ def _beside(found: Compared, drilled: Bools, limits: Limits, code: Code) -> Iter
         sample, nearest = int(bad[worst]), int(near.segment[worst])
         extra, known = code == Code.EXTRA_CUT, nearest >= 0
         one, which = (cuts, samples.segment[sample]) if extra else (found.others, nearest)
-        at, more = at_point(samples.points[sample]), and_more(number, len(listed), "contours")
+        at, more = at_point(samples.points[sample]), and_more(number, len(listed))
         block = block_name(one.toolpath, int(one.segments.path[which])) if extra or known else ""
-        yield Finding(
-            code,
-            Severity.ERROR,
-            _words(code, near.distance[worst], wrong_depth=bool(wrong_depth[worst])) + more,
+        yield _away(near.distance[worst], bool(wrong_depth[worst]), code)(
             where=f"{block} near {at}".strip(),
             measured=float(near.distance[worst]) if known else None,
             limit=limits[0],
-            unit="mm",
+            more=more,
         )
         if more:
             return
 
 
-def _words(code: Code, distance: float, *, wrong_depth: bool) -> str:
+def _away(distance: float, wrong_depth: bool, code: Code) -> Sentence:
     extra = code == Code.EXTRA_CUT
     if not np.isfinite(distance):
-        return "nothing was asked to be cut" if extra else "the program cuts nothing"
+        return EXTRA_CUT_NOTHING_ASKED if extra else CONTOUR_MISSING_NOTHING_CUT
     if wrong_depth:
-        return (
-            "a cut is at another depth than was asked"
-            if extra
-            else "what was asked is cut at another depth"
-        )
-    far = f"{distance:.4f} mm"
-    return (
-        f"a cut lies {far} beside what was asked" if extra else f"cut {far} beside what was asked"
-    )
+        return EXTRA_CUT_OTHER_DEPTH if extra else CONTOUR_MISSING_OTHER_DEPTH
+    return EXTRA_CUT_ELSEWHERE if extra else CONTOUR_MISSING_ELSEWHERE
 
 
 def _plunges(
@@ -313,14 +330,11 @@ def _plunges(
         fine[one[deep[plunge, 2] <= ends[one, 2] + limits[1]]] = True
     bad = rows[~fine]
     for number, row in enumerate(bad.tolist()):
-        more = and_more(number, len(bad), "plunges")
-        yield Finding(
-            Code.EXTRA_CUT,
-            Severity.ERROR,
-            f"a plunge to {toolpath.end[row, 2]:.3f} mm was not asked for{more}",
+        more = and_more(number, len(bad))
+        yield EXTRA_CUT_PLUNGE(
             where=f"{block_name(toolpath, row)} at {at_point(toolpath.end[row])}",
-            measured=float(toolpath.end[row, 2]),
-            unit="mm",
+            measured=toolpath.end[row, 2],
+            more=more,
         )
         if more:
             return
@@ -353,16 +367,13 @@ def _again(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Fi
     lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
     bad = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
     for rank, place in enumerate(bad.tolist()):
-        row, more = int(rows[place]), and_more(rank, len(bad), "moves")
+        row, more = int(rows[place]), and_more(rank, len(bad))
         times, limit = int(counts[more_often][place]), max(int(lie[place]), 1)
-        yield Finding(
-            Code.EXTRA_CUT,
-            Severity.ERROR,
-            f"a move is cut {times} times, asked for {limit} times{more}",
+        yield EXTRA_CUT_AGAIN(
             where=f"{block_name(mine.toolpath, row)} near {at_point(middle[place])}",
-            measured=float(times),
-            limit=float(limit),
-            unit="times",
+            measured=times,
+            limit=limit,
+            more=more,
         )
         if more:
             return
@@ -460,20 +471,14 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
     off = np.abs(is_ - wanted) > FEED_SHARE * asked.feed_unit_mm_min
     rows, of = both.unlike(~off)
     said = asked.feed_said[of]
-    for severity, which in ((Severity.ERROR, said), (Severity.WARNING, ~said)):
+    for is_asked, which in ((True, said), (False, ~said)):
         if which.any():
-            row, feed = int(rows[which][0]), float(both.written.feed[of][which][0])
-            found = float(both.decoded.feed[row])
-            named = "asked for" if severity == Severity.ERROR else "the machine's own"
-            yield Finding(
-                Code.FEED_DIFFERS,
-                severity,
-                f"{_moves(int(which.sum()))} at another feed: {found:g} mm/min, where {feed:g} is "
-                + named,
+            row = int(rows[which][0])
+            yield (FEED_DIFFERS if is_asked else FEED_DIFFERS_OWN)(
                 where=block_name(both.decoded, row),
-                measured=found,
-                limit=feed,
-                unit="mm_min",
+                measured=both.decoded.feed[row],
+                limit=both.written.feed[of][which][0],
+                moves=int(which.sum()),
             )
 
 
@@ -482,19 +487,16 @@ def _spindle(both: _Both) -> Iterator[Finding]:
     is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     asked = wanted[of] != OFF
-    for severity, which in ((Severity.ERROR, asked), (Severity.INFO, ~asked)):
+    for is_asked, which in ((True, asked), (False, ~asked)):
         if which.any():
             row, limit = int(rows[which][0]), float(wanted[of][which][0])
-            named = "asked for" if severity == Severity.ERROR else "nobody asked for it"
-            words = f"{_turning(float(is_[row]))}, where {_turning(limit)} is"
-            yield Finding(
-                Code.SPINDLE_DIFFERS,
-                severity,
-                f"{_moves(int(which.sum()))} with {words} {named}",
+            yield (SPINDLE_DIFFERS if is_asked else SPINDLE_DIFFERS_UNASKED)(
                 where=block_name(both.decoded, row),
-                measured=float(is_[row]),
+                measured=is_[row],
                 limit=limit,
-                unit="rev_min",
+                moves=int(which.sum()),
+                turning=_turning(float(is_[row])),
+                wanted=_turning(limit),
             )
 
 
@@ -509,17 +511,14 @@ def _tools(both: _Both) -> Iterator[Finding]:
     is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     asked = wanted[of] != OFF
-    for severity, which in ((Severity.ERROR, asked), (Severity.INFO, ~asked)):
+    for is_asked, which in ((True, asked), (False, ~asked)):
         if which.any():
-            row, limit = int(rows[which][0]), float(wanted[of][which][0])
-            wished = f"tool {limit:g} is asked for" if limit != OFF else "no tool is asked for"
-            yield Finding(
-                Code.SETTING_DIFFERS,
-                severity,
-                f"{_moves(int(which.sum()))} with tool {is_[row]:g}, where {wished}",
+            row = int(rows[which][0])
+            yield (SETTING_DIFFERS_TOOL if is_asked else SETTING_DIFFERS_TOOL_UNASKED)(
                 where=block_name(both.decoded, row),
-                measured=float(is_[row]),
-                limit=limit,
+                measured=is_[row],
+                limit=wanted[of][which][0],
+                moves=int(which.sum()),
             )
 
 
@@ -531,16 +530,12 @@ def _corners(both: _Both) -> Iterator[Finding]:
     rows, of = both.unlike(~looser)
     if len(rows):
         row, limit = int(rows[0]), float(wanted[of][0])
-        room = "as far as the moves allow" if np.isinf(is_[row]) else f"within {is_[row]:g} mm"
-        yield Finding(
-            Code.SETTING_DIFFERS,
-            Severity.ERROR,
-            f"{_moves(len(rows))} with corners rounded {room}, where "
-            + (f"{limit:g} mm is asked for" if limit else "none is to be rounded"),
+        yield (SETTING_DIFFERS_CORNERS if limit else SETTING_DIFFERS_NO_CORNERS)(
             where=block_name(both.decoded, row),
-            measured=float(is_[row]) if np.isfinite(is_[row]) else None,
+            measured=is_[row] if np.isfinite(is_[row]) else None,
             limit=limit,
-            unit="mm",
+            moves=len(rows),
+            room="as far as the moves allow" if np.isinf(is_[row]) else f"within {is_[row]:g} mm",
         )
 
 
@@ -566,15 +561,11 @@ def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Find
             short.append((row, waited))
     if short:
         row, waited = short[0]
-        yield Finding(
-            Code.SETTING_DIFFERS,
-            Severity.ERROR,
-            f"the tool waits {waited:g} s, where {written.value[row]:g} s are asked for; "
-            f"at {len(short)} places",
+        yield SETTING_DIFFERS_DWELL(
             where=f"at {at_point(written.end[row])}",
             measured=waited,
-            limit=float(written.value[row]),
-            unit="s",
+            limit=written.value[row],
+            places=len(short),
         )
 
 
@@ -594,16 +585,12 @@ def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[
     if len(bad) == 0:
         return
     row = int(bad[np.argmin(low[bad])])
-    whose = "asked for" if asked.safe_z_said else "the machine's own"
-    yield Finding(
-        Code.CLEARANCE_LOW,
-        _gravity(float(low[row]), asked),
-        f"{len(bad)} rapids run lower than Z {asked.safe_z_mm:g} mm, {whose}: down to "
-        f"Z {low[row]:g} mm",
+    yield (CLEARANCE_LOW if asked.safe_z_said else CLEARANCE_LOW_OWN)(
+        severity=_gravity(float(low[row]), asked),
         where=f"{block_name(toolpath, row)} near {at_point(end[row])}",
-        measured=float(low[row]),
+        measured=low[row],
         limit=asked.safe_z_mm,
-        unit="mm",
+        rapids=len(bad),
     )
 
 
@@ -616,34 +603,20 @@ def _gravity(low_mm: float, asked: Asked) -> Severity:
 def _end(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
     """END_DIFFERS for a program without its end, or whose tool ends lower than was asked."""
     if (written.kind == Kind.END).any() and not (decoded.kind == Kind.END).any():
-        yield Finding(
-            Code.END_DIFFERS,
-            Severity.ERROR,
-            "the program has no end: no block says that it is over",
-            where=block_name(decoded, len(decoded) - 1) if len(decoded) else "",
+        yield END_DIFFERS_NO_END(
+            where=block_name(decoded, len(decoded) - 1) if len(decoded) else ""
         )
     last, goal = _last(decoded), _last(written)
     if last[2] < min(goal[2], asked.safe_z_mm) - asked.limits_mm[1]:
-        yield Finding(
-            Code.END_DIFFERS,
-            _gravity(float(last[2]), asked),
-            f"the tool ends at Z {last[2]:g} mm, where Z {goal[2]:g} mm is asked for",
+        yield END_DIFFERS(
+            severity=_gravity(float(last[2]), asked),
             where=f"at {at_point(last)}",
-            measured=float(last[2]),
-            limit=float(goal[2]),
-            unit="mm",
+            measured=last[2],
+            limit=goal[2],
         )
     elif np.hypot(*(last - goal)[:2]) > asked.limits_mm[0]:
-        yield Finding(
-            Code.END_DIFFERS,
-            Severity.INFO,
-            f"the tool ends at {at_point(last)}; camtool would end at {at_point(goal)}",
-        )
+        yield END_DIFFERS_PLACE(end=at_point(last), wanted=at_point(goal))
 
 
 def _last(toolpath: Toolpath) -> Floats:
     return toolpath.end[-1] if len(toolpath) else toolpath.start
-
-
-def _moves(count: int) -> str:
-    return f"{count} moves run" if count != 1 else "1 move runs"

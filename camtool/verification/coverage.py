@@ -15,7 +15,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    CONTOUR_MISSING,
+    CONTOUR_MISSING_AT_DEPTH,
+    CONTOUR_MISSING_HOLE,
+    CONTOUR_MISSING_HOLE_DEPTH,
+    CONTOUR_MISSING_NO_CUTS,
+    CUT_OTHER_WAY,
+    EXTRA_CUT,
+    EXTRA_CUT_AT_DEPTH,
+    EXTRA_CUT_HOLE,
+    EXTRA_CUT_HOLE_DEPTH,
+    EXTRA_CUT_NONE_WANTED,
+    Finding,
+    Sentence,
+)
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
@@ -97,23 +111,25 @@ def cover(decoded: Target, goal: Goal, spacing_mm: float, drilled: Drilled) -> C
     return Coverage(match, rounding, (*missing, *extra))
 
 
+_MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
+_EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
+
+
 def _extra_cuts(there: _Compared, goal: Goal) -> Iterator[Finding]:
     cuts, samples, distance = there.cuts, there.samples, there.found.distance
     listed = list(_by_contour(cuts, samples, distance, there.bad(goal)))
     for number, (_, worst, share) in enumerate(listed):
         row = int(cuts.segments.path[samples.segment[worst]])
         at = at_point(samples.points[worst])
-        how = _away(distance[worst], "wanted", wrong_depth=bool(there.wrong_depth[worst]))
-        yield Finding(
-            Code.EXTRA_CUT,
-            Severity.ERROR,
-            f"{share:.0%} of a cut was not wanted: {how}" + and_more(number, len(listed), "cuts"),
+        wrong_depth, more = bool(there.wrong_depth[worst]), and_more(number, len(listed))
+        yield _away(distance[worst], wrong_depth, _EXTRA)(
             where=f"{block_name(cuts.toolpath, row)} near {at}",
             measured=_finite(distance[worst]),
             limit=goal.limit_mm,
-            unit="mm",
+            share=share,
+            more=more,
         )
-        if and_more(number, len(listed), "cuts"):
+        if more:
             return
 
 
@@ -124,18 +140,16 @@ def _missing(back: _Compared, goal: Goal) -> Iterator[Finding]:
         row = int(cuts.segments.path[samples.segment[worst]])
         source = cuts.toolpath.text(row)
         name = f"contour {contour + 1}" + (f" ({source})" if source else "")
-        how = _away(distance[worst], "decoded", wrong_depth=bool(back.wrong_depth[worst]))
-        yield Finding(
-            Code.CONTOUR_MISSING,
-            Severity.ERROR,
-            f"{share:.0%} of {name} is not cut by the program: {how}"
-            + and_more(number, len(listed), "contours"),
+        wrong_depth, more = bool(back.wrong_depth[worst]), and_more(number, len(listed))
+        yield _away(distance[worst], wrong_depth, _MISSING)(
             where=f"{name} near {at_point(samples.points[worst])}",
             measured=_finite(distance[worst]),
             limit=goal.limit_mm,
-            unit="mm",
+            share=share,
+            contour=name,
+            more=more,
         )
-        if and_more(number, len(listed), "contours"):
+        if more:
             return
 
 
@@ -154,11 +168,14 @@ def _by_contour(
         yield which, int(worst), float(count / all_of[which])
 
 
-def _away(distance: float, side: str, *, wrong_depth: bool) -> str:
+def _away(
+    distance: float, wrong_depth: bool, sentences: tuple[Sentence, Sentence, Sentence]
+) -> Sentence:
+    """Which of the sentences is to be said: away, away at this depth, or nothing there."""
+    away, at_depth, nothing = sentences
     if not np.isfinite(distance):
-        return f"there are no {side} cutting moves at all"
-    depth = ", and none is at its depth" if wrong_depth else ""
-    return f"up to {distance:.3f} mm from every {side} cutting move{depth}"
+        return nothing
+    return at_depth if wrong_depth else away
 
 
 def _finite(distance: float) -> float | None:
@@ -230,6 +247,10 @@ def contours_drilled(
     return drilled, stands
 
 
+_MISSING_HOLES = CONTOUR_MISSING_HOLE, CONTOUR_MISSING_HOLE_DEPTH
+_EXTRA_HOLES = EXTRA_CUT_HOLE, EXTRA_CUT_HOLE_DEPTH
+
+
 def hole_findings(
     decoded: Holes,
     wanted: Holes,
@@ -240,28 +261,30 @@ def hole_findings(
     limits in XY and in height. `stand`: which decoded and which wanted holes stand for contours
     of the other side, as `contours_drilled` tells."""
     return (
-        *_unpaired(wanted, decoded, limits_mm, stand[1], Code.CONTOUR_MISSING),
-        *_unpaired(decoded, wanted, limits_mm, stand[0], Code.EXTRA_CUT),
+        *_unpaired(wanted, decoded, limits_mm, stand[1], _MISSING_HOLES),
+        *_unpaired(decoded, wanted, limits_mm, stand[0], _EXTRA_HOLES),
     )
 
 
 def _unpaired(
-    holes: Holes, others: Holes, limits_mm: tuple[float, float], stand: Bools, code: Code
+    holes: Holes,
+    others: Holes,
+    limits_mm: tuple[float, float],
+    stand: Bools,
+    sentences: tuple[Sentence, Sentence],
 ) -> Iterator[Finding]:
+    """A finding for each hole without another one: `sentences` where there is none at its place,
+    and where there is one of another depth."""
+    none, other_depth = sentences
     here, paired = _paired(holes, others, limits_mm)
     alone = np.flatnonzero(~paired & ~stand).tolist()
-    what = "is not drilled by the program" if code == Code.CONTOUR_MISSING else "was not wanted"
     for number, hole in enumerate(alone):
-        more = and_more(number, len(alone), "holes")
-        row, depth = int(holes.row[hole]), STOCK_TOP_MM - float(holes.bottom_mm[hole])
-        how = ": there is one of another depth" if here[hole] else ""
-        yield Finding(
-            code,
-            Severity.ERROR,
-            f"a hole {depth:.3f} mm deep {what}{how}{more}",
+        more = and_more(number, len(alone))
+        row = int(holes.row[hole])
+        yield (other_depth if here[hole] else none)(
             where=f"{block_name(holes.toolpath, row)} at {at_point(holes.at[hole])}",
-            measured=depth,
-            unit="mm",
+            measured=STOCK_TOP_MM - holes.bottom_mm[hole],
+            more=more,
         )
         if more:
             return
@@ -409,14 +432,9 @@ def other_way(compared: Compared, turned: Ints) -> Iterator[Finding]:
     rows = compared.rows[turned]
     first = np.unique(cuts.contour[rows], return_index=True)[1]
     for number, place in enumerate(first.tolist()):
-        row, more = int(rows[place]), and_more(number, len(first), "contours")
+        row, more = int(rows[place]), and_more(number, len(first))
         at = at_point(compared.samples.points[turned[place]])
-        yield Finding(
-            Code.CUT_OTHER_WAY,
-            Severity.ERROR,
-            f"the cut runs the other way round than was asked{more}",
-            where=f"{block_name(cuts.toolpath, row)} near {at}",
-        )
+        yield CUT_OTHER_WAY(where=f"{block_name(cuts.toolpath, row)} near {at}", more=more)
         if more:
             return
 
@@ -438,7 +456,6 @@ def block_name(toolpath: Toolpath, row: int) -> str:
     return f"block {block + 1}" if block >= 0 else f"move {row + 1}"
 
 
-def and_more(number: int, total: int, noun: str) -> str:
-    """Text for the last finding that is listed, "" for all others."""
-    more = total - FINDINGS_PER_CODE
-    return f"; and {more} more {noun}" if more > 0 and number == FINDINGS_PER_CODE - 1 else ""
+def and_more(number: int, total: int) -> int:
+    """How many more there are than are listed, for the last one that is; 0 for all others."""
+    return max(total - FINDINGS_PER_CODE, 0) if number == FINDINGS_PER_CODE - 1 else 0

@@ -8,7 +8,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    ARC_MISSES_END,
+    ARC_MISSES_END_FAR,
+    END_NOT_REACHED,
+    MANY_REVERSALS,
+    NO_MOTION,
+    NO_MOTION_BELOW,
+    OUT_OF_TRAVEL_IN_PROGRAM,
+    PLAY_NOT_KNOWN,
+    RAPID_IN_STOCK_IN_PROGRAM,
+    RETURN_TO_MACHINE_ZERO,
+    Finding,
+    Severity,
+)
 from camtool.machine.model import Machine
 from camtool.planning.naming import own_numbers
 from camtool.simulation.simulate import findings_of
@@ -50,18 +63,14 @@ def motion_findings(
 def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator[Finding]:
     coded = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
     for number, (row, place) in enumerate(tally.gave_up.items()):
-        more = and_more(number, len(tally.gave_up), "arcs")
+        more = and_more(number, len(tally.gave_up))
         missed = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
-        noun = "arc" if decoded.is_arc[row] else "move"
-        apart = f", passing it {missed:.1f} steps away" if math.isfinite(missed) else ""
-        yield Finding(
-            Code.ARC_MISSES_END,
-            Severity.ERROR,
-            f"the {noun} does not stop at its end{apart}: the real machine would run on{more}",
+        yield (ARC_MISSES_END if math.isfinite(missed) else ARC_MISSES_END_FAR)(
             where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
-            measured=float(missed) if math.isfinite(missed) else None,
+            measured=missed if math.isfinite(missed) else None,
             limit=0.0,
-            unit="steps",
+            move="arc" if decoded.is_arc[row] else "move",
+            more=more,
         )
         if more:
             return
@@ -78,15 +87,12 @@ def _missed_ends(held: Toolpath, case: Case, tally: Tally, rows: RowFigures) -> 
         return
     asked = (mode.tolerance_mm + mode.merging_mm for mode in held.modes if mode.tolerance_mm)
     meant_mm = case.coverage_mm + max(asked, default=0.0)
-    yield Finding(
-        Code.END_NOT_REACHED,
-        Severity.WARNING if missed.most_mm > meant_mm else Severity.INFO,
-        f"the controller leaves {missed.count} moves beside their ends, "
-        f"up to {missed.most_mm * UM_PER_MM:.2f} µm",
+    yield END_NOT_REACHED(
+        severity=Severity.WARNING if missed.most_mm > meant_mm else Severity.INFO,
         where=f"{block_name(held, missed.row)}, end {at_point(held.end[missed.row])}",
         measured=missed.most_mm * UM_PER_MM,
         limit=0.0,
-        unit="um",
+        count=missed.count,
     )
 
 
@@ -94,30 +100,25 @@ def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
     for name, axis, (low, high) in zip(AXES, machine.axes, extents, strict=True):
         span = float(high - low)
         if axis.travel_mm is not None and span > axis.travel_mm + TRAVEL_EPS_MM:
-            yield Finding(
-                Code.OUT_OF_TRAVEL,
-                Severity.ERROR,
-                f"the program spans {span:.3f} mm of {name}, the axis has {axis.travel_mm:g} mm: "
-                + own_numbers(machine, [f"axes.{name.lower()}.travel_mm={math.ceil(span)}"]),
+            yield OUT_OF_TRAVEL_IN_PROGRAM(
                 where=f"axis {name}, {low:.3f} to {high:.3f} mm",
                 measured=span,
                 limit=axis.travel_mm,
-                unit="mm",
+                axis=name,
+                mend=own_numbers(machine, [f"axes.{name.lower()}.travel_mm={math.ceil(span)}"]),
             )
 
 
 def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
     found = _through_stock(decoded, case)
     for number, one in enumerate(found):
-        more = and_more(number, len(found), "rapids")
-        yield Finding(
-            Code.RAPID_IN_STOCK,
-            Severity.ERROR,
-            f"a rapid runs through the stock, {-one.z_mm:.3f} mm below its top{more}",
+        more = and_more(number, len(found))
+        yield RAPID_IN_STOCK_IN_PROGRAM(
             where=f"{block_name(decoded, one.row)} near {at_point(one.at_mm)}",
             measured=one.z_mm,
             limit=0.0,
-            unit="mm",
+            depth=-one.z_mm,
+            more=more,
         )
         if more:
             return
@@ -146,15 +147,7 @@ def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[
     small_mm, size_mm = machine.limits.small_part_mm, _size_mm(cuts)
     if small_mm is not None and size_mm > small_mm:
         return
-    yield Finding(
-        Code.MANY_REVERSALS,
-        Severity.WARNING,
-        f"X and Y reverse {count} times while cutting a part of {size_mm:.3g} mm; small parts "
-        f"were seen to fail above {limit}",
-        measured=float(count),
-        limit=float(limit),
-        unit="reversals",
-    )
+    yield MANY_REVERSALS(measured=count, limit=limit, size=size_mm)
 
 
 def _size_mm(cuts: CutMoves) -> float:
@@ -171,25 +164,16 @@ def _nothing_moves(cuts: CutMoves) -> Iterator[Finding]:
     homes = np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z))
     still = np.all(decoded.end == decoded.starts) if len(decoded) else True
     if bool(still) and not decoded.is_arc.any() and not homes.any():
-        message = "the program moves nothing"
+        yield NO_MOTION()
     elif len(cuts.rows) == 0 and len(holes_of(decoded)) == 0:
-        message = "the program cuts nothing: no feed move goes along below the stock top"
-    else:
-        return
-    yield Finding(Code.NO_MOTION, Severity.WARNING, message)
+        yield NO_MOTION_BELOW()
 
 
 def _homing(decoded: Toolpath, machine: Machine) -> Iterator[Finding]:
     rows = np.flatnonzero(np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z)))
     if len(rows):
         zero = ", ".join(f"{value:g}" for value in machine.controller.machine_zero_mm)
-        yield Finding(
-            Code.RETURN_TO_MACHINE_ZERO,
-            Severity.INFO,
-            f"the program returns to machine zero, which is taken to lie at ({zero}) mm from part "
-            "zero (controller.machine_zero_mm)",
-            where=block_name(decoded, int(rows[0])),
-        )
+        yield RETURN_TO_MACHINE_ZERO(where=block_name(decoded, int(rows[0])), zero=zero)
 
 
 def _unknown_play(machine: Machine, tally: Tally) -> Iterator[Finding]:
@@ -197,9 +181,4 @@ def _unknown_play(machine: Machine, tally: Tally) -> Iterator[Finding]:
     for name, axis, cells, steps in given:
         known = cells is not None or axis.backlash_mm > 0.0 or axis.compensation_mm > 0.0
         if steps and not known:
-            yield Finding(
-                Code.PLAY_NOT_KNOWN,
-                Severity.INFO,
-                f"the machine file gives {name} no play: its error is predicted as if it had none",
-                where=f"axis {name}",
-            )
+            yield PLAY_NOT_KNOWN(where=f"axis {name}", axis=name)

@@ -14,7 +14,13 @@ from urllib.parse import quote
 
 import msgspec
 
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    ABOVE_GATE,
+    ABOVE_GATE_REVERSALS,
+    ABOVE_GATE_TIME,
+    ABOVE_GATE_UNKNOWN,
+    Finding,
+)
 from camtool.plain import one_line, to_json
 from camtool.units import UM_PER_MM
 
@@ -381,26 +387,22 @@ def gate_findings(report: Report, gates: Gates) -> Iterator[Finding]:
         yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
     count = report.reversals.cutting.x + report.reversals.cutting.y
     if gates.reversals is not None and count > gates.reversals:
-        words = f"X and Y reverse {count} times while cutting; {gates.reversals} are allowed"
-        yield _above_gate(
-            words, "--max-reversals", float(count), float(gates.reversals), "reversals"
-        )
+        yield ABOVE_GATE_REVERSALS(where="--max-reversals", measured=count, limit=gates.reversals)
     if gates.time_s is not None and report.time_s > gates.time_s:
-        words = f"the program takes {clock(report.time_s)}; {clock(gates.time_s)} is allowed"
-        yield _above_gate(words, "--max-time", report.time_s, gates.time_s, "s")
+        yield ABOVE_GATE_TIME(
+            where="--max-time",
+            measured=report.time_s,
+            limit=gates.time_s,
+            takes=clock(report.time_s),
+            allowed=clock(gates.time_s),
+        )
 
 
 def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
     if found_um is None:
-        words = "no error is known, since nothing was compared: the limit cannot be kept"
-        yield _above_gate(words, "--max-error", None, limit_um, "um")
+        yield ABOVE_GATE_UNKNOWN(where="--max-error", limit=limit_um)
     elif found_um > limit_um:
-        words = f"the predicted error is {found_um:.2f} µm at most; {limit_um:.2f} µm is allowed"
-        yield _above_gate(words, "--max-error", found_um, limit_um, "um")
-
-
-def _above_gate(words: str, flag: str, measured: float | None, limit: float, unit: str) -> Finding:
-    return Finding(Code.ABOVE_GATE, Severity.ERROR, words, flag, measured, limit, unit)
+        yield ABOVE_GATE(where="--max-error", measured=found_um, limit=limit_um)
 
 
 # A Report in words: for the terminal and for the margin of a picture.

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import OVERCUT, Code, Finding, TargetCode
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import Toolpath
@@ -171,20 +171,14 @@ def wanted_shape(cuts: CutMoves, cutter: Cutter, kept: Sequence[Kept] = ()) -> W
     return Wanted(cutter, asked, depth, at)
 
 
-def overcut_findings(wanted: Wanted | None, said: Collection[Code]) -> Iterator[Finding]:
+def overcut_findings(
+    wanted: Wanted | None, said: Collection[Code | TargetCode]
+) -> Iterator[Finding]:
     """A plan that cuts beyond the walls of its drawing, unless that is said already."""
     if wanted is None or wanted.beyond_mm <= OVERCUT_MM or Code.GOUGE in said:
         return
     x, y = wanted.at_mm
-    yield Finding(
-        Code.OVERCUT,
-        Severity.ERROR,
-        f"the cut itself goes {wanted.beyond_mm:.4g} mm beyond what is drawn",
-        where=f"near ({x:.3f}, {y:.3f}) mm",
-        measured=wanted.beyond_mm,
-        limit=OVERCUT_MM,
-        unit="mm",
-    )
+    yield OVERCUT(where=f"near ({x:.3f}, {y:.3f}) mm", measured=wanted.beyond_mm, limit=OVERCUT_MM)
 
 
 def machined_shape(trace: Trace, toolpath: Toolpath, wanted: Wanted) -> Shape | None:

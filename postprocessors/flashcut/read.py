@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import FlashcutController
 from camtool.machine.model import Machine
@@ -23,6 +23,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import Block, Lexing, blocks_of
 from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from .findings import EXECUTED_OTHERWISE, FEED_ABOVE_LIMIT, FEED_HELD, FEED_HELD_ALONE
 from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
 
 LEXING: Final = Lexing(letters="GMXYZIJF")
@@ -130,16 +131,11 @@ class _Reader:
         if not self._fast.count:
             return ()
         return (
-            Finding(
-                Code.FEED_ABOVE_LIMIT,
-                Severity.WARNING,
-                f"{self._fast.count} blocks have a feed above what the machine's shortest half "
-                f"period gives, up to {self._fast.most:g} mm/min where {self._max_feed:.4g} is "
-                "the limit: that half period holds them, and so does the simulation",
+            FEED_ABOVE_LIMIT(
                 where=self._fast.where,
                 measured=self._fast.most,
                 limit=self._max_feed,
-                unit="mm_min",
+                count=self._fast.count,
             ),
         )
 
@@ -246,18 +242,14 @@ def _held(path: Toolpath, machine: Machine, controller: FlashcutController) -> I
     late = np.flatnonzero(asked > fastest * (1.0 + HELD_GUARD))
     if len(late):
         worst = int(late[(asked[late] / fastest[late]).argmax()])
-        gets, where = float(fastest[worst]), "along one axis" if alone[worst] else "of both axes"
+        gets = float(fastest[worst])
         slow = gets < WARNED_PART * asked[worst]
-        yield Finding(
-            Code.FEED_HELD,
-            Severity.WARNING if slow else Severity.INFO,
-            f"{len(late)} cuts are slower than their F: F{asked[worst]:g} becomes {gets:.3g} "
-            f"mm/min {where}, by the shortest half period (controller.half_period_ms, "
-            "controller.single_axis_half_period_ms); a shorter one makes slanted lines less exact",
+        yield (FEED_HELD_ALONE if alone[worst] else FEED_HELD)(
+            severity=Severity.WARNING if slow else Severity.INFO,
             where=f"block {int(path.block[rows[worst]]) + 1}",
             measured=gets,
-            limit=float(asked[worst]),
-            unit="mm_min",
+            limit=asked[worst],
+            count=len(late),
         )
 
 
@@ -281,18 +273,13 @@ def _too_long(
     rapids = bool((path.kind[rows[extra > 0]] == Kind.RAPID).any())
     stays = controller.goes_on_from == "programmed"
     return (
-        Finding(
-            Code.EXECUTED_OTHERWISE,
-            Severity.WARNING,
-            f"{count} straight moves of both axes make their shorter one too long, by up to "
-            f"{extra[worst]} steps ({most_um:.1f} µm), because each axis has a timer of its own"
-            + ("; it stays in all that follows" if stays else "")
-            + ". What lowers it: longer half periods (controller.half_period_ms), lines in pieces "
-            "(dialect.slants=split)"
-            + (", rapids along one axis at a time (dialect.rapids=one-axis)" if rapids else ""),
+        EXECUTED_OTHERWISE(
             where=f"block {int(path.block[rows[worst]]) + 1}",
             measured=most_um,
             limit=0.0,
-            unit="um",
+            count=count,
+            steps=int(extra[worst]),
+            stays=stays,
+            rapids=rapids,
         ),
     )

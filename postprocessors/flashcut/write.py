@@ -14,7 +14,7 @@ import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.kernels.lattice import to_steps
 from camtool.machine.controllers import FlashcutController
 from camtool.machine.model import Machine
@@ -36,6 +36,7 @@ from ..gcode.plain import (
     split_z,
 )
 from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from .findings import EVENT_LEFT_OUT_DWELL, EVENT_LEFT_OUT_STOP, VALUE_ROUNDED
 from .timers import half_periods_ms
 
 EVENT: Final = {
@@ -160,23 +161,15 @@ def _event_words(toolpath: Toolpath) -> dict[int, str]:
 
 def _event_notes(toolpath: Toolpath, dialect: Dialect) -> list[Finding]:
     """What the events lose."""
-    found = left_out(toolpath, [Kind.DWELL], "this controller has no dwell")
+    found = left_out(toolpath, [Kind.DWELL], EVENT_LEFT_OUT_DWELL)
     kinds = toolpath.kind
     spindles = np.isin(kinds, [int(Kind.SPINDLE_CW), int(Kind.SPINDLE_CCW)])
     speeds = int((spindles & ~np.isnan(toolpath.value)).sum())
     tools = int((kinds == Kind.TOOL_CHANGE).sum())
     if speeds or tools:
-        found.append(
-            Finding(
-                Code.VALUE_ROUNDED,
-                Severity.INFO,
-                f"{speeds} spindle speeds and {tools} tool numbers have no word: the spindle "
-                "turns with the feed, and M00 waits for the tool",
-            )
-        )
+        found.append(VALUE_ROUNDED(speeds=speeds, tools=tools))
     if not dialect.spindle_stops:
-        why = "M05 is written, but this machine's spindle turns with every move"
-        found += left_out(toolpath, [Kind.SPINDLE_OFF], why)
+        found += left_out(toolpath, [Kind.SPINDLE_OFF], EVENT_LEFT_OUT_STOP)
     return found
 
 

@@ -7,12 +7,13 @@ from typing import Final
 import numpy as np
 
 from camtool.arrays import Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import radius_spread, refuse, refuse_start
 
 from .dialect import feed_decimals
+from .findings import FEED_ROUNDED
 
 MOST_MM: Final = 99_999.0
 """Coordinates beyond this are refused: with three decimals, grbl's 8 digits end there."""
@@ -50,13 +51,11 @@ def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, Finding | No
     if exact.all():
         return units, None
     row = int(np.argmax(~exact))
-    return units, Finding(
-        Code.FEED_ROUNDED,
-        Severity.INFO,
-        f"{int((~exact).sum())} feeds were rounded down to a whole {1.0 / scale:g} mm/min",
+    return units, FEED_ROUNDED(
         where=toolpath.place(row),
-        measured=float(toolpath.feed[row]),
-        unit="mm_min",
+        measured=toolpath.feed[row],
+        count=int((~exact).sum()),
+        whole=1.0 / scale,
     )
 
 

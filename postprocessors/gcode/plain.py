@@ -22,7 +22,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import (
     Lowered,
@@ -35,6 +35,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 from .arcs import FLAT_UNITS, LINE_SAGITTA_UNITS, sagitta_of, turns_of
 from .checks import check
+from .findings import ARC_MENDED_PLAIN, MOVE_COLLAPSED_PLAIN, MOVE_SPLIT
 from .format import units_of
 
 SPREAD_UNITS: Final = 1.0
@@ -76,31 +77,18 @@ def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, Finding | No
     twice &= toolpath.is_feed
     if not twice.any():
         return lowered, None
-    return lowered, Finding(
-        Code.MOVE_SPLIT,
-        Severity.WARNING,
-        f"{int(twice.sum())} feed moves in XY and Z became steps of at most {step_mm:g} mm, flat "
-        "and then down, or up and then flat: nowhere deeper than the slope",
-        where=toolpath.place(int(twice.argmax())),
-        measured=step_mm,
-        unit="mm",
+    return lowered, MOVE_SPLIT(
+        where=toolpath.place(int(twice.argmax())), measured=step_mm, count=int(twice.sum())
     )
 
 
-def left_out(toolpath: Toolpath, kinds: Collection[Kind], why: str) -> list[Finding]:
-    """One EVENT_LEFT_OUT when there are rows of `kinds`: how many of what, and `why`."""
+def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) -> list[Finding]:
+    """One EVENT_LEFT_OUT when there are rows of `kinds`: how many of what."""
     rows = np.flatnonzero(np.isin(toolpath.kind, [int(kind) for kind in kinds]))
     if not len(rows):
         return []
     names = ", ".join(dict.fromkeys(Kind(kind).name for kind in toolpath.kind[rows].tolist()))
-    return [
-        Finding(
-            Code.EVENT_LEFT_OUT,
-            Severity.WARNING,
-            f"{len(rows)} events were left out ({names}): {why}",
-            where=toolpath.place(int(rows[0])),
-        )
-    ]
+    return [sentence(where=toolpath.place(int(rows[0])), count=len(rows), kinds=names)]
 
 
 @dataclass(frozen=True)
@@ -186,28 +174,17 @@ def arc_findings(rows: PlainRows, place: str) -> list[Finding]:
     found = []
     if rows.recentred or rows.lines:
         found.append(
-            Finding(
-                Code.ARC_MENDED,
-                Severity.INFO,
-                f"{rows.recentred} arcs got another centre, so that start and end lie on them as "
-                f"the program says their numbers; {rows.lines} too small or too large were "
-                "written as lines",
+            ARC_MENDED_PLAIN(
                 where=place,
-                measured=float(rows.recentred + rows.lines),
-                unit="moves",
+                measured=rows.recentred + rows.lines,
+                recentred=rows.recentred,
+                lines=rows.lines,
             )
         )
     dropped = int(((rows.kind <= Kind.ARC_CCW) & ~rows.moves).sum())
     if dropped or rows.flat:
         found.append(
-            Finding(
-                Code.MOVE_COLLAPSED,
-                Severity.INFO,
-                f"{dropped} moves of less than the last decimal were left out, {rows.flat} arcs "
-                "flatter than half of it were written as lines",
-                measured=float(dropped + rows.flat),
-                unit="moves",
-            )
+            MOVE_COLLAPSED_PLAIN(measured=dropped + rows.flat, dropped=dropped, flat=rows.flat)
         )
     return found
 

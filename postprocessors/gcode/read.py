@@ -15,12 +15,19 @@ from enum import IntEnum
 from functools import partial
 from typing import Final
 
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
 from .blocks import Block
+from .findings import (
+    FEED_ABOVE_LIMIT_IN_WORDS,
+    NEVER_READ,
+    SPINDLE_SPEED_NOT_SAID,
+    WORDS_PASSED_OVER_COOLANT,
+    WORDS_PASSED_OVER_PAUSE,
+)
 
 Point = tuple[float, float]
 
@@ -522,55 +529,32 @@ class ReadNotes:
     def findings(self) -> tuple[Finding, ...]:
         """One finding for each kind that was noticed."""
         passed_over = (
-            (self.coolant, "switch coolant"),
-            (self.pauses, "wait for the operator (M0, M1)"),
+            (self.coolant, WORDS_PASSED_OVER_COOLANT),
+            (self.pauses, WORDS_PASSED_OVER_PAUSE),
         )
         return (
             *([self._too_fast()] if self.fast else []),
             *([self._without_speed()] if self.speedless else []),
             *([_never_read(*self.behind_end)] if self.behind_end else []),
-            *(_passed_over(blocks, what) for blocks, what in passed_over if blocks),
+            *(_passed_over(blocks, sentence) for blocks, sentence in passed_over if blocks),
         )
 
     def _without_speed(self) -> Finding:
-        return Finding(
-            Code.SPINDLE_SPEED_NOT_SAID,
-            Severity.WARNING,
-            "the spindle is started and no S word has said its speed: a controller that sets the "
-            "speed turns it at 0",
-            where=f"block {self.speedless[0] + 1}",
-        )
+        return SPINDLE_SPEED_NOT_SAID(where=f"block {self.speedless[0] + 1}")
 
     def _too_fast(self) -> Finding:
         most = max(feed for _, feed in self.fast)
-        return Finding(
-            Code.FEED_ABOVE_LIMIT,
-            Severity.WARNING,
-            f"{len(self.fast)} F words are above the machine's highest feed, up to "
-            f"{most:g} mm/min where {self.max_feed_mm_min:g} is the limit: the controller holds "
-            "each move to what its axes can do, and so does the simulation",
+        return FEED_ABOVE_LIMIT_IN_WORDS(
             where=f"block {self.fast[0][0] + 1}",
             measured=most,
             limit=self.max_feed_mm_min,
-            unit="mm_min",
+            count=len(self.fast),
         )
 
 
 def _never_read(count: int, line: int) -> Finding:
-    return Finding(
-        Code.NEVER_READ,
-        Severity.WARNING,
-        f"{count} lines stand behind the end of the program, which the controller never reads",
-        where=f"line {line}",
-        measured=float(count),
-        unit="lines",
-    )
+    return NEVER_READ(where=f"line {line}", measured=count)
 
 
-def _passed_over(blocks: list[int], what: str) -> Finding:
-    return Finding(
-        Code.WORDS_PASSED_OVER,
-        Severity.INFO,
-        f"{len(blocks)} blocks {what}, which moves nothing and is passed over",
-        where=f"block {blocks[0] + 1}",
-    )
+def _passed_over(blocks: list[int], sentence: Sentence) -> Finding:
+    return sentence(where=f"block {blocks[0] + 1}", count=len(blocks))

@@ -21,7 +21,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Ints
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, toolpath_extents
 from camtool.toolpath.program import Program
@@ -29,6 +29,7 @@ from camtool.toolpath.program import Program
 from .arcs import ArcCounts, Arcs, arcs_of
 from .checks import check, feed_units
 from .dialect import GcodeDialect, feed_decimals
+from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
 from .format import (
     NumberStyle,
     comment,
@@ -232,42 +233,23 @@ def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> list[F
     found = []
     if mended := counts.recentred + counts.split + counts.lines:
         found.append(
-            Finding(
-                Code.ARC_MENDED,
-                Severity.INFO,
-                f"{mended} arcs would not have passed the controller's rule with their rounded "
-                f"numbers: {counts.recentred} were re-centred, {counts.split} split in two, "
-                f"{counts.lines} written as lines",
+            ARC_MENDED(
                 where=toolpath.place(counts.first),
-                measured=float(mended),
-                unit="arcs",
+                measured=mended,
+                recentred=counts.recentred,
+                split=counts.split,
+                lines=counts.lines,
             )
         )
     if collapsed := dropped + counts.flat:
-        found.append(
-            Finding(
-                Code.MOVE_COLLAPSED,
-                Severity.INFO,
-                f"{dropped} moves of less than the last decimal were left out, "
-                f"{counts.flat} arcs flatter than half of it became lines",
-                measured=float(collapsed),
-                unit="moves",
-            )
-        )
+        found.append(MOVE_COLLAPSED(measured=collapsed, dropped=dropped, flat=counts.flat))
     return found
 
 
 def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> list[Finding]:
     if not rows:
         return []
-    return [
-        Finding(
-            Code.VALUE_ROUNDED,
-            Severity.INFO,
-            f"{len(rows)} dwells or spindle speeds were rounded to three decimals",
-            where=toolpath.place(rows[0]),
-        )
-    ]
+    return [VALUE_ROUNDED(where=toolpath.place(rows[0]), count=len(rows))]
 
 
 # The rows that are sent, and the modal text of each, by whole columns.

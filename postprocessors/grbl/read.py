@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.controllers import GrblController
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
@@ -20,6 +20,7 @@ from camtool.toolpath.moves import Toolpath
 from ..gcode.blocks import Lexing, blocks_of
 from ..gcode.read import M_CODES, ModalReader, Rules
 from .dialect import MOST_TOOL, Dialect, dialect_of
+from .findings import FEED_TOO_SLOW
 
 SLOW_GUARD: Final = 1e-6
 """Part of a feed: one below the slowest by less is the slowest."""
@@ -99,16 +100,12 @@ def _too_slow(path: Toolpath, machine: Machine) -> Iterator[Finding]:
         slow = np.flatnonzero(path.is_feed & (path.feed < least * (1.0 - SLOW_GUARD)))
     if len(slow):
         worst = int(slow[(path.feed[slow] / least[slow]).argmin()])
-        yield Finding(
-            Code.FEED_TOO_SLOW,
-            Severity.WARNING,
-            f"{len(slow)} cuts are slower than the controller can step (it makes no less than "
-            f"{machine.controller.least_step_hz:g} steps a second): F{path.feed[worst]:g} runs "
-            f"at {least[worst]:.3g} mm/min, and is simulated so",
+        yield FEED_TOO_SLOW(
             where=f"block {int(path.block[worst]) + 1}",
-            measured=float(path.feed[worst]),
-            limit=float(least[worst]),
-            unit="mm_min",
+            measured=path.feed[worst],
+            limit=least[worst],
+            count=len(slow),
+            least_hz=machine.controller.least_step_hz,
         )
 
 

@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from camtool.findings import Code, Finding, Severity
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
 from ..gcode.write import Event, Style, common_words, tool_number, write_program
 from .dialect import MOST_TOOL, Dialect, dialect_of
+from .findings import EVENT_LEFT_OUT
 
 HEADER = ("G17 G21 G90 G94", "G54")
 """XY plane, mm, absolute, feeds a minute; the first work frame. grbl knows I J as offsets only,
 so it is not told so (G91.1)."""
-
-MOUNT_FIRST = Finding(
-    Code.EVENT_LEFT_OUT,
-    Severity.INFO,
-    "the tool is not said, since grbl knows no tool change: mount it before the program",
-)
 
 
 def write_grbl(toolpath: Toolpath, machine: Machine) -> Program:
@@ -30,7 +24,7 @@ def write_grbl(toolpath: Toolpath, machine: Machine) -> Program:
     program = write_program(toolpath, machine, style)
     if dialect.tool_change == "pause" or not mounted_before(toolpath).any():
         return program
-    return replace(program, findings=(*program.findings, MOUNT_FIRST))
+    return replace(program, findings=(*program.findings, EVENT_LEFT_OUT()))
 
 
 def _words(event: Event, dialect: Dialect) -> str:

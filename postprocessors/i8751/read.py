@@ -23,11 +23,12 @@ import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, dialect_of
+from .findings import READ_TWO_WAYS, VALUE_ROUNDED
 from .pulses import PulseTimes
 
 SHOWN_CHARS: Final = 40
@@ -162,32 +163,18 @@ def _two_ways(decoded: Decoded, dialect: Dialect) -> Iterator[Finding]:
     count = int((high > 0).sum())
     if count and not dialect.long_runs:
         record = int((high > 0).any(axis=1).argmax())
-        yield Finding(
-            Code.READ_TWO_WAYS,
-            Severity.WARNING,
-            f"{count} runs of a motor have more than 255 steps; they are read by "
-            f"dialect.high_byte = {dialect.high_byte}, and by the other reading (255 or 256) a "
-            f"motor ends up to {int(high.sum(axis=0).max())} steps elsewhere: post again in "
-            "shorter runs, or say dialect.long_runs=true where it is known",
+        yield READ_TWO_WAYS(
             where=f"record {record + 1}",
-            measured=float(count),
-            unit="runs",
+            measured=count,
+            high_byte=dialect.high_byte,
+            steps=int(high.sum(axis=0).max()),
         )
 
 
 def _findings(decoded: Decoded) -> tuple[Finding, ...]:
     if not decoded.rounded:
         return ()
-    return (
-        Finding(
-            Code.VALUE_ROUNDED,
-            Severity.INFO,
-            f"{decoded.rounded} distances are no whole steps and were rounded, at most by "
-            f"{decoded.worst_steps:.2f} steps",
-            measured=decoded.worst_steps,
-            unit="steps",
-        ),
-    )
+    return (VALUE_ROUNDED(measured=decoded.worst_steps, count=decoded.rounded),)
 
 
 # Packets: bytes as the controller stores them, and refused where it could not.

@@ -32,12 +32,23 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.arrays import Bools, Ints
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 
 from .dialect import RECORDS_PER_PACKET, Dialect, dialect_of
+from .findings import (
+    EVENT_LEFT_OUT_SPINDLE,
+    EVENT_LEFT_OUT_TOOL,
+    FEED_ROUNDED,
+    MOVE_COLLAPSED,
+    MOVE_SPLIT,
+    MOVE_SPLIT_ARCS,
+    MOVE_SPLIT_LINES,
+    MOVE_SPLIT_LONG,
+    VALUE_ROUNDED_DWELL,
+)
 from .records import Counts, Records, check_toolpath, records_of
 
 Bytes = npt.NDArray[np.uint8]
@@ -236,77 +247,30 @@ class _Dump:
 def _findings(counts: Counts, dialect: Dialect) -> Iterator[Finding]:
     """One finding for each kind of change that was made."""
     if counts.slopes:
-        yield Finding(
-            Code.MOVE_SPLIT,
-            Severity.WARNING,
-            f"{counts.slopes} feed moves in XY and Z became steps of at most "
-            f"{counts.slope_step_mm:g} mm, nowhere deeper than the slope, because Z moves alone",
-            where=counts.slopes_place,
-            measured=counts.slope_step_mm,
-            unit="mm",
+        yield MOVE_SPLIT(
+            where=counts.slopes_place, measured=counts.slope_step_mm, count=counts.slopes
         )
     if counts.arcs:
-        yield Finding(
-            Code.MOVE_SPLIT,
-            Severity.INFO,
-            f"{counts.arcs} arcs became {counts.chords} chords within "
-            f"{dialect.arc_tolerance_mm:g} mm (dialect.arc_tolerance_mm)",
-            measured=float(counts.chords),
-            unit="moves",
+        yield MOVE_SPLIT_ARCS(
+            measured=counts.chords, arcs=counts.arcs, tolerance=dialect.arc_tolerance_mm
         )
     if counts.cut_lines:
-        yield Finding(
-            Code.MOVE_SPLIT,
-            Severity.INFO,
-            f"{counts.cut_lines} lines became {counts.cut_pieces}, so that 45° and then one axis "
-            f"stay within {dialect.tolerance_mm:g} mm of them (dialect.tolerance_mm)",
-            measured=float(counts.cut_pieces),
-            unit="moves",
+        yield MOVE_SPLIT_LINES(
+            measured=counts.cut_pieces, lines=counts.cut_lines, tolerance=dialect.tolerance_mm
         )
     if counts.long_moves:
-        yield Finding(
-            Code.MOVE_SPLIT,
-            Severity.INFO,
-            f"{counts.long_moves} moves of more than {dialect.most_steps} steps were split",
-            measured=float(counts.long_moves),
-            unit="moves",
-        )
+        yield MOVE_SPLIT_LONG(measured=counts.long_moves, most=dialect.most_steps)
     yield from _left_out(counts)
 
 
 def _left_out(counts: Counts) -> Iterator[Finding]:
     if counts.dropped:
-        yield Finding(
-            Code.MOVE_COLLAPSED,
-            Severity.INFO,
-            f"{counts.dropped} moves of less than a step were left out",
-            measured=float(counts.dropped),
-            unit="moves",
-        )
+        yield MOVE_COLLAPSED(measured=counts.dropped)
     if counts.feeds:
-        yield Finding(
-            Code.FEED_ROUNDED,
-            Severity.INFO,
-            f"the feeds of {counts.feeds} moves are not said: the machine has one speed, and 8 "
-            "steps a second in moves of less than 90 steps",
-        )
+        yield FEED_ROUNDED(count=counts.feeds)
     if counts.dwells_rounded:
-        yield Finding(
-            Code.VALUE_ROUNDED,
-            Severity.INFO,
-            f"{counts.dwells_rounded} dwells were rounded up to whole seconds",
-        )
+        yield VALUE_ROUNDED_DWELL(count=counts.dwells_rounded)
     if counts.tools:
-        yield Finding(
-            Code.EVENT_LEFT_OUT,
-            Severity.INFO,
-            "the tool is not said: mount it before the program",
-        )
+        yield EVENT_LEFT_OUT_TOOL()
     if counts.spindle:
-        yield Finding(
-            Code.EVENT_LEFT_OUT,
-            Severity.WARNING,
-            f"{counts.spindle} spindle events were left out: the machine cannot switch its "
-            "spindle; do it by hand",
-            where=counts.spindle_place,
-        )
+        yield EVENT_LEFT_OUT_SPINDLE(where=counts.spindle_place, count=counts.spindle)

@@ -18,11 +18,23 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
 from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Choices
+from .findings import (
+    FEED_ROUNDED,
+    FEED_ROUNDED_TO_LIMIT,
+    FEED_ROUNDED_UP,
+    MOVE_COLLAPSED,
+    MOVE_COLLAPSED_STROKES,
+    MOVE_SPLIT_BENT,
+    MOVE_SPLIT_INTO_JOBS,
+    PLACES_SNAPPED,
+    PLACES_SNAPPED_AND_STARTS,
+    PLACES_SNAPPED_FROM_ONE,
+)
 from .strokes import Cuts
 
 TIE_TOLERANCE: Final = 1e-6
@@ -385,34 +397,17 @@ class Notes:
         grid_mm = dialect.grid_units * UNIT_MM
         found = []
         if self.snap_mm:
-            starts = (
-                f"; {self.late_starts} strokes begin at least {grid_mm:g} mm from home, because"
-                " the way to a first point of 0 would never end"
-                if self.late_starts
-                else ""
-            )
             found.append(
-                Finding(
-                    Code.PLACES_SNAPPED,
-                    Severity.WARNING,
-                    f"vertices were moved to the grid of {grid_mm:g} mm, by"
-                    f" {self.snap_mm * 1000.0:.0f} µm at most{starts}",
+                (PLACES_SNAPPED_AND_STARTS if self.late_starts else PLACES_SNAPPED)(
                     where=self.snap_place,
                     measured=self.snap_mm,
                     limit=grid_mm,
-                    unit="mm",
+                    moved_um=self.snap_mm * 1000.0,
+                    starts=self.late_starts,
                 )
             )
         if self.ones:
-            found.append(
-                Finding(
-                    Code.PLACES_SNAPPED,
-                    Severity.WARNING,
-                    f"{self.ones} vertices were moved by 0.1 mm, because a distance of 0.1 mm"
-                    " would never end",
-                    measured=float(self.ones),
-                )
-            )
+            found.append(PLACES_SNAPPED_FROM_ONE(measured=self.ones))
         return found
 
     def _lines(self, dialect: Choices) -> list[Finding]:
@@ -420,82 +415,24 @@ class Notes:
         found = []
         if self.lost_strokes:
             found.append(
-                Finding(
-                    Code.MOVE_COLLAPSED,
-                    Severity.WARNING,
-                    f"{self.lost_strokes} strokes are smaller than the grid of {grid_mm:g} mm and"
-                    " are not cut at all; scale the drawing up",
-                    where=self.lost_place,
-                    measured=float(self.lost_strokes),
-                    unit="strokes",
+                MOVE_COLLAPSED_STROKES(
+                    where=self.lost_place, measured=self.lost_strokes, grid=grid_mm
                 )
             )
         if self.dropped:
-            found.append(
-                Finding(
-                    Code.MOVE_COLLAPSED,
-                    Severity.INFO,
-                    f"{self.dropped} lines shorter than the grid of {grid_mm:g} mm were left out",
-                    measured=float(self.dropped),
-                    unit="moves",
-                )
-            )
+            found.append(MOVE_COLLAPSED(measured=self.dropped, grid=grid_mm))
         if self.bent:
-            found.append(
-                Finding(
-                    Code.MOVE_SPLIT,
-                    Severity.INFO,
-                    f"{self.bent} lines nearly along an axis became several, because whole speeds"
-                    f" would bend them by more than {dialect.bend_tolerance_mm:g} mm",
-                    measured=float(self.bent),
-                    unit="moves",
-                )
-            )
+            found.append(MOVE_SPLIT_BENT(measured=self.bent, tolerance=dialect.bend_tolerance_mm))
         if self.more_jobs:
-            found.append(
-                Finding(
-                    Code.MOVE_SPLIT,
-                    Severity.WARNING,
-                    f"strokes of more than {dialect.max_lines} lines became {self.more_jobs} more"
-                    " jobs: between two jobs the machine goes home, and begins where it ended",
-                    measured=float(self.more_jobs),
-                    unit="jobs",
-                )
-            )
+            found.append(MOVE_SPLIT_INTO_JOBS(measured=self.more_jobs, most=dialect.max_lines))
         return found
 
     def _feeds(self) -> list[Finding]:
         found = []
         if self.limited:
-            found.append(
-                Finding(
-                    Code.FEED_ROUNDED,
-                    Severity.WARNING,
-                    f"{self.limited} lines run at the highest speed of an axis, less than wanted",
-                    measured=float(self.limited),
-                    unit="moves",
-                )
-            )
+            found.append(FEED_ROUNDED_TO_LIMIT(measured=self.limited))
         if self.feed_off > FEED_NOTICE:
-            found.append(
-                Finding(
-                    Code.FEED_ROUNDED,
-                    Severity.INFO,
-                    "feeds were rounded to whole counts of the encoder in 5 ms, by"
-                    f" {self.feed_off:.3g} mm/min at most",
-                    measured=self.feed_off,
-                    unit="mm_min",
-                )
-            )
+            found.append(FEED_ROUNDED(measured=self.feed_off))
         if self.faster > 1.0:
-            found.append(
-                Finding(
-                    Code.FEED_ROUNDED,
-                    Severity.INFO,
-                    "the feed is that of the faster axis: on slanted lines the tool runs up to"
-                    f" {self.faster:.2f} times as fast; use --set dialect.speed=path",
-                    measured=self.faster,
-                    unit="times",
-                )
-            )
+            found.append(FEED_ROUNDED_UP(measured=self.faster))
         return found

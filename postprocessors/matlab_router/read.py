@@ -15,7 +15,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -27,6 +27,14 @@ from .dialect import (
     Choices,
     cut_z_mm,
     dialect_of,
+)
+from .findings import (
+    EXECUTED_OTHERWISE_BENT,
+    EXECUTED_OTHERWISE_ODD,
+    EXECUTED_OTHERWISE_START,
+    FEED_ABOVE_LIMIT,
+    MOVE_COLLAPSED_READ,
+    OUT_OF_TRAVEL,
 )
 from .jobs import ReadJob, read_stream, read_text
 
@@ -276,14 +284,11 @@ class Worst:
             self.count += count
             self.most = max(self.most, most)
 
-    def finding(
-        self, code: Code, severity: Severity, message: str, *, unit: str = "mm"
-    ) -> list[Finding]:
-        """The finding, `{count}` and `{most}` filled in; none when nothing was beyond."""
+    def finding(self, sentence: Sentence, start: float = 0.0) -> list[Finding]:
+        """The finding; none when nothing was beyond."""
         if not self.count:
             return []
-        text = message.format(count=self.count, most=self.most)
-        return [Finding(code, severity, text, where=self.first, measured=self.most, unit=unit)]
+        return [sentence(where=self.first, measured=self.most, count=self.count, start=start)]
 
 
 @dataclass
@@ -338,37 +343,11 @@ class Seen:
 
     def findings(self) -> list[Finding]:
         """One finding for each kind that was noticed."""
-        start_mm = FIXED_Y_UNITS * UNIT_MM
         return [
-            *self.outside.finding(
-                Code.OUT_OF_TRAVEL,
-                Severity.ERROR,
-                "points outside of the machine's area: {count}, up to {most:.1f} mm from home",
-            ),
-            *self.fast.finding(
-                Code.FEED_ABOVE_LIMIT,
-                Severity.ERROR,
-                "speeds above the limit of an axis: {count}, up to {most:.4g} mm/min",
-                unit="mm_min",
-            ),
-            *self.odd.finding(
-                Code.EXECUTED_OTHERWISE,
-                Severity.WARNING,
-                "odd distances are cut short by 0.1 mm each, because the slaves run chunks of"
-                " 0.2 mm: {count}; places are off by {most:.1f} mm at most; use"
-                " --set dialect.grid_mm=0.2",
-            ),
-            *self.fixed_y.finding(
-                Code.EXECUTED_OTHERWISE,
-                Severity.WARNING,
-                f"jobs that begin at Y {start_mm:g} mm, whatever the program says: {{count}};"
-                " for a master that obeys: --set dialect.master_y=sent",
-            ),
-            *self.bent.finding(
-                Code.EXECUTED_OTHERWISE,
-                Severity.WARNING,
-                "lines that are bent by their speeds, because one axis arrives first: {count}, by"
-                " {most:.2f} mm at most",
-            ),
-            *self.empty.finding(Code.MOVE_COLLAPSED, Severity.INFO, "lines of no length: {count}"),
+            *self.outside.finding(OUT_OF_TRAVEL),
+            *self.fast.finding(FEED_ABOVE_LIMIT),
+            *self.odd.finding(EXECUTED_OTHERWISE_ODD),
+            *self.fixed_y.finding(EXECUTED_OTHERWISE_START, start=FIXED_Y_UNITS * UNIT_MM),
+            *self.bent.finding(EXECUTED_OTHERWISE_BENT),
+            *self.empty.finding(MOVE_COLLAPSED_READ),
         ]

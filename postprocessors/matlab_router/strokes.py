@@ -15,7 +15,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Sentence
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, xy_then_z
@@ -23,6 +23,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import refuse
 
 from .dialect import Choices, cut_z_mm
+from .findings import EVENT_LEFT_OUT_DWELL, EVENT_LEFT_OUT_SPEED, EVENT_LEFT_OUT_TOOL, MOVE_SPLIT
 
 DEPTH_TOLERANCE_MM: Final = 0.005
 """A cut may lie this much above or below the one depth that the machine plunges to."""
@@ -50,17 +51,7 @@ def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Choices) -> tuple[Cut
     )
     if split := len(apart.row) - len(toolpath):
         first = int(np.argmax(np.bincount(apart.row) > 1))
-        findings.append(
-            Finding(
-                Code.MOVE_SPLIT,
-                Severity.WARNING,
-                f"{split} moves in XY and Z were split: up first, down last, because Z only goes "
-                "from home to its one depth",
-                where=toolpath.place(first),
-                measured=float(split),
-                unit="moves",
-            )
-        )
+        findings.append(MOVE_SPLIT(where=toolpath.place(first), measured=split))
     path = lowered.toolpath
     below = np.asarray(path.end[:, 2] < -POSITION_EPS_MM)
     moves = path.is_motion & (path.end[:, :2] != path.starts[:, :2]).any(axis=1)
@@ -165,9 +156,9 @@ def _events(toolpath: Toolpath) -> list[Finding]:
         "post a program for each tool",
     )
     return [
-        *_unsaid(toolpath, kind == Kind.DWELL, "dwells", Severity.WARNING),
-        *_unsaid(toolpath, kind == Kind.TOOL_CHANGE, "tool numbers", Severity.INFO),
-        *_unsaid(toolpath, _with_speed(toolpath), "spindle speeds", Severity.INFO),
+        *_unsaid(toolpath, kind == Kind.DWELL, EVENT_LEFT_OUT_DWELL),
+        *_unsaid(toolpath, kind == Kind.TOOL_CHANGE, EVENT_LEFT_OUT_TOOL),
+        *_unsaid(toolpath, _with_speed(toolpath), EVENT_LEFT_OUT_SPEED),
     ]
 
 
@@ -175,16 +166,8 @@ def _with_speed(toolpath: Toolpath) -> Bools:
     return np.asarray((toolpath.kind == Kind.SPINDLE_CW) & np.isfinite(toolpath.value))
 
 
-def _unsaid(toolpath: Toolpath, rows: Bools, what: str, severity: Severity) -> list[Finding]:
+def _unsaid(toolpath: Toolpath, rows: Bools, sentence: Sentence) -> list[Finding]:
     count = int(rows.sum())
     if not count:
         return []
-    return [
-        Finding(
-            Code.EVENT_LEFT_OUT,
-            severity,
-            f"{count} {what} are not sent: the arrays have no place for them",
-            where=toolpath.place(int(np.argmax(rows))),
-            measured=float(count),
-        )
-    ]
+    return [sentence(where=toolpath.place(int(np.argmax(rows))), measured=count)]

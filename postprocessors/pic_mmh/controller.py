@@ -31,7 +31,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.kernels import arc_stops as stopping
 from camtool.kernels import leg_steps as columns
 from camtool.kernels.approach import approach_scan, approach_start, expected_quadrants
@@ -46,6 +46,7 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
 from camtool.toolpath.moves import Kind, Toolpath
 
+from .findings import ARC_END_UNSURE
 from .legs import METHODS, JudgedSteps, legs_of, positions
 
 
@@ -508,18 +509,16 @@ def arc_end_findings(toolpath: Toolpath, machine: Machine, legs: Ints) -> tuple[
     block = int(toolpath.block[row])
     taken = controller_of(machine, PicMmhController).arc_end
     return (
-        Finding(
-            Code.ARC_END_UNSURE,
-            Severity.WARNING,
-            f"{int(unsure.sum())} of {len(arcs)} arcs do not stand on their end by every reading "
-            f"of the thesis (controller.arc_end): by equal {int((~met[0]).sum())} run on past it "
-            f"({int((~met[1]).sum())} with initial_error=rounded-radius), by final-quadrant they "
-            f"stop up to {apart['final-quadrant']:.1f} steps beside it, by nearest up to "
-            f"{apart['nearest']:.1f}; simulated is {taken}",
+        ARC_END_UNSURE(
             where=f"block {block + 1}" if block >= 0 else f"move {row}",
-            measured=float(unsure.sum()),
+            measured=int(unsure.sum()),
             limit=0.0,
-            unit="arcs",
+            arcs=len(arcs),
+            missed=int((~met[0]).sum()),
+            missed_rounded=int((~met[1]).sum()),
+            final_quadrant=apart["final-quadrant"],
+            nearest=apart["nearest"],
+            taken=taken,
         ),
     )
 

@@ -18,13 +18,14 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.controllers import PicMmhController
 from camtool.machine.model import Machine, controller_of
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
 from .dialect import Dialect
+from .findings import FEED_ROUNDED
 
 HALF_STEP_TOLERANCE: Final = 1e-6
 """A coordinate within this much (in steps) of half a step is half-way between two steps."""
@@ -243,15 +244,13 @@ def _feed_words(toolpath: Toolpath, machine: Machine) -> tuple[list[str], Findin
     if not rounded.any():
         return words, None
     row = int(np.argmax(lost))
-    return words, Finding(
-        Code.FEED_ROUNDED,
-        Severity.INFO,
-        f"the feed of {int(rounded.sum())} moves was rounded down to whole steps of {unit:g} "
-        f"mm/min, at most from {feed[row]:g} to {units[row] * unit:g}",
+    return words, FEED_ROUNDED(
         where=toolpath.place(row),
-        measured=float(lost[row]),
+        measured=lost[row],
         limit=unit,
-        unit="mm_min",
+        count=int(rounded.sum()),
+        feed=feed[row],
+        lowered=units[row] * unit,
     )
 
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from typing import Final, NoReturn
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import dialect_of
+from .findings import BLOCK_TOO_LONG_READ, FEED_ABOVE_LIMIT
 
 SHOWN_CHARS: Final = 48
 """An error message shows no more of a block than this."""
@@ -172,29 +173,20 @@ class _Reader:
         found = []
         if self._long.count:
             found.append(
-                Finding(
-                    Code.BLOCK_TOO_LONG,
-                    Severity.WARNING,
-                    f"{self._long.count} blocks exceed the controller's buffer of "
-                    f"{self._buffer_chars} characters, the longest has {self._long.most:.0f}; "
-                    "use --set dialect.form=annex",
+                BLOCK_TOO_LONG_READ(
                     where=f"block {self._long.first + 1}",
                     measured=self._long.most,
-                    limit=float(self._buffer_chars or 0),
-                    unit="chars",
+                    limit=self._buffer_chars or 0,
+                    count=self._long.count,
                 )
             )
         if self._fast.count:
             found.append(
-                Finding(
-                    Code.FEED_ABOVE_LIMIT,
-                    Severity.WARNING,
-                    f"{self._fast.count} blocks have a feed above what the link carries, up to "
-                    f"{self._fast.most:g} mm/min: it holds them at {self._max_feed:.4g}",
+                FEED_ABOVE_LIMIT(
                     where=f"block {self._fast.first + 1}",
                     measured=self._fast.most,
                     limit=self._max_feed,
-                    unit="mm_min",
+                    count=self._fast.count,
                 )
             )
         return tuple(found)

@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import Lowered, arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
@@ -35,6 +35,15 @@ from .arcs import (
     unwrapped_rad,
 )
 from .dialect import dialect_of
+from .findings import (
+    ARC_MENDED,
+    ARC_MENDED_FLAT,
+    BLOCK_TOO_LONG,
+    BLOCK_TOO_LONG_PERHAPS,
+    MOVE_COLLAPSED,
+    MOVE_SPLIT,
+    VALUE_ROUNDED,
+)
 from .numbers import SAY, Grid, check_motion, event_words, far_arcs, numbers_of
 
 WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
@@ -319,63 +328,25 @@ class Notes:
         found = []
         if self.split:
             found.append(
-                Finding(
-                    Code.MOVE_SPLIT,
-                    Severity.WARNING,
-                    f"{self.split} feed moves in XY and Z became steps of at most "
-                    f"{self.split_step_mm:g} mm, nowhere deeper than the slope, because a block "
-                    "moves either XY or Z",
-                    where=self.split_place,
-                    measured=self.split_step_mm,
-                    unit="mm",
-                )
+                MOVE_SPLIT(where=self.split_place, measured=self.split_step_mm, count=self.split)
             )
         if collapsed := self.dropped + self.arcs_as_lines:
             found.append(
-                Finding(
-                    Code.MOVE_COLLAPSED,
-                    Severity.INFO,
-                    f"{self.dropped} moves of less than a step were left out, "
-                    f"{self.arcs_as_lines} arcs too small to end as arcs were written as lines",
-                    measured=float(collapsed),
-                    unit="moves",
-                )
+                MOVE_COLLAPSED(measured=collapsed, dropped=self.dropped, arcs=self.arcs_as_lines)
             )
         if self.far:
-            found.append(
-                Finding(
-                    Code.ARC_MENDED,
-                    Severity.INFO,
-                    f"{self.far} nearly straight arcs, whose centres have more than five digits "
-                    "of µm, were written as lines within a step or unit of them",
-                    where=self.far_place,
-                    measured=float(self.far),
-                    unit="moves",
-                )
-            )
+            found.append(ARC_MENDED_FLAT(where=self.far_place, measured=self.far))
         if self.mended:
             found.append(
-                Finding(
-                    Code.ARC_MENDED,
-                    Severity.INFO,
-                    f"{self.mended} arcs end on a step that the controller really meets, and a "
-                    f"line goes on to the wanted end: at most {self.remainder_um:.2f} µm "
-                    f"({self.remainder_um / step_um:.1f} steps)",
+                ARC_MENDED(
                     where=self.remainder_place,
                     measured=self.remainder_um,
-                    unit="um",
+                    count=self.mended,
+                    steps=self.remainder_um / step_um,
                 )
             )
         if self.rounded:
-            found.append(
-                Finding(
-                    Code.VALUE_ROUNDED,
-                    Severity.INFO,
-                    f"{self.rounded} dwells (up) or spindle speeds (to the nearest) were rounded "
-                    "to whole numbers",
-                    where=self.rounded_place,
-                )
-            )
+            found.append(VALUE_ROUNDED(where=self.rounded_place, count=self.rounded))
         return found
 
 
@@ -388,24 +359,8 @@ def too_long(blocks: list[str], buffer_chars: int | None) -> list[Finding]:
     if not count:
         return []
     longest = max(lengths)
-    message = (
-        f"{count} blocks are longer than the controller's buffer of {limit} characters, the "
-        f"longest has {longest}; use --set dialect.form=annex"
-    )
-    if buffer_chars is None:
-        message = (
-            f"{count} blocks have more than {limit} characters, up to {longest}: the thesis's "
-            "sample block has 43, its buffer would hold 35; see that the controller's echo of the "
-            "first one is whole, otherwise use --set dialect.form=annex"
-        )
     return [
-        Finding(
-            Code.BLOCK_TOO_LONG,
-            Severity.INFO if buffer_chars is None else Severity.WARNING,
-            message,
-            where=f"block {lengths.index(longest) + 1}",
-            measured=float(longest),
-            limit=float(limit),
-            unit="chars",
+        (BLOCK_TOO_LONG_PERHAPS if buffer_chars is None else BLOCK_TOO_LONG)(
+            where=f"block {lengths.index(longest) + 1}", measured=longest, limit=limit, count=count
         )
     ]

@@ -13,13 +13,14 @@ from dataclasses import dataclass
 from typing import Final, NoReturn
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
 from ..gcode.blocks import Block, Lexing, blocks_of
 from .dialect import dialect_of, scales_of
+from .findings import ARC_MISSES_END, COORDINATES_SCALED_READ
 
 CODES: Final = ("00", "01", "02", "03")
 PLAIN: Final = frozenset({"GXYZ", "GXYZIJ"})
@@ -119,26 +120,14 @@ class _Reader:
         """The scale that was taken, and arcs that the controller's angle does not bring home."""
         found = []
         if not self._dialect.coord_scale_checked:
-            found.append(
-                Finding(
-                    Code.COORDINATES_SCALED,
-                    Severity.WARNING,
-                    f"lengths are the program's numbers divided by {self._dialect.coord_scale:g} "
-                    "(dialect.coord_scale)",
-                    measured=self._dialect.coord_scale,
-                )
-            )
+            found.append(COORDINATES_SCALED_READ(measured=self._dialect.coord_scale))
         if self._missed.count:
             found.append(
-                Finding(
-                    Code.ARC_MISSES_END,
-                    Severity.WARNING,
-                    f"{self._missed.count} arcs of about 180°: the controller takes their angle "
-                    f"from an arcsine and ends up to {self._missed.most_mm:.3g} mm off",
+                ARC_MISSES_END(
                     where=self._missed.where,
                     measured=self._missed.most_mm,
                     limit=self._step_mm,
-                    unit="mm",
+                    count=self._missed.count,
                 )
             )
         return tuple(found)

@@ -17,7 +17,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import PostError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
@@ -35,6 +35,7 @@ from ..gcode.plain import (
     split_z,
 )
 from .dialect import Dialect, dialect_of, scales_of
+from .findings import ARC_MENDED, COORDINATES_SCALED, EVENT_LEFT_OUT, FEED_ROUNDED
 
 UNSAID: Final = (
     Kind.DWELL,
@@ -79,7 +80,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
             *squeezed,
             *arc_findings(rows, first),
             *_feed_note(toolpath, machine),
-            *left_out(toolpath, UNSAID, "this machine has no codes but G00 to G03; do it by hand"),
+            *left_out(toolpath, UNSAID, EVENT_LEFT_OUT),
         ),
     )
 
@@ -105,14 +106,7 @@ def _arcs_lowered(
         return short.after(lowered), []
     tolerance = machine.defaults.fit_tolerance_mm
     chords = arcs_to_lines(path, path.is_arc, tolerance)
-    finding = Finding(
-        Code.ARC_MENDED,
-        Severity.INFO,
-        f"{count} arcs were written as lines within {tolerance:g} mm: on axes of unequal steps "
-        "the controller would make ellipses of them",
-        measured=float(count),
-        unit="moves",
-    )
+    finding = ARC_MENDED(measured=count, tolerance=tolerance)
     return chords.after(lowered), [finding]
 
 
@@ -154,16 +148,7 @@ def _scale_note(dialect: Dialect) -> list[Finding]:
     """The warning that a wrong scale makes parts 8 times too large or too small."""
     if dialect.coord_scale_checked:
         return []
-    return [
-        Finding(
-            Code.COORDINATES_SCALED,
-            Severity.WARNING,
-            f"the program says {dialect.coord_scale:g} for 1 mm; the thesis gives 200 steps a "
-            "unit and 25 steps a mm: measure a move, then set dialect.coord_scale (1 if a unit "
-            "moves 1 mm) and dialect.coord_scale_checked=true",
-            measured=dialect.coord_scale,
-        )
-    ]
+    return [COORDINATES_SCALED(measured=dialect.coord_scale)]
 
 
 def _feed_note(toolpath: Toolpath, machine: Machine) -> list[Finding]:
@@ -175,14 +160,10 @@ def _feed_note(toolpath: Toolpath, machine: Machine) -> list[Finding]:
         return []
     row = int(other.argmax())
     return [
-        Finding(
-            Code.FEED_ROUNDED,
-            Severity.WARNING,
-            f"the feeds of {int(other.sum())} moves are not said: the machine has one speed, "
-            f"{speed:g} mm/min",
+        FEED_ROUNDED(
             where=toolpath.place(row),
-            measured=float(toolpath.feed[row]),
+            measured=toolpath.feed[row],
             limit=speed,
-            unit="mm_min",
+            count=int(other.sum()),
         )
     ]

@@ -1,29 +1,188 @@
-"""docs/findings.md explains every code, with its number, and no other."""
+"""docs/findings.md explains every code and lists every sentence, as the catalogues have them.
 
+The tables are made from the code; `pytest --bless tests/docs/test_findings.py` writes them anew
+behind the page's own text.
+"""
+
+import ast
+import importlib
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from string import Formatter
 
-from camtool.findings import Code
+import pytest
 
-PAGE = (Path(__file__).parents[2] / "docs" / "findings.md").read_text(encoding="utf-8")
+from camtool.findings import Code, Finding, Sentence, Severity, TargetCode
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "findings.md"
+SHORTEST_MEANING = 10
+GIVEN = {"where", "measured", "limit", "severity"}
 
 
-def test_every_code_is_explained_and_no_other() -> None:
-    rows = re.findall(
-        r"^\| (\d+) \| `(\w+)` \| (\w+)[^|]* \| (.+?) \| (.+?) \|$", PAGE, re.MULTILINE
-    )
-    assert {(int(number), name) for number, name, *_ in rows} == {
-        (int(code), code.name) for code in Code
+def catalogues() -> dict[str, dict[str, Sentence]]:
+    """The sentences by name, of camtool ("") and of each machine that has some."""
+    own = sorted(ROOT.glob("postprocessors/*/findings.py"))
+    modules = {"": "camtool.findings"}
+    modules |= {p.parent.name: f"camtool_postprocessors.{p.parent.name}.findings" for p in own}
+    return {
+        machine: {
+            name: value
+            for name, value in vars(importlib.import_module(module)).items()
+            if isinstance(value, Sentence)
+        }
+        for machine, module in modules.items()
     }
-    assert len(rows) == len(Code)
-    for _, _, severity, meaning, mend in rows:
-        assert severity in {"info", "warning", "error"}
-        assert len(meaning) > 10
-        assert mend
 
 
-def test_every_code_is_used_somewhere() -> None:
-    root = Path(__file__).parents[2]
-    files = [*root.glob("camtool/**/*.py"), *root.glob("postprocessors/**/*.py")]
-    text = "".join(path.read_text(encoding="utf-8") for path in files)
-    assert [code.name for code in Code if f"Code.{code.name}" not in text] == []
+def sources() -> dict[str, ast.Module]:
+    """All of the code but the catalogues."""
+    files = [*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")]
+    return {
+        str(path.relative_to(ROOT)): ast.parse(path.read_text(encoding="utf-8"))
+        for path in files
+        if path.name != "findings.py"
+    }
+
+
+def tables() -> str:
+    """The tables of codes and of sentences."""
+    made = (
+        "\n## Codes\n\n| number | code | severity | means | what to do |\n|---|---|---|---|---|\n"
+    )
+    for code in Code:
+        grave = _listed([severity.name.lower() for severity in code.severities])
+        made += f"| {int(code)} | `{code.name}` | {grave} | {code.means} | {code.mend} |\n"
+    for machine, sentences in catalogues().items():
+        title = f"Sentences of `{machine}` alone" if machine else "Sentences"
+        made += f"\n## {title}\n\n| code | severity | sentence | unit |\n|---|---|---|---|\n"
+        rows = sorted(sentences.values(), key=lambda each: (_place(each.code), each.code.name))
+        for each in rows:
+            made += f"| `{each.code.name}` | {_grave(each)} | {_readable(each)} | {each.unit} |\n"
+    return made
+
+
+def _place(code: Code | TargetCode) -> int:
+    return int(code) if isinstance(code, Code) else 0
+
+
+def _listed(words: list[str]) -> str:
+    return " or ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _grave(sentence: Sentence) -> str:
+    said = sentence.code.severities if sentence.severity is None else (sentence.severity,)
+    return _listed([severity.name.lower() for severity in said])
+
+
+def _readable(sentence: Sentence) -> str:
+    """The sentence with … for each value."""
+    made = ""
+    for text, name, spec, _ in Formatter().parse(sentence.text):
+        made += text
+        if name is not None:
+            made += (spec or "").rpartition("|")[2].replace("#", "…") if "|" in spec else "…"
+    return made.replace("|", "\\|").replace("<", "\\<").replace("*", "\\*")
+
+
+def test_the_page_has_every_code_and_every_sentence(bless: bool) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    own = page.partition("\n## ")[0].rstrip("\n") + "\n"
+    if bless:
+        PAGE.write_text(own + tables(), encoding="utf-8")
+        return
+    assert page == own + tables(), "pytest --bless tests/docs/test_findings.py writes it anew"
+
+
+def test_tables_can_be_wrong() -> None:
+    rows = re.findall(r"^\| \d+ \| `\w+` \| (?:info|warning|error)", tables(), re.MULTILINE)
+    assert len(rows) == len(Code) > 70
+    assert len(catalogues()[""]) > 100
+
+
+@pytest.mark.parametrize("code", Code, ids=lambda code: code.name)
+def test_every_code_is_explained(code: Code) -> None:
+    assert len(code.means) > SHORTEST_MEANING
+    assert code.mend
+    assert code.severities
+
+
+def test_every_code_and_every_sentence_is_said_somewhere() -> None:
+    every = [each for catalogue in catalogues().values() for each in catalogue.values()]
+    assert [code.name for code in Code if code not in {each.code for each in every}] == []
+    named = {node.id for tree in sources().values() for node in ast.walk(tree) if _is_name(node)}
+    unsaid = [name for each in catalogues().values() for name in each if name not in named]
+    assert unsaid == []
+
+
+def test_a_sentence_is_named_after_its_code_and_no_graver_or_milder() -> None:
+    for catalogue in catalogues().values():
+        for name, each in catalogue.items():
+            assert name.startswith(each.code.name.rpartition(".")[2]), name
+            assert each.severity is None or each.severity in each.code.severities, name
+
+
+def _is_name(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name)
+
+
+def said() -> Iterator[tuple[str, list[Sentence], set[str]]]:
+    """Place, sentence (or those that are chosen from there) and keywords of each call by name."""
+    known = catalogues()
+    for file, tree in sources().items():
+        parts = Path(file).parts
+        here = known[""]
+        if parts[0] == "postprocessors":
+            here = here | known["gcode"] | known.get(parts[1], {})
+        for node in ast.walk(tree):
+            names = _called(node.func) if isinstance(node, ast.Call) else []
+            if isinstance(node, ast.Call) and names and all(name in here for name in names):
+                given = {keyword.arg or "**" for keyword in node.keywords}
+                yield f"{file}:{node.lineno}", [here[name] for name in names], given
+
+
+def _called(node: ast.expr) -> list[str]:
+    """`A` of `A(...)` and of `A.said(...)`; both of `(A if … else B)(...)`."""
+    if isinstance(node, ast.IfExp):
+        return _called(node.body) + _called(node.orelse)
+    if isinstance(node, ast.Attribute) and node.attr == "said":
+        return _called(node.value)
+    return [node.id] if isinstance(node, ast.Name) else []
+
+
+def test_callers_give_the_numbers_that_a_sentence_has_places_for() -> None:
+    calls = list(said())
+    assert len(calls) > 100
+    for place, sentences, given in calls:
+        wanted = set[str]()
+        for sentence in sentences:
+            own = {field for _, field, _, _ in Formatter().parse(sentence.text) if field}
+            assert own <= given, f"{place}: {sentence.text!r} wants {own - given}"
+            several = len(sentence.code.severities) > 1 and sentence.severity is None
+            assert several == ("severity" in given), f"{place}: who says how grave it is?"
+            wanted |= own
+        assert given <= wanted | GIVEN, f"{place}: {given - wanted - GIVEN} is not said"
+
+
+def test_nobody_else_writes_sentences() -> None:
+    made = [
+        f"{file}:{node.lineno}"
+        for file, tree in sources().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        if node.func.id in (Finding.__name__, Sentence.__name__)
+    ]
+    assert made == []
+
+
+def test_a_target_has_codes_of_its_own() -> None:
+    too_hot = TargetCode("mill.TOO_HOT", (Severity.WARNING,), "the spindle is hot", "let it cool")
+    hot = Sentence(
+        too_hot, "the spindle has {measured:.0f} °C, {limit:.0f} are allowed", "celsius"
+    )
+    finding = hot(where="block 3", measured=81.2, limit=70)
+    assert str(finding) == (
+        "warning mill.TOO_HOT [block 3]: the spindle has 81 °C, 70 are allowed"
+    )
+    assert (finding.measured, finding.limit, finding.unit) == (81.2, 70.0, "celsius")

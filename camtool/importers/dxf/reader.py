@@ -13,7 +13,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from camtool.errors import DrawingError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    FILE_REPAIRED,
+    NOT_APPLIED_TO_ENTITY,
+    UNIT_GUESSED,
+    UNITLESS,
+    Finding,
+    Severity,
+)
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.importers.assemble import assemble, font_findings
 from camtool.importers.dxf.load import load, quiet, without_collector
@@ -67,26 +74,13 @@ def _repaired(repairs: tuple[str, ...]) -> list[Finding]:
         return []
     more = len(repairs) - REPAIRS_NAMED
     text = "; ".join(" ".join(message.split()) for message in repairs[:REPAIRS_NAMED])
-    tail = f"; and {more} more" if more > 0 else ""
-    return [
-        Finding(
-            Code.FILE_REPAIRED,
-            Severity.WARNING,
-            f"the file is faulty and was repaired ({len(repairs)}): {text}{tail}",
-            measured=float(len(repairs)),
-        )
-    ]
+    return [FILE_REPAIRED(measured=len(repairs), repairs=text, more=max(more, 0))]
 
 
 def _not_applied(lacking: Counter[tuple[str, str]]) -> list[Finding]:
     """What the paths of some entities leave out."""
     return [
-        Finding(
-            Code.NOT_APPLIED,
-            Severity.WARNING,
-            f"{count} {kind}: {what} is not applied",
-            measured=float(count),
-        )
+        NOT_APPLIED_TO_ENTITY(measured=count, kind=kind, what=what)
         for (kind, what), count in lacking.items()
     ]
 
@@ -148,19 +142,12 @@ def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, li
     if not code and measurement in _GUESSES:
         name, mm, meaning, severity = _GUESSES[measurement]
         why = f"{said}, but $MEASUREMENT {measurement} ({meaning})"
-        message = (
-            f"the file names no unit ({why}): read as {name}; if that is wrong, name the unit "
-            "with --units"
-        )
-        return Units(name, mm, why), [Finding(Code.UNIT_GUESSED, severity, message)]
+        return Units(name, mm, why), [UNIT_GUESSED(severity=severity, why=why, taken=name)]
     if code in _NO_PART:
         said = f"{said} ({_NO_PART[code]}, in which no part is drawn)"
     elif code:
         said = f"{said}, which is no unit"
-    message = f"the file names no unit ({said}): read as mm; if that is wrong, say it with --units"
-    return Units("mm", 1.0, f"taken as mm: {said}"), [
-        Finding(Code.UNITLESS, Severity.WARNING, message)
-    ]
+    return Units("mm", 1.0, f"taken as mm: {said}"), [UNITLESS(said=said)]
 
 
 def _whole(value: Any) -> int | None:

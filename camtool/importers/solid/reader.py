@@ -28,7 +28,13 @@ from typing import Any
 import numpy as np
 
 from camtool.errors import DrawingError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import (
+    FILE_REPAIRED_BODIES,
+    FILE_REPAIRED_IN_PART,
+    SECTION_CHOSEN,
+    SECTION_CHOSEN_FACES,
+    Finding,
+)
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.assemble import Piece, assemble
@@ -107,23 +113,9 @@ def _faults(found: dict[str, Any]) -> list[Finding]:
     """FILE_REPAIRED when the reader complained or a body does not hold together."""
     findings: list[Finding] = []
     if found["faulty"]:
-        findings.append(
-            Finding(
-                Code.FILE_REPAIRED,
-                Severity.WARNING,
-                f"{found['faulty']} of {found['bodies']} bodies have faces or edges that do not "
-                "fit together",
-                measured=float(found["faulty"]),
-            )
-        )
+        findings.append(FILE_REPAIRED_BODIES(measured=found["faulty"], bodies=found["bodies"]))
     if found["complaint"]:
-        findings.append(
-            Finding(
-                Code.FILE_REPAIRED,
-                Severity.WARNING,
-                f"the file is damaged, something may be missing: {found['complaint']}",
-            )
-        )
+        findings.append(FILE_REPAIRED_IN_PART(complaint=found["complaint"]))
     return findings
 
 
@@ -133,18 +125,9 @@ def _chosen(found: dict[str, Any], scale: float, height: float | None) -> list[F
         return []
     low, high = scale * min(found["levels"]), scale * max(found["levels"])
     bottom, top = (scale * z for z in found["span"])
-    place = f"z = {low:.6g}" if high - low <= POSITION_EPS_MM else f"z = {low:.6g} to {high:.6g}"
-    what = "the section" if height is not None else "the highest level face of each solid"
-    return [
-        Finding(
-            Code.SECTION_CHOSEN,
-            Severity.INFO,
-            f"{what} at {place} mm is drawn; the model spans z = {bottom:.6g} to {top:.6g} mm; "
-            "--section-z chooses another height",
-            measured=high,
-            unit="mm",
-        )
-    ]
+    heights = f"{low:.6g}" if high - low <= POSITION_EPS_MM else f"{low:.6g} to {high:.6g}"
+    sentence = SECTION_CHOSEN_FACES if height is None else SECTION_CHOSEN
+    return [sentence(measured=high, heights=heights, bottom=bottom, top=top)]
 
 
 # Runs `worker` in a process of its own and takes over what it found.

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from camtool.errors import DrawingError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import UNIT_GUESSED_BY_PROGRAM, UNITLESS_PX, Finding
 from camtool.geometry.drawing import Units
 from camtool.importers.options import DPI, ReadOptions
 from camtool.importers.svg.css import declared
@@ -69,12 +69,7 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> P
     page = _said(root, (width, height), box, options)
     if writer is None or not (box is None or page.units.name == "px"):
         return page
-    hint = Finding(
-        Code.UNIT_GUESSED,
-        Severity.WARNING,
-        f"{writer[0]} wrote the file, which took {writer[1]:g} px an inch, and it was read so; "
-        f"if it comes out too large, give --dpi {DPI:g}",
-    )
+    hint = UNIT_GUESSED_BY_PROGRAM(program=writer[0], px_an_inch=writer[1], usual=DPI)
     return replace(page, findings=(*page.findings, hint))
 
 
@@ -156,9 +151,4 @@ def _flip(height_mm: float) -> Affine:
 
 
 def _unitless(why: str, options: ReadOptions) -> Finding:
-    return Finding(
-        Code.UNITLESS,
-        Severity.WARNING,
-        f"{why}: read as px, {options.px_an_inch:g} an inch; if that is wrong, name the unit of a "
-        "user unit with --units, or give --dpi",
-    )
+    return UNITLESS_PX(why=why, px_an_inch=options.px_an_inch)

@@ -15,7 +15,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import NOT_APPLIED, Finding
 from camtool.geometry.drawing import Drawing, Skipped
 from camtool.geometry.fit import BezierCurve, Curve, EllipseCurve, arc_vertices, fit_curve
 from camtool.geometry.polylines import POSITION_EPS_MM
@@ -430,8 +430,7 @@ class Notes:
     def findings(self) -> list[Finding]:
         """NOT_APPLIED for each thing that changes the look and was not done; what fonts lack."""
         applied = [
-            Finding(Code.NOT_APPLIED, Severity.WARNING, f"{count} {what} {why}",
-                    measured=float(count))
+            NOT_APPLIED(measured=count, what=what, why=why)
             for (what, why), count in self.changed.items()
         ]  # fmt: skip
         return applied + font_findings(self.fonts)

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[3] / "postprocessors"
-# Options of the [dialect] table are what both must agree on.
-SHARED = {"gcode.dialect"}
+# What both must agree on: options of the [dialect] table; and the table of what is said of them.
+SHARED = {"gcode.dialect", "gcode.findings"}
 
 
 def neighbours(module: str) -> set[str]:
@@ -34,7 +34,7 @@ def reached(module: str) -> set[str]:
 @pytest.mark.parametrize("name", ["grbl", "linuxcnc"])
 def test_what_both_need_are_options_only(name: str) -> None:
     both = reached(f"{name}.write") & reached(f"{name}.read")
-    assert both == SHARED | {f"{name}.dialect"}
+    assert both == SHARED | {f"{name}.dialect"} | ({f"{name}.findings"} & both)
 
 
 @pytest.mark.parametrize(("name", "other"), [("grbl", "linuxcnc"), ("linuxcnc", "grbl")])

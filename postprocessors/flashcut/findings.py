@@ -1,0 +1,52 @@
+"""What is said of programs of this machine alone."""
+
+from __future__ import annotations
+
+from camtool.findings import WARNING, Code, Sentence
+
+FEED_ABOVE_LIMIT = Sentence(
+    Code.FEED_ABOVE_LIMIT,
+    "{count} blocks have a feed above what the machine's shortest half period gives, up to "
+    "{measured:g} mm/min where {limit:.4g} is the limit: that half period holds them, and so "
+    "does the simulation",
+    "mm_min",
+    WARNING,
+)
+VALUE_ROUNDED = Sentence(
+    Code.VALUE_ROUNDED,
+    "{speeds} spindle speeds and {tools} tool numbers have no word: the spindle turns with the "
+    "feed, and M00 waits for the tool",
+)
+EVENT_LEFT_OUT_DWELL = Sentence(
+    Code.EVENT_LEFT_OUT,
+    "{count} events were left out ({kinds}): this controller has no dwell",
+    severity=WARNING,
+)
+EVENT_LEFT_OUT_STOP = Sentence(
+    Code.EVENT_LEFT_OUT,
+    "{count} events were left out ({kinds}): M05 is written, but this machine's spindle turns "
+    "with every move",
+    severity=WARNING,
+)
+EXECUTED_OTHERWISE = Sentence(
+    Code.EXECUTED_OTHERWISE,
+    "{count} straight moves of both axes make their shorter one too long, by up to {steps} steps "
+    "({measured:.1f} µm), because each axis has a timer of its own{stays:|; it stays in all that "
+    "follows|}. What lowers it: longer half periods (controller.half_period_ms), lines in pieces "
+    "(dialect.slants=split){rapids:|, rapids along one axis at a time (dialect.rapids=one-axis)|}",
+    "um",
+)
+FEED_HELD = Sentence(
+    Code.FEED_HELD,
+    "{count} cuts are slower than their F: F{limit:g} becomes {measured:.3g} mm/min of both "
+    "axes, by the shortest half period (controller.half_period_ms, "
+    "controller.single_axis_half_period_ms); a shorter one makes slanted lines less exact",
+    "mm_min",
+)
+FEED_HELD_ALONE = Sentence(
+    Code.FEED_HELD,
+    "{count} cuts are slower than their F: F{limit:g} becomes {measured:.3g} mm/min along one "
+    "axis, by the shortest half period (controller.half_period_ms, "
+    "controller.single_axis_half_period_ms); a shorter one makes slanted lines less exact",
+    "mm_min",
+)

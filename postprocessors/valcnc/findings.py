@@ -1,0 +1,41 @@
+"""What is said of programs of this machine alone."""
+
+from __future__ import annotations
+
+from camtool.findings import WARNING, Code, Sentence
+
+FEED_ROUNDED = Sentence(
+    Code.FEED_ROUNDED,
+    "the feeds of {count} moves are not said: the machine has one speed, {limit:g} mm/min",
+    "mm_min",
+    WARNING,
+)
+ARC_MENDED = Sentence(
+    Code.ARC_MENDED,
+    "{measured} arcs were written as lines within {tolerance:g} mm: on axes of unequal steps the "
+    "controller would make ellipses of them",
+    "moves",
+)
+EVENT_LEFT_OUT = Sentence(
+    Code.EVENT_LEFT_OUT,
+    "{count} events were left out ({kinds}): this machine has no codes but G00 to G03; do it by "
+    "hand",
+    severity=WARNING,
+)
+COORDINATES_SCALED = Sentence(
+    Code.COORDINATES_SCALED,
+    "the program says {measured:g} for 1 mm; the thesis gives 200 steps a unit and 25 steps a "
+    "mm: measure a move, then set dialect.coord_scale (1 if a unit moves 1 mm) and "
+    "dialect.coord_scale_checked=true",
+)
+COORDINATES_SCALED_READ = Sentence(
+    Code.COORDINATES_SCALED,
+    "lengths are the program's numbers divided by {measured:g} (dialect.coord_scale)",
+)
+ARC_MISSES_END = Sentence(
+    Code.ARC_MISSES_END,
+    "{count} arcs of about 180°: the controller takes their angle from an arcsine and ends up to "
+    "{measured:.3g} mm off",
+    "mm",
+    WARNING,
+)
