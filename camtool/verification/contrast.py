@@ -32,7 +32,7 @@ class ContrastRow(msgspec.Struct, frozen=True):
 
 def row_of(name: str, report: Report) -> ContrastRow:
     """What the table says of one report."""
-    error, cutting = report.error_um, report.reversals.cutting
+    error = report.error_um
     circular = [circle.G_um for circle in report.circles if circle.G_um is not None]
     return ContrastRow(
         name=name,
@@ -42,7 +42,7 @@ def row_of(name: str, report: Report) -> ContrastRow:
         total_rms_um=error.total.rms,
         circular_um=max(circular, default=None),
         iterations=report.steps.iterations,
-        reversals_cutting=cutting.x + cutting.y,
+        reversals_cutting=report.cutting_reversals,
         endless=sum(finding.code == "ARC_MISSES_END" for finding in report.findings),
         time_s=report.time_s,
     )

@@ -1,6 +1,12 @@
-"""The parts of a Report as records; their keys are stable (see `camtool.verification.report`).
+"""The Report: what a verification found, as a record, JSON, text, Markdown and HTML.
 
-Nothing here is NaN or infinite: what is not known is None.
+The keys are stable: they may grow, they are never renamed (a test holds the list). No value is
+NaN or infinite: what is not known is null. Numbers are rounded to `DECIMALS` places, far below
+anything that a machine shows, so that the same job gives the same bytes on every computer.
+
+    records ─▶ Report ─▶ limits of a pipeline (`Gates`)
+                  ├────▶ `facts`, lines for a terminal and for the margin of a picture
+                  └────▶ `sheets`, tables of words ─▶ `Page` ─▶ `markdown`, `html`, `page_json`
 """
 
 from __future__ import annotations
@@ -23,6 +29,11 @@ from camtool.findings import (
 )
 from camtool.plain import one_line, to_json
 from camtool.units import UM_PER_MM
+
+DECIMALS = 6
+"""Decimal places of all numbers of the report (mm, µm, s, per cent)."""
+
+# The parts of a report.
 
 
 class MaxRms(msgspec.Struct, frozen=True):
@@ -267,14 +278,7 @@ class Before(msgspec.Struct, frozen=True):
     time_s: float | None = None
 
 
-# The Report: what `camtool verify` says, as a record, JSON, text and Markdown.
-#
-# The keys are stable: they may grow, they are never renamed (a test holds the list). No value is
-# NaN or infinite: what is not known is null. Numbers are rounded to `DECIMALS` places, far below
-# anything that a machine shows, so that the same job gives the same bytes on every computer.
-
-DECIMALS = 6
-"""Decimal places of all numbers of the report (mm, µm, s, per cent)."""
+# The report.
 
 
 class Report(msgspec.Struct, frozen=True):
@@ -316,24 +320,41 @@ class Report(msgspec.Struct, frozen=True):
         return to_json(self)
 
     def to_text(self, *, findings: bool = True) -> str:
-        """A summary of a few lines for a terminal; `findings=False` leaves these out."""
-
-        return report_text(self, findings=findings)
+        """The summary that `camtool post` and `camtool verify` print, without a final newline;
+        `findings=False` leaves these out."""
+        lines = [f"{name:<10} {value}" for name, value in facts(self)]
+        for item in self.findings if findings else ():
+            place = f" [{item.where}]" if item.where else ""
+            lines.append(f"{item.severity} {item.code}{place}: {item.message}")
+        return "\n".join(map(one_line, lines))
 
     def worst_text(self) -> str:
-        """The moves with the largest errors, one to a line, "" when nothing is cut."""
-
-        return worst_text(self)
+        """The moves with the largest errors, one to a line, "" when nothing is cut; µm."""
+        lines = [
+            f"{named(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
+            f" {um(item.interpolation_um)}, mechanics {um(item.mechanics_um)}"
+            f"  near ({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f}) mm"
+            + (f"  {one_line(item.source)}" if item.source else "")
+            for item in self.worst
+        ]
+        return "\n".join(lines)
 
     def to_markdown(self) -> str:
         """The report as Markdown, for a pull request or a job's record."""
-
-        return markdown(page_of(self))
+        return markdown(Page(self.source or self.target, self, self.findings))
 
     def notes(self) -> tuple[str, ...]:
-        """Two or three short lines to set beside a picture."""
+        """Two short lines to set beside a picture: target, time and reversals, and the error."""
+        total = self.error_um.total
+        return (
+            f"{self.target}: {clock(self.time_s)} h, {self.cutting_reversals} reversals",
+            f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{to_what(self)}",
+        )
 
-        return report_notes(self)
+    @property
+    def cutting_reversals(self) -> int:
+        """Reversals of X and Y while cutting."""
+        return self.reversals.cutting.x + self.reversals.cutting.y
 
     def with_findings(self, findings: Iterable[Finding]) -> Report:
         """The same report with these findings."""
@@ -385,7 +406,7 @@ def gate_findings(report: Report, gates: Gates) -> Iterator[Finding]:
     """An ABOVE_GATE for each limit that the report exceeds, or that it cannot be held against."""
     if gates.error_mm is not None:
         yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
-    count = report.reversals.cutting.x + report.reversals.cutting.y
+    count = report.cutting_reversals
     if gates.reversals is not None and count > gates.reversals:
         yield ABOVE_GATE_REVERSALS(where="--max-reversals", measured=count, limit=gates.reversals)
     if gates.time_s is not None and report.time_s > gates.time_s:
@@ -405,9 +426,7 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
         yield ABOVE_GATE(where="--max-error", measured=found_um, limit=limit_um)
 
 
-# A Report in words: for the terminal and for the margin of a picture.
-#
-# Its tables stand in `camtool.verification.report`, its pages in `markdown` and `html` beside it.
+# The report in words.
 
 MOST_OPERATIONS = 6
 """So many operations are told one by one."""
@@ -421,23 +440,6 @@ def clock(seconds: float) -> str:
     """
     whole = round(seconds)
     return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
-
-
-def report_text(report: Report, *, findings: bool) -> str:
-    """The summary that `camtool post` and `camtool verify` print, without a final newline."""
-    lines = [one_line(f"{name:<10} {value}") for name, value in facts(report)]
-    if findings:
-        lines += [_finding_line(report, index) for index in range(len(report.findings))]
-    return "\n".join(lines)
-
-
-def report_notes(report: Report) -> tuple[str, ...]:
-    """Target and time, reversals, predicted error."""
-    total = report.error_um.total
-    return (
-        f"{report.target}: {clock(report.time_s)} h, {_cutting_reversals(report)} reversals",
-        f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{to_what(report)}",
-    )
 
 
 def facts(report: Report) -> Iterator[tuple[str, str]]:
@@ -537,18 +539,6 @@ def _shape_words(shape: ShapeReport) -> str:
     return f"{over}; {under} (tool {shape.tool_diameter_mm:g} mm)"
 
 
-def worst_text(report: Report) -> str:
-    """The moves with the largest errors, one to a line; µm."""
-    lines = [
-        f"{named(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
-        f" {um(item.interpolation_um)}, mechanics {um(item.mechanics_um)}"
-        f"  near ({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f}) mm"
-        + (f"  {one_line(item.source)}" if item.source else "")
-        for item in report.worst
-    ]
-    return "\n".join(lines)
-
-
 def named(block: int | None, move: int) -> str:
     """A move by its block, or by its own number where there are no blocks."""
     return f"block {block}" if block is not None else f"move {move}"
@@ -575,16 +565,6 @@ def _error_sources(report: Report) -> str:
         "mechanics": error.mechanics.max,
     }
     return ", ".join(f"{name} {um(most)}" for name, most in figures.items()) + " µm"
-
-
-def _finding_line(report: Report, index: int) -> str:
-    item = report.findings[index]
-    place = f" [{item.where}]" if item.where else ""
-    return one_line(f"{item.severity} {item.code}{place}: {item.message}")
-
-
-def _cutting_reversals(report: Report) -> int:
-    return report.reversals.cutting.x + report.reversals.cutting.y
 
 
 def um(value: float | None) -> str:
@@ -650,11 +630,6 @@ class Page:
         return next((word for word in ("error", "warning") if word in grave), "fine")
 
 
-def page_of(report: Report) -> Page:
-    """The page of a report alone."""
-    return Page(report.source or report.target, report, report.findings)
-
-
 def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
     """(name, value) of the machine and the settings, in their order."""
     digests = [("machine", f"{setup.machine}, digest {setup.machine_sha256}")]
@@ -675,16 +650,12 @@ def page_json(page: Page) -> str:
     """The report's own keys, with `title`, `verdict` and `setup` before them; indented.
 
     Where nothing could be judged, `findings` are all that follows."""
-    import msgspec
-
-    from camtool.plain import to_json as json_text
-
     body: dict[str, Any] = {"title": page.title, "verdict": page.verdict}
     body["setup"] = None if page.setup is None else asdict(page.setup)
     if page.report is not None:
         body |= msgspec.to_builtins(page.report)
     body["findings"] = msgspec.to_builtins(page.findings, builtin_types=(FindingReport,))
-    return json_text(body)
+    return to_json(body)
 
 
 # The tables of a Report as rows of words, for Markdown and HTML alike.
