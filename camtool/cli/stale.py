@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camtool.batches.inputs import SUFFIXES, find_tasks
 from camtool.cli.messages import say
 from camtool.cli.options import OWN_JOB, SectionedCommand, talk_options
 from camtool.cli.post import Posting, posting_options
@@ -19,9 +20,6 @@ from camtool.findings import Severity
 if TYPE_CHECKING:
     from camtool.machine.registry import LoadedTarget
     from camtool.toolpath.program import Program
-
-DRAWINGS = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
-"""What a folder is searched for, and what a program or a job file is taken to belong to."""
 
 
 @click.command(cls=SectionedCommand, short_help="Programs that are not of their drawings now.")
@@ -95,8 +93,6 @@ def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:
 
     InputError for what is no drawing or not there, OutputError for two of one name, as of a batch.
     """
-    from camtool.batches.inputs import find_tasks
-
     if not programs.is_dir():
         raise InputError("is no folder", file=str(programs), mend="give the --out of the batch")
     return {programs / task.stem: [task.path] for task in find_tasks(files, programs)}
@@ -109,7 +105,7 @@ def _names(file: Path) -> Iterator[Path]:
             yield from (
                 Path(folder, name).with_suffix("")
                 for name in sorted(names)
-                if Path(name).suffix.lower() in DRAWINGS
+                if Path(name).suffix.lower() in SUFFIXES
             )
     elif not os.path.lexists(file):
         raise InputError("is not there", file=str(file), mend="check the path")
@@ -118,8 +114,8 @@ def _names(file: Path) -> Iterator[Path]:
 
 
 def _ordered(files: list[Path]) -> list[Path]:
-    drawings = [file for file in files if file.suffix.lower() in DRAWINGS]
-    return sorted(drawings, key=lambda file: DRAWINGS.index(file.suffix.lower()))
+    drawings = [file for file in files if file.suffix.lower() in SUFFIXES]
+    return sorted(drawings, key=lambda file: SUFFIXES.index(file.suffix.lower()))
 
 
 def _beside(name: Path) -> list[Path]:
@@ -131,7 +127,7 @@ def _beside(name: Path) -> list[Path]:
 
 def _has_program(name: Path) -> bool:
     """Whether anything lies there that may be a program: a dialect may have several endings."""
-    return any(file.suffix.lower() not in (*DRAWINGS, OWN_JOB) for file in _beside(name))
+    return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _beside(name))
 
 
 def _posted(
