@@ -135,7 +135,8 @@ class Seen:
 
     def _is_no_drawing(self, source: str) -> bool:
         """Whether a file's content says that it is none: then it is a program of the target."""
-        from camtool.importers.read import file_bytes, find_format
+        from camtool.importers.formats import find_format
+        from camtool.importers.read import file_bytes
 
         if source == STDOUT or self.drawing.format is not None:
             return False

@@ -12,22 +12,14 @@ of the curve on the chain move continuously from its first point to its last, so
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
-from camtool.geometry.curves import (
-    BezierCurve,
-    Curve,
-    EllipseCurve,
-    FunctionCurve,
-    Pieced,
-    Pieces,
-    SplineCurve,
-)
+from camtool.geometry.curves import Curve, Pieced, Pieces
 from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM
 from camtool.kernels.fit_limits import (
     ACCEPTED_SHARE,
@@ -45,20 +37,6 @@ from camtool.kernels.fit_limits import (
     STEP_TURN_RAD,
     VANISHING_TANGENT,
 )
-
-__all__ = [
-    "BezierCurve",
-    "Curve",
-    "EllipseCurve",
-    "Fit",
-    "FunctionCurve",
-    "SplineCurve",
-    "arc_vertices",
-    "fit_curve",
-    "fit_curves",
-    "split_bulges",
-]
-
 
 Judged = tuple[float, float, float]
 """Of a chain its largest and its rms deviation from the curve, and the length of that, mm."""
@@ -101,11 +79,6 @@ def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
     if isinstance(curve, Pieced):
         return _fit_pieces(curve.pieces(), tolerance_mm)
     return _fit_any(curve, tolerance_mm)
-
-
-def fit_curves(curves: Iterable[Curve], tolerance_mm: float) -> list[Fit]:
-    """`fit_curve` of each."""
-    return [fit_curve(curve, tolerance_mm) for curve in curves]
 
 
 def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: float) -> Floats:

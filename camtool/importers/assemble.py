@@ -2,13 +2,13 @@
 
 Every reader ends here, so that a DXF and an SVG of the same part give the same Drawing:
 
-    pieces ──select.py──▶ wanted ──clean.py──▶ checked, once ──heal.py──▶ contours
-                        └▶ the others, cleaned and healed on their own ──▶ unchosen closed contours
-    wanted × contours ──off.py──▶ how far they are apart         contours ──told.py──▶ findings
+    pieces ──selected──▶ wanted ──cleaned──▶ checked, once ──healed──▶ contours ──▶ findings
+                       └▶ the others, cleaned and healed on their own ──▶ unchosen closed contours
+    wanted × contours ──off_drawn──▶ how far they are apart
 
 A *piece* is one entity or one subpath, in mm, Y up. A *gap* lies between two open ends.
 Tolerances: POSITION_EPS_MM (two points are one), `options.gap_mm` (two ends are joined), and
-those of the modules named above.
+those of `healing`.
 """
 
 from __future__ import annotations
@@ -55,8 +55,6 @@ from camtool.importers.healing import IS_DRAWN_TWICE, cleaned, gap_of, healed, i
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, selected
 from camtool.units import UM_PER_MM
-
-__all__ = ["MAX_COORDINATE_MM", "Piece", "assemble"]
 
 _SOURCES_NAMED = 3
 """So many members of a chain are named in its source."""
@@ -211,7 +209,7 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
     return tuple(kept), [Skipped(kind, count, IS_DRAWN_TWICE) for kind, count in gone.items()]
 
 
-# What the importers tell of a drawing besides its lines: findings, each with its place.
+# Findings of a drawing, each with its place.
 
 SMALLEST_MM = 0.05
 """A drawing whose longer side is below this was probably read in the wrong unit."""

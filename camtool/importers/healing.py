@@ -1,7 +1,11 @@
-"""Pieces in columns: numbers checked, repeated points taken out, each piece kept once.
+"""Pieces to contours: checked, mended, joined; and how far the contours lie from what was drawn.
 
-Tolerance: POSITION_EPS_MM, below which two points are one; it decides what is a repeated point,
-what has no length, and what is drawn twice.
+    pieces ──cleaned──▶ paths, each once ──healed──▶ contours, and a Healing that counts
+    pieces × contours ──off_drawn──▶ mm
+
+Cleaning checks numbers, takes out repeated points and keeps each piece once. Its tolerance is
+POSITION_EPS_MM, below which two points are one; it decides what is a repeated point, what has no
+length, and what is drawn twice.
 """
 
 from __future__ import annotations
@@ -181,11 +185,8 @@ def _mixed(words: _Words) -> _Words:
     return word ^ (word >> np.uint64(31))
 
 
-# Cleaned pieces to contours: overlaps taken off, ends joined, arcs recognised, specks merged.
-#
-#     cleaned ──overlaps──▶ ──chain──▶ ──arcs (if asked)──▶ ──tiny──▶ contours, and a Healing
-#
-# Each stage is a function of camtool.geometry; here they are put in order and counted.
+# Healing: overlaps taken off, ends joined, arcs recognised (if asked for), specks merged. Each
+# stage is a function of camtool.geometry; here they are put in order and counted.
 
 TINY_SHARE = 0.5
 """Segments up to this share of the tolerance are merged into their neighbours."""
@@ -266,7 +267,7 @@ def _recognised(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]
     return Polylines.of(path for path, _ in made), sum(count for _, count in made)
 
 
-# How far the paths of a drawing lie from what was drawn: fitting and mending together, measured.
+# How far contours lie from what was drawn: fitting and mending together, measured.
 #
 # Readers say how far their curves lie from the arcs of each piece. What became of the pieces is
 # measured, not followed through the stages that clean and mend, so that nothing can be left out:

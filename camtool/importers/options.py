@@ -9,7 +9,7 @@ from camtool.errors import OptionError
 from camtool.units import MM_PER_UNIT
 
 FORMATS = ("dxf", "svg", "points", "solid")
-"""Names of the formats, each with a package of that name beside this module."""
+"""Names of the formats, each with a package of that name beside this file."""
 
 TEXTS = ("skip", "outline", "stroke")
 """What becomes of text: left out, the outlines of its font, or the lines of an engraving font."""

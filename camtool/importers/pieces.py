@@ -1,4 +1,10 @@
-"""The piece that readers make of an entity."""
+"""The pieces that readers make of entities, and which of them are read: by layer, colour and line
+type.
+
+A pattern has `*`, `?` and `[…]` and is the same in any case, as names in CAD are. A pattern that
+chooses nothing is an error that names what there is: a misspelt layer must not cut everything,
+or nothing.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +21,10 @@ from camtool.patterns import guess, matches
 
 MAX_COORDINATE_MM = 1e9
 """Beyond this doubles cannot tell positions apart that differ by POSITION_EPS_MM."""
+
+
+class Unusable(Exception):
+    """The entity gives no piece; the text says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +55,6 @@ class Piece:
         """The first word of the source."""
         return self.source.partition(" ")[0]
 
-
-# Which pieces of a drawing are read: by layer, colour and line type.
-#
-# A pattern has `*`, `?` and `[…]` and is the same in any case, as names in CAD are. A pattern that
-# chooses nothing is an error that names what there is: a misspelt layer must not cut everything,
-# or nothing.
 
 NAMED = 12
 """So many names are listed when a pattern chooses none of them."""

@@ -1,4 +1,4 @@
-"""One door for every drawing: which format it is (`read_format`), and its reader."""
+"""One door for every drawing: which format it is (`formats`), and its reader."""
 
 from __future__ import annotations
 
@@ -15,16 +15,6 @@ from camtool.importers.options import DEFAULTS, ReadOptions
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-
-__all__ = [
-    "MAX_FILE_BYTES",
-    "STDIN",
-    "content",
-    "file_bytes",
-    "find_format",
-    "read_bytes",
-    "read_drawing",
-]
 
 MAX_FILE_BYTES = 500_000_000
 """A larger file is refused before it is read: its drawing would not fit into memory."""

@@ -1,4 +1,9 @@
-"""Letters of drawings as curves: fonts, layout, and the codes of MTEXT."""
+"""Letters of drawings as curves: fonts, and letters put side by side.
+
+Letters are outlines of an installed font, or the single strokes of Hershey's Roman. They are
+measured in heights of a capital: the baseline is y = 0, a capital reaches y = 1. Fonts are found
+by ezdxf, which lists the installed ones once for all its uses; nothing is downloaded.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +21,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.geometry import hershey
-from camtool.importers.dxf.shapes import Unusable
-
-# Letters as curves: outlines of an installed font, or the single strokes of Hershey's Roman.
-#
-# Letters are measured in heights of a capital: the baseline is y = 0, a capital reaches y = 1.
-# Fonts are found by ezdxf, which lists the installed ones once for all its uses; nothing is
-# downloaded.
+from camtool.importers.pieces import Unusable
 
 SUBSTITUTES = ("Liberation Sans", "Arimo", "Arial", "Helvetica", "DejaVu Sans", "Noto Sans")
 """Families that stand in for a font that is not installed, the first that is: most drawings name

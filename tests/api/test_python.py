@@ -150,7 +150,7 @@ def test_everything_has_a_picture(posted: Run) -> None:
 
 
 def test_the_houses_own_records_have_pictures_too(square: Path) -> None:
-    from camtool.importers import read_drawing
+    from camtool.importers.read import read_drawing
 
     assert camtool.preview(read_drawing(square)).svg.startswith("<svg")
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camtool.geometry.fit import BezierCurve, EllipseCurve, FunctionCurve, fit_curves
+from camtool.geometry.curves import BezierCurve, EllipseCurve, FunctionCurve
+from camtool.geometry.fit import fit_curve
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.simplify import recognise_arcs
 from tests.oracles.curves import fewest_chords
@@ -36,7 +37,9 @@ def test_quadratics(benchmark: Any, what: str) -> None:
     if what == "points":
         assert len(benchmark.pedantic(lambda: [c.point(t) for c in curves], rounds=5)) == 900
         return
-    fits = benchmark.pedantic(lambda: fit_curves(curves, TOLERANCE_MM), rounds=5, warmup_rounds=1)
+    fits = benchmark.pedantic(
+        lambda: [fit_curve(curve, TOLERANCE_MM) for curve in curves], rounds=5, warmup_rounds=1
+    )
     assert max(fit.max_mm for fit in fits) <= TOLERANCE_MM
     moves = sum(len(fit.vertices) - 1 for fit in fits[:30])
     fine = np.linspace(0.0, 1.0, 20_000)
@@ -55,7 +58,9 @@ def test_ellipses(benchmark: Any, way: str) -> None:
     ]
     if way == "functions":
         curves = [FunctionCurve(c.point, c.tangent, c.breaks) for c in curves]
-    fits = benchmark.pedantic(lambda: fit_curves(curves, TOLERANCE_MM), rounds=5, warmup_rounds=1)
+    fits = benchmark.pedantic(
+        lambda: [fit_curve(curve, TOLERANCE_MM) for curve in curves], rounds=5, warmup_rounds=1
+    )
     assert max(fit.max_mm for fit in fits) <= TOLERANCE_MM
 
 

@@ -12,15 +12,8 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
-from camtool.geometry.fit import (
-    BezierCurve,
-    EllipseCurve,
-    FunctionCurve,
-    SplineCurve,
-    arc_vertices,
-    curve_nodes,
-    fit_curve,
-)
+from camtool.geometry.curves import BezierCurve, EllipseCurve, FunctionCurve, SplineCurve
+from camtool.geometry.fit import arc_vertices, curve_nodes, fit_curve
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from tests.drawings import drawing_of
 from tests.oracles import arcs

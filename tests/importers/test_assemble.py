@@ -11,9 +11,10 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.measure import signed_areas
-from camtool.importers.assemble import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM, Piece, assemble
+from camtool.importers.assemble import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM, assemble
 from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions
+from camtool.importers.pieces import Piece
 
 MM = Units("mm", 1.0, "in a test")
 

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
-from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.dxf.text import TextShape, text_strokes
+from camtool.importers.pieces import Unusable
 
 PITCH = 5.0 / 3.0
 

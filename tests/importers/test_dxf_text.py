@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from camtool.arrays import Floats
 from camtool.findings import Code
 from camtool.importers import text as text_fonts
-from camtool.importers.dxf.shapes import Unusable
 from camtool.importers.dxf.text import TextShape, text_strokes
 from camtool.importers.options import ReadOptions
+from camtool.importers.pieces import Unusable
 from camtool.importers.read import read_drawing
 from camtool.importers.text import Wanted, font_for
 

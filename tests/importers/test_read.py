@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 
 import camtool.importers
 from camtool.errors import DrawingError, OptionError
-from camtool.importers import ReadOptions, read_drawing
 from camtool.importers import read as reader
-from camtool.importers.read import find_format, read_bytes
+from camtool.importers.formats import find_format
+from camtool.importers.options import ReadOptions
+from camtool.importers.read import read_bytes, read_drawing
 
 
 def npy() -> bytes:
@@ -250,7 +251,7 @@ def test_nothing_heavy_is_loaded_before_it_is_needed(tmp_path: Path) -> None:
     path = tmp_path / "part.svg"
     path.write_text(SVG)
     code = (
-        "from pathlib import Path\nfrom camtool.importers import read_drawing\n"
+        "from pathlib import Path\nfrom camtool.importers.read import read_drawing\n"
         f"read_drawing(Path({str(path)!r}))"
     )
     modules = loaded(code)

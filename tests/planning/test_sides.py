@@ -14,8 +14,9 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Unchosen, Units
 from camtool.geometry.measure import extents, sample
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.importers.assemble import Piece, assemble
+from camtool.importers.assemble import assemble
 from camtool.importers.options import ReadOptions, Selection
+from camtool.importers.pieces import Piece
 from camtool.machine.model import Machine
 from camtool.planning.items import Contour
 from camtool.planning.job import Job, Operation, Stock, Tool, job_of

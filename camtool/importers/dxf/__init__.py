@@ -1,1 +1,2 @@
-"""DXF drawings: `reader` is the door, `walk` visits entities, `kinds` says what comes of each."""
+"""DXF drawings: `reader` is the door, `load` gives the document, `walk` visits its entities,
+`shapes` and `text` make paths of them."""

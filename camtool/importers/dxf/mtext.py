@@ -14,7 +14,7 @@ from enum import Enum
 from itertools import groupby, pairwise
 from typing import Any
 
-from camtool.importers.dxf.shapes import Unusable
+from camtool.importers.pieces import Unusable
 from camtool.importers.text import (
     NUMBERED,
     Ink,

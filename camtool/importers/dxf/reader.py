@@ -1,6 +1,6 @@
 """DXF drawings, ASCII and binary, of any version that ezdxf knows: what a space of them shows.
 
-    bytes → load (dxf_tags, dxf_load) → walk of model space or a layout (dxf_walk) → assemble
+    bytes ──load──▶ document ──Walk of model space or a layout──▶ pieces ──assemble──▶ Drawing
 
 What cannot be used is counted with a reason: layers that are off or frozen, kinds without lines,
 entities that lack what they need.

@@ -1,4 +1,4 @@
-"""Where a DXF entity lies: the map from its world, or from the plane it is drawn in, to mm.
+"""DXF entities to paths in mm: lines and circles exact, all other curves fitted.
 
 DXF keeps flat entities in a coordinate system of their own (OCS: the arbitrary axis algorithm of
 the DXF reference, here ezdxf's), and blocks are placed by any affine map. `Frame` is that map,
@@ -19,18 +19,10 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
-from camtool.geometry.fit import (
-    BezierCurve,
-    Curve,
-    EllipseCurve,
-    Fit,
-    SplineCurve,
-    arc_vertices,
-    fit_curve,
-    split_bulges,
-)
+from camtool.geometry.curves import BezierCurve, Curve, EllipseCurve, SplineCurve
+from camtool.geometry.fit import Fit, arc_vertices, fit_curve, split_bulges
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
-from camtool.importers.pieces import MAX_COORDINATE_MM
+from camtool.importers.pieces import MAX_COORDINATE_MM, Unusable
 
 FLAT_TILT = 1e-4
 """An entity that rises by more than this share of its width is not flat: seen from above its shape
@@ -40,10 +32,6 @@ ROUND_SHARE = 1e-9
 """Half axes that differ by less, or stand less askew, make a circle."""
 
 _UPWARDS = (0.0, 0.0, 1.0)
-
-
-class Unusable(Exception):
-    """The entity gives no path; the text says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +190,7 @@ def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
     return fit_curve(curve, tolerance_mm)
 
 
-# One DXF entity to paths in mm: lines and circles exact, all other curves fitted.
+# Lines, circles, arcs, ellipses and polylines.
 
 __all__ = [
     "Frame",
@@ -388,7 +376,7 @@ def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Sh
     return Shape(np.concatenate(parts), closed, np.concatenate(off))
 
 
-# SPLINE, HELIX and text of DXF drawings to paths in mm.
+# Splines, helices and the outlines of text.
 #
 # A spline is read as the file writes it: knots and weights that do not belong to its control
 # points make it unusable, as a guess would be another curve.
@@ -480,7 +468,7 @@ def outline(parts: list[Floats], closed: bool, frame: Frame, tolerance_mm: float
     return Shape(np.concatenate(vertices), closed, np.concatenate(off))
 
 
-# HATCH, MPOLYGON, SOLID, TRACE and 3DFACE of DXF drawings: the outlines of areas, in mm.
+# The outlines of areas: HATCH, MPOLYGON, SOLID, TRACE and 3DFACE.
 
 _TEXT_BOX = 8  # flag of a boundary path that keeps a hatch off a text
 _CORNERS = ("vtx0", "vtx1", "vtx2", "vtx3")

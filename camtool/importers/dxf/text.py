@@ -19,7 +19,8 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.importers.dxf.load import printable
 from camtool.importers.dxf.mtext import write_mtext
-from camtool.importers.dxf.shapes import Unusable, require
+from camtool.importers.dxf.shapes import require
+from camtool.importers.pieces import Unusable
 from camtool.importers.text import (
     MAX_CHARACTERS,
     NUMBERED,

@@ -22,7 +22,6 @@ from camtool.importers.dxf.shapes import (
     Frame,
     Reader,
     Shape,
-    Unusable,
     arc,
     circle,
     ellipse,
@@ -38,7 +37,7 @@ from camtool.importers.dxf.shapes import (
     spline,
 )
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
-from camtool.importers.pieces import Piece
+from camtool.importers.pieces import Piece, Unusable
 
 MAX_NESTING = 50
 """Blocks within blocks, at most."""
@@ -289,7 +288,7 @@ def _source(entity: Any, scope: Scope | None) -> str:
     return f"{entity.dxftype()} {entity.dxf.handle}{scope.within if scope is not None else ''}"
 
 
-# What becomes of each kind of DXF entity: its reader, the parts it is made of, or why not.
+# What becomes of each kind of entity: its reader, the parts it is made of, or why it is not used.
 
 READERS: dict[str, Reader] = {
     "3DFACE": face,

@@ -1,13 +1,14 @@
 """Lists of points: CSV and its kin, JSON, NumPy's files and the Matlab router's arrays.
 
-    text     one point a line; `points_text` says how
-    JSON     strokes of [x, y]; `points_json`
-    .npy     one array (n, 2), or (n, 3) with bulges; .npz: one array per stroke; `points_numpy`
-    .m       the arrays xy, lxy and velxy in tenths of a millimetre; `points_matlab`
+    text     one point a line
+    JSON     strokes of [x, y]
+    .npy     one array (n, 2), or (n, 3) with bulges; .npz: one array per stroke
+    .m       the arrays xy, lxy and velxy in tenths of a millimetre (`matlab`)
 
-The content says which. A stroke is closed when the file says so or when its last point is its
-first. Numbers are mm unless the file or the caller names another unit. Every fault is an error
-with its line (or its row in an array). Nothing in a file is ever run or unpickled.
+The content says which; `tables` has all but the last. A stroke is closed when the file says so
+or when its last point is its first. Numbers are mm unless the file or the caller names another
+unit. Every fault is an error with its line (or its row in an array). Nothing in a file is ever run
+or unpickled.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ import numpy as np
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.fit import split_bulges
-from camtool.importers.assemble import Piece, assemble
+from camtool.importers.assemble import assemble
 from camtool.importers.options import ReadOptions
+from camtool.importers.pieces import Piece
 from camtool.importers.points.matlab import is_matlab, parse_matlab
 from camtool.importers.points.tables import (
     NPY_START,

@@ -1,4 +1,4 @@
-"""The record that every reader of points makes, before units are known."""
+"""Points as text, as JSON and in NumPy's files, each to strokes whose unit is not known yet."""
 
 from __future__ import annotations
 
@@ -299,9 +299,9 @@ def _not_finite(name: str) -> bool:
 
 # Points as JSON, one of
 #
-# [[x, y], ...]                   one stroke
-# [[[x, y], ...], ...]            strokes
-# {"units": "mm", "strokes": [{"points": [[x, y], ...], "closed": true, "layer": "CUT"}]}
+#     [[x, y], ...]                   one stroke
+#     [[[x, y], ...], ...]            strokes
+#     {"units": "mm", "strokes": [{"points": [[x, y], ...], "closed": true, "layer": "CUT"}]}
 
 _FILE_KEYS = ("units", "strokes")
 _STROKE_KEYS = ("points", "closed", "layer")

@@ -1,1 +1,2 @@
-"""Solid models by OpenCASCADE, in a process of its own: `reader` is the door."""
+"""Solid models by OpenCASCADE: `reader` is the door, `worker` a process of its own, in which
+`bodies` reads the model and `outline` draws it."""

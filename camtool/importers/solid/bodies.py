@@ -1,4 +1,4 @@
-"""What the readers of solids share: bodies with their names and colours.
+"""Solid models to bodies with their names and colours: STEP, BREP, and build123d scripts.
 
 `TopoDS_Shape` and all else of OpenCASCADE has no types for Python: it is `Any` here.
 """
@@ -128,9 +128,9 @@ def _listed(explorer: Any) -> Iterator[Any]:
         explorer.Next()
 
 
-# STEP and BREP files to bodies with their names and colours, by OpenCASCADE alone.
+# STEP and BREP files, by OpenCASCADE alone.
 #
-# This is the kernel under build123d, which itself takes four times as long to load.
+# It is the kernel under build123d, which itself takes four times as long to load.
 
 _AGAIN = "export it again as STEP (AP214 or AP242)"
 
@@ -262,7 +262,7 @@ def _name(label: Any) -> str:
     return str(TCollection_AsciiString(name.Get()).ToCString())
 
 
-# A build123d script is run, and what it leaves is the model.
+# Scripts. A build123d script is run, and what it leaves is the model.
 #
 # It may leave `part`, `sketch` or `result`: a shape, a list of shapes, or one of the builders.
 # `__name__` is not "__main__", so that what a script does only when it is started itself (showing

@@ -1,4 +1,4 @@
-"""Which faces of a model are drawn, and their outer and inner wires.
+"""Which faces of a model are drawn, and their outer and inner wires as lines and arcs.
 
 A face is level when it is plane and its normal is vertical. Of a solid the highest level face
 that looks up is taken (and those beside it at the same height), or the faces that the plane of
@@ -200,9 +200,9 @@ def _box(shape: Any) -> tuple[float, ...]:
 
 # Edges of OpenCASCADE in a level plane to lines and arcs in x and y.
 #
-# line, circle                     exact
-# ellipse, B-spline, Bézier        fitted; their numbers are taken over
-# all others                       fitted by asking OpenCASCADE for points and tangents
+#     line, circle                     exact
+#     ellipse, B-spline, Bézier        fitted; their numbers are taken over
+#     all others                       fitted by asking OpenCASCADE for points and tangents
 
 LEVEL_RAD = 1e-6
 """A face or a circle whose axis leaves the vertical by no more is level: 1 nm over 1 mm."""

@@ -37,9 +37,10 @@ from camtool.findings import (
 )
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.importers.assemble import Piece, assemble
+from camtool.importers.assemble import assemble
 from camtool.importers.formats import is_brep, is_step, text_head
 from camtool.importers.options import ReadOptions
+from camtool.importers.pieces import Piece
 
 _AGAIN = "export it again as STEP (AP214 or AP242)"
 _STEP_END = b"END-ISO-10303-21"
@@ -130,7 +131,7 @@ def _chosen(found: dict[str, Any], scale: float, height: float | None) -> list[F
     return [sentence(measured=high, heights=heights, bottom=bottom, top=top)]
 
 
-# Runs `worker` in a process of its own and takes over what it found.
+# `worker` in a process of its own: started, and what it found taken over.
 
 FILE_SECONDS = 60.0
 """A STEP or BREP file may take so long, and SECONDS_PER_MB more for its size: damaged ones can

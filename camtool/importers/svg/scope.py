@@ -1,4 +1,4 @@
-"""What holds for an element of an SVG by its place in the document."""
+"""What holds for an element of an SVG by its place in the document: map, style, layer, frame."""
 
 from __future__ import annotations
 

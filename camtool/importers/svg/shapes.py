@@ -1,4 +1,4 @@
-"""Subpaths of SVG shapes.
+"""Path data and basic shapes of SVG to subpaths.
 
 A subpath is a start and segments in user units, Y down as in the file:
 
@@ -109,7 +109,7 @@ def _pair(z: complex) -> Floats:
     return np.array([z.real, z.imag])
 
 
-# The path data of SVG as subpaths.
+# Path data.
 #
 # The words of path data are checked here to the letter: what stands before the first wrong sign is
 # drawn, as the standard wants it, and the fault is told. Lines and arcs are done with that; the
@@ -342,7 +342,7 @@ def _pairs(points: list[complex] | tuple[complex, ...]) -> Floats:
     return np.array(points, dtype=np.complex128).view(np.float64).reshape(-1, 2)
 
 
-# The basic shapes of SVG as subpaths, in user units.
+# The basic shapes, in user units.
 #
 # Source: Scalable Vector Graphics 1.1, chapter 9 (basic shapes); 4.2 for lengths.
 

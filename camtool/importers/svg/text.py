@@ -20,7 +20,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.importers.dxf.shapes import Unusable
+from camtool.importers.pieces import Unusable
 from camtool.importers.svg.scope import is_for_us
 from camtool.importers.svg.shapes import Bezier, Lengths, Lines, Segment, Subpath
 from camtool.importers.svg.style import Style

@@ -1,4 +1,4 @@
-"""Numbers of SVG attributes and affine maps.
+"""Numbers of SVG attributes, affine maps and transform lists.
 
     ( x' )   ( a c ) ( x )   ( e )
     ( y' ) = ( b d ) ( y ) + ( f )

@@ -1,4 +1,4 @@
-"""An SVG file as a tree of nodes, each knowing its line and its parent.
+"""The bytes of an SVG file to a tree of nodes, each knowing its line and its parent.
 
 The tree is read as a stream over defusedxml. Document types are let pass (old programs write
 one), and so are short entities that stand for plain text (Adobe Illustrator writes them for its
@@ -238,11 +238,11 @@ def _attributes(attributes: dict[str, str]) -> dict[str, str]:
 
 # The bytes of an SVG file, made ready for the XML parser.
 #
-# gzip (.svgz)           unpacked, up to MAX_BYTES
-# UTF-16, Shift-JIS, ...  decoded by what the file says of itself, and given on as UTF-8
-# <!DOCTYPE ... "url">   the reference to the outside is blotted out: nothing may be fetched, and
-#                        an entity that only the outside could define is an error then, where
-#                        expat would have left it out of an attribute without a word
+#     gzip (.svgz)            unpacked, up to MAX_BYTES
+#     UTF-16, Shift-JIS, ...  decoded by what the file says of itself, and given on as UTF-8
+#     <!DOCTYPE ... "url">    the reference to the outside is blotted out: nothing may be fetched,
+#                             and an entity that only the outside could define is an error then,
+#                             where expat would have left it out of an attribute without a word
 
 MAX_BYTES = 200_000_000
 """A larger SVG file (unpacked) is refused: its tree would not fit into memory."""
