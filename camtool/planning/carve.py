@@ -13,6 +13,11 @@ tip stops where it no longer fits). Where the depth of the operation or the widt
 not allow more, walls are cut at that depth, and the floor between them is left and reported: a
 pocket with a flat tool clears it.
 
+A disc of radius ρ in the region is what the bit cuts at the surface. `grooves` are stretches of
+the medial axis with low ≤ ρ ≤ high; where discs are larger than `high`, the `walls` run beside the
+boundary at that distance. Together they are where the middle of the largest disc allowed runs when
+it rolls along the boundary.
+
 What is cut is right to `CARVE_TOLERANCE_MM`: all vertices lie on the medial axis or on the
 parallel curve, exact to rounding; lines and arcs between them leave the axis, sideways and in
 radius together, by no more than the tolerance; twigs that would reach no farther are left out.
@@ -271,14 +276,6 @@ def _limited(
         )
 
 
-# The pieces of a carved region: where the tip of a V bit runs, at the radius that it cuts.
-#
-# A disc of radius ρ in the region is what a cone cuts at the surface when its tip is as deep as ρ
-# asks. `grooves` are stretches of the medial axis with low ≤ ρ ≤ high; where discs are larger than
-# `high`, the `walls` run beside the boundary at that distance. Together they are where the middle
-# of the largest disc allowed runs when it rolls along the boundary.
-
-
 @dataclass(frozen=True)
 class Band:
     """Radii mm from `low` to `high`, what the pass before has left and what this one may cut; and
@@ -422,16 +419,6 @@ def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
     return float((aside + np.abs(inner[:, 2] - radius)).max())
 
 
-# Pieces of a carved region as a graph: twigs that cut nothing go, and the rest is walked.
-#
-#     pieces ──ends that meet──▶ graph ──twigs off──▶ graph ──as few walks as there can be──▶ walks
-#
-# A connected graph in which 2k places have an odd number of ends is walked in k walks (in one when
-# k is 0): it is joined by k jumps between near places to one closed walk, that is found piece by
-# piece (Hierholzer), and cut where the tool would jump. Short pieces between two such places are
-# walked twice instead, into a corner and back, which saves a jump each.
-
-
 @dataclass(frozen=True, eq=False)
 class Graph:
     """P pieces between V places: `ends` (P, 2) rows of `places` (V, 3) of x, y, rho."""
@@ -499,6 +486,11 @@ def _pieces_at(graph: Graph) -> list[list[int]]:
 
 def walks(graph: Graph, again_mm: float) -> list[Floats]:
     """All pieces, joined to as few walks (n, 4) of x, y, rho, bulge as possible.
+
+    A connected graph in which 2k places have an odd number of ends is walked in k walks (in one
+    when k is 0): it is joined by k jumps between near places to one closed walk, that is found
+    piece by piece (Hierholzer), and cut where the tool would jump. Short pieces between two such
+    places are walked twice instead, into a corner and back, which saves a jump each.
 
     Pieces up to `again_mm` long may be walked twice. A walk begins at that of its ends where the
     disc is smaller.

@@ -1,4 +1,4 @@
-"""Checks of a whole toolpath before anything is written: travel, stock, rapids, tools, feeds.
+"""Checks before anything is written: travel, stock, rapids, tools, feeds; what looks forgotten.
 
 Everything that is cut lies below the stock top, z < 0. The stock, where the job knows one, ends at
 its sides and at its thickness; beside it is air, so leads and overrun may go there, and so may
@@ -46,6 +46,9 @@ FEED_TOLERANCE = 1e-6
 
 MOST_LISTED = 10
 """So many rapids are listed; the last one says how many more there are."""
+
+IN_PASSES = ("profile", "pocket", "engrave")
+"""Kinds of operation that go down in passes, each of one depth."""
 
 AXES = "XYZ"
 Box = tuple[float, float, float, float]
@@ -261,23 +264,18 @@ def _place(toolpath: Toolpath, row: int) -> str:
     return f"move {row} ({source})" if source else f"move {row}"
 
 
-# What of a cut looks forgotten or too bold: said in one sentence, for the program does it.
-#
-# Only where the program starts the spindle is a missing speed a doubt, and a point that follows
-# closed contours, and a plunge at the feed of the cut: other machines engrave with points, and
-# their spindles turn by hand.
-
-IN_PASSES = ("profile", "pocket", "engrave")
-"""Kinds of operation that go down in passes, each of one depth."""
-
-
 def doubts(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
-    """One finding for all that is doubtful about the operations that cut something; none when
-    all is well. `starts_spindle`: the program starts the spindle."""
+    """One finding for all that looks forgotten or too bold in the operations that cut something;
+    none when all is well.
+
+    Only where the program starts the spindle (`starts_spindle`) is a missing speed a doubt, and a
+    point that follows closed contours, and a plunge at the feed of the cut: other machines engrave
+    with points, and their spindles turn by hand.
+    """
     cutting = [step for step in steps if step.runs]
     said: dict[str, list[Step]] = defaultdict(list)
     for step in cutting:
-        for doubt in _of(step, starts_spindle):
+        for doubt in _doubts_of(step, starts_spindle):
             said[doubt].append(step)
     if not said:
         return []
@@ -288,7 +286,7 @@ def doubts(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
     return [CUT_DOUBTFUL(doubts="; ".join(parts))]
 
 
-def _of(step: Step, starts_spindle: bool) -> Iterator[str]:
+def _doubts_of(step: Step, starts_spindle: bool) -> Iterator[str]:
     """What is doubtful about an operation, each with the flag that mends it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = tool.radius_mm + operation.allowance_mm > 0.0

@@ -1,13 +1,10 @@
-"""Contour-parallel ways of a pocket: rings from the middle outwards, in one stroke.
+"""Ways that clear a region in the plane: rings or a zigzag, slots, and the links between strokes.
 
-The region here is that of the tool's middle: the pocket shrunk by the tool's radius r. It is
-shrunk again and again by the step s, and each boundary is a ring. What lies between two rings is
-nearer than s to the outer one; so for s up to r nothing is left over, whatever the shape. For a
-longer step the tool would miss what is farther than r both from the outer ring and from all that
-lies within the inner one. There it also follows the boundary of the region shrunk by r, as far
-as that is farther than r from the inner ring: the *tips*. They reach into corners and cores.
+    region of the tool's middle ──rings from the middle outwards──▶ strokes ┐
+                                ──straight lines at an angle──────▶ strokes ┴──linked──▶ way
 
-Regions fall apart as they shrink: they form a tree. A region is cut after all that came of it.
+The region of the tool's middle is the pocket shrunk by the tool's radius. Nothing of the pocket is
+left over: `ring_cells` and `zigzag_ways` say why. Links (`route`) never leave the region.
 """
 
 from __future__ import annotations
@@ -45,6 +42,33 @@ from camtool.planning.paths import Along, joined, middles, runs_of_true
 SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Parts of the step that are tried where it leaves tips: rings alone make a calmer way."""
 
+MOST_MARGIN = 0.5
+"""The most that is left for the ring round the walls, over the tool's radius."""
+
+SLOT_TOLERANCE = 1e-3
+"""A slot narrower than the tool by up to this part of its diameter counts as wide as the tool."""
+
+HAIRS = (1e-5, 1e-4, 3e-4, SLOT_TOLERANCE)
+"""Parts of the diameter by which the tool is taken thinner, in turn."""
+
+ALL_OF_IT = 0.98
+"""A thinner hair is taken when it shows this part of the length that the tolerance shows."""
+
+BEYOND = 3.0
+"""How far from the region of the true tool a slot begins, in hairs: sharp corners reach out."""
+
+SLOT_LEAST = 0.5
+"""The shortest band, all round, that counts as a slot, over the tool's diameter."""
+
+BAND_PLACES = 200
+"""In how many places a band is measured."""
+
+ON_LINE_MM = 5e-6
+"""A place this near to the boundary of a region is still in it."""
+
+POLE_SHARE = 0.01
+"""How near to the true middle of a region its middle is looked for, over its extent."""
+
 
 @dataclass(eq=False)
 class Cell:
@@ -70,7 +94,15 @@ class Steps:
 
 
 def ring_cells(region: Polylines, steps: Steps) -> Cell:
-    """The tree of regions of one connected region of the tool's middle."""
+    """The tree of regions of one connected region of the tool's middle.
+
+    It is shrunk again and again by the step s, and each boundary is a ring. What lies between two
+    rings is nearer than s to the outer one; so for s up to the tool's radius r nothing is left
+    over, whatever the shape. For a longer step the tool would miss what is farther than r both
+    from the outer ring and from all that lies within the inner one. There it also follows the
+    boundary of the region shrunk by r, as far as that is farther than r from the inner ring: the
+    *tips*. They reach into corners and cores. Regions fall apart as they shrink: they form a tree.
+    """
     root = Cell(Rails(region))
     waiting, order = [root], []
     while waiting:
@@ -109,7 +141,8 @@ def _tips(core: Polylines, shrunk: Polylines, steps: Steps) -> list[Polyline]:
 
 
 def ring_ways(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
-    """(n, 3) x, y, bulge: an open path over all rings, and the cell that it begins in.
+    """(n, 3) x, y, bulge: an open path over all rings, and the cell that it begins in. A region is
+    cut after all that came of it.
 
     Several paths only where rounding hides the way from one ring to the next (`Way`).
     """
@@ -151,19 +184,6 @@ def _pick(cells: list[Cell], here: Floats | None) -> int:
     return int(np.argmin(apart))
 
 
-# Zig-zag ways of a pocket: straight strokes at an angle, to and fro, and rings round the walls.
-#
-# The region of the tool's middle is shrunk by a margin m and cut by parallel lines, h apart. Their
-# pieces within it are the strokes; then the boundary of the whole region is followed, which takes
-# the margin off the walls. Nothing is left over when  h/2 + m ≤ r,  the tool's radius: the line
-# nearest to a place of the shrunk region is no farther than h/2, and if the way straight to it
-# leaves the shrunk region, that is within h/2, and so the wall's ring within h/2 + m. Every other
-# place is within m of that ring.
-
-MOST_MARGIN = 0.5
-"""The most that is left for the ring round the walls, over the tool's radius."""
-
-
 @dataclass(frozen=True)
 class Scan:
     """Distance of the strokes and radius of the tool, mm, and the angle of the strokes; whether
@@ -190,6 +210,13 @@ class Strokes:
 
 def zigzag_ways(region: Polylines, scan: Scan) -> list[Floats]:
     """(n, 3) x, y, bulge: an open path over all strokes and rings of one connected region.
+
+    The region is shrunk by a margin m and cut by parallel lines, h apart. Their pieces within it
+    are the strokes; then the boundary of the whole region is followed, which takes the margin off
+    the walls. Nothing is left over when  h/2 + m ≤ r,  the tool's radius: the line nearest to a
+    place of the shrunk region is no farther than h/2, and if the way straight to it leaves the
+    shrunk region, that is within h/2, and so the wall's ring within h/2 + m. Every other place is
+    within m of that ring.
 
     Several paths only where rounding hides the way from one stroke to the next (`Way`).
     """
@@ -275,33 +302,14 @@ def _neighbours(strokes: Strokes) -> list[list[int]]:
     return beside
 
 
-# Slots as wide as the tool, where the region of its middle is a line and has no area.
-#
-# With a tool thinner by a hair the region of the middle is a band as thin as that hair. What of it
-# lies beyond the region of the true tool is a slot. Of the hairs that show all of the slots the
-# thinnest is taken, so that the band is the middle of the slot as near as can be.
-
-SLOT_TOLERANCE = 1e-3
-"""A slot narrower than the tool by up to this part of its diameter counts as wide as the tool."""
-
-HAIRS = (1e-5, 1e-4, 3e-4, SLOT_TOLERANCE)
-"""Parts of the diameter by which the tool is taken thinner, in turn."""
-
-ALL_OF_IT = 0.98
-"""A thinner hair is taken when it shows this part of the length that the tolerance shows."""
-
-BEYOND = 3.0
-"""How far from the region of the true tool a slot begins, in hairs: sharp corners reach out."""
-
-SLOT_LEAST = 0.5
-"""The shortest band, all round, that counts as a slot, over the tool's diameter."""
-
-STEPS = 200
-"""In how many places a band is measured."""
-
-
 def slot_ways(region: Polylines, tool_radius_mm: float) -> list[Floats]:
-    """(n, 3) x, y, bulge: open paths along the middles of slots as wide as the tool."""
+    """(n, 3) x, y, bulge: open paths along the middles of slots as wide as the tool, where the
+    region of its middle is a line and has no area.
+
+    With a tool thinner by a hair the region of the middle is a band as thin as that hair. What of
+    it lies beyond the region of the true tool is a slot. Of the hairs that show all of the slots
+    the thinnest is taken, so that the band is the middle of the slot as near as can be.
+    """
     diameter = 2.0 * tool_radius_mm
     widest = _bands(region, tool_radius_mm, SLOT_TOLERANCE * diameter)
     if not widest:
@@ -333,7 +341,7 @@ def _covered(path: Polyline, others: list[Polyline], near_mm: float) -> bool:
     """Whether all of a path runs beside others: it is the other edge of a band."""
     if not others:
         return False
-    points = sample(path, length(path) / STEPS)
+    points = sample(path, length(path) / BAND_PLACES)
     return bool((nearest(points, Segments.of(Polylines.of(others))).distance <= near_mm).all())
 
 
@@ -343,7 +351,7 @@ def _once(band: Polyline, near_mm: float) -> Polyline:
         return band
     along = Along.of(band)
     half = 0.5 * along.total_mm
-    at = np.arange(STEPS) / STEPS * half
+    at = np.arange(BAND_PLACES) / BAND_PLACES * half
     begin = float(at[np.hypot(*(along.at(at) - along.at(at + half)).T).argmax()])
     one = Polyline(along.piece(begin, begin + half))
     other = Polyline(along.piece(begin + half, begin + 2.0 * half))
@@ -356,9 +364,6 @@ def _without_specks(vertices: Floats, speck_mm: float) -> Floats:
     """An open path (n, 3) without segments as short as a band is wide: they lead across it."""
     step = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
     return np.asarray(vertices[np.concatenate([step > speck_mm, [True]])])
-
-
-# The way of the tool through a pocket, collected stroke by stroke, with the links between.
 
 
 class Way:
@@ -433,17 +438,6 @@ def _chained(parts: list[Floats]) -> Floats:
     return tidy(joined(parts))
 
 
-# Ways for the tool between two places of a region, at depth, that never leave the region.
-#
-# A straight line leaves a region through one of its paths and comes back through the same one:
-# each path has the region on its left and one connected piece of what is not the region on its
-# right. So the way goes straight, and where the line is outside it follows that path, the shorter
-# way round.
-
-ON_LINE_MM = 5e-6
-"""A place this near to the boundary of a region is still in it."""
-
-
 @dataclass(frozen=True, eq=False)
 class Rails:
     """A connected region on the left of its closed paths, made ready for ways in it."""
@@ -504,6 +498,11 @@ def _length_to(point: Floats, segments: Segments, row: int) -> float:
 def route(start: Floats, end: Floats, rails: Rails) -> Floats | None:
     """(k, 3) x, y, bulge from one place (2,) of a connected region to another, staying in it.
 
+    A straight line leaves a region through one of its paths and comes back through the same one:
+    each path has the region on its left and one connected piece of what is not the region on its
+    right. So the way goes straight, and where the line is outside it follows that path, the
+    shorter way round.
+
     None when rounding hides where the straight line goes out or in, or the two places are not in
     one connected region.
     """
@@ -550,14 +549,9 @@ def tidy(vertices: Floats) -> Floats:
     return kept
 
 
-# The connected parts of a region whose paths are oriented already, and their middles.
-
-POLE_SHARE = 0.01
-"""How near to the true middle of a region its middle is looked for, over its extent."""
-
-
 def parts_of(lines: Polylines) -> list[Polylines]:
-    """Each outer path (CCW) with the holes (CW) in it: the smallest outer one around each."""
+    """The connected parts of a region whose paths are oriented already: each outer path (CCW) with
+    the holes (CW) in it, the smallest outer one around each."""
     if len(lines) == 0:
         return []
     areas = signed_areas(lines)
@@ -591,9 +585,6 @@ def pole(region: Polylines) -> Floats:
     holes = [ring for row, ring in enumerate(rings) if row != outer and len(ring) > 2]
     circle = shapely.maximum_inscribed_circle(shapely.Polygon(rings[outer], holes), fine)
     return np.asarray(shapely.get_coordinates(circle)[0], dtype=np.float64)
-
-
-# Paths cut by a region, exact with arcs: what of them is within it, or outside.
 
 
 def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:

@@ -35,6 +35,12 @@ from camtool.planning.ramps import (
 )
 from camtool.planning.tabs import Tab, bridges_of, raised, tabs_of
 
+START_SNAP_MM = 1e-3
+"""A start nearer than this to a vertex is that vertex: no move shorter than it is made."""
+
+START_CORNER_RAD = 0.1
+"""A path that turns by more than this at a vertex has a corner there."""
+
 Heights = tuple[float | None, list[Tab]]
 """What decides the height of the tool: the angle of its ramps (None: it plunges), and the tabs."""
 
@@ -160,15 +166,6 @@ def _slope(contour: Contour, along: Along) -> tuple[float | None, list[Finding]]
         length=along.total_mm,
     )
     return None, [finding]
-
-
-# Where a closed contour may begin, by rule or by hand.
-
-START_SNAP_MM = 1e-3
-"""A start nearer than this to a vertex is that vertex: no move shorter than it is made."""
-
-START_CORNER_RAD = 0.1
-"""A path that turns by more than this at a vertex has a corner there."""
 
 
 def with_starts(

@@ -1,4 +1,4 @@
-"""What was drawn, for each row of a plan: how far it lies from it, and the edge that it cuts.
+"""What was drawn, for each row of a plan: how far off it lies, the edge it cuts, what must stay.
 
 A row stands for the lines of its operation that are nearest to it: a tool that runs beside a line
 has no other line nearer than that one. What was drawn lies off this line by as much as reading
@@ -74,9 +74,11 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
 
 def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
     """(R, 2) how far what was drawn lies from the lines that the rows were planned along, mm."""
-    from camtool.planning.carve import CARVE_TOLERANCE_MM
+    made = 0.0
+    if step.operation.kind == "vcarve":
+        from camtool.planning.carve import CARVE_TOLERANCE_MM
 
-    made = CARVE_TOLERANCE_MM if step.operation.kind == "vcarve" else 0.0
+        made = CARVE_TOLERANCE_MM
     found = np.full((len(rows), 2), made)
     lines = step.chosen.lines
     of = placed.off_mm[_vertex_rows(placed.paths, step.chosen.source)]
@@ -175,15 +177,13 @@ def _carved(points: Floats, cone: Cone) -> Floats:
     )
 
 
-# What the runs of a plan must leave of the material, as the drawing has it.
-#
-# A profile leaves the part, a pocket and a carving what is outside of their region; engraving and
-# drilling leave nothing in particular. Where reliefs go into the corners of the part, they are
-# meant to, and nothing is said of that operation.
-
-
 def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:
-    """All runs of a plan, with what they must leave."""
+    """All runs of a plan, with what they must leave of the material, as the drawing has it.
+
+    A profile leaves the part, a pocket and a carving what is outside of their region; engraving
+    and drilling leave nothing in particular. Where reliefs go into the corners of the part, they
+    are meant to, and nothing is said of that operation.
+    """
     return tuple(each for step in steps for each in _kept(step))
 
 

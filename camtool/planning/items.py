@@ -143,14 +143,13 @@ class Bridge:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What became of one operation: its setting, what it took, its items as the operation made
-    them, the runs in order of cutting with the item that each is of, how far rapids go in XY: as
-    drawn, and as ordered, mm; and the bridges that its tabs leave."""
+    """What became of one operation: its setting, what it took, the runs in order of cutting with
+    the item that each is of, how far rapids go in XY: as drawn, and as ordered, mm; and the
+    bridges that its tabs leave."""
 
     operation: Operation
     setting: Setting
     chosen: Chosen
-    work: Work
     runs: tuple[Run, ...]
     owners: tuple[Item, ...]
     findings: tuple[Finding, ...]

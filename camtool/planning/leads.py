@@ -29,13 +29,10 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
 from camtool.planning.naming import at_place
-from camtool.planning.paths import Along, backwards
+from camtool.planning.paths import QUARTER, Along, backwards
 
 LEAD_SLACK_MM = 1e-5
 """A lead may come nearer to wanted material than the tool's radius by this much."""
-
-QUARTER = math.tan(math.pi / 8.0)
-"""The bulge of a quarter of a circle."""
 
 LEAD_HALVINGS = 4
 """So often a lead that does not fit is halved before it is left out."""

@@ -23,6 +23,9 @@ from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turned
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments
 
+QUARTER = math.tan(math.pi / 8.0)
+"""The bulge of a quarter of a circle."""
+
 LARGEST_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
 """Arcs are not put together beyond this, except a whole circle: an end near the start could be
 taken for the other side of it."""

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,19 +28,33 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
+from camtool.planning.checks import checked
+from camtool.planning.contours import runs_of, with_starts
+from camtool.planning.drawn import drawn_of
+from camtool.planning.drill import drill
+from camtool.planning.engrave import engrave
+from camtool.planning.gouges import side_findings
 from camtool.planning.items import Bridge, Chosen, Contour, Item, Run, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
+from camtool.planning.leads import KeepOut
 from camtool.planning.link import Worked, link, settled
 from camtool.planning.naming import key_of
+from camtool.planning.order import (
+    Point,
+    best_order,
+    choices_of,
+    chosen_path,
+    drawn,
+    must_precede,
+    travel_mm,
+)
 from camtool.planning.place import SCALE_SHARE, collapsed, place
+from camtool.planning.profile import profile
 from camtool.planning.settings import safe_z_of, setting_of
 from camtool.planning.sides import Sides, choose
+from camtool.planning.tabs import spared, with_tabs
 from camtool.toolpath.moves import Toolpath
 
-if TYPE_CHECKING:
-    from camtool.planning.leads import KeepOut
-
-Point = tuple[float, float]
 HOME: Point = (0.0, 0.0)
 
 MOST_OVERLAPS = 20
@@ -72,9 +85,6 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     are whole again, those that stay whole are cut from the starts that were chosen for them (on
     which their ramps, leads and tabs depend), and nothing is approached.
     """
-    from camtool.planning.checks import checked
-    from camtool.planning.drawn import drawn_of
-
     placed = place(drawing, job)
     sides = Sides.of(placed, job, machine.defaults.cut_depth_mm)
     here: Point = HOME
@@ -128,32 +138,17 @@ def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:
         )
 
 
-def work_of(chosen: Chosen, setting: Setting) -> Work:
-    """The items that the operation makes of its paths."""
-    return _kind(setting.operation.kind)(chosen, setting)
-
-
 def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
-    """Imported where it is used: carving needs more than engraving."""
+    """What makes items of the paths; pockets and carvings need more, imported where it is used."""
     if kind == "pocket":
         from camtool.planning.pocket import pocket
 
         return pocket
-    if kind == "engrave":
-        from camtool.planning.engrave import engrave
-
-        return engrave
-    if kind == "drill":
-        from camtool.planning.drill import drill
-
-        return drill
     if kind == "vcarve":
         from camtool.planning.carve import vcarve
 
         return vcarve
-    from camtool.planning.profile import profile
-
-    return profile
+    return {"profile": profile, "engrave": engrave, "drill": drill}[kind]
 
 
 def _step(
@@ -166,20 +161,8 @@ def _step(
 ) -> Step:
     """One operation from what it takes to its runs, for a tool that comes from the first point
     of its `way` and goes to the second (None: stays)."""
-    from camtool.planning.contours import runs_of
-    from camtool.planning.gouges import side_findings
-    from camtool.planning.order import (
-        best_order,
-        choices_of,
-        chosen_path,
-        drawn,
-        must_precede,
-        travel_mm,
-    )
-    from camtool.planning.tabs import with_tabs
-
     chosen = choose(placed, setting.operation, sides)
-    work = work_of(chosen, setting)
+    work = _kind(setting.operation.kind)(chosen, setting)
     items: tuple[Item, ...] = tuple(_with_starts(item) for item in work.items)
     items, bare = with_tabs(items)
     findings = [*work.findings, *side_findings(work, chosen, sides, setting.operation), *bare]
@@ -211,7 +194,6 @@ def _step(
         operation=setting.operation,
         setting=setting,
         chosen=chosen,
-        work=work,
         runs=tuple(runs),
         owners=tuple(owners),
         findings=tuple(findings),
@@ -235,8 +217,6 @@ def _sparing(steps: list[Step]) -> list[Step]:
     bridges = [bridge for step in steps for bridge in step.bridges]
     if not bridges:
         return steps
-    from camtool.planning.tabs import spared
-
     made = []
     for step in steps:
         kept = spared(step.runs, step.operation, step.setting.feeds, bridges)
@@ -272,8 +252,6 @@ def _refuse_endless(items: tuple[Item, ...], setting: Setting) -> None:
 def _walls(placed: Drawing, job: Job, operation: Operation) -> KeepOut:
     """The closed lines that ways to and from a contour must leave alone: those of the operation
     itself, and those that any operation makes walls of."""
-    from camtool.planning.leads import KeepOut
-
     makers = [each for each in job.operations if each.kind in ("profile", "pocket")]
     names = list(zip(placed.layers, placed.colours, strict=True))
     own = np.array([operation.takes(*name) for name in names], dtype=np.bool_)
@@ -289,8 +267,6 @@ def _with_starts(item: Item) -> Item:
     operation = item.setting.operation
     if operation.start == "nearest":
         return item
-    from camtool.planning.contours import with_starts
-
     path, starts = with_starts(item.path, operation.start, operation.tool.radius_mm)
     return replace(item, path=path, starts=starts)
 

@@ -8,7 +8,9 @@ the teeth go with the feed (climb): round walls CCW and round islands CW, as a s
 wants it. "conventional" is the other way; "drawn" is climb too, because no ring is drawn.
 
 The tool goes down once for each connected region of its middle, and stays at depth between rings:
-links run within that region, so they cut nothing that is to stay.
+links run within that region, so they cut nothing that is to stay. At each level it goes down from
+the floor of the level before (at first from the stock's top), follows the way, and comes back over
+the new floor to where it goes down again.
 """
 
 from __future__ import annotations
@@ -49,13 +51,28 @@ from camtool.planning.clearing import (
 )
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
-from camtool.planning.naming import at_place, tool_name
+from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import Along, joined
 from camtool.planning.ramps import feeds_along
 from camtool.planning.reach import unreached_findings
 
 MOST_WAYS = 10_000
 """More steps than this across a pocket are taken as a mistake."""
+
+HELIX_MOST = 0.5
+"""The largest radius of a helix when none is asked for, over the tool's radius."""
+
+HELIX_LEAST = 0.1
+"""The smallest radius of a helix that is worth it, over the tool's radius."""
+
+HELIX_MOST_TURNS = 200
+"""A helix of more turns than this at one level is not made."""
+
+RAMP_MOST_LAPS = 20
+"""A ramp that would go to and fro on the whole way more often than this becomes a plunge."""
+
+Link = Callable[[Floats, Floats], Floats | None]
+"""From a place (2,) to another: (k, 3) over the floor, or None when there is no way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,11 +181,11 @@ def _ways(part: Polylines, operation: Operation) -> Iterator[tuple[Floats, Rails
 
 def _check(chosen: Chosen, operation: Operation) -> None:
     """OptionError for what cannot be a pocket."""
-    where = f"operation {operation.name or operation.kind!r}"
+    where = operation_name(operation)
     if operation.tool.radius_mm == 0.0 and len(chosen.lines):
         raise OptionError(
             "a pocket needs a tool that cuts a width",
-            where=f"{where}, key tool",
+            where=key_of(operation, "tool"),
             mend="give the tool a diameter",
         )
     if not chosen.lines.closed.all():
@@ -200,7 +217,7 @@ def _check_step(chosen: Chosen, operation: Operation) -> None:
     if size > MOST_WAYS * step:
         raise OptionError(
             f"steps of {step:g} mm go more than {MOST_WAYS} times into {size:g} mm",
-            where=f"operation {operation.name or operation.kind!r}, key step_over",
+            where=key_of(operation, "step_over"),
             mend="give a larger step-over, or a larger tool",
         )
 
@@ -225,27 +242,6 @@ def _slot(each: Pocket, slot: Floats, operation: Operation) -> Finding:
         measured=operation.tool.diameter_mm,
         tool=tool_name(operation.tool),
     )
-
-
-# Ways of a pocket lowered to all its levels: the tool goes down straight, on a ramp or a helix.
-#
-# At each level the tool goes down from the floor of the level before (at first from the stock's
-# top), follows the way, and comes back over the new floor to where it goes down again.
-
-HELIX_MOST = 0.5
-"""The largest radius of a helix when none is asked for, over the tool's radius."""
-
-HELIX_LEAST = 0.1
-"""The smallest radius of a helix that is worth it, over the tool's radius."""
-
-HELIX_MOST_TURNS = 200
-"""A helix of more turns than this at one level is not made."""
-
-RAMP_MOST_LAPS = 20
-"""A ramp that would go to and fro on the whole way more often than this becomes a plunge."""
-
-Link = Callable[[Floats, Floats], Floats | None]
-"""From a place (2,) to another: (k, 3) over the floor, or None when there is no way."""
 
 
 @dataclass(frozen=True, eq=False)

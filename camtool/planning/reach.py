@@ -48,6 +48,10 @@ PARTING = 4.0
 times √(2 r · TOGETHER_MM), on which a disc of radius r comes off a straight wall by TOGETHER_MM:
 where it does is not seen more sharply."""
 
+CORNER_SHARE = 0.25
+"""Pieces up to this part of the tool's disc count as feet of corners, and are told together: that
+of a corner of 55 degrees is as large."""
+
 
 @dataclass(frozen=True, eq=False)
 class Unreached:
@@ -251,13 +255,6 @@ def _joined(stretches: list[Polyline]) -> list[Polyline]:
     if len(vertices) < 2 or (len(vertices) == 2 and not vertices[:, 2].any()):
         return []
     return [Polyline(vertices, closed=True)]
-
-
-# What stays uncut because the tool is too wide, in words.
-
-CORNER_SHARE = 0.25
-"""Pieces up to this part of the tool's disc count as feet of corners, and are told together: that
-of a corner of 55 degrees is as large."""
 
 
 def unreached_findings(

@@ -44,7 +44,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.planning.items import Bridge, Contour, Feeds, Item, Run
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name
-from camtool.planning.paths import Along
+from camtool.planning.paths import QUARTER, Along
 from camtool.planning.ramps import Knots, feeds_along, lifted
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
@@ -64,6 +64,9 @@ TAB_SLACK_MM = 1e-5
 
 WIDTH_ROUNDS = 8
 """How long a tab is on a bend is found among so many places, so often, each time closer."""
+
+BRIDGE_SLACK_MM = 1e-4
+"""A bridge may be cut into by this much: by rounding, where its own contour goes up and down."""
 
 
 @dataclass(frozen=True)
@@ -330,29 +333,6 @@ def _left_out(contour: Contour, along: Along, length: float) -> Finding:
     return TAB_LEFT_OUT(where=at_place(contour.name, along.at(np.array([length]))[0].tolist()))
 
 
-# The bridges that tabs leave stay whole: whatever else is cut keeps above them.
-#
-# A tab is made by the contour that it belongs to. The tool comes by again: round a neighbour that
-# is nearer than two slots are wide, on the other side of a narrow contour, on a lead, or in
-# another operation. What must stay is a rectangle, as wide as the bridge and as long as the slot
-# is wide:
-#
-#     ────────────────────────────  wall          A, B: where the tool goes up and comes down again
-#          ╭───╮ ┌─w─┐ ╭───╮                      the rectangle lies on the line through the middle
-#          │ A │ │   │ │ B │                      of the tab, square to the chord A B
-#          ╰───╯ └───┘ ╰───╯
-#
-# A tool of radius r cuts into it where its middle is nearer than r to the rectangle. There its run
-# is raised to the top of the bridge, as by a tab of its own; so the neighbour has a bridge there
-# too, which is said.
-
-BRIDGE_SLACK_MM = 1e-4
-"""A bridge may be cut into by this much: by rounding, where its own contour goes up and down."""
-
-QUARTER = math.tan(math.pi / 8.0)
-"""The bulge of a quarter of a circle."""
-
-
 def bridges_of(along: Along, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
     """The bridges of the tabs of a contour; none for a tool that cuts no width."""
     found = []
@@ -378,7 +358,22 @@ class Spared:
 def spared(
     runs: Sequence[Run], operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
 ) -> Spared:
-    """The runs of an operation, kept above all bridges."""
+    """The runs of an operation, kept above all bridges: whatever else is cut spares them.
+
+    A tab is made by the contour that it belongs to. The tool comes by again: round a neighbour
+    that is nearer than two slots are wide, on the other side of a narrow contour, on a lead, or in
+    another operation. What must stay is a rectangle, as wide as the bridge and as long as the slot
+    is wide:
+
+        ────────────────────────────  wall      A, B: where the tool goes up and comes down again
+             ╭───╮ ┌─w─┐ ╭───╮                  the rectangle lies on the line through the middle
+             │ A │ │   │ │ B │                  of the tab, square to the chord A B
+             ╰───╯ └───┘ ╰───╯
+
+    A tool of radius r cuts into it where its middle is nearer than r to the rectangle. There its
+    run is raised to the top of the bridge, as by a tab of its own; so the neighbour has a bridge
+    there too, which is said.
+    """
     if not bridges or not runs:
         return Spared(tuple(runs), ())
     reach = operation.tool.radius_mm
