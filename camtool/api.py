@@ -466,7 +466,7 @@ class Looks(TypedDict, total=False):
     crop_mm: tuple[float, float, float, float] | None
     dark: bool
     exaggerate: float
-    layers: frozenset[str]
+    layers: frozenset[str] | None
     polar: int | None
 
 

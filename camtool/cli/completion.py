@@ -268,10 +268,10 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 def _picture_layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """The layers of pictures; of several, the one after the last comma."""
-    from camtool.pictures.options import LAYERS
+    from camtool.pictures.layers import layer_names
 
     before, comma, last = incomplete.rpartition(",")
-    for name in LAYERS:
+    for name in layer_names():
         if name.startswith(last):
             yield CompletionItem(f"{before}{comma}{name}")
 

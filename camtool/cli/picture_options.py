@@ -17,7 +17,7 @@ import click
 from camtool.cli.messages import say
 from camtool.cli.options import Command, option, with_flags
 from camtool.errors import OptionError
-from camtool.pictures.options import LAYERS, NOT_UNDER_PATH, OF_DRAWINGS, OF_PREDICTIONS, chosen
+from camtool.pictures.layers import Layer, chosen, layer_names, layer_of, layers_in
 from camtool.units import parse_length
 
 if TYPE_CHECKING:
@@ -28,13 +28,6 @@ if TYPE_CHECKING:
 _PICTURE = "Picture"
 OF_ALL = ("--size", "--crop", "--dark")
 """What every still picture has."""
-
-HINTS = {
-    "swept": "; --tool-diameter says how wide the tool is (a V bit is as wide as it is deep)",
-    "travel": "; the path does not lie within the table's travel",
-    "drawing": "; there is no drawing in it",
-}
-"""Why a layer is empty, where that has a reason that is not in the drawing."""
 
 PICTURES = (".svg", ".png", ".html")
 """Kinds of pictures, by the ends of their names."""
@@ -61,6 +54,12 @@ class Canvas:
     moves: bool = True
     predicted: bool = False
     layered: bool = True
+
+    def has(self, layer: Layer) -> bool:
+        """Whether its pictures can have the layer."""
+        if layer.needs == "path":
+            return self.predicted
+        return layer.needs == "drawing" or self.moves
 
 
 DRAWING = Canvas("camtool preview --target NAME --simulate shows more", moves=False)
@@ -103,7 +102,7 @@ class PictureFlags:
         from camtool.pictures.options import Options
 
         times = 1.0 if self.exaggerate is None else self.exaggerate
-        layers = chosen(self.named, self.no_layer)
+        layers = chosen(self.named, self.no_layer) if self.named or self.no_layer else None
         return Options(self.size, self.crop, self.dark, times, layers, self.polar)
 
     def check(self, pictures: Sequence[str | None], canvas: Canvas) -> None:
@@ -138,13 +137,13 @@ class PictureFlags:
             raise click.UsageError(f"{others}: --polar plots a circle alone; drop one of them")
 
     def _check_layers(self, canvas: Canvas, options: Options) -> None:
-        covered = canvas.predicted and "path" in options.layers
+        shown = layer_names() if options.layers is None else options.layers
+        covered = canvas.predicted and "path" in shown
         for name in self.named:
-            if (name in OF_PREDICTIONS and not canvas.predicted) or (
-                name not in OF_DRAWINGS and not canvas.moves
-            ):
+            layer = layer_of(name)
+            if not canvas.has(layer):
                 raise click.UsageError(f"--layers {name}: there is none here; {canvas.more}")
-            if name in NOT_UNDER_PATH and covered and name in options.layers:
+            if not layer.under_path and covered and name in shown:
                 raise click.UsageError(
                     f"--layers {name}: it is left out where the predicted path is shown; "
                     "name it without path"
@@ -205,7 +204,7 @@ def picture_options(command: Command) -> Command:
                 _PICTURE,
                 "--layers",
                 metavar="NAME,...",
-                help=f"Only these layers: {', '.join(LAYERS)}.",
+                help=f"Only these layers: {', '.join(layer_names())}.",
             ),
             option(
                 _PICTURE,
@@ -285,7 +284,7 @@ class Painter:
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
         """What to say of layers that hold nothing, and where nothing could be judged."""
         for name in self._missing(scenes):
-            yield f"--layers {name}: nothing in this picture{HINTS.get(name, '')}"
+            yield f"--layers {name}: nothing in this picture{layer_of(name).hint}"
         for flag in ("--exaggerate", "--polar"):
             if flag in self.flags.given and not _judged(scenes):
                 yield f"{flag}: the part cannot be judged; the picture shows what is planned"
@@ -294,11 +293,11 @@ class Painter:
         named = self.flags.named
         if not named:
             return []
-        from camtool.pictures.content import missing_layers
+        from camtool.pictures.content import content_of
 
         options = self.flags.options()
-        empty = [missing_layers(scene, options, named) for scene in scenes]
-        return [name for name in named if all(name in names for names in empty)]
+        held = {name for scene in scenes for name in layers_in(content_of(scene, options))}
+        return [name for name in named if name not in held]
 
 
 def _judged(scenes: Sequence[Scene]) -> bool:

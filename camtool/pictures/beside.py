@@ -16,11 +16,10 @@ from pathlib import PurePath
 
 from camtool.errors import OptionError
 from camtool.pictures import axes, legend, polar
-from camtool.pictures.colours import DRAWING, LAYERS
-from camtool.pictures.content import Content, content_of, entries_of
+from camtool.pictures.colours import DRAWING, LAYER_COLOURS
+from camtool.pictures.content import Content, Group, content_of
 from camtool.pictures.draw import panel, rendered
-from camtool.pictures.legend import Entry
-from camtool.pictures.marks import Group
+from camtool.pictures.layers import Entry, legend_of
 from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
 from camtool.pictures.page import HEAD_GAP, LEGEND_DROP, Page, fitted, foot_of, sheet, table_of
 from camtool.pictures.polar import ROOM, dial_of, plot
@@ -111,7 +110,7 @@ def _alike(contents: Sequence[Content]) -> list[Content]:
     top_um = _top_um(contents)
     window = union([one.window for one in contents if not one.is_empty])
     names = dict.fromkeys(group.name for one in contents for group in one.groups)
-    strong = {name: LAYERS[index % len(LAYERS)] for index, name in enumerate(names)}
+    strong = {name: LAYER_COLOURS[index % len(LAYER_COLOURS)] for index, name in enumerate(names)}
 
     def coloured(group: Group) -> Group:
         pale = group.colour == DRAWING
@@ -132,7 +131,7 @@ def _entries(contents: Sequence[Content], view: View) -> list[Entry]:
     """The legend of all, each entry once; layers of drawings are named alike in all."""
     groups = {(group.name, group.colour): group for one in contents for group in one.groups}
     every = tuple(groups.values())
-    found = [entry for one in contents for entry in entries_of(replace(one, groups=every), view)]
+    found = [entry for one in contents for entry in legend_of(replace(one, groups=every), view)]
     return list(dict.fromkeys(found))
 
 

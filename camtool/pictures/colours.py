@@ -35,7 +35,7 @@ GAP = "#d5311e"
 SWEPT = "#d6e6f6"
 REVERSAL = "#8a2be2"
 
-LAYERS = ("#2b4c6f", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a")
+LAYER_COLOURS = ("#2b4c6f", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a")
 
 BINS = 24
 """Steps of the error map: fine enough to look smooth, few enough for small files."""

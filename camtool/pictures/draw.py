@@ -15,22 +15,21 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from camtool.errors import OutputError
-from camtool.pictures import axes, legend, marks, text
+from camtool.pictures import axes, legend, text
 from camtool.pictures.colours import QUIET
 from camtool.pictures.content import Content, content_of
+from camtool.pictures.layers import drawn
 from camtool.pictures.options import AS_USUAL, PNG_WIDTH_PX, SVG_WIDTH_PX, Options, check_width
 from camtool.pictures.page import Page, mat, page_of, sheet
+from camtool.pictures.plot import Plot
 from camtool.pictures.polar import draw_polar
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import Look, element, number
 from camtool.pictures.text import Style
-from camtool.pictures.trace import trace_layer
 from camtool.pictures.view import View, page_width
 
 PNG_DPI = 96
 """resvg's own default of 0 makes lengths in mm vanish."""
-
-TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 
 
 def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUAL) -> str:
@@ -86,59 +85,12 @@ def png(svg: str, width_px: int) -> bytes:
 
 
 def _plot(content: Content, view: View) -> list[str]:
-    """What lies in the plot, from the ground up."""
-    lines = [layer for layer in _lines(content, view) if layer]
-    layers = [element("g", {"id": "mm", "transform": view.matrix()}, *lines)] if lines else []
-    strokes, trace = content.strokes, content.trace
-    turns = content.reversals.tolist()
-    layers.append(marks.dots("reversals", turns, view, marks.reversal_look()))
-    if strokes is not None and trace is None:
-        layers.append(marks.arrows(content.arrows, view))
-        layers.append(marks.dots("starts", content.starts.tolist(), view, marks.start_look()))
-        plunges = strokes.plunges.tolist()
-        layers.append(marks.dots("plunges", plunges, view, marks.plunge_look()))
-    if content.zero_shown(view):
-        layers.append(marks.origin(view.page(0.0, 0.0)))
-    for name, _, places, look in content.places.looks():
-        layers.append(marks.dots(name, places.tolist(), view, look))
-    if strokes is not None and trace is None and "order" in content.shown:
-        starts = strokes.starts.tolist()
-        layers.append(marks.order(marks.placed(starts, view, marks.every(len(starts)))))
-    layers.append(marks.worst(marks.placed(content.worst.tolist(), view)))
-    if content.is_empty:
-        middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
-        layers.append(text.label("nothing to draw", middle, Style(16.0, QUIET, "middle")))
-    return layers
-
-
-def _lines(content: Content, view: View) -> list[str]:
-    """The layers that are written in mm."""
-    layers: list[str] = []
-    strokes, trace, travel = content.strokes, content.trace, content.scene.travel_mm
-    if content.outlines:
-        layers.append(marks.body(content.outlines))
-    if content.swept and content.scene.tool_mm:
-        layers.append(marks.swept(content.swept, content.scene.tool_mm))
-    if travel is not None:
-        layers.append(marks.travel(travel, view))
-    if content.outlines:
-        alone = strokes is None and trace is None
-        width = marks.pen(view, ALONE_PEN if alone else DRAWING_PEN, content.outlines)
-        layers.append(marks.drawing(content.groups, view, width))
-    if strokes is not None:
-        if strokes.rapids and trace is None:
-            layers.append(marks.rapids(strokes.rapids, view))
-        base = FEED_PEN if trace is None else 0.6 * FEED_PEN
-        cuts = (*strokes.feeds, *strokes.ramps)
-        width = marks.pen(view, base, cuts)
-        level = strokes.feeds if trace is None else cuts
-        if level:
-            layers.append(marks.feeds(level, view, width, pale=trace is not None))
-        if strokes.ramps and trace is None:
-            layers.append(marks.ramps(strokes.ramps, view, width))
-    if trace is not None:
-        layers.append(trace_layer(trace, view, TRACE_PEN))
-    return layers
+    """What lies in the plot; where that is nothing, it says so."""
+    layers = drawn(content, Plot(view))
+    if not content.is_empty:
+        return layers
+    middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
+    return [*layers, text.label("nothing to draw", middle, Style(16.0, QUIET, "middle"))]
 
 
 def _beside(content: Content, page: Page) -> list[str]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from camtool.pictures import marks, text
+from camtool.pictures import text
 from camtool.pictures.axes import NAME_LIFT, TICK_CAP
-from camtool.pictures.colours import BINS, FEED, FRAME, INK, PLUNGE, QUIET, RAPID, bin_colours
+from camtool.pictures.colours import BINS, FRAME, INK, QUIET, bin_colours
+from camtool.pictures.layers import SWATCH, Entry
 from camtool.pictures.svg import Look, PathData, element, number, one_line
 from camtool.pictures.text import Style
 from camtool.pictures.view import MARGIN, PAGE, Box, decimals_of, multiples, round_step
@@ -19,7 +19,7 @@ ENTRY = Style(cap=14.5, colour=QUIET)
 TITLE_STEP = 34.0
 NOTE_STEP = 28.0
 ROW_STEP = 33.0
-SWATCH, SWATCH_GAP, ENTRY_GAP = 34.0, 11.0, 28.0
+SWATCH_GAP, ENTRY_GAP = 11.0, 28.0
 LONGEST_ENTRY = 330.0
 BAR_WIDTH, BAR_GAP = 18.0, 26.0
 LEAST_BAR_SPACING = 85.0
@@ -29,22 +29,14 @@ CLEAR_OF_TOP = 2.3
 BAR_TITLE = "error (µm)"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One line of the legend: its swatch (already centred on height 0, from x 0) and its text."""
+def _name(entry: Entry) -> str:
+    """The text of an entry, shortened where it must be."""
+    return text.shortened(entry.name, ENTRY.cap, LONGEST_ENTRY)
 
-    swatch: str
-    name: str
 
-    @property
-    def shown(self) -> str:
-        """The text, shortened where it must be."""
-        return text.shortened(self.name, ENTRY.cap, LONGEST_ENTRY)
-
-    @property
-    def width(self) -> float:
-        """Room on the row, with the gap to the next."""
-        return SWATCH + SWATCH_GAP + text.width(self.shown, ENTRY.cap) + ENTRY_GAP
+def _width(entry: Entry) -> float:
+    """Room of an entry on its row, with the gap to the next."""
+    return SWATCH + SWATCH_GAP + text.width(_name(entry), ENTRY.cap) + ENTRY_GAP
 
 
 def head(
@@ -87,16 +79,16 @@ def rows(entries: Sequence[Entry], first: float, room: float) -> list[list[Entry
     """The entries in rows: the first no wider than `first`, the others than `room`; the first
     one stays empty when there is no room in it."""
     found: list[list[Entry]] = []
-    if entries and entries[0].width - ENTRY_GAP > first:
+    if entries and _width(entries[0]) - ENTRY_GAP > first:
         found.append([])
     used = math.inf
     for entry in entries:
         limit = first if len(found) <= 1 else room
-        if used + entry.width - ENTRY_GAP > limit:
+        if used + _width(entry) - ENTRY_GAP > limit:
             found.append([])
             used = 0.0
         found[-1].append(entry)
-        used += entry.width
+        used += _width(entry)
     return found
 
 
@@ -104,11 +96,11 @@ def table_of(entries: Sequence[Entry], bar: float, room: float) -> tuple[list[li
     """The rows, and which of them ends with something `bar` wide: the first where an entry fits
     beside it, else the last with room for it, else one of its own."""
     first = room - bar
-    if not entries or entries[0].width - ENTRY_GAP <= first:
+    if not entries or _width(entries[0]) - ENTRY_GAP <= first:
         return rows(entries, first, room), 0
     found = rows(entries, room, room)
     for row in reversed(range(len(found))):
-        if sum(entry.width for entry in found[row]) - ENTRY_GAP <= first:
+        if sum(_width(entry) for entry in found[row]) - ENTRY_GAP <= first:
             return found, row
     return [[], *found], 0
 
@@ -122,48 +114,9 @@ def legend(table: Sequence[Sequence[Entry]], left: float, middle: float) -> str:
             move = f"translate({number(across)} {number(height)})"
             at = (across + SWATCH + SWATCH_GAP, height + ENTRY.cap / 2.0)
             parts.append(element("g", {"transform": move}, entry.swatch))
-            parts.append(text.label(entry.shown, at, ENTRY, full=entry.name))
-            across += entry.width
+            parts.append(text.label(_name(entry), at, ENTRY, full=entry.name))
+            across += _width(entry)
     return element("g", {"id": "legend"}, *parts) if parts else ""
-
-
-def line_swatch(colour: str, width: float, dashes: str = "") -> str:
-    """A piece of line."""
-    look: Look = {"stroke": colour, "stroke-width": width, "fill": "none"}
-    if dashes:
-        look["stroke-dasharray"] = dashes
-    else:
-        look["stroke-linecap"] = "round"
-    return element("path", {"d": f"M1 0L{number(SWATCH - 1.0)} 0", **look})
-
-
-def dot_swatch(look: Look) -> str:
-    """A round mark in the middle of the swatch."""
-    return element("circle", {"cx": SWATCH / 2.0, "cy": 0.0, **look})
-
-
-def map_swatch(width: float) -> str:
-    """A piece of line that runs through the colours of the map."""
-    colours = bin_colours()
-    step = SWATCH / BINS
-    pieces = []
-    for index, colour in enumerate(colours):
-        data = PathData()
-        data.move(index * step, 0.0)
-        data.line(SWATCH, 0.0)  # the next one covers the rest: no seams
-        look: Look = {"d": str(data), "stroke": colour, "stroke-width": width, "fill": "none"}
-        pieces.append(element("path", look))
-    return element("g", {}, *pieces)
-
-
-def cross_swatch() -> str:
-    """Part zero, in small."""
-    return marks.origin((SWATCH / 2.0, 0.0), 9.0).replace(' id="part-zero"', "")
-
-
-FEED_SWATCH = (FEED, 2.8)
-RAPID_SWATCH = (RAPID, 1.6, "7 5")
-RAMP_SWATCH = (PLUNGE, 2.8)
 
 
 def bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:

@@ -1,62 +1,11 @@
-"""The layers of a picture by name: which there are, and a picture's content with some of them."""
+"""How a picture is to look: its size, its part, its palette, its layers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from camtool.errors import OptionError
-from camtool.patterns import guess
-
-LAYERS = (
-    "drawing",
-    "swept",
-    "travel",
-    "rapids",
-    "feeds",
-    "plunges",
-    "starts",
-    "order",
-    "arrows",
-    "reversals",
-    "path",
-    "worst",
-    "zero",
-    "doubts",
-)
-"""Names of layers, from the ground up."""
-
-USUAL = frozenset(LAYERS) - {"reversals"}
-"""What is shown when nobody says."""
-
-OF_DRAWINGS = frozenset({"drawing", "zero", "doubts"})
-"""What a picture of a drawing alone can show."""
-
-OF_PREDICTIONS = frozenset({"path", "worst"})
-"""What a picture shows only where it is predicted how the slides move."""
-
-NOT_UNDER_PATH = frozenset({"rapids", "plunges", "starts", "order", "arrows"})
-"""What is left out where the predicted path is shown."""
-
-
-def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
-    """The layers `names` (none: the usual ones) but those `without`; OptionError for others, and
-    when none is left."""
-    shown, left_out = set(names), set(without)
-    for name in sorted(shown | left_out):
-        if name not in LAYERS:
-            raise OptionError(
-                f"{name!r} is no layer",
-                mend=f"{guess(name, LAYERS)}There are {', '.join(LAYERS)}",
-            )
-    left = frozenset(shown or USUAL) - left_out
-    if not left:
-        raise OptionError("no layer is left to show", mend="name others, or leave out fewer")
-    return left
-
-
-# How a picture is to look: its size, its part, its palette.
 
 SMALLEST_PX, LARGEST_PX = 16, 20_000
 """Widths of pictures that are allowed."""
@@ -75,14 +24,15 @@ class Options:
     the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
     ground. `exaggerate`: the predicted path is drawn so many times as far from the wanted one.
     `polar`: the plot of the radial errors of this circle, from 1, in place of the picture.
-    `layers` are the names of those to show. OptionError for sizes that make no picture, and for
-    a plot of a circle with what such a plot does not have: a part, a factor or layers."""
+    `layers` are the names of those to show, None: the usual ones. OptionError for sizes that make
+    no picture, and for a plot of a circle with what such a plot does not have: a part, a factor
+    or layers."""
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None
     dark: bool = False
     exaggerate: float = 1.0
-    layers: frozenset[str] = USUAL
+    layers: frozenset[str] | None = None
     polar: int | None = None
 
     def __post_init__(self) -> None:
@@ -101,7 +51,7 @@ class Options:
                 f"a part of {crop[2]:g} × {crop[3]:g} mm cannot be shown",
                 mend="give X,Y,WIDTH,HEIGHT, the last two above 0",
             )
-        if self.polar is not None and (crop, self.exaggerate, self.layers) != (None, 1.0, USUAL):
+        if self.polar is not None and (crop, self.exaggerate, self.layers) != (None, 1.0, None):
             raise OptionError(
                 "a circle is plotted alone: it has no part, no layers, and a factor of its own",
                 mend="drop polar, or crop_mm, exaggerate and layers",

@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from camtool.arrays import Floats
-from camtool.pictures import axes, legend, marks
-from camtool.pictures.colours import FEED_PALE, LAYERS
+from camtool.pictures import axes, legend
+from camtool.pictures.colours import FEED_PALE, LAYER_COLOURS
 from camtool.pictures.content import cropped
 from camtool.pictures.draw import rendered
-from camtool.pictures.legend import Entry, line_swatch
+from camtool.pictures.layers import Entry, line_swatch
 from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
 from camtool.pictures.page import HEAD_GAP, LEGEND_DROP, fitted, foot_of, mat, sheet, table_of
+from camtool.pictures.plot import Plot
 from camtool.pictures.strokes import strokes_of
 from camtool.pictures.svg import Look, PathData, element
 from camtool.pictures.trace import FINEST_SHARE
@@ -70,7 +71,7 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
 
 
 def _colour(index: int) -> str:
-    return LAYERS[index % len(LAYERS)]
+    return LAYER_COLOURS[index % len(LAYER_COLOURS)]
 
 
 def _entries(overlay: Overlay) -> list[Entry]:
@@ -85,7 +86,9 @@ def _paths(overlay: Overlay, view: View) -> str:
     """All paths in mm."""
     strokes = strokes_of(overlay.wanted)
     chains = (*strokes.feeds, *strokes.ramps)
-    layers = [marks.feeds(chains, view, WANTED_PEN, pale=True)] if chains else []
+    plot = Plot(view)
+    pen = {**plot.round_pen(WANTED_PEN), "stroke": FEED_PALE}
+    layers = [plot.lines("feeds", chains, pen)] if chains else []
     low, high = view.x_range
     decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
     for index, (_, runs) in enumerate(overlay.runs):
@@ -95,7 +98,7 @@ def _paths(overlay: Overlay, view: View) -> str:
             for point in run[1:].tolist():
                 data.line(*point)
         if data:
-            pen: Look = {"fill": "none", "stroke-width": view.mm(RUN_PEN)}
-            look: Look = {"stroke": _colour(index), "stroke-linejoin": "round", **pen}
+            look: Look = {"stroke": _colour(index), "stroke-linejoin": "round"}
+            look |= {"fill": "none", "stroke-width": view.mm(RUN_PEN)}
             layers.append(element("path", {"id": f"run-{index + 1}", "d": str(data), **look}))
     return element("g", {"id": "mm", "transform": view.matrix()}, *layers)

@@ -11,8 +11,8 @@ from camtool.arrays import Floats
 from camtool.pictures import axes, legend
 from camtool.pictures.axes import Ticks, ticks_of
 from camtool.pictures.colours import PAPER, darkened
-from camtool.pictures.content import Content, entries_of
-from camtool.pictures.legend import Entry
+from camtool.pictures.content import Content
+from camtool.pictures.layers import Entry, legend_of
 from camtool.pictures.options import SMALLEST_PX, SVG_WIDTH_PX, Options
 from camtool.pictures.svg import Look, PathData, element, number, title
 from camtool.pictures.view import CROP_SHAPES, MARGIN, PAGE, TALLEST, WIDEST, Box, View, fit
@@ -55,7 +55,7 @@ def page_of(content: Content, width: float = PAGE) -> Page:
         return 0.0 if trace is None else legend.bar_width(trace.top_um, view.box.height)
 
     view, ticks = fitted(content.window, top, width, shapes, bar)
-    table, bar_y = table_of(entries_of(content, view), view, view.box)
+    table, bar_y = table_of(legend_of(content, view), view, view.box)
     legend_y = view.box.bottom + LEGEND_DROP
     return Page(head, view, ticks, table, legend_y, bar_y, foot_of(table, legend_y), width)
 

@@ -14,7 +14,7 @@ from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.pictures import legend, text
 from camtool.pictures.colours import BACK, BACK_SPREAD, FEED, FRAME, GRID, INK, PLOT, QUIET, SPREAD
-from camtool.pictures.legend import Entry, line_swatch
+from camtool.pictures.layers import Entry, line_swatch
 from camtool.pictures.options import SVG_WIDTH_PX, Options
 from camtool.pictures.page import foot_of, sheet
 from camtool.pictures.scene import Round, Scene

@@ -33,7 +33,7 @@ def test_outside_the_map_there_is_no_colour(fraction: float) -> None:
 
 
 def test_layers_differ() -> None:
-    assert len(set(colours.LAYERS)) == len(colours.LAYERS)
+    assert len(set(colours.LAYER_COLOURS)) == len(colours.LAYER_COLOURS)
 
 
 def test_the_dark_map_stays_visible_on_its_ground() -> None:
@@ -44,18 +44,18 @@ def test_the_dark_map_stays_visible_on_its_ground() -> None:
 
 @pytest.mark.parametrize("name", ["INK", "QUIET", "FEED", "RAPID", "PLUNGE", "GAP", *range(7)])
 def test_lines_and_letters_are_seen_on_the_dark_ground(name: str | int) -> None:
-    colour = colours.LAYERS[name] if isinstance(name, int) else getattr(colours, name)
+    colour = colours.LAYER_COLOURS[name] if isinstance(name, int) else getattr(colours, name)
     ground = colours.lightness(painted(colours.PLOT)) + 0.05
     assert (colours.lightness(painted(colour)) + 0.05) / ground > 4.0
 
 
 def test_layers_differ_on_the_dark_ground_too() -> None:
-    assert len({painted(colour) for colour in colours.LAYERS}) == len(colours.LAYERS)
+    assert len({painted(colour) for colour in colours.LAYER_COLOURS}) == len(colours.LAYER_COLOURS)
 
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_layers_differ_for_the_red_and_the_green_blind(dark: bool) -> None:
-    layers = [painted(colour) if dark else colour for colour in colours.LAYERS]
+    layers = [painted(colour) if dark else colour for colour in colours.LAYER_COLOURS]
     for matrix in BLIND.values():
         seen = [np.clip(matrix @ linear(colour), 0.0, 1.0) for colour in layers]
         for one, other in combinations(seen, 2):

@@ -16,7 +16,8 @@ from camtool.geometry.drawing import Branch, Gap, Healing, Mark, SelfCrossing
 from camtool.pictures.axes import TICK_CAP
 from camtool.pictures.colours import FEED, PAPER, PLUNGE, RAPID, bin_colours, on_dark
 from camtool.pictures.content import content_of
-from camtool.pictures.draw import ALONE_PEN, TRACE_PEN, draw, png
+from camtool.pictures.draw import draw, png
+from camtool.pictures.layers import ALONE_PEN, TRACE_PEN
 from camtool.pictures.options import Options
 from camtool.pictures.page import page_of
 from camtool.pictures.scene import Scene

@@ -1,19 +1,23 @@
 """Layers: what each shows, and pictures with some of them only."""
 
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Gap
-from camtool.pictures.content import content_of, missing_layers
+from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw
-from camtool.pictures.marks import CLEAR, every, placed
-from camtool.pictures.options import LAYERS, USUAL, Options, chosen
+from camtool.pictures.layers import chosen, layer_names, layers_in, usual_layers
+from camtool.pictures.options import Options
 from camtool.pictures.page import page_of
+from camtool.pictures.plot import CLEAR, every, placed
 from camtool.pictures.scene import Scene
 from camtool.pictures.strokes import turns_of
 from camtool.toolpath.builder import ToolpathBuilder
@@ -27,6 +31,7 @@ from tests.pictures.conftest import (
     scene_of_toolpath,
 )
 
+LAYERS = layer_names()
 MILLED = replace(scene_of_toolpath(followed(plate()), title="", drawing=plate()), tool_mm=0.5)
 JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))
 GROUPS = {
@@ -45,6 +50,11 @@ GROUPS = {
 def ids(scene: Scene, *layers: str) -> set[str]:
     svg = draw(scene, options=Options(layers=frozenset(layers)))
     return {g.attrib["id"] for g in svg_page.parse(svg).iter() if "id" in g.attrib}
+
+
+def held(scene: Scene, *layers: str) -> set[str]:
+    """The layers, of these or of all, that hold something."""
+    return set(layers_in(content_of(scene, Options(layers=frozenset(layers or LAYERS)))))
 
 
 @pytest.mark.parametrize("layer", list(GROUPS))
@@ -71,7 +81,7 @@ def test_layers_do_not_move_the_picture() -> None:
 
 
 def test_names_of_layers_are_checked() -> None:
-    assert chosen([], []) == USUAL
+    assert chosen([], []) == usual_layers() == set(LAYERS) - {"reversals"}
     assert chosen(["feeds", "order"], ["order"]) == {"feeds"}
     with pytest.raises(OptionError) as found:
         chosen(["reversal"], [])
@@ -83,15 +93,13 @@ def test_names_of_layers_are_checked() -> None:
 
 
 def test_layers_that_hold_nothing_are_known() -> None:
-    every = Options(layers=frozenset(LAYERS))
-    empty = ["travel", "starts", "path", "worst", "doubts"]  # each contour begins with a plunge
-    assert missing_layers(MILLED, every, LAYERS) == empty
-    assert missing_layers(replace(MILLED, tool_mm=None), every, ["swept"]) == ["swept"]
-    below = missing_layers(JUDGED, every, LAYERS)
-    assert {"rapids", "plunges", "starts", "order", "arrows"} <= set(below)
-    assert not {"path", "worst", "feeds", "zero"} & set(below)
-    alone = Options(layers=frozenset({"order", "arrows"}))  # without the path they are drawn
-    assert missing_layers(JUDGED, alone, ["order", "arrows"]) == []
+    empty = {"travel", "starts", "path", "worst", "doubts"}  # each contour begins with a plunge
+    assert held(MILLED) == set(LAYERS) - empty
+    assert "swept" not in held(replace(MILLED, tool_mm=None))
+    below = held(JUDGED)
+    assert not {"rapids", "plunges", "starts", "order", "arrows"} & below
+    assert {"path", "worst", "feeds", "zero"} <= below
+    assert held(JUDGED, "order", "arrows") == {"order", "arrows"}  # without the path
     groups = {g for name in LAYERS if name not in empty for g in GROUPS.get(name, ())}
     assert groups <= ids(MILLED, *LAYERS)
 
@@ -242,3 +250,52 @@ def test_arrows_of_passes_over_each_other_are_left_out() -> None:
     arrows = svg_page.group(svg_page.parse(svg), "arrows")
     assert arrows is not None
     assert arrows[0].attrib["d"].count("M") == 1
+
+
+ONE_ROW = """
+import sys
+from camtool.pictures import layers
+
+def corners(content, *_):
+    return [place for chain in content.outlines for place in chain.points.tolist()]
+
+layers.LAYERS += (
+    layers.Layer(
+        "corners",
+        corners,
+        lambda content, plot: plot.dots("corners", corners(content), layers.POINT_MARK),
+        lambda content, view: [layers.Entry(layers.dot_swatch(layers.POINT_MARK), "corner")],
+        needs="drawing",
+    ),
+)
+from camtool.cli.main import main
+sys.argv = ["camtool", "preview", *sys.argv[1:]]
+main()
+"""
+"""A program that adds a layer, and runs `camtool preview`."""
+
+
+def test_a_layer_is_added_by_one_row(tmp_path: Path) -> None:
+    """Help, pictures, legends, checks and messages know it."""
+
+    def ran(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", ONE_ROW, *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    (tmp_path / "box.csv").write_text("0,0\n4,0\n4,4\n0,4\n0,0\n")
+    (tmp_path / "points.csv").write_text("1,1\n")
+    box, picture = str(tmp_path / "box.csv"), tmp_path / "box.svg"
+    assert "doubts, corners." in " ".join(ran("--help").stdout.split())
+    assert ran(box, "-o", str(picture)).returncode == 0
+    root = svg_page.parse(picture.read_text(encoding="utf-8"))
+    layer = svg_page.group(root, "corners")
+    assert layer is not None
+    assert len(layer) == 5
+    assert "corner" in {g.get("aria-label") for g in root.iter()}
+    assert ran(box, "-o", str(picture), "--no-layer", "corners").returncode == 0
+    assert svg_page.group(svg_page.parse(picture.read_text(encoding="utf-8")), "corners") is None
+    assert "did you mean corners?" in ran(box, "-o", str(picture), "--layers", "corner").stderr
+    program = ["-t", "grbl", "-o", str(picture), "--layers", "corners,rapids"]
+    (tmp_path / "a.nc").write_text("G0 X1\nG1 X2 F100\nM2\n")
+    said = ran(str(tmp_path / "a.nc"), *program).stderr
+    assert "--layers corners: nothing in this picture" in said

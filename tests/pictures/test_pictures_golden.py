@@ -11,7 +11,8 @@ import pytest
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.beside import draw_beside
 from camtool.pictures.draw import draw, png
-from camtool.pictures.options import LAYERS, Options
+from camtool.pictures.layers import layer_names
+from camtool.pictures.options import Options
 from camtool.pictures.overlay import Overlay, draw_overlay
 from camtool.pictures.scene import Round, Scene
 from tests.oracles.png import decode
@@ -70,7 +71,7 @@ def beside(*scenes: Scene, **looks: object) -> Callable[[], str]:
 PICTURES = {
     **{name: one(SCENES[name]) for name in ("drawing", "toolpath", "result", "line", "ramp")},
     "dark": one(DRESSED, dark=True, size_px=400, exaggerate=10.0),
-    "layers": one(MILLED, layers=frozenset(LAYERS), crop_mm=(0.0, 0.0, 3.0, 3.0)),
+    "layers": one(MILLED, layers=frozenset(layer_names()), crop_mm=(0.0, 0.0, 3.0, 3.0)),
     "overlay": lambda: draw_overlay(compared()),
     "polar": one(LOBED, polar=1),
     "polar-both": one(BALLBAR, polar=2, dark=True),

@@ -29,7 +29,7 @@ from camtool.pictures.colours import (
     FRAME,
     GRID,
     INK,
-    LAYERS,
+    LAYER_COLOURS,
     PLOT,
     QUIET,
     SPREAD,
@@ -105,7 +105,7 @@ def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, objec
     return {
         "layers": [
             {"name": name, "light": colour, "dark": on_dark(colour)}
-            for name, colour in zip(names, cycle(LAYERS), strict=False)
+            for name, colour in zip(names, cycle(LAYER_COLOURS), strict=False)
         ],
         "sources": [] if drawing is None else list(drawing.sources),
         "texts": [] if toolpath is None else list(toolpath.texts),

@@ -1,0 +1,503 @@
+"""The layers of a picture, one row each: its name, when it has something, how it is drawn, and
+what the legend says of it.
+
+`LAYERS` is the table. Whatever lists, checks, draws or explains layers reads it, so that a layer
+is added by one row. Nothing here loads numpy: help and completion ask for the names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from camtool.errors import OptionError
+from camtool.patterns import guess
+from camtool.pictures.colours import (
+    BINS,
+    DRAWING,
+    FEED,
+    FEED_PALE,
+    GAP,
+    INK,
+    OUTLINE,
+    PAPER,
+    PLUNGE,
+    RAPID,
+    REVERSAL,
+    SWEPT,
+    TRAVEL,
+    bin_colours,
+)
+from camtool.pictures.svg import Look, PathData, element, number, title
+
+if TYPE_CHECKING:
+    from camtool.pictures.content import Content
+    from camtool.pictures.plot import Plot
+    from camtool.pictures.view import View
+
+SWATCH = 34.0
+"""Width of the sample before a line of the legend."""
+
+MOST_LAYERS_NAMED = 7
+"""More layers of a drawing than this are counted, not named, in the legend."""
+
+TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN, RAPID_PEN = 2.7, 2.8, 4.8, 2.8, 1.4
+RING = 8.0
+
+PLUNGE_MARK: Look = {"r": 5.0, "fill": PLUNGE, "stroke": PAPER, "stroke-width": 1.6}
+START_MARK: Look = {"r": 5.0, "fill": PAPER, "stroke": FEED, "stroke-width": 2.2}
+REVERSAL_MARK: Look = {"r": 3.4, "fill": REVERSAL, "stroke": PAPER, "stroke-width": 1.0}
+WORST_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.0}
+GAP_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.4}
+POINT_MARK: Look = {"r": 4.0, "fill": INK, "stroke": PAPER, "stroke-width": 1.2}
+DOUBT_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the legend: its swatch (already centred on height 0, from x 0) and its text."""
+
+    swatch: str
+    name: str
+
+
+def _nothing(*_: object) -> Iterable[Entry]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One layer. `holds` says whether it has something; then `draw` gives its SVG, and `legend`
+    its entries.
+
+    Layers `in_mm` lie below all others and are drawn in mm, Y up; the others in units of the page.
+    Among its kind, one of a higher `height` covers those of lower ones; `ground` is drawn below
+    all. `place` is its place in the legend. `usual`: it is shown when nobody says. `needs` is what
+    a picture must be of: a "drawing", "moves", or the predicted "path". Where a predicted path is
+    shown, it is left out unless it is `under_path`. `hint` says why it may be empty, where the
+    reason is not in the drawing.
+    """
+
+    name: str
+    holds: Callable[[Content], object]
+    draw: Callable[[Content, Plot], str]
+    legend: Callable[[Content, View], Iterable[Entry]] = _nothing
+    ground: Callable[[Content, Plot], str] | None = None
+    in_mm: bool = False
+    height: int = 100
+    place: int = 100
+    usual: bool = True
+    needs: str = "moves"
+    under_path: bool = True
+    hint: str = ""
+
+    def is_in(self, content: Content) -> bool:
+        """Whether the picture shows it, and it has something."""
+        shown = content.shown
+        return (
+            (self.usual if shown is None else self.name in shown)
+            and (self.under_path or content.trace is None)
+            and bool(self.holds(content))
+        )
+
+
+def line_swatch(colour: str, width: float, dashes: str = "") -> str:
+    """A piece of line."""
+    look: Look = {"stroke": colour, "stroke-width": width, "fill": "none"}
+    if dashes:
+        look["stroke-dasharray"] = dashes
+    else:
+        look["stroke-linecap"] = "round"
+    return element("path", {"d": f"M1 0L{number(SWATCH - 1.0)} 0", **look})
+
+
+def dot_swatch(look: Look) -> str:
+    """A round mark in the middle of the swatch."""
+    return element("circle", {"cx": SWATCH / 2.0, "cy": 0.0, **look})
+
+
+def map_swatch(width: float) -> str:
+    """A piece of line that runs through the colours of the map."""
+    step = SWATCH / BINS
+    pieces = []
+    for index, colour in enumerate(bin_colours()):
+        data = PathData()
+        data.move(index * step, 0.0)
+        data.line(SWATCH, 0.0)  # the next one covers the rest: no seams
+        look: Look = {"d": str(data), "stroke": colour, "stroke-width": width, "fill": "none"}
+        pieces.append(element("path", look))
+    return element("g", {}, *pieces)
+
+
+# Drawings.
+
+
+def _body(content: Content, plot: Plot) -> str:
+    return plot.body(content.outlines)
+
+
+def _drawing(content: Content, plot: Plot) -> str:
+    """The lines of the drawing, a group for each of its layers."""
+    alone = content.strokes is None and content.trace is None
+    width = plot.pen(ALONE_PEN if alone else DRAWING_PEN, content.outlines)
+    groups = [
+        element("g", {"stroke": group.colour}, title(group.name), plot.path(group.chains))
+        for group in content.groups
+    ]
+    return element("g", {"id": "drawing", **plot.round_pen(width)}, *groups)
+
+
+def _drawing_legend(content: Content, view: View) -> Iterator[Entry]:
+    if content.strokes is not None or content.trace is not None:
+        yield Entry(line_swatch(DRAWING, 5.0), "drawing")
+    elif len(content.groups) == 1:
+        name = content.groups[0].name
+        named = f"drawing, layer {name}" if name.strip() else "drawing"
+        yield Entry(line_swatch(OUTLINE, 2.8), named)
+    else:
+        for group in content.groups[:MOST_LAYERS_NAMED]:
+            yield Entry(line_swatch(group.colour, 2.8), group.name or "(no layer)")
+        if more := len(content.groups[MOST_LAYERS_NAMED:]):
+            yield Entry("", f"and {more} more layers")
+
+
+def _doubts(content: Content, plot: Plot) -> str:
+    kinds = [plot.dots(name, places, look) for name, _, places, look in _kinds(content)]
+    return "\n".join(kind for kind in kinds if kind)
+
+
+def _doubts_legend(content: Content, view: View) -> Iterator[Entry]:
+    for _, name, places, look in _kinds(content):
+        yield from _mark(name, places, look, view)
+
+
+def _kinds(content: Content) -> list[tuple[str, str, Iterable[tuple[float, float]], Look]]:
+    """(id, name for people, places, look): open ends, centres of holes, and where a contour is not
+    clear."""
+    places = content.places
+    return [
+        ("gaps", "open end", places.gaps.tolist(), GAP_MARK),
+        ("points", "point", places.points.tolist(), POINT_MARK),
+        ("doubts", "crossing or branch", places.doubts.tolist(), DOUBT_MARK),
+    ]
+
+
+# Moves.
+
+
+def _swept(content: Content, plot: Plot) -> str:
+    """What the tool covers, at its true width."""
+    width = content.scene.tool_mm or 0.0
+    line: Look = {"fill": "none", "stroke": SWEPT, "stroke-width": width}
+    ends: Look = {"stroke-linecap": "round", "stroke-linejoin": "round"}
+    return plot.lines("swept", content.swept, {**line, **ends})
+
+
+def _swept_legend(content: Content, view: View) -> Iterator[Entry]:
+    yield Entry(line_swatch(SWEPT, 9.0), f"tool {content.scene.tool_mm:.4g} mm wide")
+
+
+def _travel(content: Content, plot: Plot) -> str:
+    return plot.frame("travel", content.scene.travel_mm or (0.0, 0.0), TRAVEL)
+
+
+def _travel_legend(content: Content, view: View) -> Iterator[Entry]:
+    """Only where a side of the frame crosses the window."""
+    wide, high = content.scene.travel_mm or (0.0, 0.0)
+    (x0, x1), (y0, y1) = view.x_range, view.y_range
+    overlaps = x0 <= wide and x1 >= 0.0 and y0 <= high and y1 >= 0.0
+    inside = x0 > 0.0 and x1 < wide and y0 > 0.0 and y1 < high
+    if overlaps and not inside:
+        yield Entry(line_swatch(TRAVEL, 2.0), f"travel {wide:g} × {high:g} mm")
+
+
+def _rapids(content: Content, plot: Plot) -> str:
+    """Thin and dashed."""
+    mm = plot.view.mm
+    line: Look = {"fill": "none", "stroke": RAPID, "stroke-width": mm(RAPID_PEN)}
+    dashes = f"{mm(7.0):.9g} {mm(5.0):.9g}"
+    return plot.lines("rapids", content.moves.rapids, {**line, "stroke-dasharray": dashes})
+
+
+def _rapids_legend(content: Content, view: View) -> Iterator[Entry]:
+    yield Entry(line_swatch(RAPID, 1.6, "7 5"), "rapid")
+
+
+def _feeds(content: Content, plot: Plot) -> str:
+    """Solid, and slopes in the colour of plunges; pale and thin below a predicted path."""
+    moves, pale = content.moves, content.trace is not None
+    cuts = (*moves.feeds, *moves.ramps)
+    pen = plot.round_pen(plot.pen(0.6 * FEED_PEN if pale else FEED_PEN, cuts))
+    if pale:
+        return plot.lines("feeds", cuts, {**pen, "stroke": FEED_PALE})
+    level = plot.lines("feeds", moves.feeds, {**pen, "stroke": FEED})
+    slopes = plot.lines("ramps", moves.ramps, {**pen, "stroke": PLUNGE})
+    return "\n".join(part for part in (level, slopes) if part)
+
+
+def _feeds_legend(content: Content, view: View) -> Iterator[Entry]:
+    moves, trace = content.moves, content.trace
+    if moves.feeds and trace is None:
+        yield Entry(line_swatch(FEED, 2.8), "feed")
+    elif moves.feeds:
+        below = "programmed path" if content.times == 1.0 else "wanted path"
+        yield Entry(line_swatch(FEED_PALE, 2.0), below)
+    if moves.ramps and trace is None:
+        yield Entry(line_swatch(PLUNGE, 2.8), "slope")
+
+
+def _plunges(content: Content, plot: Plot) -> str:
+    return plot.dots("plunges", content.moves.plunges.tolist(), PLUNGE_MARK)
+
+
+def _starts(content: Content, plot: Plot) -> str:
+    return plot.dots("starts", content.starts.tolist(), START_MARK)
+
+
+def _order(content: Content, plot: Plot) -> str:
+    return plot.order(content.moves.starts.tolist())
+
+
+def _arrows(content: Content, plot: Plot) -> str:
+    return plot.arrows(content.moves.feeds)
+
+
+def _reversals(content: Content, plot: Plot) -> str:
+    return plot.dots("reversals", content.reversals.tolist(), REVERSAL_MARK)
+
+
+def _reversals_legend(content: Content, view: View) -> Iterable[Entry]:
+    return _mark("reversal", content.reversals.tolist(), REVERSAL_MARK, view)
+
+
+# What is predicted.
+
+
+def _path(content: Content, plot: Plot) -> str:
+    return plot.trace(content.trace, TRACE_PEN) if content.trace is not None else ""
+
+
+def _path_legend(content: Content, view: View) -> Iterator[Entry]:
+    said = "by error" if content.times == 1.0 else f"error × {content.times:g}"
+    yield Entry(map_swatch(4.0), f"predicted path, {said}")
+
+
+def _worst(content: Content, plot: Plot) -> str:
+    return plot.ranks("worst", content.worst.tolist(), WORST_MARK)
+
+
+def _worst_legend(content: Content, view: View) -> Iterable[Entry]:
+    return _mark("largest errors, by rank", content.worst.tolist(), WORST_MARK, view)
+
+
+# Part zero.
+
+
+def _zero(content: Content, plot: Plot) -> str:
+    at = plot.view.page(0.0, 0.0)
+    return _cross(at, 13.0, {"id": "part-zero"}) if plot.view.shows(0.0, 0.0) else ""
+
+
+def _zero_legend(content: Content, view: View) -> Iterator[Entry]:
+    if view.shows(0.0, 0.0):
+        yield Entry(_cross((SWATCH / 2.0, 0.0), 9.0, {}), "part zero")
+
+
+def _cross(at: tuple[float, float], size: float, name: Look) -> str:
+    """A cross with a ring."""
+    data = PathData()
+    for dx, dy in ((size, 0.0), (0.0, size)):
+        data.move(at[0] - dx, at[1] - dy)
+        data.line(at[0] + dx, at[1] + dy)
+    line: Look = {"fill": "none", "stroke": INK, "stroke-width": 1.8}
+    ring: Look = {"cx": number(at[0]), "cy": number(at[1]), "r": 0.5 * size}
+    lines = element("path", {"d": str(data)})
+    return element("g", {**name, **line}, element("circle", ring), lines)
+
+
+def _mark(
+    name: str, places: Iterable[tuple[float, float]], look: Look, view: View
+) -> Iterator[Entry]:
+    """The entry of round marks, if any of them is in view."""
+    if any(view.shows(*place) for place in places):
+        yield Entry(dot_swatch(look), name)
+
+
+LAYERS = (
+    Layer(
+        "drawing",
+        lambda content: content.outlines,
+        _drawing,
+        _drawing_legend,
+        ground=_body,
+        in_mm=True,
+        height=3,
+        place=0,
+        needs="drawing",
+        hint="; there is no drawing in it",
+    ),
+    Layer(
+        "swept",
+        lambda content: content.swept,
+        _swept,
+        _swept_legend,
+        in_mm=True,
+        height=1,
+        place=6,
+        hint="; --tool-diameter says how wide the tool is (a V bit is as wide as it is deep)",
+    ),
+    Layer(
+        "travel",
+        lambda content: content.scene.travel_mm,
+        _travel,
+        _travel_legend,
+        in_mm=True,
+        height=2,
+        place=11,
+        hint="; the path does not lie within the table's travel",
+    ),
+    Layer(
+        "rapids",
+        lambda content: content.moves.rapids,
+        _rapids,
+        _rapids_legend,
+        in_mm=True,
+        height=4,
+        place=3,
+        under_path=False,
+    ),
+    Layer(
+        "feeds",
+        lambda content: content.moves.feeds or content.moves.ramps,
+        _feeds,
+        _feeds_legend,
+        in_mm=True,
+        height=5,
+        place=2,
+    ),
+    Layer(
+        "plunges",
+        lambda content: len(content.moves.plunges),
+        _plunges,
+        lambda content, view: [Entry(dot_swatch(PLUNGE_MARK), "plunge")],
+        height=4,
+        place=4,
+        under_path=False,
+    ),
+    Layer(
+        "starts",
+        lambda content: len(content.starts),
+        _starts,
+        lambda content, view: [Entry(dot_swatch(START_MARK), "start")],
+        height=3,
+        place=5,
+        under_path=False,
+    ),
+    Layer("order", lambda content: len(content.moves.starts), _order, height=7, under_path=False),
+    Layer("arrows", lambda content: content.moves.feeds, _arrows, height=2, under_path=False),
+    Layer(
+        "reversals",
+        lambda content: len(content.reversals),
+        _reversals,
+        _reversals_legend,
+        height=1,
+        place=7,
+        usual=False,
+    ),
+    Layer(
+        "path",
+        lambda content: content.trace is not None,
+        _path,
+        _path_legend,
+        in_mm=True,
+        height=6,
+        place=1,
+        needs="path",
+    ),
+    Layer(
+        "worst",
+        lambda content: len(content.worst),
+        _worst,
+        _worst_legend,
+        height=8,
+        place=8,
+        needs="path",
+    ),
+    Layer(
+        "zero",
+        lambda content: not content.is_empty,
+        _zero,
+        _zero_legend,
+        height=5,
+        place=10,
+        needs="drawing",
+    ),
+    Layer(
+        "doubts",
+        lambda content: content.places.any,
+        _doubts,
+        _doubts_legend,
+        height=6,
+        place=9,
+        needs="drawing",
+    ),
+)
+"""All layers, in the order in which help and messages name them."""
+
+
+def layer_names() -> tuple[str, ...]:
+    """The names of all layers."""
+    return tuple(layer.name for layer in LAYERS)
+
+
+def layer_of(name: str) -> Layer:
+    """The layer of this name."""
+    return next(layer for layer in LAYERS if layer.name == name)
+
+
+def usual_layers() -> frozenset[str]:
+    """The names of those that are shown when nobody says."""
+    return frozenset(layer.name for layer in LAYERS if layer.usual)
+
+
+def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
+    """The layers `names` (none: the usual ones) but those `without`; OptionError for others, and
+    when none is left."""
+    shown, left_out = set(names), set(without)
+    known = layer_names()
+    for name in sorted(shown | left_out):
+        if name not in known:
+            raise OptionError(
+                f"{name!r} is no layer",
+                mend=f"{guess(name, known)}There are {', '.join(known)}",
+            )
+    left = frozenset(shown or usual_layers()) - left_out
+    if not left:
+        raise OptionError("no layer is left to show", mend="name others, or leave out fewer")
+    return left
+
+
+def layers_in(content: Content) -> list[str]:
+    """The names of the layers that hold something in a picture, wherever its window lies."""
+    return [layer.name for layer in LAYERS if layer.is_in(content)]
+
+
+def legend_of(content: Content, view: View) -> list[Entry]:
+    """The legend: only what is present and within view."""
+    there = (layer for layer in LAYERS if layer.is_in(content))
+    placed = sorted(there, key=lambda layer: layer.place)
+    return [entry for layer in placed for entry in layer.legend(content, view)]
+
+
+def drawn(content: Content, plot: Plot) -> list[str]:
+    """What lies in the plot, from the ground up: what is drawn in mm in one group, the rest above
+    it."""
+    there = sorted(
+        (layer for layer in LAYERS if layer.is_in(content)), key=lambda layer: layer.height
+    )
+    lines = [layer.ground(content, plot) for layer in there if layer.ground is not None]
+    lines += [layer.draw(content, plot) for layer in there if layer.in_mm]
+    lines = [line for line in lines if line]
+    group = element("g", {"id": "mm", "transform": plot.view.matrix()}, *lines) if lines else ""
+    return [group, *(layer.draw(content, plot) for layer in there if not layer.in_mm)]

@@ -1,0 +1,260 @@
+"""The Plot: lines, marks, arrows and numbers, as the layers of a picture draw them.
+
+Lines are written in mm (their group flips and scales), marks in units of the page.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camtool.pictures import text
+from camtool.pictures.colours import BODY, FEED, INK, PLOT
+from camtool.pictures.strokes import Chain, path_data
+from camtool.pictures.svg import Look, PathData, element, number
+from camtool.pictures.text import Style
+from camtool.pictures.trace import Trace, trace_layer
+from camtool.pictures.view import View, round_step
+
+Place = tuple[float, float]
+
+MOST_BODIES = 500
+"""The light fill shows what is closed; drawings of more paths go without."""
+
+INK_SHARE = 0.12
+"""Lines become thinner once they would cover more than this share of the plot."""
+
+THINNEST = 0.5
+
+ARROW_LENGTH, ARROW_WIDTH = 18.0, 6.5
+ARROW_EVERY = 900.0
+ARROWS_APART = 60.0
+"""An arrow nearer than this to another is left out: passes at several depths lie over each
+other."""
+
+SHORTEST_WITH_ARROW = 90.0
+MOST_WITH_ARROW, MOST_ON_ONE = 150, 4
+MARKS_OF_FULL_SIZE = 120
+SMALLEST_MARK = 0.3
+TIE_DECIMALS = 4
+
+CAP = 12.0
+"""Height of the digits on the page."""
+
+HALO = 5.0
+"""Width of the ground's colour round the digits."""
+
+AWAY = 9.0
+CLEAR = 3.0
+MOST = 400
+"""No more numbers are tried."""
+
+MOST_ALL = 100
+"""Of more contours than this only every 2nd, 5th, 10th … has its number."""
+
+DIRECTIONS = ((1.0, -1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Plot:
+    """What layers draw on: the window of a picture."""
+
+    view: View
+
+    # Lines, in mm.
+
+    def pen(self, base: float, chains: Iterable[Chain]) -> float:
+        """Line width on the page: `base`, or thinner where lines are crowded."""
+        view = self.view
+        length = sum(self._length_shown(chain) for chain in chains) * view.scale
+        if length == 0.0:
+            return base
+        room = INK_SHARE * view.box.width * view.box.height / length
+        return max(min(base, room), THINNEST)
+
+    def _length_shown(self, chain: Chain) -> float:
+        """mm of a chain in view, about: moves whose ends have the window between them count whole,
+        none for more than its diagonal."""
+        low, high = np.array([self.view.x_range, self.view.y_range]).T
+        begin, end = chain.points[:-1], chain.points[1:]
+        near = (np.minimum(begin, end) <= high) & (np.maximum(begin, end) >= low)
+        lengths = np.minimum(chain.lengths(), math.hypot(*(high - low)))
+        return float(lengths[near.all(axis=1)].sum())
+
+    def round_pen(self, width: float) -> Look:
+        """A pen of a width on the page."""
+        return {
+            "fill": "none",
+            "stroke-width": self.view.mm(width),
+            "stroke-linecap": "round",
+            "stroke-linejoin": "round",
+        }
+
+    def path(self, chains: Sequence[Chain]) -> str:
+        """Lines and arcs as one path."""
+        return element("path", {"d": path_data(chains)})
+
+    def lines(self, name: str, chains: Sequence[Chain], look: Look) -> str:
+        """The same in a group of its own, drawn so; empty without any."""
+        return element("g", {"id": name, **look}, self.path(chains)) if chains else ""
+
+    def body(self, chains: Sequence[Chain]) -> str:
+        """A light fill of what is closed (even-odd, so that holes stay open)."""
+        closed = [chain for chain in chains if chain.closed]
+        if not closed or len(closed) > MOST_BODIES:
+            return ""
+        fill: Look = {"d": path_data(closed), "fill": BODY, "fill-rule": "evenodd"}
+        return element("g", {"id": "body"}, element("path", fill))
+
+    def frame(self, name: str, size_mm: tuple[float, float], colour: str) -> str:
+        """A rectangle from part zero."""
+        sides: Look = {"x": 0.0, "y": 0.0, "width": size_mm[0], "height": size_mm[1]}
+        line: Look = {"fill": "none", "stroke": colour, "stroke-width": self.view.mm(2.0)}
+        return element("g", {"id": name}, element("rect", {**sides, **line}))
+
+    def trace(self, trace: Trace, width: float) -> str:
+        """The path of the slides, coloured by its error."""
+        return trace_layer(trace, self.view, width)
+
+    # Marks, in units of the page.
+
+    def dots(self, name: str, places: Iterable[Place], look: Look) -> str:
+        """Round marks at places in mm: each is drawn, smaller where there are very many."""
+        shown = [self.view.page(*place) for place in places if self.view.shows(*place)]
+        if not shown:
+            return ""
+        shrink = max(math.sqrt(min(MARKS_OF_FULL_SIZE / len(shown), 1.0)), SMALLEST_MARK)
+        line = {key: value for key, value in look.items() if key != "r"}
+        if "stroke-width" in line:
+            line["stroke-width"] = round(float(line["stroke-width"]) * shrink, 3)
+        size = number(float(look["r"]) * shrink)
+        marks = [
+            element("circle", {"cx": number(x), "cy": number(y), "r": size}) for x, y in shown
+        ]
+        return element("g", {"id": name, **line}, *marks)
+
+    def arrows(self, chains: Sequence[Chain]) -> str:
+        """Few arrows, in the direction of travel: none on short chains, four at most on one."""
+        view = self.view
+        lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
+        long = [index for index, length in enumerate(lengths) if length >= SHORTEST_WITH_ARROW]
+        data, taken = PathData(), list[Place]()
+        for index in long[:: 1 + len(long) // MOST_WITH_ARROW]:
+            wanted = min(1 + int(lengths[index] / ARROW_EVERY), MOST_ON_ONE)
+            for place in range(wanted):
+                point, heading = _along(chains[index], place / wanted, (place + 1) / wanted)
+                at = view.page(*point)
+                if view.shows(*point) and all(math.dist(at, one) >= ARROWS_APART for one in taken):
+                    _arrow(data, at, -heading)
+                    taken.append(at)
+        if not data:
+            return ""
+        return element("g", {"id": "arrows"}, element("path", {"d": str(data), "fill": FEED}))
+
+    def order(self, places: Sequence[Place]) -> str:
+        """The numbers of contours; of very many, each 2nd, 5th, 10th …"""
+        numbers = placed(places, self.view, every(len(places)))
+        return _group("order", [_written(one, INK) for one in numbers])
+
+    def ranks(self, name: str, places: Sequence[Place], look: Look) -> str:
+        """A ring at each place with its number, in the colour of the ring."""
+        numbers = placed(places, self.view)
+        rings = []
+        for one in numbers:
+            at: Look = {"cx": number(one.at[0]), "cy": number(one.at[1])}
+            rings.append(element("circle", {**at, **look}))
+        return _group(name, [*rings, *(_written(one, str(look["stroke"])) for one in numbers)])
+
+
+def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], float]:
+    """Point and heading in the middle of the longest piece of a move between two shares of the
+    chain's length: on a straight or a smooth arc, away from corners."""
+    ends = np.cumsum(chain.lengths())
+    begins = np.concatenate([[0.0], ends[:-1]])
+    first = np.maximum(begins, low * ends[-1])
+    last = np.minimum(ends, high * ends[-1])
+    # Rounded, so that of two halves of a circle the first is taken everywhere.
+    index = int(np.argmax(np.round((last - first) / ends[-1], TIE_DECIMALS)))
+    middle = 0.5 * (first[index] + last[index])
+    return chain.at(index, float((middle - begins[index]) / (ends[index] - begins[index])))
+
+
+def _arrow(data: PathData, at: tuple[float, float], heading: float) -> None:
+    """A slim arrowhead with its middle at `at`; heading in page directions (Y down)."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    half = ARROW_LENGTH / 2.0
+    corners = ((half, 0.0), (-half, ARROW_WIDTH), (-half / 2.0, 0.0), (-half, -ARROW_WIDTH))
+    for index, (along, across) in enumerate(corners):
+        x, y = at[0] + along * cos - across * sin, at[1] + along * sin + across * cos
+        (data.line if index else data.move)(x, y)
+    data.close()
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number beside the place that it belongs to, both on the page; `box` is left, top, right,
+    bottom."""
+
+    name: str
+    at: tuple[float, float]
+    box: tuple[float, float, float, float]
+
+
+def every(count: int) -> int:
+    """How far apart the numbers of so many contours are."""
+    return 1 if count <= MOST_ALL else round(round_step(count / MOST_ALL))
+
+
+def placed(places: Sequence[tuple[float, float]], view: View, step: int = 1) -> list[Number]:
+    """Numbers from 1 at places in mm, or the first and each that `step` divides, none over
+    another."""
+    found: list[Number] = []
+    boxes: list[tuple[float, float, float, float]] = []
+    indices = [k for k in range(len(places)) if k == 0 or (k + 1) % step == 0]
+    for index in indices[:MOST]:
+        place = places[index]
+        if not view.shows(*place):
+            continue
+        name, at = str(index + 1), view.page(*place)
+        for direction in DIRECTIONS:
+            box = _beside(name, at, direction)
+            if _inside(box, view) and not any(_touch(box, other) for other in boxes):
+                found.append(Number(name, at, box))
+                boxes.append(box)
+                break
+    return found
+
+
+def _beside(
+    name: str, at: tuple[float, float], direction: tuple[float, float]
+) -> tuple[float, float, float, float]:
+    wide = text.width(name, CAP)
+    left = at[0] + AWAY if direction[0] > 0.0 else at[0] - AWAY - wide
+    top = at[1] + 0.5 * AWAY if direction[1] > 0.0 else at[1] - 0.5 * AWAY - CAP
+    return left, top, left + wide, top + CAP
+
+
+def _inside(box: tuple[float, float, float, float], view: View) -> bool:
+    plot = view.box
+    return (
+        box[0] > plot.left and box[1] > plot.top and box[2] < plot.right and box[3] < plot.bottom
+    )
+
+
+def _touch(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
+    beside = a[2] + CLEAR <= b[0] or b[2] + CLEAR <= a[0]
+    return not (beside or a[3] + CLEAR <= b[1] or b[3] + CLEAR <= a[1])
+
+
+def _group(name: str, parts: list[str]) -> str:
+    return element("g", {"id": name}, *parts) if parts else ""
+
+
+def _written(one: Number, colour: str) -> str:
+    style, at = Style(CAP, colour), (one.box[0], one.box[3])
+    halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": HALO}
+    below = element("path", {"d": text.strokes(one.name, at, style), **halo})
+    return below + "\n" + text.label(one.name, at, style)
