@@ -139,8 +139,8 @@ class Running:
 
 @dataclass(frozen=True)
 class Ordered:
-    """Tasks with their jobs, the text by which each job (by stem) is told from others, and the
-    drawings whose own job is wrong."""
+    """Tasks with their jobs, a text that identifies each job (by stem), and the drawings whose own
+    job is wrong."""
 
     tasks: list[Task]
     jobs: dict[str, str]
@@ -157,13 +157,13 @@ class Ended:
 
 @dataclass(frozen=True)
 class LazyPool:
-    """A pool that is not there before it has something to do."""
+    """A pool that is made when it has something to do."""
 
     pool: Callable[[], Pool]
     begins: Callable[[], None]
 
     def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
-        """Those of the pool."""
+        """The results of the pool."""
         pool = self.pool()
         self.begins()
         yield from pool.results(tasks)
@@ -182,7 +182,8 @@ class BatchRun:
     def run(
         self, sources: Sequence[str], job: JobFlags, reads: Sequence[str], *, own_jobs: bool
     ) -> int:
-        """Find, make, say; the exit code. CamtoolError for what is no single drawing's fault.
+        """Find the drawings, make what is not up to date, report; the exit code. CamtoolError for
+        errors that belong to no single drawing.
 
         `reads` are files that are read besides drawings and jobs.
         """
@@ -294,7 +295,7 @@ class BatchRun:
     def _outcomes(
         self, ordered: Ordered, manifest: Manifest, stop: Stop, shown: Display
     ) -> Generator[Outcome]:
-        """Those that come until something stops the run."""
+        """The outcomes until something stops the run."""
         from camtool.batches.run import Order, run_batch
 
         force = self.running.force
@@ -339,7 +340,7 @@ def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:
 
 
 def _order(job: JobFlags, work: PostWork) -> tuple[JobOrder, str]:
-    """A job, and the text by which it is told from others."""
+    """A job, and the text that identifies it."""
     wanted = job.job(work.drawing)
     return JobOrder(wanted, job.file), repr(wanted)
 

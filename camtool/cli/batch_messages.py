@@ -72,12 +72,12 @@ class Lines:
         self._done = 0
 
     def begins(self) -> None:
-        """Nothing: the first line will tell."""
+        """Nothing: the first line shows it."""
 
     def add(self, outcome: Outcome) -> None:
         """One line, and those of its findings."""
         self._done += 1
-        for line in said_of(outcome, self._verbosity):
+        for line in lines_of(outcome, self._verbosity):
             say(line, quiet=False)
         if outcome.state is not State.UP_TO_DATE or self._verbosity.verbose:
             place = f"{self._done:>{len(str(self._total))}}/{self._total}"
@@ -89,8 +89,8 @@ class Lines:
 
 
 class Bar:
-    """A bar with rate and time left, once there is something to do; what goes wrong stands above
-    it in one line, and in full in the table."""
+    """A bar with rate and time left, once there is something to do. Errors stand above it on one
+    line each, and in full in the table."""
 
     def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total
@@ -139,7 +139,7 @@ _PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False}
 """Text that comes from files is no markup."""
 
 
-def said_of(outcome: Outcome, verbosity: Verbosity) -> list[str]:
+def lines_of(outcome: Outcome, verbosity: Verbosity) -> list[str]:
     """The lines for one drawing: its error always, its findings unless quiet."""
     lines = [] if outcome.error is None else [f"camtool: error: {outcome.error}"]
     if verbosity.verbose:
@@ -232,7 +232,7 @@ def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
         failed = each.state is State.FAILED
         what = "failed" if failed else _counted(each.warnings, "warning")
         name = PurePath(each.source).relative_to(base) if base else each.source
-        # What failed is told in full; warnings in one line, for there may be many alike.
+        # Errors are shown in full, warnings on one line each: there may be many alike.
         why = Text(_why(each)) if failed else Text(_why(each), no_wrap=True, overflow="ellipsis")
         table.add_row(Text(one_line(str(name))), what, why, style=COLOUR[each.state])
     Console(stderr=True).print(table)
@@ -240,10 +240,10 @@ def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
 
 
 def _common(outcomes: Sequence[Outcome]) -> str:
-    """The folders that all drawings have in common, "" for none."""
+    """The folder that all drawings share; "" for none."""
     try:
         return os.path.commonpath([PurePath(each.source).parent for each in outcomes])
-    except ValueError:  # some are told from the root, some from here
+    except ValueError:  # some paths are absolute, some relative
         return ""
 
 

@@ -86,7 +86,7 @@ class PostWork:
                 compensate=self.compensate,
                 gates=self.gates,
             )
-        made = _said(task, run)
+        made = _made(task, run)
         if made.error is not None:
             return made
         files = dict(self._files(task, run))
@@ -124,8 +124,9 @@ def _is_code(path: Path) -> bool:
     return path.suffix in (".py", ".toml") and path.is_file()
 
 
-def _said(task: Task, run: Run) -> Made:
-    """The findings: the error of a drawing that must not be written, and the worst lines."""
+def _made(task: Task, run: Run) -> Made:
+    """What a worker reports: the error of a drawing that must not be written, and the worst
+    findings."""
 
     def lines(severity: Severity) -> list[Finding]:
         return [each for each in run.findings if each.severity == severity]

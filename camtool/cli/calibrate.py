@@ -42,14 +42,14 @@ def calibrate(
     from camtool.calibration.measurements import read_measurements
 
     check_places([measurements, machine], [output, report])
-    said = read_measurements(Path(measurements))
-    flags = MachineFlags(target or (None if machine else said.target or None), machine, ())
+    measured = read_measurements(Path(measurements))
+    flags = MachineFlags(target or (None if machine else measured.target or None), machine, ())
     known = flags.load().machine
-    found = estimated(said, known)
+    found = estimated(measured, known)
     files: dict[str, bytes] = {}
     if output is not None:
         own = _own_table(machine, str(flags.name()))
-        files[output] = machine_file(found, said, known, own).encode()
+        files[output] = machine_file(found, measured, known, own).encode()
     if report is not None:
         files[report] = to_json(to_data(found, known)).encode()
     write_all(files)

@@ -1,8 +1,8 @@
 """`camtool completion`: the script that completes commands, flags and values in a shell.
 
-The shell asks camtool itself, which answers in `main` before any command runs. What flags take is
-told there by their place: `complete_values` gives each parameter the type that completes it, so
-that commands need not know of shells. No answer compiles a kernel or loads a library of drawings.
+The shell asks camtool itself, which answers in `main` before any command runs. There
+`complete_values` gives each parameter the type that completes its values, so that commands need
+not know of shells. No answer compiles a kernel or loads a library of drawings.
 
 The scripts are ours and not click's, for those take names apart at spaces, commas and backslashes,
 and `--target=pi` is nothing to them or is replaced whole. A script hands over its line up to the
@@ -160,8 +160,8 @@ class Fish(_Shell):
 
     def format_completion(self, item: CompletionItem[Any]) -> str:
         """The kind, the value, and behind a tab the help."""
-        said, answer = _help(item), super().format_completion(item)
-        return f"{answer}\t{said}" if said else answer
+        text, answer = _help(item), super().format_completion(item)
+        return f"{answer}\t{text}" if text else answer
 
 
 SHELLS: dict[str, type[_Shell]] = {kind.name: kind for kind in (Bash, Zsh, Fish)}
@@ -217,7 +217,7 @@ def complete_values(command: click.Command) -> None:
 
 
 class _Completed(StringParamType):
-    """Text of which a shell may be told what it can be; taken as it is."""
+    """Text whose possible values a shell can be given; any text is taken."""
 
     def __init__(self, answer: _Answer) -> None:
         self._answer = answer
@@ -259,8 +259,8 @@ def _targets(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """The layers of the drawing that the line names before, if it is a DXF of text."""
     # What stands before a flag that still lacks its value has not been given its place.
-    said = [*(ctx.params.get(key) or () for key in _DRAWINGS), tuple(ctx.args)]
-    given = [Path(name) for names in said for name in _several(names)]
+    named = [*(ctx.params.get(key) or () for key in _DRAWINGS), tuple(ctx.args)]
+    given = [Path(name) for names in named for name in _several(names)]
     for name in sorted({layer for file in given for layer in dxf_layers(file)}):
         if name.casefold().startswith(incomplete.casefold()):
             yield CompletionItem(name.replace("[", "[[]"))  # a layer is given by a pattern

@@ -109,7 +109,7 @@ def coupon(
 
 
 def _travel(machine: Machine | None) -> tuple[float, float]:
-    """The machine's table, mm; OptionError when nobody has said how large it is."""
+    """The machine's table, mm; OptionError when its travel is not known."""
     if machine is None:
         return SIZE
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm

@@ -23,7 +23,7 @@ SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm"
 
 
 def say_first_run(*, quiet: bool, judging: bool = False) -> None:
-    """A word before the long silence of the first run; `judging` as below."""
+    """A message before the long silence of the first run; `judging` as below."""
     if first_run(judging=judging):
         say("camtool: first run: compiling the kernels, once, for some 12 s", quiet=quiet)
 
@@ -33,7 +33,7 @@ def first_run(*, judging: bool = False) -> bool:
     time goes there, and reading a drawing compiles others.
 
     Their compiled form lies beside them or in NUMBA_CACHE_DIR; where their folder cannot be
-    written numba keeps it elsewhere, and then we cannot tell: False.
+    written, numba keeps it elsewhere, and nobody can know: False.
     """
     import camtool.kernels
 

@@ -90,10 +90,10 @@ def check(
 
     reads = [*JobFlags(file).files(), against, *machine.files()]
     check_places(reads, [report])
-    said = JobFlags(file).job(drawing)
+    job = JobFlags(file).job(drawing)
     target = machine.load().machine if machine.name() is not None else None
-    read = drawing.read(against, target, said) if against is not None else None
-    facts, findings = described(said, read, target)
+    read = drawing.read(against, target, job) if against is not None else None
+    facts, findings = described(job, read, target)
     if report is not None:
         facts["findings"] = [
             {

@@ -106,9 +106,9 @@ def _code(*, debug: bool) -> int:
         with life_signs(sys.stderr, sys.argv[1:]):
             return _run()
     except click.ClickException as error:
-        said = io.StringIO()
-        error.show(said)
-        for line in said.getvalue().splitlines():
+        text = io.StringIO()
+        error.show(text)
+        for line in text.getvalue().splitlines():
             say(line, quiet=False)
         return EXIT_BAD_INPUT
     except (click.Abort, KeyboardInterrupt):

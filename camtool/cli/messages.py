@@ -35,33 +35,33 @@ COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 def say(text: str, *, quiet: bool) -> None:
     """One message, unless quiet: one line that can be seen, whatever names it holds."""
     if not quiet:
-        _tell(tinted(one_line(text)))
+        _echo(tinted(one_line(text)))
 
 
 def show_text(text: str, *, err: bool = False) -> None:
     """Lines for people on stdout, styled or not, whose names `one_line` has gone through."""
     if err:
-        _tell(text)
+        _echo(text)
     else:
         click.echo(text)
 
 
-def _tell(text: str) -> None:
-    """Text on stderr; where that is full nobody can be told so."""
+def _echo(text: str) -> None:
+    """Text on stderr; a full stderr is ignored, since there is nowhere to report it."""
     with suppress(OSError):
         click.echo(text, err=True)
 
 
 def in_colour(stream: TextIO | None) -> bool:
-    """Whether a stream is a terminal of somebody who has said neither NO_COLOR (no-color.org)
-    nor CLICOLOR=0 (bixense.com/clicolors); one that was closed is None."""
-    said = os.environ.get
+    """Whether a stream is a terminal whose user has set neither NO_COLOR (no-color.org) nor
+    CLICOLOR=0 (bixense.com/clicolors); a closed stream is None."""
+    variable = os.environ.get
     return (
         stream is not None
         and stream.isatty()
-        and not said("NO_COLOR")
-        and said("CLICOLOR") != "0"
-        and said("TERM") != "dumb"
+        and not variable("NO_COLOR")
+        and variable("CLICOLOR") != "0"
+        and variable("TERM") != "dumb"
     )
 
 
@@ -70,7 +70,7 @@ def say_error(error: CamtoolError) -> None:
     text, mend = one_line(f"camtool: error: {error}"), one_line(" ".join(error.mend.split()))
     if mend and text.endswith(mend) and in_colour(sys.stderr):
         text = text.removesuffix(mend) + click.style(mend, bold=True)
-    _tell(tinted(text))
+    _echo(tinted(text))
 
 
 def tinted(text: str) -> str:
@@ -89,8 +89,8 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
     """Errors always, warnings unless quiet, remarks when verbose; one line each, and one for all
     that are like those before, unless verbose."""
     least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
-    told = [finding for finding in findings if finding.severity >= least]
-    for finding, more in [(each, 0) for each in told] if verbose else summed(told):
+    shown = [finding for finding in findings if finding.severity >= least]
+    for finding, more in [(each, 0) for each in shown] if verbose else summed(shown):
         say(f"camtool: {finding}", quiet=False)
         if more:
             name = f"{finding.severity.name.lower()} {finding.code.name}"
@@ -129,7 +129,7 @@ def show_facts(plain: str, name_width: int, marks: Marks, *, err: bool = False) 
 
 
 def show_compared(plain: str, rows: Sequence[ContrastRow]) -> None:
-    """The table of `--compare`: the way with the least error in green, endless ones in red."""
+    """The table of `--compare`: the variant with the least error in green, endless ones in red."""
     if in_colour(sys.stdout):
         head, *lines = plain.split("\n")
         ends = [row.total_max_um for row in rows if not row.endless]
@@ -156,8 +156,8 @@ def _line(line: str, name_width: int, marks: Marks, columns: int) -> str:
     colour = None if mark is None else COLOURS[mark]
     wide = max(columns - name_width, LEAST_WIDTH)
     parts = textwrap.wrap(value, wide, break_long_words=False, break_on_hyphens=False)
-    said = f"\n{' ' * name_width}".join(click.style(part, fg=colour) for part in parts)
-    return f"{click.style(name.rstrip(), bold=True, fg=colour)}{name[len(name.rstrip()) :]}{said}"
+    value = f"\n{' ' * name_width}".join(click.style(part, fg=colour) for part in parts)
+    return f"{click.style(name.rstrip(), bold=True, fg=colour)}{name[len(name.rstrip()) :]}{value}"
 
 
 def _way(line: str, row: ContrastRow, least: float | None) -> str:

@@ -1,7 +1,8 @@
 """The flags that say how a picture looks, and the pictures of a command drawn by them.
 
 A command says with a `Canvas` what its pictures can show. What a picture cannot honour is refused
-by name before any work is done; a layer that was named and turns out to hold nothing is told.
+by name before any work is done; the user is warned about empty layers that were
+named.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ class PictureFlags:
         return tuple(dict.fromkeys(name for name in names if name))
 
     def options(self) -> Options:
-        """What `camtool.preview` is told; OptionError for what makes no picture."""
+        """The options of the pictures; OptionError for what makes no picture."""
         from camtool.pictures.options import Options
 
         times = 1.0 if self.exaggerate is None else self.exaggerate

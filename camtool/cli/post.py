@@ -211,7 +211,7 @@ def post(
 # How `post` and `convert` end: all files or none, and a short summary.
 
 ANY_MACHINE = "travel, rates and backlash are placeholders: camtool targets new NAME --extends {}"
-"""What is said where nobody has told what the machine is."""
+"""The note where the machine's own numbers are not known."""
 
 
 @dataclass(frozen=True)
@@ -260,10 +260,10 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
     output = asked.program(run.program.extension)
     write_all({output: run.program.data, **outputs.files(run, picture)})
     if run.report is not None and not quiet:
-        said = run.report.to_text(findings=False)
+        summary = run.report.to_text(findings=False)
         if run.target.any_machine:
-            said += f"\n{'machine':<10} {ANY_MACHINE.format(run.target.machine.target.name)}"
-        show_facts(said, REPORT_NAMES, report_marks(run.findings), err=True)
+            summary += f"\n{'machine':<10} {ANY_MACHINE.format(run.target.machine.target.name)}"
+        show_facts(summary, REPORT_NAMES, report_marks(run.findings), err=True)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(run.program.data)} bytes)", quiet=quiet)
     return 0
@@ -299,7 +299,7 @@ def watch(
     """Calls `again` now and after each change of the `files`, until Ctrl-C; then 0.
 
     Which files these are may change with what they hold: a job file names a tool table.
-    What is wrong is said on one line, and watching goes on: the next save may mend it.
+    An error is shown on one line, and watching goes on: the next save may mend it.
     """
     try:
         seen = _digests(files)

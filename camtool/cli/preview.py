@@ -113,8 +113,8 @@ def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:
 
 @dataclass(frozen=True)
 class Seen:
-    """How files are made into scenes, each with what was noticed in its drawing; where no part can
-    be made of it, what stands against that."""
+    """How files are made into scenes, each with the findings of its drawing, or with those of the
+    program where no part can be made of it."""
 
     machine: MachineFlags
     simulate: bool

@@ -34,9 +34,9 @@ EMBEDDED = "picture.svg"
 _CAPTION = "The predicted result"
 _PLACES = ("target", "machine", "settings", "output", "preview", "report", "page")
 _LOOKS = (*PICTURE_FLAGS, "beside", "before_after")
-_NOT_TOLD = frozenset((*_PLACES, *_LOOKS, "quiet", "verbose", "watching"))
-"""What says where things are, how pictures look and how much is said; the machine tells of
-itself."""
+_NOT_LISTED = frozenset((*_PLACES, *_LOOKS, "quiet", "verbose", "watching"))
+"""Flags that a page does not list: places, looks of pictures, verbosity; the machine has a row of
+its own."""
 
 
 def report_option(command: Any) -> Any:
@@ -162,15 +162,15 @@ def _flags_given() -> tuple[tuple[str, str], ...]:
     context = click.get_current_context()
     given = click.core.ParameterSource.COMMANDLINE
     return tuple(
-        (param.opts[0], _said(context, str(param.name)))
+        (param.opts[0], _value(context, str(param.name)))
         for param in context.command.params
-        if param.name not in _NOT_TOLD
+        if param.name not in _NOT_LISTED
         and context.get_parameter_source(str(param.name)) is given
         and isinstance(param, click.Option)
     )
 
 
-def _said(context: click.Context, name: str) -> str:
+def _value(context: click.Context, name: str) -> str:
     value = context.params.get(name)
     if isinstance(value, tuple):
         return ", ".join(map(str, value))

@@ -168,7 +168,7 @@ def build_job(file: JobTables, flags: JobTables, chosen: tuple[str, ...] = ()) -
         _operation(n, (file.defaults, own, flags.defaults), tools, len(tables))
         for n, own in enumerate(tables, start=1)
     ]
-    _refuse_twin_names(operations, tables)
+    _refuse_equal_names(operations, tables)
     rows = _rows(operations, chosen)
     for layer in (file.defaults, flags.defaults):
         _refuse_unused(
@@ -210,7 +210,9 @@ def _operation(
     """Operation `number` of `count`: its own keys over the defaults, flags over both."""
     defaults, own, flags = layers
     merged = flags.over(own.over(defaults)).only(OPERATION)
-    record_of(Operation, OPERATION, own.only(OPERATION))  # what flags hide must be right too
+    record_of(
+        Operation, OPERATION, own.only(OPERATION)
+    )  # keys that flags override must be right too
     kind = Operation.kind
     if "kind" in merged.given:
         kind = OPERATION["kind"].read(merged.given["kind"])
@@ -249,7 +251,7 @@ def _refuse_tool(operation: Operation, own: Table) -> None:
         )
 
 
-def _refuse_twin_names(operations: list[Operation], tables: tuple[Table, ...]) -> None:
+def _refuse_equal_names(operations: list[Operation], tables: tuple[Table, ...]) -> None:
     names = [operation.name for operation in operations]
     for n, table in enumerate(tables):
         if names[n] in names[:n]:
@@ -280,7 +282,7 @@ def _rows(operations: list[Operation], chosen: tuple[str, ...]) -> list[int]:
 
 
 def _refuse_unused(layer: Table, operations: list[Operation]) -> None:
-    """Refuse a default, or a flag, of which no operation makes use."""
+    """Refuse a default or a flag that no operation uses."""
     for name, given in layer.only(OPERATION).given.items():
         reasons = [_why_unused(name, operation) for operation in operations]
         if None not in reasons and reasons[0] is not None:
@@ -330,7 +332,8 @@ class Tools:
     units: str = "mm"
 
     def of(self, layers: Sequence[Table], kind: str) -> Tool:
-        """The tool of an operation of this kind. `layers`: what is said of it, the nearest last.
+        """The tool of an operation of this kind. `layers`: the tables that apply to
+        it, the nearest last.
 
         The nearest name or number counts, and single keys (`tool_diameter`) of that layer and
         of nearer ones change it.
@@ -411,7 +414,7 @@ def with_table(tools: Tools, path: Path) -> Tools:
 
 
 def refuse_bad_tools(named: Mapping[str, Table]) -> None:
-    """Refuse what is no tool, used or not, and two tools of one number."""
+    """Refuse tools that are wrong, used or not, and two tools with one number."""
     seen: dict[int, str] = {}
     for name, keys in named.items():
         _tool(name, keys, "")

@@ -31,8 +31,8 @@ NOT_KNOWN_MM = math.inf
 def described(
     job: Job, drawing: Drawing | None = None, machine: Machine | None = None
 ) -> tuple[dict[str, Any], list[Finding]]:
-    """The job in words and numbers, mm, with what it takes of a drawing; and what is to be said
-    of the sides. OptionError for an operation that takes nothing."""
+    """The job in words and numbers, mm, with what it takes of a drawing, and the findings
+    about its sides. OptionError for an operation that takes nothing."""
     facts: dict[str, Any] = {
         "operations": [_operation(job, k) for k in range(len(job.operations))]
     }
@@ -50,15 +50,15 @@ def described(
     facts = {"drawing": drawing.file, "extents_mm": {"x": x, "y": y}, **facts}
     unsaid = NOT_KNOWN_MM if machine is None else machine.defaults.cut_depth_mm
     sides = Sides.of(placed, job, unsaid)
-    for operation, said in zip(job.operations, facts["operations"], strict=True):
+    for operation, row in zip(job.operations, facts["operations"], strict=True):
         chosen = choose(placed, operation, sides)
         closed = chosen.lines.closed
-        said["takes"] = {
+        row["takes"] = {
             "closed": int(closed.sum()),
             "open": int((~closed).sum()),
             "points": len(chosen.points),
         }
-        said["contours"] = _groups(operation, chosen, sides, placed)
+        row["contours"] = _groups(operation, chosen, sides, placed)
         if operation.side == "auto" and runs_beside(operation):
             findings += by_uncut(sides, operation, chosen.source[closed])
     return facts, findings
@@ -80,7 +80,7 @@ def _operation(job: Job, index: int) -> dict[str, Any]:
 def _groups(
     operation: Operation, chosen: Chosen, sides: Sides, placed: Drawing
 ) -> list[dict[str, Any]]:
-    """How many contours of a layer have the tool on which side, and why."""
+    """How many contours of each layer have the tool on which side, and why."""
     if operation.kind == "drill":
         return []
     groups: Counter[tuple[str, str, str]] = Counter()

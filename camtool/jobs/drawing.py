@@ -56,7 +56,7 @@ def read_to_scale(read: Callable[[float], Drawing], job: Job) -> Drawing:
     for _ in range(MOST_LOOKS - 1):
         try:
             scale = part_scale(drawing, job)
-        except OptionError:  # which planning says, with its place in the job
+        except OptionError:  # planning reports it, with its place in the job
             return drawing
         if abs(scale - drawing.made_for) <= SCALE_SHARE * drawing.made_for:
             return drawing
@@ -91,7 +91,7 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
 
 
 def _unmatched(error: NoMatchError, job: Job) -> OptionError:
-    """The reader's complaint about a layer of the job, with the operation that wants it."""
+    """The reader's error about a layer of the job, with the operation that names it."""
     rows = enumerate(job.operations, start=1)
     called = next(_called(each, n) for n, each in rows if error.pattern in each.layers)
     return OptionError(

@@ -55,7 +55,7 @@ class Given:
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
-        """OptionErrors from within get the place of this value."""
+        """Within the block, an OptionError gets the place of this value."""
         try:
             yield
         except OptionError as error:
@@ -65,7 +65,8 @@ class Given:
 @dataclass(frozen=True)
 class Value:
     """What a key may be: `read` makes the field's value of what was given. The help of its flag
-    shows `metavar` or `choices`; a switch has neither. Some may be `tables` of their own."""
+    shows `metavar` or `choices`; a switch has neither. With `tables`, a table
+    may give it too."""
 
     read: Callable[[Given], Any]
     metavar: str = ""
@@ -169,9 +170,9 @@ def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError 
     other, values = only
     if getattr(record, keys[other].field) in values:
         return None
-    said = " or ".join(f'"{value}"' for value in values)
+    needed = " or ".join(f'"{value}"' for value in values)
     return OptionError(
-        f"has no effect without {other} = {said}", mend=f"give {other} too, or leave {name} out"
+        f"has no effect without {other} = {needed}", mend=f"give {other} too, or leave {name} out"
     )
 
 
@@ -201,7 +202,7 @@ _WILD = re.compile(r"[*?\[]")
 
 
 def plain(convert: Callable[[object], Any]) -> Callable[[Given], Any]:
-    """Reads a value by a function that knows nothing of its place."""
+    """A reader that converts the bare value; errors get the place of the value."""
 
     def read(given: Given) -> Any:
         with given.blamed():
@@ -268,16 +269,16 @@ def text(value: object) -> str:
 
 
 def word(known: Sequence[str]) -> Callable[[Given], Any]:
-    """One of the words that are known, with a guess which one was meant."""
+    """One of the known words; the error for another one guesses which was meant."""
 
     def convert(value: object) -> str:
-        said = text(value)
-        if said not in known:
+        name = text(value)
+        if name not in known:
             raise OptionError(
-                f"unknown word {said!r}",
-                mend=f"{guess(said, known)}use one of {', '.join(known)}",
+                f"unknown word {name!r}",
+                mend=f"{guess(name, known)}use one of {', '.join(known)}",
             )
-        return said
+        return name
 
     return plain(convert)
 
@@ -299,7 +300,7 @@ def layers(value: object) -> tuple[str, ...]:
 
 
 def colours(value: object) -> tuple[str, ...]:
-    """Patterns of colours as drawings have them ("#rrggbb"); names and numbers are turned so."""
+    """Patterns of colours, "#rrggbb" as drawings have them; names and numbers are converted."""
     from camtool.importers.pieces import colour_named
 
     if isinstance(value, list | tuple):
@@ -310,7 +311,7 @@ def colours(value: object) -> tuple[str, ...]:
 
 
 def lengths(value: object) -> tuple[float, float]:
-    """[12, "9mm"] or "12x9mm": a unit behind both is that of both."""
+    """[12, "9mm"] or "12x9mm"; a unit at the end holds for both."""
     if isinstance(value, str):
         match = _PAIR.fullmatch(value.strip())
         if match is None:
@@ -398,14 +399,14 @@ def _word_or_place(value: object, known: Sequence[str]) -> str | tuple[float, fl
     """One of the words, or a place as a list of two lengths or a text with a comma."""
     if isinstance(value, list | tuple):
         return _two(value, length, '["10mm", "5mm"]')
-    said = text(value)
-    if said in known:
-        return said
-    places = said.split(",")
+    name = text(value)
+    if name in known:
+        return name
+    places = name.split(",")
     if len(places) != 2:
         raise OptionError(
-            f"{said!r} is no place",
-            mend=f"{guess(said, known)}use one of {', '.join(known)}, or x,y",
+            f"{name!r} is no place",
+            mend=f"{guess(name, known)}use one of {', '.join(known)}, or x,y",
         )
     return length(places[0]), length(places[1])
 

@@ -117,7 +117,7 @@ def _by(names: Sequence[str], of_marks: Sequence[str], key: str) -> list[_Group]
 
 
 def _extent(drawing: Drawing, group: _Group) -> float:
-    """The size of what the group holds, mm: what holds others comes after them."""
+    """The size of the group, mm; larger groups come after the ones within them."""
     lines = drawing.paths.select(group.paths)
     return float(np.ptp(extents(lines), axis=1).sum()) if len(lines) else 0.0
 
