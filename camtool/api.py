@@ -19,8 +19,6 @@ from camtool.comparison import Comparison
 from camtool.errors import CamtoolError, MachineError, OptionError, ProgramError
 from camtool.geometry.drawing import Drawing
 from camtool.jobs.keys import field_value
-from camtool.machine.loader import extended_by
-from camtool.machine.registry import ListedTarget, LoadedTarget, list_target, target_names
 from camtool.pictures.picture import Picture
 from camtool.pictures.scene import Scene
 from camtool.pipeline import Judging
@@ -28,6 +26,8 @@ from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.job import job_of as made
 from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
 from camtool.simulation.motion import Effects
+from camtool.targets.loader import extended_by
+from camtool.targets.registry import ListedTarget, LoadedTarget, list_target, target_names
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 from camtool.units import parse_length
@@ -243,7 +243,7 @@ def load_target(
     `settings`: {"axes.x.backlash_mm": 0.2}, or as `--set` takes them. Units are those that the
     keys end on. Raises UnknownTargetError (with the nearest names) and MachineError.
     """
-    from camtool.machine.registry import load_target as loaded
+    from camtool.targets.registry import load_target as loaded
 
     if isinstance(settings, Mapping):
         settings = [f"{key}={_as_toml(value)}" for key, value in settings.items()]
@@ -377,13 +377,13 @@ def compare(
     verdict on each way. Raises ProgramError with block and column, OptionError for ways that are
     none, and MachineError for values that the machine cannot have. Source: docs/verifying.md.
     """
-    from camtool.comparison import Way, altered, compare_program, ways_of
+    from camtool.comparison import Way, compare_program, ways_of
 
     loaded, wanted, how = as_target(target), job or Job(), judging or Judging()
     data, source = as_bytes(program)
     read = None if against is None else as_drawing(against, loaded, wanted)
     if isinstance(ways, str):
-        chosen = ways_of(ways, lambda settings: altered(loaded, settings), how)
+        chosen = ways_of(ways, lambda settings: loaded.with_settings(settings), how)
     else:
         chosen = [Way(name, as_target(each), how) for name, each in ways.items()]
     if not chosen:
@@ -435,7 +435,8 @@ def calibrate(
     """
     from camtool.calibration.calibrate import calibrate as calibrated
     from camtool.calibration.measurements import Measurements, read_measurements
-    from camtool.machine.loader import extended_by, read_table
+    from camtool.tables import read_table
+    from camtool.targets.loader import extended_by
 
     own = None if machine is None else Path(machine)
     said = measurements

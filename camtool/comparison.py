@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
 from camtool.patterns import guess
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from camtool.arrays import Floats
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
-    from camtool.machine.registry import LoadedTarget
     from camtool.pictures.overlay import Overlay
     from camtool.planning.job import Job
     from camtool.simulation.motion import Effects
+    from camtool.targets.registry import LoadedTarget
     from camtool.toolpath.moves import Toolpath
     from camtool.verification.contrast import ContrastRow
     from camtool.verification.verify import Verification
@@ -88,25 +88,24 @@ class Comparison(Shown):
 
         from camtool.pictures.overlay import Overlay
         from camtool.simulation.motion import ALL, Options
-        from camtool.simulation.simulate import model_of, simulate
         from camtool.verification.contrast import strokes_within, worst_place
         from camtool.verification.cuts import cut_moves
 
         commanded = all(way.judging.interpolator is not None for way in self.ways)
-        machine, decoded = self.ways[0].target.machine, self.runs[0].decoded
+        first, decoded = self.ways[0].target, self.runs[0].decoded
         assert decoded is not None
-        wanted = model_of(machine).held(decoded, machine)
+        wanted = first.model.quantised(decoded, first.machine)
         place = worst_place(self.verdicts.values())
         window = self._window(wanted, place)
         room = ROOM * (window[:, 1] - window[:, 0]).max()
         around = window + np.array([-room, room])
         lines = []
         for way, run in zip(self.ways, self.runs, strict=True):
-            machine, moves = way.target.machine, run.decoded
+            moves = run.decoded
             assert moves is not None
             options = Options(way.judging.interpolator, way.judging.effects or ALL)
             cutting = cut_moves(moves, flat_cuts=True).is_cut
-            chunks = simulate(moves, machine, options)
+            chunks = way.target.simulate(moves, options)
             lines.append((way.name, strokes_within(chunks, cutting, around, commanded=commanded)))
         what = "commanded positions" if commanded else "paths of the slides"
         x, y = place
@@ -180,19 +179,6 @@ def ways_of(what: str, load: Load, judging: Judging) -> list[Way]:
     ]
 
 
-def altered(target: LoadedTarget, settings: Sequence[str]) -> LoadedTarget:
-    """The target with settings over its machine; MachineError names the wrong one."""
-    from msgspec import to_builtins
-
-    from camtool.machine.loader import build_machine
-
-    if not settings:
-        return target
-    machine = build_machine(to_builtins(target.machine), str(target.file), None, settings)
-    target.post.check(machine)
-    return replace(target, machine=machine)
-
-
 def left_out(names: Sequence[str]) -> Effects:
     """The mechanics without these effects; OptionError for others."""
     from camtool.simulation.motion import ALL
@@ -208,9 +194,7 @@ def left_out(names: Sequence[str]) -> Effects:
 
 
 def _interpolators(target: LoadedTarget, judging: Judging) -> list[Way]:
-    from camtool.machine.controllers import Interpolator
-
-    names = get_args(Interpolator)
+    names = target.model.interpolators
     return [Way(name, target, replace(judging, interpolator=name)) for name in names]
 
 

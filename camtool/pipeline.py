@@ -21,12 +21,11 @@ from camtool.run import Run
 if TYPE_CHECKING:
     from camtool.arrays import Bools
     from camtool.geometry.drawing import Drawing
-    from camtool.machine.controllers import Interpolator
     from camtool.machine.model import Machine
-    from camtool.machine.registry import LoadedTarget
     from camtool.planning.items import Step
     from camtool.planning.job import Job
     from camtool.simulation.motion import Effects
+    from camtool.targets.registry import LoadedTarget
     from camtool.toolpath.moves import Bent, Toolpath
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import Kept
@@ -42,7 +41,7 @@ class Judging:
     it was posted bent against the mechanics; how many of the worst moves are listed, and how many
     points of the slides' path are kept (None: as usual)."""
 
-    interpolator: Interpolator | None = None
+    interpolator: str | None = None
     effects: Effects | None = None
     gates: Gates | None = None
     compensated: bool = False
@@ -82,7 +81,7 @@ def post_drawing(
     plan = planned(drawing, job, target.machine)
     wanted = plan.toolpath
     run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
-    doubtful = doubts(plan.steps, starts_spindle=getattr(target.post, "starts_spindle", False))
+    doubtful = doubts(plan.steps, starts_spindle=target.post.starts_spindle)
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
@@ -260,7 +259,7 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
 
 def _decoded(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     try:
-        toolpath: Toolpath = target.post.read(data, target.machine)
+        toolpath = target.post.read(data, target.machine)
     except ProgramError as error:
         error.file = error.file or file
         raise
@@ -333,14 +332,12 @@ def _judged(
     """Simulated, and compared with what was wanted and drawn."""
     from camtool.verification.verify import verify
 
-    line_bytes = getattr(target.post, "line_bytes", None)
-    sent = len(data) if line_bytes is None else line_bytes(data, target.machine)
-    stray_mm = getattr(target.post, "stray_mm", None)
-    stray = 0.0 if stray_mm is None else stray_mm(target.machine)
+    sent = target.post.line_bytes(data, target.machine)
+    stray = target.post.stray_mm(target.machine)
     sized = replace(options, size_bytes=len(data), line_bytes=sent, stray_mm=stray)
     return verify(
         decoded,
-        target.machine,
+        target,
         wanted=goal.wanted,
         drawing=goal.drawing,
         options=sized,
@@ -361,11 +358,7 @@ def _asked(job: Job, target: LoadedTarget, planned: Toolpath, sent: Bent | None)
     machine = target.machine
     wanted = planned if sent is None else sent.toolpath
     program = target.post.write(wanted, machine)
-    unit = getattr(target.post, "unit_mm", None)
-    units = [
-        max(axis.coded_step_mm, axis.resolution_mm or 0.0) if unit is None else unit(machine)
-        for axis in machine.axes
-    ]
+    units = [target.post.unit_mm(machine, axis) for axis in machine.axes]
     written, blocks = target.post.read(program.data, machine), len(program.row_of_block)
     return Asked(
         written=written,

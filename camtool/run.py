@@ -18,10 +18,10 @@ from camtool.geometry.drawing import Drawing
 from camtool.toolpath.moves import Kind, Toolpath
 
 if TYPE_CHECKING:
-    from camtool.machine.registry import LoadedTarget
     from camtool.pictures.overlay import Overlay
     from camtool.pictures.scene import Scene
     from camtool.planning.job import Job
+    from camtool.targets.registry import LoadedTarget
     from camtool.toolpath.program import Listing, Program
     from camtool.verification.report import Report
     from camtool.verification.verify import Verification

@@ -11,8 +11,8 @@ import msgspec
 from msgspec import Meta
 
 from camtool.errors import InputError, MachineError
-from camtool.machine.loader import convert, read_table
 from camtool.machine.ranges import Length, Lost, Place, Reading, Tolerance
+from camtool.tables import convert, read_table
 
 Pair = tuple[Length, Length]
 Flat = Literal["x", "y"]

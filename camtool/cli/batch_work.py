@@ -18,9 +18,9 @@ from camtool.findings import Finding, Severity
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
-    from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
     from camtool.run import Run
+    from camtool.targets.registry import LoadedTarget
     from camtool.verification.report import Gates
 
 REMARKS = 20

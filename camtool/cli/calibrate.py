@@ -64,6 +64,6 @@ def calibrate(
 
 def _own_table(machine: str | None, target: str) -> dict[str, Any]:
     """What the user's machine file says; without one, only what it extends."""
-    from camtool.machine.loader import read_table
+    from camtool.tables import read_table
 
     return {"extends": target} if machine is None else read_table(Path(machine))

@@ -311,7 +311,7 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """The keys of the machine that the line names before."""
     import msgspec
 
-    from camtool.machine.registry import load_target
+    from camtool.targets.registry import load_target
 
     target = ctx.params.get("target")
     if isinstance(target, str):

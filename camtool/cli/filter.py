@@ -18,7 +18,6 @@ from camtool.cli.options import SectionedCommand, talk_options
 from camtool.cli.picture_options import PictureFlags
 from camtool.cli.post import Asked, Posting, finish, posting_options
 
-TARGET = "linuxcnc"
 BEGUN, READ, MADE, DONE = 1, 20, 95, 100
 """What the progress bar shows, per cent: begun, read, made and judged, written."""
 
@@ -40,7 +39,9 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
     one. The target is linuxcnc unless --target or --machine names another one.
     """
     if posting.machine.name() is None:
-        posting = replace(posting, machine=replace(posting.machine, target=TARGET))
+        from camtool.targets.registry import filter_target
+
+        posting = replace(posting, machine=replace(posting.machine, target=filter_target()))
     _progress(BEGUN)
     target = posting.load()
     posting = posting.of(source)

@@ -70,10 +70,10 @@ def compile_ahead(target: str) -> None:
     from camtool.importers.read import read_bytes
     from camtool.kernels.tour import Tour
     from camtool.kernels.tour_search import settled
-    from camtool.machine.registry import load_target
     from camtool.pipeline import post_drawing
     from camtool.planning.job import job_of
     from camtool.planning.order import Choices, best_order
+    from camtool.targets.registry import load_target
 
     # Of one item, with no neighbours and nothing before it or after it.
     places, rows, none = np.zeros((3, 4)), np.arange(3), np.empty(0, dtype=np.int64)

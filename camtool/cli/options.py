@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
     from camtool.importers.options import ReadOptions
     from camtool.machine.model import Machine
-    from camtool.machine.registry import LoadedTarget
     from camtool.planning.job import Job
+    from camtool.targets.registry import LoadedTarget
     from camtool.verification.report import Gates
 
 
@@ -145,7 +145,7 @@ class MachineFlags:
 
     def load(self) -> LoadedTarget:
         """The target with the user's file and settings over it."""
-        from camtool.machine.registry import load_target
+        from camtool.targets.registry import load_target
 
         name = self.name()
         if name is None:
@@ -161,7 +161,7 @@ class MachineFlags:
         """The target's name: as given, or as the machine file says; None when nobody does."""
         if self.target is not None or self.machine is None:
             return self.target
-        from camtool.machine.loader import extended_by
+        from camtool.targets.loader import extended_by
 
         return extended_by(Path(self.machine))
 
@@ -431,7 +431,7 @@ class JobFlags:
         where the job file cannot be read: `job` says why."""
         if self.file is None or "tool_table" in self.given:
             return self.given.get("tool_table")
-        from camtool.machine.loader import parsed_table
+        from camtool.tables import parsed_table
 
         try:
             name = parsed_table(Path(self.file).read_text(encoding="utf-8")).get("tool_table")

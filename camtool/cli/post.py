@@ -50,9 +50,9 @@ from camtool.cli.report import Outputs, report_option
 from camtool.errors import CamtoolError, OptionError
 
 if TYPE_CHECKING:
-    from camtool.machine.registry import LoadedTarget
     from camtool.pictures.scene import Scene
     from camtool.run import Run
+    from camtool.targets.registry import LoadedTarget
 
 
 def scenes_of(run: Run, *, before: bool) -> list[Scene]:

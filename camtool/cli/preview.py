@@ -35,8 +35,8 @@ from camtool.errors import CamtoolError, DrawingError
 from camtool.findings import Finding
 
 if TYPE_CHECKING:
-    from camtool.machine.registry import LoadedTarget
     from camtool.pictures.scene import Scene
+    from camtool.targets.registry import LoadedTarget
 
     Findings = tuple[Finding, ...]
 
@@ -183,7 +183,7 @@ class Seen:
 
 def _refuse_program(source: str) -> None:
     """CamtoolError when the file's extension says that it is a program and no target is given."""
-    from camtool.machine.registry import list_target, target_names
+    from camtool.targets.registry import list_target, target_names
 
     for name in target_names():
         try:

@@ -144,15 +144,14 @@ def _page(run: Run, pictures: tuple[tuple[str, str], ...]) -> Page:
 
 
 def _setup(run: Run) -> Setup:
-    from camtool.machine.registry import changed_values, machine_digest
     from camtool.verification.report import Changed, Setup
 
     machine, program = run.target.machine, run.program
     return Setup(
         machine=f"{machine.target.name}: {machine.target.title}",
-        machine_sha256=machine_digest(machine),
+        machine_sha256=machine.digest,
         program_sha256=None if program is None else hashlib.sha256(program.data).hexdigest(),
-        changed=tuple(Changed(*change) for change in changed_values(run.target)),
+        changed=tuple(Changed(*change) for change in run.target.changed_values()),
         flags=_flags_given(),
     )
 

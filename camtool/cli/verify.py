@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import click
 
@@ -45,12 +45,11 @@ from camtool.cli.report import Outputs, report_option
 if TYPE_CHECKING:
     from camtool.comparison import Way
     from camtool.geometry.drawing import Drawing
-    from camtool.machine.controllers import Interpolator
-    from camtool.machine.registry import LoadedTarget
     from camtool.pictures.scene import Scene
     from camtool.pipeline import Judging
     from camtool.planning.job import Job
     from camtool.run import Run
+    from camtool.targets.registry import LoadedTarget
 
 
 INTERPOLATORS = ("dsm", "dda", "stairs")
@@ -145,7 +144,7 @@ def verify(
     from camtool.pipeline import Judging
 
     judging = Judging(
-        interpolator=cast("Interpolator | None", interpolator),
+        interpolator=interpolator,
         effects=left_out(without) if without else None,
         gates=gates.gates(),
         compensated=compensated,

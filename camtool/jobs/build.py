@@ -42,8 +42,8 @@ from camtool.jobs.keys import (
     why_idle,
 )
 from camtool.jobs.tool_table import TableTool, read_tool_table
-from camtool.machine.loader import read_table
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
+from camtool.tables import read_table
 
 OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
 """Keys of `[[operations]]`."""

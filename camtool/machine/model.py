@@ -1,17 +1,23 @@
-"""What a machine file may say of the mechanics beyond its single axes."""
+"""A machine as frozen records: what its TOML file may say, with types, units and ranges.
+
+Field names carry their units. `msgspec` checks types and ranges and refuses unknown keys;
+`camtool.tables` turns its complaints into errors that name file, table and key. What
+`[controller]` and `[dialect]` may say is the target's to tell: `Machine` is generic over both.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal
 
 import msgspec
 from msgspec import Meta
+from typing_extensions import TypeVar
 
 from camtool.errors import MachineError
-from camtool.machine.controllers import Controller, SlideStart
 from camtool.machine.ranges import (
     Acceleration,
     Depth,
@@ -25,68 +31,8 @@ from camtool.machine.ranges import (
     Tolerance,
 )
 
-MAX_SQUARENESS_RAD = 0.1
-"""No machine is out of square by more (5.7°): a larger number was meant in other units."""
 
-
-class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The play of one axis by region of the table, in mm.
-
-    `x_mm` and `y_mm` are the edges of the cells, ascending, in table coordinates: those of the
-    work frame less `controller.machine_zero_mm`. `play_mm[j][i]` holds from y_mm[j] up to
-    y_mm[j + 1] and from x_mm[i] up to x_mm[i + 1]; outside of all edges holds the nearest cell.
-    """
-
-    x_mm: tuple[Place, ...]
-    y_mm: tuple[Place, ...]
-    play_mm: tuple[tuple[Lost, ...], ...]
-
-    def __post_init__(self) -> None:
-        for name, edges in (("x_mm", self.x_mm), ("y_mm", self.y_mm)):
-            if len(edges) < 2 or any(a >= b for a, b in pairwise(edges)):
-                raise ValueError(f"{name} must be two edges or more, each above the one before")
-        rows, columns = len(self.y_mm) - 1, len(self.x_mm) - 1
-        if len(self.play_mm) != rows or any(len(row) != columns for row in self.play_mm):
-            raise ValueError(
-                f"play_mm must be {rows} rows (along y_mm) of {columns} numbers (along x_mm)"
-            )
-
-
-class PlayMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The play of X and of Y by region, in place of their `backlash_mm` when `use` is true; an
-    axis without cells keeps that."""
-
-    use: bool = False
-    x: PlayCells | None = None
-    y: PlayCells | None = None
-
-    def __post_init__(self) -> None:
-        if self.use and self.x is None and self.y is None:
-            raise ValueError("use is true, but neither play_map.x nor play_map.y is there")
-
-    @property
-    def used(self) -> tuple[PlayCells | None, PlayCells | None, None]:
-        """The cells of X, Y and Z that hold; None where `backlash_mm` does."""
-        return (self.x, self.y, None) if self.use else (None, None, None)
-
-
-class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """`squareness_rad`: how much the angle between +X and +Y is less than a right one.
-    `seed`: which draws the random repeatability of the axes makes."""
-
-    squareness_rad: Annotated[float, Meta(ge=-MAX_SQUARENESS_RAD, le=MAX_SQUARENESS_RAD)] = 0.0
-    seed: Annotated[int, Meta(ge=0, le=(1 << 32) - 1)] = 0
-
-
-# A machine as frozen records: what its TOML file may say, with types, units and ranges.
-#
-# Field names carry their units. `msgspec` checks types and ranges and refuses unknown keys;
-# `camtool.machine.loader` turns its complaints into errors that name file, table and key.
-
-_Controller = TypeVar("_Controller", bound=SlideStart)
-
-
-class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What the machine is called and what its programs are called."""
 
     name: str
@@ -164,7 +110,25 @@ class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gap_mm: Slack = 0.01
 
 
-Scalar = bool | int | float | str
+class SlideStart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How the slides stand when a program begins, and where machine zero is.
+
+    `machine_zero_mm` is its place in the work frame: homing goes there.
+    """
+
+    start_play: Literal["preloaded", "centred"] = "preloaded"
+    start_direction: Literal["+", "-"] = "+"
+    machine_zero_mm: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
+
+
+class PathController(SlideStart, frozen=True, tag_field="model", tag="path"):
+    """Any controller, as if it followed the programmed lines and arcs exactly.
+
+    It stands in for controllers whose own arithmetic is not modelled. `grid` "steps": ends and
+    arc centres lie on the axes' coded steps; "none": they are taken as programmed.
+    """
+
+    grid: Literal["steps", "none"] = "steps"
 
 
 class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -187,19 +151,94 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return sending if self.wait == "sequential" else max(0.0, sending - motion_s)
 
 
-class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Everything known about one machine. `dialect` is checked by its post-processor."""
+# The mechanics beyond its single axes.
 
-    target: Target
+MAX_SQUARENESS_RAD = 0.1
+"""No machine is out of square by more (5.7°): a larger number was meant in other units."""
+
+
+class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The play of one axis by region of the table, in mm.
+
+    `x_mm` and `y_mm` are the edges of the cells, ascending, in table coordinates: those of the
+    work frame less `controller.machine_zero_mm`. `play_mm[j][i]` holds from y_mm[j] up to
+    y_mm[j + 1] and from x_mm[i] up to x_mm[i + 1]; outside of all edges holds the nearest cell.
+    """
+
+    x_mm: tuple[Place, ...]
+    y_mm: tuple[Place, ...]
+    play_mm: tuple[tuple[Lost, ...], ...]
+
+    def __post_init__(self) -> None:
+        for name, edges in (("x_mm", self.x_mm), ("y_mm", self.y_mm)):
+            if len(edges) < 2 or any(a >= b for a, b in pairwise(edges)):
+                raise ValueError(f"{name} must be two edges or more, each above the one before")
+        rows, columns = len(self.y_mm) - 1, len(self.x_mm) - 1
+        if len(self.play_mm) != rows or any(len(row) != columns for row in self.play_mm):
+            raise ValueError(
+                f"play_mm must be {rows} rows (along y_mm) of {columns} numbers (along x_mm)"
+            )
+
+
+class PlayMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The play of X and of Y by region, in place of their `backlash_mm` when `use` is true; an
+    axis without cells keeps that."""
+
+    use: bool = False
+    x: PlayCells | None = None
+    y: PlayCells | None = None
+
+    def __post_init__(self) -> None:
+        if self.use and self.x is None and self.y is None:
+            raise ValueError("use is true, but neither play_map.x nor play_map.y is there")
+
+    @property
+    def used(self) -> tuple[PlayCells | None, PlayCells | None, None]:
+        """The cells of X, Y and Z that hold; None where `backlash_mm` does."""
+        return (self.x, self.y, None) if self.use else (None, None, None)
+
+
+class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """`squareness_rad`: how much the angle between +X and +Y is less than a right one.
+    `seed`: which draws the random repeatability of the axes makes."""
+
+    squareness_rad: Annotated[float, Meta(ge=-MAX_SQUARENESS_RAD, le=MAX_SQUARENESS_RAD)] = 0.0
+    seed: Annotated[int, Meta(ge=0, le=(1 << 32) - 1)] = 0
+
+
+# `Machine` alone, in an annotation, is a machine of any target. Python knows such defaults from
+# 3.13 on.
+ControllerT = TypeVar("ControllerT", bound=SlideStart, default=SlideStart, covariant=True)
+DialectT = TypeVar("DialectT", bound=msgspec.Struct, default=msgspec.Struct, covariant=True)
+_Record = TypeVar("_Record", bound=SlideStart)
+
+
+class Machine(
+    msgspec.Struct,
+    Generic[ControllerT, DialectT],
+    frozen=True,
+    forbid_unknown_fields=True,
+    kw_only=True,
+):
+    """Everything known about one machine; its target says what `controller` and `dialect` are."""
+
+    target: TargetNames
     axes: Axes
     feed: Feed
     limits: Limits
     defaults: Defaults
-    controller: Controller
+    controller: ControllerT
     link: Link = Link()
     mechanics: MechanicsOptions = MechanicsOptions()
     play_map: PlayMap = PlayMap()
-    dialect: dict[str, Scalar] = {}
+    dialect: DialectT
+
+    @property
+    def digest(self) -> str:
+        """SHA-256, hex, of all that a file must say to get this machine: equal for equal machines,
+        on every computer, wherever their records stand in the code."""
+        said = msgspec.json.encode(_said(self), order="deterministic")
+        return hashlib.sha256(said).hexdigest()
 
     @property
     def max_feed_mm_min(self) -> float:
@@ -247,7 +286,19 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         yield from (axis.max_rate_mm_min for axis in axes if axis.max_rate_mm_min is not None)
 
 
-def controller_of(machine: Machine, kind: type[_Controller]) -> _Controller:
+def _said(record: msgspec.Struct) -> dict[str, Any]:
+    """The values of a record that are not its defaults, with the tag that tells it from others."""
+    config, said = record.__struct_config__, dict[str, Any]()
+    if config.tag_field is not None:
+        said[config.tag_field] = config.tag
+    for field in msgspec.structs.fields(record):
+        value = getattr(record, field.name)
+        if value != field.default:
+            said[field.encode_name] = _said(value) if isinstance(value, msgspec.Struct) else value
+    return said
+
+
+def controller_of(machine: Machine, kind: type[_Record]) -> _Record:
     """The machine's controller, which must be of this kind; MachineError when it is not."""
     if not isinstance(machine.controller, kind):
         wanted = kind.__struct_config__.tag

@@ -36,8 +36,7 @@ from camtool.findings import (
 from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments, reverse
-from camtool.machine.controllers import Controller
-from camtool.machine.model import Axis, Machine, PlayCells
+from camtool.machine.model import Axis, Machine, PlayCells, SlideStart
 from camtool.planning.items import Contour, Fixed, Item, Run
 from camtool.planning.job import Operation
 from camtool.planning.paths import flat
@@ -735,7 +734,7 @@ def residuals(machine: Machine) -> tuple[Residual, Residual]:
     return x, y
 
 
-def residual(axis: Axis, controller: Controller) -> Residual:
+def residual(axis: Axis, controller: SlideStart) -> Residual:
     """One axis of a machine with this controller."""
     from camtool.kernels.play import play_limits
 

@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.machine.controllers import Interpolator
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +124,6 @@ class Options:
     """`interpolator` takes the place of the controller's own for arcs; no chunk has more than
     `chunk_steps` samples."""
 
-    interpolator: Interpolator | None = None
+    interpolator: str | None = None
     effects: Effects = ALL
     chunk_steps: int = CHUNK_STEPS

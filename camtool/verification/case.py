@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 from camtool.geometry.drawing import Drawing
-from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
 from camtool.planning.job import Job
 from camtool.simulation.motion import ALL, Effects, Options
+from camtool.targets.registry import LoadedTarget
 from camtool.toolpath.moves import Bent, Toolpath
 from camtool.toolpath.wanted import Kept
 from camtool.verification.conformance import Asked
@@ -78,7 +78,7 @@ class VerifyOptions:
     nobody knows.
     """
 
-    interpolator: Interpolator | None = None
+    interpolator: str | None = None
     effects: Effects = ALL
     tool_diameter_mm: float | None = None
     cone: Cone | None = None
@@ -102,13 +102,18 @@ class Case:
     must run the same way round."""
 
     decoded: Toolpath
-    machine: Machine
+    target: LoadedTarget
     wanted: Toolpath | None
     drawing: Drawing | None
     options: VerifyOptions
     sent: Bent | None = None
     asked: Asked | None = None
     said: Toolpath | None = None
+
+    @property
+    def machine(self) -> Machine:
+        """The machine that runs it."""
+        return self.target.machine
 
     @property
     def simulation(self) -> Options:
@@ -123,9 +128,7 @@ class Case:
     @property
     def spacing_mm(self) -> float:
         """How far apart the samples of the motion are, about."""
-        from camtool.simulation.simulate import model_of
-
-        return model_of(self.machine).spacing_mm(self.decoded, self.machine)
+        return self.target.model.spacing_mm(self.decoded, self.machine)
 
     @property
     def coverage_mm(self) -> float:

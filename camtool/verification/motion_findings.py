@@ -24,7 +24,6 @@ from camtool.findings import (
 )
 from camtool.machine.model import Machine
 from camtool.planning.naming import own_numbers
-from camtool.simulation.simulate import findings_of
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
 from camtool.units import UM_PER_MM
@@ -49,7 +48,7 @@ def motion_findings(
     decoded, machine = cuts.toolpath, case.machine
     return (
         *_endless_arcs(decoded, machine, tally),
-        *findings_of(case.decoded, machine, case.simulation),
+        *case.target.model.findings(case.decoded, machine, case.simulation),
         *_missed_ends(decoded, case, tally, rows),
         *_out_of_travel(machine, extents),
         *_rapids_in_stock(decoded, case),

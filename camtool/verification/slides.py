@@ -20,8 +20,8 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
+from camtool.simulation.controller import FusedRun
 from camtool.simulation.motion import Chunk, still_ledger
-from camtool.simulation.simulate import StepsOnTheWay
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.circles import (
     UNSEEN,
@@ -106,7 +106,7 @@ class SlidePass:
             mend="check its numbers, and the coded and real steps of the axes",
         )
 
-    def run(self, steps: StepsOnTheWay) -> None:
+    def run(self, steps: FusedRun) -> None:
         """All rows of a controller that is run on the way."""
         for low, high in pairwise(self._bounds(0, steps.rows)):
             self._close(low)

@@ -17,15 +17,9 @@ from camtool import __version__
 from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
-from camtool.machine.model import Machine
+from camtool.simulation.controller import FusedRun
 from camtool.simulation.motion import Chunk
-from camtool.simulation.simulate import (
-    StepsOnTheWay,
-    check_options,
-    model_of,
-    simulate,
-    steps_on_the_way,
-)
+from camtool.targets.registry import LoadedTarget
 from camtool.toolpath.moves import Bent, Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record
@@ -120,7 +114,7 @@ class Verification:
 
 def verify(
     decoded: Toolpath,
-    machine: Machine,
+    target: LoadedTarget,
     *,
     wanted: Toolpath | None = None,
     drawing: Drawing | None = None,
@@ -129,24 +123,24 @@ def verify(
     asked: Asked | None = None,
     said: Toolpath | None = None,
 ) -> Verification:
-    """Simulate `decoded` on `machine` and judge it; against `wanted` when there is one.
+    """Simulate `decoded` on the target's machine and judge it; against `wanted` when there is one.
 
     `drawing` gives the fitting error and its findings; `sent` is what the program was written from
     where `wanted` was bent; `asked` is what else its job asks for, `said` what the program was
     written from. Toolpaths are in the work frame.
     """
-    case = Case(decoded, machine, wanted, drawing, options or VerifyOptions(), sent, asked, said)
-    check_options(machine, case.simulation)
-    steps = steps_on_the_way(decoded, machine, case.simulation)
-    return judge(case, steps or simulate(decoded, machine, case.simulation))
+    case = Case(decoded, target, wanted, drawing, options or VerifyOptions(), sent, asked, said)
+    target.check_options(case.simulation)
+    fused = target.model.fused_run(decoded, target.machine, case.simulation)
+    return judge(case, fused or target.simulate(decoded, case.simulation))
 
 
-def judge(case: Case, motion: Iterable[Chunk] | StepsOnTheWay) -> Verification:
-    """Judge a case by the chunks of its motion, whoever made them, or by a controller that is run
-    on the way."""
+def judge(case: Case, motion: Iterable[Chunk] | FusedRun) -> Verification:
+    """Judge a case by the chunks of its motion, whoever made them, or by a run that is judged as
+    it is made."""
     # Without Z on either side, all feed moves are taken to cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
-    held = model_of(case.machine).held(case.decoded, case.machine)
+    held = case.target.model.quantised(case.decoded, case.machine)
     decoded = Target(cut_moves(held, flat_cuts=flat_cuts))
     wanted = decoded
     if case.wanted is not None:
@@ -467,10 +461,9 @@ class Result:
 
 def assumptions(case: Case) -> tuple[str, ...]:
     """What the times and figures take for granted."""
-    from camtool.simulation.simulate import model_of
 
     link = case.machine.link
-    said = model_of(case.machine).assumptions(case.decoded, case.machine)
+    said = case.target.model.assumptions(case.decoded, case.machine)
     if link.baud is None:
         return (*said, "the program is in the controller before it runs")
     how = "block by block, before each is cut" if link.wait == "sequential" else "while it runs"
@@ -489,9 +482,8 @@ def _max_rms(figure: Figure) -> record.MaxRms:
 
 def _interpolator(case: Case) -> str:
     """How the controller makes lines and arcs."""
-    from camtool.simulation.simulate import model_of
 
-    return model_of(case.machine).interpolation(case.decoded, case.machine, case.simulation)
+    return case.target.model.interpolation(case.decoded, case.machine, case.simulation)
 
 
 def _blocks(case: Case) -> int | None:

@@ -1,52 +1,63 @@
-"""The dialect of the micro machine tool on a PC's parallel port: `G01 X1.0 Y1.0 F3.0`.
+"""The micro machine tool on a PC's parallel port: `G01 X1.0 Y1.0 F3.0`.
 
-docs/dialects/flashcut.md explains the format, its contradictions and what was chosen.
+docs/dialects/flashcut.md explains the format, its contradictions and what was chosen;
+docs/controllers/flashcut.md what the controller does with it.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from camtool.targets.target import Target
+
+from .dialect import Dialect, FlashcutController, FlashcutMachine, check
+
 if TYPE_CHECKING:
-    from camtool.machine.model import Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
+    from .controller import FlashcutModel
 
-class FlashcutPost:
-    """Writes and reads flashcut programs; the two share no code but the options of `[dialect]`."""
+
+class Flashcut(Target):
+    """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "flashcut"
+    controllers = (FlashcutController,)
+    dialect = Dialect
 
-    def check(self, machine: Machine) -> None:
-        """Raise MachineError when the machine's `[dialect]` table does not fit."""
-        from .dialect import dialect_of
+    def check(self, machine: FlashcutMachine) -> None:
+        """Raise MachineError where values of the dialect do not go with the machine."""
+        check(machine)
 
-        dialect_of(machine)
-
-    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+    def write(self, toolpath: Toolpath, machine: FlashcutMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
         from .write import write_program
 
         return write_program(toolpath, machine)
 
-    def read(self, data: bytes, machine: Machine) -> Toolpath:
+    def read(self, data: bytes, machine: FlashcutMachine) -> Toolpath:
         """The moves as the controller takes them; ProgramError with block, line and column."""
         from .read import read_program
 
         return read_program(data, machine)
 
-    def unit_mm(self, machine: Machine) -> float:
+    def model(self) -> FlashcutModel:
+        """The model of its controller."""
+        from .controller import FlashcutModel
+
+        return FlashcutModel()
+
+    def unit_mm(self, machine: FlashcutMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
-        from .dialect import dialect_of
+        return float(10.0**-machine.dialect.decimals)
 
-        return 10.0 ** -dialect_of(machine).decimals
-
-    def listing(self, data: bytes, machine: Machine) -> Listing:
+    def listing(self, data: bytes, machine: FlashcutMachine) -> Listing:
         """The lines that are blocks."""
         from ..gcode.blocks import listing
 
         return listing(data)
 
 
-POST = FlashcutPost()
+POST = Flashcut()

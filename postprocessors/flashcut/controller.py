@@ -1,6 +1,6 @@
 """The PC of the parallel-port machine: independent millisecond timers, one for each axis.
 
-What it does with a row of the toolpath, in the order of this file and `flashcut_moves`:
+What it does with a row of the toolpath, in the order of this file:
 
 1. A row becomes displacements: one of X and Y, one of Z, an arc as many chords as
    `controller.chords_per_turn` says. Each is counted from where the program was, or, with
@@ -24,7 +24,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
@@ -41,58 +40,57 @@ from camtool.kernels.timers import (
     Z,
     timers_fill,
 )
-from camtool.machine.controllers import FlashcutController
-from camtool.machine.model import Machine, controller_of
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.path import check_positions, check_rows, placed
+from camtool.simulation.rows import check_positions, check_rows, placed, row_place
 from camtool.toolpath.moves import Kind, Toolpath
 
+from .dialect import Dialect, FlashcutController
 from .timers import feeds_of, half_periods_ms, shortest_ms
+
+_Machine = Machine[FlashcutController, Dialect]
 
 MOVES_AT_ONCE = 1 << 14
 """Chords and other moves that are worked on together: some 100 bytes each."""
 
 
-def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
-    return FlashcutRun(toolpath, machine, options).run()
+class FlashcutModel(ControllerModel[FlashcutController, Dialect]):
+    """The PC of the parallel-port machine: a timer for each axis."""
 
+    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
+        """The motion, chunk by chunk."""
+        return FlashcutRun(toolpath, machine, options).run()
 
-def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The moves as the program says them, homing at machine zero: the controller keeps lengths
-    and rounds displacements, so that steps are part of its interpolation."""
-    return followed(toolpath, machine)
+    def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
+        """The moves as the program says them, homing at machine zero: the controller keeps lengths
+        and rounds displacements, so that steps are part of its interpolation."""
+        return followed(toolpath, machine)
 
+    def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
+        """Both axes by timers of their own."""
+        return "timers"
 
-def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """A step: every step is a sample."""
-    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-
-
-def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
-    """Both axes by timers of their own."""
-    return "timers"
-
-
-def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
-    """What times and figures take for granted."""
-    controller = controller_of(machine, FlashcutController)
-    shortest = shortest_ms(np.array([False, True]), controller)
-    step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-    both, one = feeds_of(shortest, step_mm, controller).tolist()
-    return (
-        f"a step takes {controller.half_periods_per_step} half periods of at least "
-        f"{shortest[0]:g} ms (controller.half_period_ms), or {shortest[1]:g} ms where one axis "
-        "moves alone (controller.single_axis_half_period_ms), each a millisecond late: no move "
-        f"is faster than {both:.3g} or {one:.3g} mm/min, whatever its F",
-        "the longer axis of a move keeps the feed; speeds change at once",
-        f"an arc becomes {controller.chords_per_turn} chords a turn (controller.chords_per_turn)",
-        f"displacements are counted from where the program {_FROM[controller.goes_on_from]} "
-        "(controller.goes_on_from)",
-        f"each step of a compensation has {_compensation(controller)} "
-        "(controller.compensation_half_period_ms)",
-    )
+    def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
+        """What times and figures take for granted."""
+        controller = machine.controller
+        shortest = shortest_ms(np.array([False, True]), controller)
+        step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+        both, one = feeds_of(shortest, step_mm, controller).tolist()
+        return (
+            f"a step takes {controller.half_periods_per_step} half periods of at least "
+            f"{shortest[0]:g} ms (controller.half_period_ms), or {shortest[1]:g} ms where one "
+            "axis moves alone (controller.single_axis_half_period_ms), each a millisecond late: "
+            f"no move is faster than {both:.3g} or {one:.3g} mm/min, whatever its F",
+            "the longer axis of a move keeps the feed; speeds change at once",
+            f"an arc becomes {controller.chords_per_turn} chords a turn "
+            "(controller.chords_per_turn)",
+            f"displacements are counted from where the program {_FROM[controller.goes_on_from]} "
+            "(controller.goes_on_from)",
+            f"each step of a compensation has {_compensation(controller)} "
+            "(controller.compensation_half_period_ms)",
+        )
 
 
 def _compensation(controller: FlashcutController) -> str:
@@ -108,8 +106,8 @@ _FROM = {"programmed": "was, so that steps too many stay", "reached": "has got t
 class FlashcutRun:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
-    def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
-        controller = controller_of(machine, FlashcutController)
+    def __init__(self, toolpath: Toolpath, machine: _Machine, options: Options) -> None:
+        controller = machine.controller
         path = followed(toolpath.first(toolpath.running), machine)
         check_rows(path, len(path))
         self._rows = len(path)
@@ -205,7 +203,7 @@ CHORD_GUARD = 1e-9
 """Part of a chord: an arc longer than whole chords by less has no further one."""
 
 
-def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
+def followed(toolpath: Toolpath, machine: _Machine) -> Toolpath:
     """The same with homing at machine zero, and events where the moves before them ended.
 
     ProgramError for arcs without a centre and positions of more steps than can be counted.
@@ -223,14 +221,14 @@ def followed(toolpath: Toolpath, machine: Machine) -> Toolpath:
     return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
 
 
-def half_periods(toolpath: Toolpath, machine: Machine, step_mm: float, alone: Bools) -> Ints:
+def half_periods(toolpath: Toolpath, machine: _Machine, step_mm: float, alone: Bools) -> Ints:
     """(N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the shortest.
     `alone` (N,): rows of one axis.
 
     ProgramError for feeds whose half period the controller cannot count.
     """
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    wanted = half_periods_ms(feed, step_mm, alone, controller_of(machine, FlashcutController))
+    wanted = half_periods_ms(feed, step_mm, alone, machine.controller)
     slow = wanted >= MOST_LONG
     if slow.any():
         raise ProgramError(
@@ -261,10 +259,10 @@ class MoveTable:
     half_period_z: Ints
 
     @classmethod
-    def of(cls, toolpath: Toolpath, machine: Machine) -> MoveTable:
+    def of(cls, toolpath: Toolpath, machine: _Machine) -> MoveTable:
         """The table of a toolpath that `followed` gave."""
         kind, starts, sweeps = toolpath.kind, toolpath.starts, toolpath.sweeps()
-        per_turn = controller_of(machine, FlashcutController).chords_per_turn
+        per_turn = machine.controller.chords_per_turn
         homes_xy, homes_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
         rises = homes_z | (toolpath.is_motion & (toolpath.end[:, 2] != starts[:, 2]))
         along = toolpath.is_motion & ((toolpath.end[:, :2] != starts[:, :2]).any(axis=1) | ~rises)
@@ -311,10 +309,3 @@ class MoveTable:
         angle = np.arctan2(spoke[:, 1], spoke[:, 0]) + share * self.sweeps[row]
         turned = np.column_stack([np.cos(angle), np.sin(angle)])
         return np.asarray(centre + radius[:, None] * turned)
-
-
-def row_place(toolpath: Toolpath, bad: npt.ArrayLike) -> str:
-    """The block (from 1) that the first bad row was read from, or the row when planned."""
-    row = int(np.argmax(bad))
-    block = int(toolpath.block[row])
-    return f"block {block + 1}" if block >= 0 else f"move {row}"

@@ -16,13 +16,11 @@ import numpy as np
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity
 from camtool.kernels.lattice import to_steps
-from camtool.machine.controllers import FlashcutController
-from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import Block, Lexing, blocks_of
-from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from .dialect import MOST_MM, STOP_TEXT, Dialect, FlashcutController, FlashcutMachine
 from .findings import EXECUTED_OTHERWISE, FEED_ABOVE_LIMIT, FEED_HELD, FEED_HELD_ALONE
 from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
 
@@ -65,7 +63,7 @@ NOT_INCHES: Final = frozenset({"G20", "G21", "G30", "G31"})
 """Arcs in the list that the thesis cites (L393-432), which it does not implement."""
 
 
-def read_program(data: bytes, machine: Machine) -> Toolpath:
+def read_program(data: bytes, machine: FlashcutMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block, line and column when it is none."""
     reader = _Reader(machine)
     for block in blocks_of(data, LEXING):
@@ -88,10 +86,10 @@ class _Excess:
 class _Reader:
     """Blocks in, rows out; knows the feed that holds and whether the program has ended."""
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self, machine: FlashcutMachine) -> None:
         self.path = ToolpathBuilder()
         self.blocks = 0
-        self._dialect: Dialect = dialect_of(machine)
+        self._dialect: Dialect = machine.dialect
         self._max_feed = machine.max_feed_mm_min
         self._sign = 1.0 if self._dialect.z_up == "+" else -1.0
         self._templates = {code: set(forms) for code, forms in TEMPLATES.items()}
@@ -221,7 +219,7 @@ def _refuse_spacing(block: Block) -> None:
 # What the machine's timers make of a program's lines and feeds.
 
 
-def _timer_findings(path: Toolpath, machine: Machine) -> tuple[Finding, ...]:
+def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> tuple[Finding, ...]:
     """What feeds become, and which moves of both axes get steps too many on their shorter one."""
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
@@ -229,7 +227,9 @@ def _timer_findings(path: Toolpath, machine: Machine) -> tuple[Finding, ...]:
     return (*_held(path, machine, controller), *_too_long(path, machine, controller))
 
 
-def _held(path: Toolpath, machine: Machine, controller: FlashcutController) -> Iterator[Finding]:
+def _held(
+    path: Toolpath, machine: FlashcutMachine, controller: FlashcutController
+) -> Iterator[Finding]:
     """FEED_HELD: cuts whose feed the shortest half period does not let them have."""
     rows = np.flatnonzero(path.is_feed)
     steps_mm = np.array([axis.coded_step_mm for axis in machine.axes])
@@ -254,7 +254,7 @@ def _held(path: Toolpath, machine: Machine, controller: FlashcutController) -> I
 
 
 def _too_long(
-    path: Toolpath, machine: Machine, controller: FlashcutController
+    path: Toolpath, machine: FlashcutMachine, controller: FlashcutController
 ) -> tuple[Finding, ...]:
     rows = np.flatnonzero(path.is_motion & ~path.is_arc)
     x_mm, y_mm = machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.machine.controllers import FlashcutController
+
+from .dialect import FlashcutController
 
 PERIOD_GUARD = 1e-6
 """ms. Half periods of feeds that are decimals may lie this much below a half of a millisecond."""

@@ -16,8 +16,6 @@ from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.kernels.lattice import to_steps
-from camtool.machine.controllers import FlashcutController
-from camtool.machine.model import Machine
 from camtool.toolpath.lower import MAX_PARTS, Lowered
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
@@ -35,7 +33,7 @@ from ..gcode.plain import (
     plain_rows,
     split_z,
 )
-from .dialect import MOST_MM, STOP_TEXT, Dialect, dialect_of
+from .dialect import MOST_MM, STOP_TEXT, Dialect, FlashcutController, FlashcutMachine
 from .findings import EVENT_LEFT_OUT_DWELL, EVENT_LEFT_OUT_STOP, VALUE_ROUNDED
 from .timers import half_periods_ms
 
@@ -47,9 +45,9 @@ EVENT: Final = {
 }
 
 
-def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     check_plain(toolpath, machine)
     feeds, feed_note = feed_units(toolpath, machine)
     lowered, split_note = split_z(toolpath, machine)
@@ -77,7 +75,7 @@ def write_program(toolpath: Toolpath, machine: Machine) -> Program:
     )
 
 
-def _split_slants(toolpath: Toolpath, machine: Machine) -> Lowered:
+def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
     """Long slanted lines in pieces that the machine's timers do exactly; PostError when they would
     be too many. XY and Z are apart.
 
@@ -176,7 +174,7 @@ def _event_notes(toolpath: Toolpath, dialect: Dialect) -> list[Finding]:
 class _Writer:
     """Blocks one by one; knows which feed the controller holds."""
 
-    def __init__(self, rows: PlainRows, dialect: Dialect, machine: Machine) -> None:
+    def __init__(self, rows: PlainRows, dialect: Dialect, machine: FlashcutMachine) -> None:
         self.blocks: list[str] = []
         self.rows: list[int] = []
         self._table = rows

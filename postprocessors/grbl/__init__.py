@@ -1,51 +1,63 @@
-"""The dialect of grbl 1.1; docs/dialects/grbl.md explains the format, its options and limits."""
+"""Any controller on grbl 1.1; docs/dialects/grbl.md explains the format, its options and limits,
+docs/controllers/grbl.md the model of the controller."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from camtool.targets.target import Target
+
+from ..gcode.dialect import feed_decimals
+from .dialect import Dialect, GrblController, GrblMachine
+
 if TYPE_CHECKING:
-    from camtool.machine.model import Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
+    from .controller import GrblModel
 
-class GrblPost:
-    """Writes and reads grbl programs; the two share no code but the options of `[dialect]`."""
+
+class Grbl(Target):
+    """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "grbl"
+    controllers = (GrblController,)
+    dialect = Dialect
     starts_spindle = True
     any_machine = True
 
-    def check(self, machine: Machine) -> None:
-        """Raise MachineError when the machine's `[dialect]` table does not fit."""
-        from .dialect import dialect_of
+    def check(self, machine: GrblMachine) -> None:
+        """Raise MachineError where values of the dialect do not go with the machine."""
+        feed_decimals(machine)
 
-        dialect_of(machine)
-
-    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+    def write(self, toolpath: Toolpath, machine: GrblMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
         from .write import write_grbl
 
         return write_grbl(toolpath, machine)
 
-    def read(self, data: bytes, machine: Machine) -> Toolpath:
+    def read(self, data: bytes, machine: GrblMachine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block, line and column."""
         from .read import read_grbl
 
         return read_grbl(data, machine)
 
-    def unit_mm(self, machine: Machine) -> float:
+    def model(self) -> GrblModel:
+        """The model of its controller."""
+        from .controller import GrblModel
+
+        return GrblModel()
+
+    def unit_mm(self, machine: GrblMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
-        from .dialect import dialect_of
+        return float(10.0**-machine.dialect.decimals)
 
-        return 10.0 ** -dialect_of(machine).decimals
-
-    def listing(self, data: bytes, machine: Machine) -> Listing:
+    def listing(self, data: bytes, machine: GrblMachine) -> Listing:
         """The lines that are blocks."""
         from ..gcode.blocks import listing
 
         return listing(data)
 
 
-POST = GrblPost()
+POST = Grbl()

@@ -1,16 +1,16 @@
 """grbl 1.1: arcs as chords, lines of whole steps, speeds planned some blocks ahead.
 
-What it does with a program, in the order of the files:
+What it does with a program, in the order of this file:
 
-1. Numbers become 32-bit floats, arcs the ends of chords (`grbl_chords`).
-2. Targets become steps and blocks (`grbl_blocks`); each block is a Bresenham line in X, Y and Z
+1. Numbers become 32-bit floats, arcs the ends of chords.
+2. Targets become steps and blocks; each block is a Bresenham line in X, Y and Z
    at once (`camtool.kernels.step_lines`). Its smoothing (AMASS) shifts steps of the slower axes
    within an event; at the end of each event the axes stand where they do without it.
 3. Speeds: limits of the axes, corners by junction deviation, the ring of blocks
    (`camtool.kernels.lookahead`), trapezoids (`speed_plan`). They change times, not positions.
 
 Positions are absolute: a row starts at the step where the one before ended, and no rounding adds
-up. grbl compensates no play.
+up. Its numbers, 32-bit floats, are nearer than a hundredth of a step. grbl compensates no play.
 """
 
 from __future__ import annotations
@@ -25,14 +25,18 @@ import numpy.typing as npt
 from camtool.arrays import Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.step_lines import step_lines_fill, steps_taken
-from camtool.machine.controllers import GrblController
-from camtool.machine.model import Machine, controller_of
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
-from camtool.simulation.path import check_positions, check_rows, placed
-from camtool.simulation.row_chunks import RowTotals, row_chunks
+from camtool.simulation.rows import check_rows
+from camtool.simulation.samples import RowTotals, row_chunks
 from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
 from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import Dialect, GrblController
+
+_Machine = Machine[GrblController, Dialect]
 
 ALWAYS_ON = 255
 """The $1 that leaves the motors on, and holds nothing at a stop."""
@@ -41,59 +45,50 @@ DWELL_STEP_S = 0.05
 """Dwells are counted in whole steps of this, rounded up (DWELL_TIME_STEP, `delay_sec`)."""
 
 
-def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
-    controller = _controller(machine)
-    path = held(toolpath, machine)
-    rows = path.running
-    check_rows(path, rows)
-    path = path.first(rows)
-    blocks = blocks_of(path, machine, controller)
-    samples = GrblSamples(blocks, rows, machine)
-    plan = speeds_of(blocks, path, machine)
-    seconds = np.zeros(rows)
-    np.add.at(seconds, blocks.row, plan.seconds(controller.buffer_blocks - 1))
-    if controller.idle_delay_ms != ALWAYS_ON:
-        held_s = controller.idle_delay_ms / 1000.0
-        np.add.at(seconds, blocks.row[stops(blocks, path)], held_s)
-    dwell = path.kind == Kind.DWELL
-    seconds[dwell] = [_dwell_s(value) for value in path.value[dwell].tolist()]
-    mechanics = Mechanics(machine, samples.start_mm(path.start), options.effects)
-    return row_chunks(samples, RowTotals(seconds, iterates=True), mechanics, options.chunk_steps)
+class GrblModel(ControllerModel[GrblController, Dialect]):
+    """grbl 1.1: chords, whole steps, trapezoids planned ahead."""
 
+    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
+        """The motion, chunk by chunk."""
+        controller = _controller(machine)
+        path = self.quantised(toolpath, machine)
+        rows = path.running
+        check_rows(path, rows)
+        path = path.first(rows)
+        blocks = blocks_of(path, machine, controller)
+        samples = GrblSamples(blocks, rows, machine)
+        plan = speeds_of(blocks, path, machine)
+        seconds = np.zeros(rows)
+        np.add.at(seconds, blocks.row, plan.seconds(controller.buffer_blocks - 1))
+        if controller.idle_delay_ms != ALWAYS_ON:
+            held_s = controller.idle_delay_ms / 1000.0
+            np.add.at(seconds, blocks.row[stops(blocks, path)], held_s)
+        dwell = path.kind == Kind.DWELL
+        seconds[dwell] = [_dwell_s(value) for value in path.value[dwell].tolist()]
+        mechanics = Mechanics(machine, samples.start_mm(path.start), options.effects)
+        return row_chunks(
+            samples, RowTotals(seconds, iterates=True), mechanics, options.chunk_steps
+        )
 
-def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The moves as read, homing at machine zero: grbl rounds to steps when it makes blocks, and
-    its numbers are 32-bit floats, nearer than a hundredth of a step."""
-    check_positions(toolpath, machine)
-    return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
+    def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
+        """Chords, and Bresenham lines."""
+        return "chords"
 
-
-def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """A step: every step event is a sample."""
-    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-
-
-def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
-    """Chords, and Bresenham lines."""
-    return "chords"
-
-
-def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
-    """What the times take for granted."""
-    controller = _controller(machine)
-    return (
-        f"arcs are chords within {controller.arc_tolerance_mm:g} mm ($12), lines whole steps",
-        f"corners by a junction deviation of {controller.junction_deviation_mm:g} mm ($11), "
-        f"speeds planned {controller.buffer_blocks - 1} blocks ahead",
-        "the sender keeps grbl's buffer full; overrides stand at 100 %",
-    )
+    def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
+        """What the times take for granted."""
+        controller = _controller(machine)
+        return (
+            f"arcs are chords within {controller.arc_tolerance_mm:g} mm ($12), lines whole steps",
+            f"corners by a junction deviation of {controller.junction_deviation_mm:g} mm ($11), "
+            f"speeds planned {controller.buffer_blocks - 1} blocks ahead",
+            "the sender keeps grbl's buffer full; overrides stand at 100 %",
+        )
 
 
 class GrblSamples:
     """All step events of a program, numbered from 0; none are held."""
 
-    def __init__(self, blocks: Blocks, rows: int, machine: Machine) -> None:
+    def __init__(self, blocks: Blocks, rows: int, machine: _Machine) -> None:
         self._blocks = blocks
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         self._offsets = np.concatenate([[0], np.cumsum(blocks.events)])
@@ -128,7 +123,7 @@ class GrblSamples:
         return np.asarray(np.diff(count, axis=0))
 
 
-def _controller(machine: Machine) -> GrblController:
+def _controller(machine: _Machine) -> GrblController:
     """The machine's controller; MachineError for a compensation that grbl does not do."""
     for name, axis in zip("xyz", machine.axes, strict=True):
         if axis.compensation_mm > 0.0:
@@ -137,7 +132,7 @@ def _controller(machine: Machine) -> GrblController:
                 where=f"table [axes.{name}], key compensation_mm",
                 mend="leave it out",
             )
-    return controller_of(machine, GrblController)
+    return machine.controller
 
 
 def _dwell_s(seconds: float) -> float:
@@ -188,7 +183,7 @@ class Blocks:
         return np.asarray(np.abs(self.way).max(axis=1, initial=0))
 
 
-def blocks_of(path: Toolpath, machine: Machine, controller: GrblController) -> Blocks:
+def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Blocks:
     """The blocks of a program; ProgramError for positions beyond all that grbl can count."""
     targets = targets_of(path, machine, controller)
     steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
@@ -214,7 +209,7 @@ def _rounded(mm: Singles, steps_per_mm: Singles) -> Ints:
     return np.asarray(np.copysign(np.floor(np.abs(product) + 0.5), product).astype(np.int64))
 
 
-def speeds_of(blocks: Blocks, path: Toolpath, machine: Machine) -> SpeedPlan:
+def speeds_of(blocks: Blocks, path: Toolpath, machine: _Machine) -> SpeedPlan:
     """How fast each block may go, and each corner be passed.
 
     Along a unit vector u no axis exceeds its own limit, so a block is held to min(limit / |u|).
@@ -292,7 +287,7 @@ class Targets:
     mm: Singles
 
 
-def targets_of(path: Toolpath, machine: Machine, controller: GrblController) -> Targets:
+def targets_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Targets:
     """What the rows of a program ask of the planner; rows that do not move ask nothing."""
     ends = as_read(path.end, machine)
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
@@ -310,17 +305,15 @@ def targets_of(path: Toolpath, machine: Machine, controller: GrblController) -> 
     return Targets(row, mm)
 
 
-def as_read(values: Floats, machine: Machine) -> Singles:
+def as_read(values: Floats, machine: _Machine) -> Singles:
     """Numbers as `read_float` (nuts_bolts.c) makes them from their digits.
 
     The digits are one whole number, which is multiplied by 0.01 and 0.1 until the point is where
-    it belongs, each time rounded. How many decimals were written only `dialect.decimals` says;
-    where it does not, or the number has others, it is taken as the nearest float.
+    it belongs, each time rounded. How many decimals were written `dialect.decimals` says; a
+    number that has others is taken as the nearest float.
     """
     nearest = values.astype(np.float32)
-    decimals = machine.dialect.get("decimals")
-    if not isinstance(decimals, int):
-        return nearest
+    decimals = machine.dialect.decimals
     scaled = np.abs(values) * 10.0**decimals
     digits = np.rint(scaled)
     whole = np.maximum(np.floor(np.log10(np.maximum(np.trunc(np.abs(values)), 1.0))), 0.0) + 1.0
@@ -339,7 +332,7 @@ class _Chords:
     """The arcs of a program, J of them, from `begin` to `end` (J, 3) mm."""
 
     def __init__(
-        self, path: Toolpath, machine: Machine, begin: Singles, end: Singles, arcs: Ints
+        self, path: Toolpath, machine: _Machine, begin: Singles, end: Singles, arcs: Ints
     ) -> None:
         self._begin, self._end = begin, end
         offset = as_read(path.centre[arcs] - path.starts[arcs, :2], machine)

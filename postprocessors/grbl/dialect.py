@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
-from camtool.machine.loader import convert
-from camtool.machine.model import Machine
-from camtool.machine.ranges import Seconds
+from msgspec import Meta
 
-from ..gcode.dialect import GcodeDialect, feed_decimals
+from camtool.machine.model import Machine, SlideStart
+from camtool.machine.ranges import Seconds, Slack, Tolerance
+
+from ..gcode.dialect import GcodeDialect
 
 MOST_TOOL: Final = 255
 """Tools beyond it are grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
@@ -23,7 +24,25 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     most_dwell_s: Seconds
 
 
-def dialect_of(machine: Machine) -> Dialect:
-    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
-    feed_decimals(machine)
-    return convert(machine.dialect, Dialect, machine.target.name, "dialect")
+class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
+    """A controller on grbl 1.1, and the options of its model.
+
+    `arc_tolerance_mm` is its $12 and `junction_deviation_mm` its $11 (defaults.h, general
+    machine). `buffer_blocks`: places of its planner's ring, of which one stays empty
+    (BLOCK_BUFFER_SIZE, planner.h). `arc_correction`: chords between two that it computes by sine
+    and cosine (N_ARC_CORRECTION, config.h). `idle_delay_ms` is its $1: each stop holds what comes
+    next for so long, 255 keeps the motors on and holds nothing (`st_go_idle`, stepper.c).
+    `least_step_hz`: no axis that has the most steps makes fewer a second: 16 MHz / (65535 · 8),
+    the longest tick of its timer at the highest smoothing (`st_prep_buffer`, stepper.c).
+    """
+
+    arc_tolerance_mm: Tolerance = 0.002
+    junction_deviation_mm: Slack = 0.01
+    buffer_blocks: Annotated[int, Meta(ge=3, le=10_000)] = 16
+    arc_correction: Annotated[int, Meta(ge=1, le=10_000)] = 12
+    idle_delay_ms: Annotated[int, Meta(ge=0, le=255)] = 25
+    least_step_hz: Annotated[float, Meta(ge=0.01, le=10_000.0)] = 30.518
+
+
+GrblMachine = Machine[SlideStart, Dialect]
+"""Any machine that speaks this dialect."""

@@ -13,13 +13,11 @@ import numpy as np
 
 from camtool.errors import ProgramError
 from camtool.findings import Finding
-from camtool.machine.controllers import GrblController
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
 from ..gcode.blocks import Lexing, blocks_of
 from ..gcode.read import M_CODES, ModalReader, Rules
-from .dialect import MOST_TOOL, Dialect, dialect_of
+from .dialect import MOST_TOOL, Dialect, GrblController, GrblMachine
 from .findings import FEED_TOO_SLOW
 
 SLOW_GUARD: Final = 1e-6
@@ -58,9 +56,9 @@ REFUSED: Final = {
 }
 
 
-def read_grbl(data: bytes, machine: Machine) -> Toolpath:
+def read_grbl(data: bytes, machine: GrblMachine) -> Toolpath:
     """The moves of a program; ProgramError with block, line and column."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     lexing = Lexing(
         letters="GMXYZIJKFSTPRL",
         lower_case=True,
@@ -82,7 +80,7 @@ def read_grbl(data: bytes, machine: Machine) -> Toolpath:
     return replace(path, findings=(*path.findings, *_too_slow(path, machine)))
 
 
-def _too_slow(path: Toolpath, machine: Machine) -> Iterator[Finding]:
+def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
     """FEED_TOO_SLOW: cuts slower than the longest tick of the timer allows.
 
     A line of d mm whose leading axis makes n steps is never slower than d/n mm times the least

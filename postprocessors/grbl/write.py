@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
 from ..gcode.write import Event, Style, common_words, tool_number, write_program
-from .dialect import MOST_TOOL, Dialect, dialect_of
+from .dialect import MOST_TOOL, Dialect, GrblMachine
 from .findings import EVENT_LEFT_OUT
 
 HEADER = ("G17 G21 G90 G94", "G54")
@@ -17,9 +16,9 @@ HEADER = ("G17 G21 G90 G94", "G54")
 so it is not told so (G91.1)."""
 
 
-def write_grbl(toolpath: Toolpath, machine: Machine) -> Program:
+def write_grbl(toolpath: Toolpath, machine: GrblMachine) -> Program:
     """The program; PostError names the move that cannot be said or done."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     style = Style(dialect, HEADER, lambda event: _words(event, dialect))
     program = write_program(toolpath, machine, style)
     if dialect.tool_change == "pause" or not mounted_before(toolpath).any():

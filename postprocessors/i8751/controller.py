@@ -23,6 +23,7 @@ from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import (
     LegRun,
     Legs,
@@ -35,59 +36,57 @@ from camtool.simulation.legs import (
 from camtool.simulation.motion import Chunk, Options
 from camtool.toolpath.moves import Toolpath
 
-from .pulses import PulseTimes, firmware_of
+from .dialect import Dialect, I8751Controller
+from .pulses import PulseTimes
+
+_Machine = Machine[I8751Controller, Dialect]
 
 ROWS_AT_ONCE = 1 << 14
 """Rows whose legs are worked out together: some 5 MB."""
 
 
-def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
-    _check(toolpath, machine)
-    count = toolpath.running
-    times = PulseTimes(firmware_of(machine))
-    points = np.concatenate([toolpath.start[None, :], toolpath.end[:count]])
-    at = _in_steps(points, machine)
-    standing = Standing(at[0], waits_s(toolpath, count), float(times.periods_s[0]))
-    return LegRun(standing, machine, options).run(_blocks(np.diff(at, axis=0), times))
+class I8751Model(ControllerModel[I8751Controller, Dialect]):
+    """The Intel 8751: a dog-leg of X and Y, then Z."""
+
+    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
+        """The motion, chunk by chunk."""
+        _check(toolpath, machine)
+        count = toolpath.running
+        times = PulseTimes(machine.dialect)
+        points = np.concatenate([toolpath.start[None, :], toolpath.end[:count]])
+        at = _in_steps(points, machine)
+        standing = Standing(at[0], waits_s(toolpath, count), float(times.periods_s[0]))
+        return LegRun(standing, machine, options).run(_blocks(np.diff(at, axis=0), times))
+
+    def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
+        """The same with start and ends at their nearest steps; ProgramError for arcs, homing."""
+        _check(toolpath, machine)
+        step_mm = coded_steps_mm(machine)
+        return replace(
+            toolpath,
+            start=_in_steps(toolpath.start[None, :], machine)[0] * step_mm,
+            end=_in_steps(toolpath.end, machine) * step_mm,
+        )
+
+    def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
+        """A diagonal and the rest along an axis; there are no arcs."""
+        return "dog-leg"
+
+    def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
+        """What the times take for granted."""
+        firmware = machine.dialect
+        periods = PulseTimes(firmware).periods_s
+        elbow = "each leg of a dog-leg has" if firmware.elbow == "ramps" else "a dog-leg has"
+        delay = "its listing's cycles" if firmware.delay == "counted" else "the thesis's equation"
+        return (
+            f"pulses start at {1.0 / periods[0]:.2f} Hz and run at {1.0 / periods[-1]:.1f} Hz "
+            f"(dialect.cruise, dialect.start_reload), by {delay} (dialect.delay)",
+            f"{elbow} a ramp of its own, from 90 pulses on (dialect.elbow)",
+            "the steps of the controller's own arithmetic take no time",
+        )
 
 
-def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The same with start and ends at their nearest steps. ProgramError for arcs and homing."""
-    _check(toolpath, machine)
-    step_mm = coded_steps_mm(machine)
-    return replace(
-        toolpath,
-        start=_in_steps(toolpath.start[None, :], machine)[0] * step_mm,
-        end=_in_steps(toolpath.end, machine) * step_mm,
-    )
-
-
-def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """A step: every pulse is a sample."""
-    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-
-
-def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
-    """A diagonal and the rest along an axis; there are no arcs."""
-    return "dog-leg"
-
-
-def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
-    """What the times take for granted."""
-    firmware = firmware_of(machine)
-    periods = PulseTimes(firmware).periods_s
-    elbow = "each leg of a dog-leg has" if firmware.elbow == "ramps" else "a dog-leg has"
-    delay = "its listing's cycles" if firmware.delay == "counted" else "the thesis's equation"
-    return (
-        f"pulses start at {1.0 / periods[0]:.2f} Hz and run at {1.0 / periods[-1]:.1f} Hz "
-        f"(dialect.cruise, dialect.start_reload), by {delay} (dialect.delay)",
-        f"{elbow} a ramp of its own, from 90 pulses on (dialect.elbow)",
-        "the steps of the controller's own arithmetic take no time",
-    )
-
-
-def _check(toolpath: Toolpath, machine: Machine) -> None:
+def _check(toolpath: Toolpath, machine: _Machine) -> None:
     check_rows(toolpath, machine)
     arcs = toolpath.is_arc[: toolpath.running]
     if arcs.any():
@@ -98,7 +97,7 @@ def _check(toolpath: Toolpath, machine: Machine) -> None:
         )
 
 
-def _in_steps(points: Floats, machine: Machine) -> Ints:
+def _in_steps(points: Floats, machine: _Machine) -> Ints:
     """Points (N, 3) mm in steps."""
     columns = [to_steps(points[:, at], axis.coded_step_mm) for at, axis in enumerate(machine.axes)]
     return np.column_stack(columns)

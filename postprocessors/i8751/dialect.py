@@ -10,8 +10,7 @@ import re
 from typing import Final, Literal
 
 from camtool.errors import MachineError
-from camtool.machine.loader import convert
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, SlideStart
 from camtool.machine.ranges import Tolerance
 
 from .pulses import Firmware
@@ -84,10 +83,21 @@ class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return x, y, z
 
 
-def dialect_of(machine: Machine) -> Dialect:
-    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
-    name = machine.target.name
-    dialect = convert(machine.dialect, Dialect, name, "dialect")
+class I8751Controller(SlideStart, frozen=True, tag_field="model", tag="i8751"):
+    """The Intel 8751.
+
+    How its firmware counts and times pulses decides what its bytes mean too, so those options are
+    said once, in `[dialect]`: `camtool_postprocessors.i8751.pulses`.
+    """
+
+
+I8751Machine = Machine[SlideStart, Dialect]
+"""Any machine that speaks this dialect."""
+
+
+def check(machine: I8751Machine) -> None:
+    """Raise MachineError where the dialect's values are none, or too fine for the machine."""
+    name, dialect = machine.target.name, machine.dialect
     if not re.fullmatch("x?y?z?", dialect.plus_backward):
         raise MachineError(
             f"{dialect.plus_backward!r} names no axes",
@@ -95,7 +105,7 @@ def dialect_of(machine: Machine) -> Dialect:
             where="table [dialect], key plus_backward",
             mend='write axes in the order x, y, z, such as "xz", or ""',
         )
-    # Staying within half of the coarser step is possible for every line; see dogleg.py.
+    # Staying within half of the coarser step is possible for every line; see `dogleg`.
     least = 0.5 * max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     if dialect.tolerance_mm < least:
         raise MachineError(
@@ -104,4 +114,3 @@ def dialect_of(machine: Machine) -> Dialect:
             where="table [dialect], key tolerance_mm",
             mend=f"use {least:g} mm or more",
         )
-    return dialect

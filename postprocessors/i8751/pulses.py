@@ -19,8 +19,6 @@ import numpy as np
 from msgspec import Meta
 
 from camtool.arrays import Floats, Ints
-from camtool.machine.loader import convert
-from camtool.machine.model import Machine
 
 CLOCK_HZ: Final = 12e6
 """The controller's crystal (L2993)."""
@@ -66,16 +64,6 @@ class Firmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     def pulses(self, steps: Ints) -> Ints:
         """Pulses that steps of either sign take, of any shape."""
         return np.where(steps != 0, np.abs(steps) + self.lost_pulses, 0)
-
-
-def firmware_of(machine: Machine) -> Firmware:
-    """The options of the machine's `[dialect]`, as they are where it has none of them.
-
-    MachineError names the key that does not fit.
-    """
-    known = {field.name for field in msgspec.structs.fields(Firmware)}
-    table = {key: value for key, value in machine.dialect.items() if key in known}
-    return convert(table, Firmware, machine.target.name, "dialect")
 
 
 class PulseTimes:

@@ -24,10 +24,9 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, dialect_of
+from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, I8751Machine
 from .findings import READ_TWO_WAYS, VALUE_ROUNDED
 from .pulses import PulseTimes
 
@@ -70,14 +69,14 @@ class ByteFault(Exception):
         super().__init__(message)
 
 
-def read_program(data: bytes, machine: Machine) -> Toolpath:
+def read_program(data: bytes, machine: I8751Machine) -> Toolpath:
     """The moves of a program; ProgramError naming record and byte, or line and column."""
-    return _toolpath(decoded_records(data, machine), machine, dialect_of(machine))
+    return _toolpath(decoded_records(data, machine), machine, machine.dialect)
 
 
-def decoded_records(data: bytes, machine: Machine) -> Decoded:
+def decoded_records(data: bytes, machine: I8751Machine) -> Decoded:
     """The records of a program in any of its three forms; ProgramError as `read_program`."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     if not data:
         raise ProgramError("the program is empty", mend="give a file of i8751 packets")
     if dialect.format == "listing":
@@ -102,7 +101,7 @@ def _read_packets(data: bytes, dialect: Dialect) -> Decoded:
         ) from None
 
 
-def _toolpath(decoded: Decoded, machine: Machine, dialect: Dialect) -> Toolpath:
+def _toolpath(decoded: Decoded, machine: I8751Machine, dialect: Dialect) -> Toolpath:
     """Rows of all records, then END."""
     steps, waits = decoded.steps, decoded.waits
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
@@ -352,7 +351,7 @@ _RECORD: Final = re.compile(_BETWEEN.join(letter + value for letter, value, _ in
 class ListingReader:
     """Lines in, records out; ProgramError with record, line and column."""
 
-    def __init__(self, machine: Machine, dialect: Dialect) -> None:
+    def __init__(self, machine: I8751Machine, dialect: Dialect) -> None:
         self._step_mm = [axis.coded_step_mm for axis in machine.axes]
         self._most = dialect.sayable_steps
         self._steps: list[list[int]] = []

@@ -16,12 +16,11 @@ import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
-from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
-from .dialect import MOST_DWELL_BYTE_S, Dialect
+from .dialect import MOST_DWELL_BYTE_S, Dialect, I8751Machine
 from .dogleg import FREE, Line, elbows, reaches
 
 MOST_STEPS: Final = 10_000_000
@@ -40,7 +39,7 @@ REFUSED: Final = {
 """Homing was proposed and not built (L5267-5273)."""
 
 
-def check_toolpath(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> None:
+def check_toolpath(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) -> None:
     """PostError for the first row that this machine cannot do."""
     refuse_start(toolpath)
     _check_events(toolpath)
@@ -95,7 +94,7 @@ def _check_events(toolpath: Toolpath) -> None:
     )
 
 
-def _check_coordinates(toolpath: Toolpath, machine: Machine) -> None:
+def _check_coordinates(toolpath: Toolpath, machine: I8751Machine) -> None:
     for axis, (name, given) in enumerate(zip("XYZ", machine.axes, strict=True)):
         most_mm = MOST_STEPS * given.coded_step_mm
         values = toolpath.end[:, axis]
@@ -145,7 +144,7 @@ class Records:
         return len(self.steps)
 
 
-def records_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Records:
+def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) -> Records:
     """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
     counts = Counts()
     lowered, row = _lowered(toolpath, slope_step_mm(machine), dialect, counts)
@@ -198,14 +197,14 @@ def _lowered(
     return lines.toolpath, two.row[lines.row]
 
 
-def _rounded(toolpath: Toolpath, machine: Machine) -> Ints:
+def _rounded(toolpath: Toolpath, machine: I8751Machine) -> Ints:
     """(N, 3) ends in whole steps, half away from zero."""
     scaled = toolpath.end / np.array([axis.coded_step_mm for axis in machine.axes])
     return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
 
 
 def _cut_rows(
-    toolpath: Toolpath, deltas: Ints, machine: Machine, dialect: Dialect, counts: Counts
+    toolpath: Toolpath, deltas: Ints, machine: I8751Machine, dialect: Dialect, counts: Counts
 ) -> dict[int, Ints]:
     """The rows that need more than one record, each with the steps (k, 3) of its records."""
     xy = deltas[:, :2]

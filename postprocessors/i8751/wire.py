@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from camtool.machine.model import Machine
 from camtool.toolpath.program import Listing
 
-from .dialect import dialect_of
+from .dialect import I8751Machine
 from .read import decoded_records
 from .write import END_OF_DATA, byte_table, packet_bytes
 
 
-def packet_count(data: bytes, machine: Machine) -> int:
+def packet_count(data: bytes, machine: I8751Machine) -> int:
     """The length of the program as packets; ProgramError as its reader has it."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     if dialect.format == "packets":
         return len(data)
     decoded = decoded_records(data, machine)
     return len(packet_bytes(decoded.steps, decoded.waits, dialect))
 
 
-def listing(data: bytes, machine: Machine) -> Listing:
+def listing(data: bytes, machine: I8751Machine) -> Listing:
     """The bytes of each record in hex, then the end of the data; whatever the form of the file."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     decoded = decoded_records(data, machine)
     end = f"{END_OF_DATA:02X}"
     if not len(decoded.steps):

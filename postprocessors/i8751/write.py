@@ -33,11 +33,10 @@ import numpy.typing as npt
 
 from camtool.arrays import Bools, Ints
 from camtool.findings import Finding
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 
-from .dialect import RECORDS_PER_PACKET, Dialect, dialect_of
+from .dialect import RECORDS_PER_PACKET, Dialect, I8751Machine
 from .findings import (
     EVENT_LEFT_OUT_SPINDLE,
     EVENT_LEFT_OUT_TOOL,
@@ -90,9 +89,9 @@ BYTES_WIDTH: Final = 24
 """The comments of the hex dump stand in one column."""
 
 
-def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     check_toolpath(toolpath, machine, dialect)
     records = records_of(toolpath, machine, dialect)
     extension = TEXT_EXTENSION
@@ -154,7 +153,7 @@ def _high_low(steps: Ints, dialect: Dialect) -> tuple[Ints, Ints]:
     return high, pulses - high * unit
 
 
-def decimals_of(machine: Machine) -> int:
+def decimals_of(machine: I8751Machine) -> int:
     """Decimals of mm that say every step of the machine without doubt."""
     finest = min(axis.coded_step_mm for axis in machine.axes)
     return max(LEAST_DECIMALS, math.ceil(-math.log10(STEPS_PER_LAST_DIGIT * finest)))
@@ -166,7 +165,7 @@ def safe_text(text: str) -> str:
     return " ".join(plain.split())[:MOST_MESSAGE_CHARS]
 
 
-def listing_text(records: Records, machine: Machine) -> str:
+def listing_text(records: Records, machine: I8751Machine) -> str:
     """The listing, one record a line, END last."""
     step_x, step_y, step_z = (axis.coded_step_mm for axis in machine.axes)
     digits = decimals_of(machine)
@@ -183,7 +182,7 @@ def listing_text(records: Records, machine: Machine) -> str:
     return "\n".join([head, *lines, "END"]) + "\n"
 
 
-def dump_text(records: Records, machine: Machine, dialect: Dialect) -> str:
+def dump_text(records: Records, machine: I8751Machine, dialect: Dialect) -> str:
     """The hex dump of the packets: offset, bytes, meaning, expected replies."""
     lines = ["; i8751 packets: offset, bytes, meaning <- expected replies"]
     offset = 0
@@ -199,7 +198,7 @@ def dump_text(records: Records, machine: Machine, dialect: Dialect) -> str:
 class _Dump:
     """Runs of bytes with their meaning and replies; no bytes for a line of comment alone."""
 
-    def __init__(self, records: Records, machine: Machine, dialect: Dialect) -> None:
+    def __init__(self, records: Records, machine: I8751Machine, dialect: Dialect) -> None:
         self._records = records
         self._steps_mm = [axis.coded_step_mm for axis in machine.axes]
         self._digits = decimals_of(machine)

@@ -1,51 +1,64 @@
-"""The dialect of LinuxCNC; docs/dialects/linuxcnc.md explains format, options and limits."""
+"""LinuxCNC; docs/dialects/linuxcnc.md explains the format, its options and limits,
+docs/controllers/linuxcnc.md the model of the controller."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from camtool.targets.target import Target
+
+from ..gcode.dialect import feed_decimals
+from .dialect import Dialect, LinuxcncController, LinuxcncMachine
+
 if TYPE_CHECKING:
-    from camtool.machine.model import Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
+    from .controller import LinuxcncModel
 
-class LinuxCncPost:
-    """Writes and reads linuxcnc programs; the two share no code but the options of `[dialect]`."""
+
+class Linuxcnc(Target):
+    """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "linuxcnc"
+    controllers = (LinuxcncController,)
+    dialect = Dialect
     starts_spindle = True
     any_machine = True
+    filter_default = True
 
-    def check(self, machine: Machine) -> None:
-        """Raise MachineError when the machine's `[dialect]` table does not fit."""
-        from .dialect import dialect_of
+    def check(self, machine: LinuxcncMachine) -> None:
+        """Raise MachineError where values of the dialect do not go with the machine."""
+        feed_decimals(machine)
 
-        dialect_of(machine)
-
-    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+    def write(self, toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
         from .write import write_linuxcnc
 
         return write_linuxcnc(toolpath, machine)
 
-    def read(self, data: bytes, machine: Machine) -> Toolpath:
+    def read(self, data: bytes, machine: LinuxcncMachine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block, line and column."""
         from .read import read_linuxcnc
 
         return read_linuxcnc(data, machine)
 
-    def unit_mm(self, machine: Machine) -> float:
+    def model(self) -> LinuxcncModel:
+        """The model of its controller."""
+        from .controller import LinuxcncModel
+
+        return LinuxcncModel()
+
+    def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
-        from .dialect import dialect_of
+        return float(10.0**-machine.dialect.decimals)
 
-        return 10.0 ** -dialect_of(machine).decimals
-
-    def listing(self, data: bytes, machine: Machine) -> Listing:
+    def listing(self, data: bytes, machine: LinuxcncMachine) -> Listing:
         """The lines that are blocks."""
         from ..gcode.blocks import listing
 
         return listing(data)
 
 
-POST = LinuxCncPost()
+POST = Linuxcnc()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from camtool.machine.loader import convert
-from camtool.machine.model import Machine
+from msgspec import Meta
+
+from camtool.machine.model import Machine, SlideStart
 from camtool.machine.ranges import Tolerance
 
-from ..gcode.dialect import GcodeDialect, feed_decimals
+from ..gcode.dialect import GcodeDialect
 
 
 class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -21,7 +22,20 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     percent: bool = False
 
 
-def dialect_of(machine: Machine) -> Dialect:
-    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
-    feed_decimals(machine)
-    return convert(machine.dialect, Dialect, machine.target.name, "dialect")
+class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxcnc"):
+    """LinuxCNC 2.9 with its trapezoid planner, and the options of its model.
+
+    How corners are met the program says; where it does not, `[dialect]`, keys `path` and
+    `blend_tolerance_mm`. `servo_period_s`: SERVO_PERIOD of the ini file. `lookahead_moves`:
+    ARC_BLEND_OPTIMIZATION_DEPTH, `kink_ratio`: ARC_BLEND_KINK_RATIO, the part of the highest
+    acceleration that a bend may take up within one period and pass for straight (defaults of
+    initraj.cc).
+    """
+
+    servo_period_s: Annotated[float, Meta(ge=1e-6, le=1.0)] = 0.001
+    lookahead_moves: Annotated[int, Meta(ge=2, le=10_000)] = 50
+    kink_ratio: Annotated[float, Meta(ge=0.001, le=0.7071)] = 0.1
+
+
+LinuxcncMachine = Machine[SlideStart, Dialect]
+"""Any machine that speaks this dialect."""

@@ -10,12 +10,11 @@ import re
 from typing import Final
 
 from camtool.errors import ProgramError
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
 from ..gcode.blocks import Lexing, blocks_of
 from ..gcode.read import ModalReader, Rules
-from .dialect import Dialect, dialect_of
+from .dialect import Dialect, LinuxcncMachine
 
 GROUPS: Final = {
     **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
@@ -59,9 +58,9 @@ SAYS_SOMETHING: Final = re.compile(rb"\s*[^\s%(;]")
 """A line that is not blank, a % or a comment."""
 
 
-def read_linuxcnc(data: bytes, machine: Machine) -> Toolpath:
+def read_linuxcnc(data: bytes, machine: LinuxcncMachine) -> Toolpath:
     """The moves of a program; ProgramError with block, line and column."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     lexing = Lexing(
         letters="GMXYZIJKFSTPRLDHQABCUVW",
         lower_case=True,

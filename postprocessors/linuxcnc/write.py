@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from camtool.toolpath.program import Program
 
 from ..gcode.format import NumberStyle, say_number
 from ..gcode.write import Event, Style, common_words, tool_number, write_program
-from .dialect import dialect_of
+from .dialect import LinuxcncMachine
 
 MODES: Final = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
 """XY plane, mm, no cutter radius, no tool length, the first work frame, no cycle, absolute, I J as
@@ -22,9 +21,9 @@ MOST_TOOL: Final = 99_999
 TOLERANCE: Final = NumberStyle(6, strip=True)
 
 
-def write_linuxcnc(toolpath: Toolpath, machine: Machine) -> Program:
+def write_linuxcnc(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     """The program; PostError names the move that cannot be said or done."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     style = Style(
         dialect,
         (MODES,),

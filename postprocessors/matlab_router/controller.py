@@ -1,4 +1,18 @@
-"""The machine record of the Matlab router as the arrays that its kernel runs on."""
+"""The slaves of the Matlab router: speed loops with integers behind lines of whole chunks.
+
+What the machine does with the rows of a toolpath:
+
+1. The master runs them one at a time: a row's distance per axis, in tenths of a millimetre, and
+   its speed per axis, in counts of the encoder in 5 ms, go to the slaves, which start together
+   (Y a little after X) and stop each by itself. Rows of one program line are one such order.
+2. Distances are differences: where an axis comes to stand beside its place, it goes on from there.
+   Only homing brings it back to its zero.
+3. Each slave runs as `camtool.kernels.slaves` says. A line ends when all have had their counts;
+   the motors still coast then, and are sampled on until the next line begins.
+
+A sample is the place of all motors at a tick of 5 ms. `docs/controllers/matlab-router.md` has the
+sources, and what is inferred.
+"""
 
 from __future__ import annotations
 
@@ -12,320 +26,19 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.controllers import MatlabRouterController
-from camtool.machine.model import Machine, controller_of
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.path import placed
+from camtool.simulation.rows import placed
 from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import Dialect, MatlabRouterController
 
 if TYPE_CHECKING:
     from camtool.kernels.slave_record import Account, Program, State
 
-
-TICK_S = 0.005
-"""The slaves' timer: (65536 − 53036) · 2 / 5 MHz (L2757)."""
-
-TICKS_PER_S = 200
-"""The same, the other way round."""
-
-SIGNS = np.array([1, 1, -1])
-"""Home is at the low ends of X and Y and at the top of Z: all distances are away from it."""
-
-TEXT_KID = (17.549, 28.152, 16.2)
-"""Table 4.1, L2872-2880, in thousandths; the table's order is Y, X, Z."""
-
-TEXT_KPD = (98.125, 159.124, 92.64)
-"""The same."""
-
-IDENTIFIED = 70.0
-"""The drive at which gains were measured (L2704): whatever the friction, that speed stays."""
-
-
-def program_of(orders: Ints, pauses_s: Floats, machine: Machine) -> Program:
-    """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
-    from camtool.kernels.slave_record import TABLE_COUNTS, Program
-
-    router = controller_of(machine, MatlabRouterController)
-    text = router.slaves == "text"
-    axes = np.zeros((3, 8))
-    friction = np.array(router.friction_percent)
-    axes[:, 0] = np.array(router.plant_gain) * IDENTIFIED / (IDENTIFIED - friction)
-    axes[:, 1] = np.array(router.time_constant_s) * TICKS_PER_S
-    axes[:, 2] = router.friction_percent
-    axes[:, 3] = router.kid or (TEXT_KID if text else (28.0,) * 3)
-    axes[:, 4] = router.kpd or (TEXT_KPD if text else (159.0,) * 3)
-    axes[:, 5] = router.chunk_counts
-    axes[:, 6] = 0 if text else router.home_phase_counts
-    axes[:, 7] = router.home_counts
-    if not text and (axes[:, 3:5] % 1.0).any():
-        raise MachineError(
-            "the gains of the listing are whole thousandths",
-            where="table [controller], keys kid and kpd",
-            mend='round them, or say slaves = "text"',
-        )
-    share = np.arange(TABLE_COUNTS + 1) / TABLE_COUNTS
-    table = np.rint(router.table_counts * np.sqrt(share)).astype(np.int64)
-    lag = router.start_lag_s * TICKS_PER_S
-    return Program(orders, pauses_s * TICKS_PER_S, axes, table, lag, text)
-
-
-def state_of(start_mm: Floats, machine: Machine) -> State:
-    """All motors at rest at a place."""
-    from camtool.kernels.slave_record import COUNT, PLACE, SHOWN, TARGET, TURN, State
-
-    router = controller_of(machine, MatlabRouterController)
-    coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    place = np.rint((start_mm - np.array(machine.controller.machine_zero_mm)) * SIGNS / coded)
-    motors, slaves = np.zeros((3, 6)), np.zeros((3, 11), dtype=np.int64)
-    motors[:, PLACE] = place
-    slaves[:, COUNT] = slaves[:, TARGET] = slaves[:, SHOWN] = place
-    if router.slaves == "listing":
-        slaves[:, SHOWN] = (slaves[:, COUNT] + np.array(router.home_phase_counts)) % TURN
-    return State(motors, slaves, np.zeros(3, dtype=np.int64), np.zeros(2))
-
-
-def account_of(rows: int) -> Account:
-    """Nothing done yet."""
-    from camtool.kernels.slave_record import Account
-
-    zeros = np.zeros(rows)
-    return Account(zeros, zeros.astype(np.int64), np.ones(rows, dtype=np.bool_))
-
-
-# What the master of the Matlab router orders: rows of a toolpath as lines of its slaves.
-#
-#     distance  d = |way| / 0.1 mm, a whole number;  chunks = (d / 2 − 1 in an unsigned int16) + 1
-#     speed     v = feed · |way of the axis| / |way| in counts in 5 ms, rounded; sign: direction
-#
-# The reader of the dialect says as the feed of a line what both its speeds together are, so they
-# come out as they were: hypot(V, v) squared is a whole number, and (V, v) the pair of whole
-# numbers with that sum of squares that is nearest to the way. (Two such pairs are at least √2
-# apart, and those of the GUI lie within half a count of the way.)
-
-UNITS_PER_MM = 10
-"""The program counts in tenths of a millimetre (L3202-3204)."""
-
-INT16 = 0xFFFF
-"""The slaves' counter of chunks is unsigned, 16 bits (L5589-5600)."""
-
-NUMBERS_OF_HEADER, NUMBERS_OF_LINE = 3, 4
-"""How many numbers the PC sends for a job, and for each of its lines (L4294-4360)."""
-
-PATIENCE, PATIENCE_TICKS = 4.0, 400.0
-"""A line is given up after so many times what its speeds should need, and two seconds more."""
-
-SETTLE_TAUS = 12.0
-"""Behind its last line a job is followed for so many time constants: 6e-6 of the speed is left."""
-
-PAIR_COUNTS = 10
-"""How far from the way's own speeds those of a line are looked for, in counts in a tick."""
-
-PAIR_TOLERANCE = 1e-4
-"""A sum of squares of speeds that is a whole number within this comes from a program."""
-
-ON_HOME_COUNTS = 0.5
-"""A place within so many counts of home is home."""
-
-TEXT_FACTORS = ((10.0, 1), (100.0, 10), (1100.0, 100), (math.inf, 1000))
-"""Equation 4.49 (L3077-3097): a distance up to so many tenths of a millimetre goes in so many
-equal parts."""
-
-
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """L orders of the master.
-
-    orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each; extra_s (N,): what
-    rows take besides (dwells, and the numbers of a job on their way from the PC).
-    """
-
-    orders: Ints
-    pauses_s: Floats
-    extra_s: Floats
-
-
-def block_of(toolpath: Toolpath, row: int) -> str:
-    """The block (from 1) that a row was read from, or the row when it was planned."""
-    block = int(toolpath.block[row])
-    return f"block {block + 1}" if block >= 0 else f"move {row}"
-
-
-def lines_of(path: Toolpath, rows: int, machine: Machine) -> Lines:
-    """The orders for the first `rows` rows of a held toolpath.
-
-    Raises ProgramError for a line without a feed above 0, a dwell without its seconds, and part
-    zero set anew away from part zero.
-    """
-    _check(path, rows)
-    router = controller_of(machine, MatlabRouterController)
-    way_mm = (path.end - path.starts)[:rows] * SIGNS if rows else np.zeros((0, 3))
-    kind = path.kind[:rows]
-    straight = kind == Kind.LINE
-    homes = _homing(path, way_mm, machine)
-    first = np.flatnonzero((way_mm != 0.0).any(axis=1))
-    second = first.copy()
-    tail = _tails(path, way_mm, first)
-    way = way_mm[first]
-    way[np.flatnonzero(tail) - 1] += way[tail]
-    second[np.flatnonzero(tail) - 1] = first[tail]
-    speeds = _speeds(path, way_mm, first, machine)
-    keep = ~tail
-    first, second, way, speeds = first[keep], second[keep], way[keep], speeds[keep]
-    amount = _amounts(way, router, machine)
-    ref = np.where(way < 0.0, -speeds, speeds)
-    part = _parting(path, first, second, machine)
-    amount = np.where(homes[first][:, None] & (way != 0.0), -1, amount)
-    most = _patience(way, ref, amount, machine)
-    orders = np.column_stack([amount, ref, first, second, most, part])
-    header = ~straight[first] | (way[:, 2] != 0.0)
-    extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
-    return Lines(orders, _pauses(header, router), extra + _link(header, first, rows, router))
-
-
-def _check(path: Toolpath, rows: int) -> None:
-    """ProgramError for what cannot be followed."""
-    running = np.arange(len(path)) < rows
-    with np.errstate(invalid="ignore"):
-        no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
-        no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
-    away = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
-    for bad, message in (
-        (no_feed, "a move at a feed without a feed above 0"),
-        (no_time, "a dwell without its seconds"),
-        (away, "part zero is set away from part zero"),
-    ):
-        if (bad & running).any():
-            raise ProgramError(message, where=block_of(path, int((bad & running).argmax())))
-
-
-def _homing(path: Toolpath, way_mm: Floats, machine: Machine) -> Bools:
-    """(R,) rows that go home: those that say so, and rapids that end there on all that moves."""
-    coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    off = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
-    there = ((off <= ON_HOME_COUNTS * coded) | (way_mm == 0.0)).all(axis=1)
-    kind = path.kind[: len(way_mm)]
-    said = (kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)
-    return np.asarray(said | ((kind == Kind.RAPID) & there & (way_mm <= 0.0).all(axis=1)))
-
-
-def _tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
-    """(L,) of the rows `first` those that are the rest of the line before them: where one axis of
-    a line of the program goes on alone."""
-    block, way = path.block[first], way_mm[first]
-    flat = (path.kind[first] == Kind.LINE) & (way[:, 2] == 0.0)
-    tail = np.zeros(len(first), dtype=np.bool_)
-    tail[1:] = (block[1:] == block[:-1]) & (block[1:] >= 0) & flat[1:] & flat[:-1]
-    tail[1:] &= (np.diff(first) == 1) & ((way[1:] != 0.0).sum(axis=1) == 1)
-    tail[2:] &= ~tail[1:-1]
-    return tail
-
-
-def _parting(path: Toolpath, first: Ints, second: Ints, machine: Machine) -> Ints:
-    """(L, 2) the axis that goes on after the end of the first of two rows, and its count there;
-    zeros where there is one row."""
-    part = np.zeros((len(first), 2), dtype=np.int64)
-    both = np.flatnonzero(first != second)
-    axis = np.abs(path.end[second] - path.end[first])[both, :2].argmax(axis=1)
-    home = np.array(machine.controller.machine_zero_mm)
-    coded = np.array([each.coded_step_mm for each in machine.axes])
-    part[both, 0] = axis
-    part[both, 1] = np.rint((path.end[first[both], axis] - home[axis]) / coded[axis])
-    return part
-
-
-def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: Machine) -> Ints:
-    """(L, 3) counts in a tick of the axes of the rows `first`."""
-    coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    way = np.abs(way_mm[first])
-    feed = path.feed[first] / (60.0 * TICKS_PER_S)
-    along = feed[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
-    # No axis can be told more than an int16, and none of the listing's programs tells as much.
-    wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
-    told = to_steps(wanted, 1.0)
-    slanted = np.flatnonzero((wanted[:, 0] > 0.0) & (wanted[:, 1] > 0.0) & (wanted[:, 2] == 0.0))
-    told[slanted, :2] = _pairs(wanted[slanted, :2])
-    rapid_mm = machine.rapid_mm_min / (60.0 * TICKS_PER_S)
-    rapid = to_steps(min(rapid_mm, INT16 * coded[0]), float(coded[0]))
-    return np.where((path.kind[first] == Kind.LINE)[:, None], told, rapid)
-
-
-def _pairs(wanted: Floats) -> Ints:
-    """(K, 2) whole speeds whose squares add up to those of `wanted` (K, 2), the nearest to it
-    within `PAIR_COUNTS`; where there are none: each rounded."""
-    total = np.rint((wanted**2).sum(axis=1))
-    rounded = to_steps(wanted, 1.0)
-    slow = wanted.argmin(axis=1)[:, None]
-    near = np.take_along_axis(rounded, slow, axis=1)
-    near = near + np.arange(-PAIR_COUNTS, PAIR_COUNTS + 1)
-    other = np.rint(np.sqrt(np.maximum(total[:, None] - near**2, 0.0))).astype(np.int64)
-    adds_up = (near >= 0) & (near**2 + other**2 == total[:, None])
-    off = np.abs(near - np.take_along_axis(wanted, slow, axis=1))
-    best = np.where(adds_up, off, np.inf).argmin(axis=1)[:, None]
-    pair = np.empty_like(rounded)
-    np.put_along_axis(pair, slow, np.take_along_axis(near, best, axis=1), axis=1)
-    np.put_along_axis(pair, 1 - slow, np.take_along_axis(other, best, axis=1), axis=1)
-    exact = np.abs((wanted**2).sum(axis=1) - total) <= PAIR_TOLERANCE
-    return np.asarray(np.where((adds_up.any(axis=1) & exact)[:, None], pair, rounded))
-
-
-def _amounts(way_mm: Floats, router: MatlabRouterController, machine: Machine) -> Ints:
-    """(L, 3) chunks, or counts as the text has them; 0 where an axis does not move."""
-    units = to_steps(np.abs(way_mm), 1.0 / UNITS_PER_MM)
-    if router.slaves == "listing":
-        return np.asarray(np.where(units > 0, ((units // 2 - 1) & INT16) + 1, 0))
-    coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    counts = np.rint(np.abs(way_mm) / coded).astype(np.int64)
-    bounds = np.array([most for most, _ in TEXT_FACTORS])
-    parts = np.array([factor for _, factor in TEXT_FACTORS])[np.searchsorted(bounds, units)]
-    return np.asarray(counts // parts * parts)
-
-
-def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: Machine) -> Ints:
-    """(L,) ticks after which a line is given up."""
-    coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    router = controller_of(machine, MatlabRouterController)
-    speed = np.where(amount < 0, np.array(router.home_counts), np.abs(ref))
-    needed = np.abs(way_mm) / coded / np.maximum(speed, 1)
-    needed = np.where(speed > 0, needed, 0.0)
-    most = PATIENCE * needed.max(axis=1, initial=0.0) + PATIENCE_TICKS
-    return np.asarray(np.ceil(most).astype(np.int64))
-
-
-def _pauses(header: Bools, router: MatlabRouterController) -> Floats:
-    """(L,) s behind each line."""
-    pauses = np.where(header, router.pause_s, router.turnaround_s)
-    last = ~header & np.append(header[1:], True)
-    if len(last):
-        last[-1] = True
-    settle = SETTLE_TAUS * max(router.time_constant_s)
-    return np.where(last, np.maximum(settle, router.turnaround_s), pauses)
-
-
-def _link(header: Bools, first: Ints, rows: int, router: MatlabRouterController) -> Floats:
-    """(R,) s of the numbers of each job, at the first row of its way home."""
-    extra = np.zeros(rows)
-    opens = np.flatnonzero(header & ~np.concatenate([[False], header[:-1]]))
-    lines = np.add.reduceat(~header, opens) if len(opens) else np.zeros(0)
-    pause = NUMBERS_OF_HEADER * router.header_pause_s
-    extra[first[opens]] = pause + lines * NUMBERS_OF_LINE * router.number_pause_s
-    return extra
-
-
-# The slaves of the Matlab router: speed loops with integers behind lines of whole chunks.
-#
-# What the machine does with the rows of a toolpath:
-#
-# 1. The master runs them one at a time: a row's distance per axis, in tenths of a millimetre, and
-# its speed per axis, in counts of the encoder in 5 ms, go to the slaves, which start together (Y a
-# little after X) and stop each by itself. Rows of one program line are one such order. 2.
-# Distances are differences: where an axis comes to stand beside its place, it goes on from there.
-# Only homing brings it back to its zero. 3. Each slave runs as `camtool.kernels.slaves` says. A
-# line ends when all have had their counts; the motors still coast then, and are sampled on until
-# the next line begins.
-#
-# A sample is the place of all motors at a tick of 5 ms. `docs/controllers/matlab-router.md` has
-# the sources, and what is inferred.
+_Machine = Machine[MatlabRouterController, Dialect]
 
 FARTHEST_UNITS = 32767
 """Distances from home are an int16 of tenths of a millimetre (L4625-4635)."""
@@ -334,69 +47,73 @@ UNIT_MM = 0.1
 """What the program counts in (L3202-3204)."""
 
 
-def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
-    return _Run(toolpath, machine, options).run()
+class MatlabRouterModel(ControllerModel[MatlabRouterController, Dialect]):
+    """The slaves of the Matlab router: a servo for each axis."""
 
+    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
+        """The motion, chunk by chunk."""
+        return _Run(self.quantised(toolpath, machine), machine, options).run()
 
-def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The same with all ends on whole counts from home, homing at home. ProgramError for arcs,
-    which no slave has, and for what lies farther from home than the program can say."""
-    if toolpath.is_arc.any():
-        raise ProgramError(
-            "this machine has no arcs",
-            where=block_of(toolpath, int(toolpath.is_arc.argmax())),
-            mend="post the drawing for it: arcs become lines then",
+    def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
+        """The same with all ends on whole counts from home, homing at home. ProgramError for arcs,
+        which no slave has, and for what lies farther from home than the program can say."""
+        if toolpath.is_arc.any():
+            raise ProgramError(
+                "this machine has no arcs",
+                where=block_of(toolpath, int(toolpath.is_arc.argmax())),
+                mend="post the drawing for it: arcs become lines then",
+            )
+        home = np.array(machine.controller.machine_zero_mm)
+        far = (np.abs(toolpath.end - home) > FARTHEST_UNITS * UNIT_MM).any(axis=1)
+        if far.any():
+            raise ProgramError(
+                "a position is beyond all that the controller can count",
+                where=block_of(toolpath, int(far.argmax())),
+            )
+        end = placed(toolpath, home).end
+        coded = [axis.coded_step_mm for axis in machine.axes]
+        columns = [
+            to_steps((end - home)[:, index], step) * step for index, step in enumerate(coded)
+        ]
+        return replace(toolpath, end=home + np.column_stack(columns))
+
+    def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
+        """What an axis goes in a tick at the highest feed of the machine or of the program."""
+        feeds = toolpath.feed[np.isfinite(toolpath.feed)]
+        fastest = min(float(feeds.max(initial=0.0)), machine.max_feed_mm_min)
+        rapid = machine.rapid_mm_min if np.isfinite(machine.rapid_mm_min) else 0.0
+        step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+        return max(step, max(fastest, rapid) / 60.0 * TICK_S)
+
+    def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
+        """Each axis by itself, by its speed loop."""
+        return "servo"
+
+    def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
+        """What times and figures take for granted."""
+        router = machine.controller
+        law = (
+            "slave X's program"
+            if router.slaves == "listing"
+            else "the program that the text tells"
         )
-    home = np.array(machine.controller.machine_zero_mm)
-    far = (np.abs(toolpath.end - home) > FARTHEST_UNITS * UNIT_MM).any(axis=1)
-    if far.any():
-        raise ProgramError(
-            "a position is beyond all that the controller can count",
-            where=block_of(toolpath, int(far.argmax())),
+        rub = "no" if not any(router.friction_percent) else "dry"
+        return (
+            f"each slave runs {law} on all axes (controller.slaves)",
+            f"the motors are of first order, with {rub} friction (controller.plant_gain,"
+            " time_constant_s, friction_percent)",
+            f"the speeds of the last 1000 counts are a root up to {router.table_counts} counts"
+            " (controller.table_counts): the thesis does not list them",
+            f"{1e3 * router.turnaround_s:g} ms between lines, {1e3 * router.pause_s:g} ms behind"
+            " homing and plunges (controller.turnaround_s, pause_s)",
+            "homing is even and ends at rest on machine zero",
         )
-    end = placed(toolpath, home).end
-    coded = [axis.coded_step_mm for axis in machine.axes]
-    columns = [to_steps((end - home)[:, index], step) * step for index, step in enumerate(coded)]
-    return replace(toolpath, end=home + np.column_stack(columns))
-
-
-def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """What an axis goes in a tick at the highest feed of the machine or of the program."""
-    feeds = toolpath.feed[np.isfinite(toolpath.feed)]
-    fastest = min(float(feeds.max(initial=0.0)), machine.max_feed_mm_min)
-    rapid = machine.rapid_mm_min if np.isfinite(machine.rapid_mm_min) else 0.0
-    step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-    return max(step, max(fastest, rapid) / 60.0 * TICK_S)
-
-
-def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
-    """Each axis by itself, by its speed loop."""
-    return "servo"
-
-
-def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
-    """What times and figures take for granted."""
-    router = controller_of(machine, MatlabRouterController)
-    law = "slave X's program" if router.slaves == "listing" else "the program that the text tells"
-    rub = "no" if not any(router.friction_percent) else "dry"
-    return (
-        f"each slave runs {law} on all axes (controller.slaves)",
-        f"the motors are of first order, with {rub} friction (controller.plant_gain,"
-        " time_constant_s, friction_percent)",
-        f"the speeds of the last 1000 counts are a root up to {router.table_counts} counts"
-        " (controller.table_counts): the thesis does not list them",
-        f"{1e3 * router.turnaround_s:g} ms between lines, {1e3 * router.pause_s:g} ms behind"
-        " homing and plunges (controller.turnaround_s, pause_s)",
-        "homing is even and ends at rest on machine zero",
-    )
 
 
 class _Run:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
-    def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
-        path = held(toolpath, machine)
+    def __init__(self, path: Toolpath, machine: _Machine, options: Options) -> None:
         self._rows = path.running
         self._lines: Lines = lines_of(path, self._rows, machine)
         self._program = program_of(self._lines.orders, self._lines.pauses_s, machine)
@@ -461,3 +178,294 @@ class _Run:
         way = np.abs(np.diff(along, axis=0)).cumsum(axis=0)
         total = np.concatenate([np.zeros((1, 3), dtype=np.int64), way])
         return np.asarray(np.diff(total[offsets], axis=0))
+
+
+# What the master of the Matlab router orders: rows of a toolpath as lines of its slaves.
+#
+#     distance  d = |way| / 0.1 mm, a whole number;  chunks = (d / 2 − 1 in an unsigned int16) + 1
+#     speed     v = feed · |way of the axis| / |way| in counts in 5 ms, rounded; sign: direction
+#
+# The reader of the dialect says as the feed of a line what both its speeds together are, so they
+# come out as they were: hypot(V, v) squared is a whole number, and (V, v) the pair of whole
+# numbers with that sum of squares that is nearest to the way. (Two such pairs are at least √2
+# apart, and those of the GUI lie within half a count of the way.)
+
+UNITS_PER_MM = 10
+"""The program counts in tenths of a millimetre (L3202-3204)."""
+
+INT16 = 0xFFFF
+"""The slaves' counter of chunks is unsigned, 16 bits (L5589-5600)."""
+
+NUMBERS_OF_HEADER, NUMBERS_OF_LINE = 3, 4
+"""How many numbers the PC sends for a job, and for each of its lines (L4294-4360)."""
+
+PATIENCE, PATIENCE_TICKS = 4.0, 400.0
+"""A line is given up after so many times what its speeds should need, and two seconds more."""
+
+SETTLE_TAUS = 12.0
+"""Behind its last line a job is followed for so many time constants: 6e-6 of the speed is left."""
+
+PAIR_COUNTS = 10
+"""How far from the way's own speeds those of a line are looked for, in counts in a tick."""
+
+PAIR_TOLERANCE = 1e-4
+"""A sum of squares of speeds that is a whole number within this comes from a program."""
+
+ON_HOME_COUNTS = 0.5
+"""A place within so many counts of home is home."""
+
+TEXT_FACTORS = ((10.0, 1), (100.0, 10), (1100.0, 100), (math.inf, 1000))
+"""Equation 4.49 (L3077-3097): a distance up to so many tenths of a millimetre goes in so many
+equal parts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """L orders of the master.
+
+    orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each; extra_s (N,): what
+    rows take besides (dwells, and the numbers of a job on their way from the PC).
+    """
+
+    orders: Ints
+    pauses_s: Floats
+    extra_s: Floats
+
+
+def block_of(toolpath: Toolpath, row: int) -> str:
+    """The block (from 1) that a row was read from, or the row when it was planned."""
+    block = int(toolpath.block[row])
+    return f"block {block + 1}" if block >= 0 else f"move {row}"
+
+
+def lines_of(path: Toolpath, rows: int, machine: _Machine) -> Lines:
+    """The orders for the first `rows` rows of a held toolpath.
+
+    Raises ProgramError for a line without a feed above 0, a dwell without its seconds, and part
+    zero set anew away from part zero.
+    """
+    _check(path, rows)
+    router = machine.controller
+    way_mm = (path.end - path.starts)[:rows] * SIGNS if rows else np.zeros((0, 3))
+    kind = path.kind[:rows]
+    straight = kind == Kind.LINE
+    homes = _homing(path, way_mm, machine)
+    first = np.flatnonzero((way_mm != 0.0).any(axis=1))
+    second = first.copy()
+    tail = _tails(path, way_mm, first)
+    way = way_mm[first]
+    way[np.flatnonzero(tail) - 1] += way[tail]
+    second[np.flatnonzero(tail) - 1] = first[tail]
+    speeds = _speeds(path, way_mm, first, machine)
+    keep = ~tail
+    first, second, way, speeds = first[keep], second[keep], way[keep], speeds[keep]
+    amount = _amounts(way, router, machine)
+    ref = np.where(way < 0.0, -speeds, speeds)
+    part = _parting(path, first, second, machine)
+    amount = np.where(homes[first][:, None] & (way != 0.0), -1, amount)
+    most = _patience(way, ref, amount, machine)
+    orders = np.column_stack([amount, ref, first, second, most, part])
+    header = ~straight[first] | (way[:, 2] != 0.0)
+    extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
+    return Lines(orders, _pauses(header, router), extra + _link(header, first, rows, router))
+
+
+def _check(path: Toolpath, rows: int) -> None:
+    """ProgramError for what cannot be followed."""
+    running = np.arange(len(path)) < rows
+    with np.errstate(invalid="ignore"):
+        no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
+        no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
+    away = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
+    for bad, message in (
+        (no_feed, "a move at a feed without a feed above 0"),
+        (no_time, "a dwell without its seconds"),
+        (away, "part zero is set away from part zero"),
+    ):
+        if (bad & running).any():
+            raise ProgramError(message, where=block_of(path, int((bad & running).argmax())))
+
+
+def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
+    """(R,) rows that go home: those that say so, and rapids that end there on all that moves."""
+    coded = np.array([axis.coded_step_mm for axis in machine.axes])
+    off = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
+    there = ((off <= ON_HOME_COUNTS * coded) | (way_mm == 0.0)).all(axis=1)
+    kind = path.kind[: len(way_mm)]
+    said = (kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)
+    return np.asarray(said | ((kind == Kind.RAPID) & there & (way_mm <= 0.0).all(axis=1)))
+
+
+def _tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
+    """(L,) of the rows `first` those that are the rest of the line before them: where one axis of
+    a line of the program goes on alone."""
+    block, way = path.block[first], way_mm[first]
+    flat = (path.kind[first] == Kind.LINE) & (way[:, 2] == 0.0)
+    tail = np.zeros(len(first), dtype=np.bool_)
+    tail[1:] = (block[1:] == block[:-1]) & (block[1:] >= 0) & flat[1:] & flat[:-1]
+    tail[1:] &= (np.diff(first) == 1) & ((way[1:] != 0.0).sum(axis=1) == 1)
+    tail[2:] &= ~tail[1:-1]
+    return tail
+
+
+def _parting(path: Toolpath, first: Ints, second: Ints, machine: _Machine) -> Ints:
+    """(L, 2) the axis that goes on after the end of the first of two rows, and its count there;
+    zeros where there is one row."""
+    part = np.zeros((len(first), 2), dtype=np.int64)
+    both = np.flatnonzero(first != second)
+    axis = np.abs(path.end[second] - path.end[first])[both, :2].argmax(axis=1)
+    home = np.array(machine.controller.machine_zero_mm)
+    coded = np.array([each.coded_step_mm for each in machine.axes])
+    part[both, 0] = axis
+    part[both, 1] = np.rint((path.end[first[both], axis] - home[axis]) / coded[axis])
+    return part
+
+
+def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> Ints:
+    """(L, 3) counts in a tick of the axes of the rows `first`."""
+    coded = np.array([axis.coded_step_mm for axis in machine.axes])
+    way = np.abs(way_mm[first])
+    feed = path.feed[first] / (60.0 * TICKS_PER_S)
+    along = feed[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
+    # No axis can be told more than an int16, and none of the listing's programs tells as much.
+    wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
+    told = to_steps(wanted, 1.0)
+    slanted = np.flatnonzero((wanted[:, 0] > 0.0) & (wanted[:, 1] > 0.0) & (wanted[:, 2] == 0.0))
+    told[slanted, :2] = _pairs(wanted[slanted, :2])
+    rapid_mm = machine.rapid_mm_min / (60.0 * TICKS_PER_S)
+    rapid = to_steps(min(rapid_mm, INT16 * coded[0]), float(coded[0]))
+    return np.where((path.kind[first] == Kind.LINE)[:, None], told, rapid)
+
+
+def _pairs(wanted: Floats) -> Ints:
+    """(K, 2) whole speeds whose squares add up to those of `wanted` (K, 2), the nearest to it
+    within `PAIR_COUNTS`; where there are none: each rounded."""
+    total = np.rint((wanted**2).sum(axis=1))
+    rounded = to_steps(wanted, 1.0)
+    slow = wanted.argmin(axis=1)[:, None]
+    near = np.take_along_axis(rounded, slow, axis=1)
+    near = near + np.arange(-PAIR_COUNTS, PAIR_COUNTS + 1)
+    other = np.rint(np.sqrt(np.maximum(total[:, None] - near**2, 0.0))).astype(np.int64)
+    adds_up = (near >= 0) & (near**2 + other**2 == total[:, None])
+    off = np.abs(near - np.take_along_axis(wanted, slow, axis=1))
+    best = np.where(adds_up, off, np.inf).argmin(axis=1)[:, None]
+    pair = np.empty_like(rounded)
+    np.put_along_axis(pair, slow, np.take_along_axis(near, best, axis=1), axis=1)
+    np.put_along_axis(pair, 1 - slow, np.take_along_axis(other, best, axis=1), axis=1)
+    exact = np.abs((wanted**2).sum(axis=1) - total) <= PAIR_TOLERANCE
+    return np.asarray(np.where((adds_up.any(axis=1) & exact)[:, None], pair, rounded))
+
+
+def _amounts(way_mm: Floats, router: MatlabRouterController, machine: _Machine) -> Ints:
+    """(L, 3) chunks, or counts as the text has them; 0 where an axis does not move."""
+    units = to_steps(np.abs(way_mm), 1.0 / UNITS_PER_MM)
+    if router.slaves == "listing":
+        return np.asarray(np.where(units > 0, ((units // 2 - 1) & INT16) + 1, 0))
+    coded = np.array([axis.coded_step_mm for axis in machine.axes])
+    counts = np.rint(np.abs(way_mm) / coded).astype(np.int64)
+    bounds = np.array([most for most, _ in TEXT_FACTORS])
+    parts = np.array([factor for _, factor in TEXT_FACTORS])[np.searchsorted(bounds, units)]
+    return np.asarray(counts // parts * parts)
+
+
+def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: _Machine) -> Ints:
+    """(L,) ticks after which a line is given up."""
+    coded = np.array([axis.coded_step_mm for axis in machine.axes])
+    router = machine.controller
+    speed = np.where(amount < 0, np.array(router.home_counts), np.abs(ref))
+    needed = np.abs(way_mm) / coded / np.maximum(speed, 1)
+    needed = np.where(speed > 0, needed, 0.0)
+    most = PATIENCE * needed.max(axis=1, initial=0.0) + PATIENCE_TICKS
+    return np.asarray(np.ceil(most).astype(np.int64))
+
+
+def _pauses(header: Bools, router: MatlabRouterController) -> Floats:
+    """(L,) s behind each line."""
+    pauses = np.where(header, router.pause_s, router.turnaround_s)
+    last = ~header & np.append(header[1:], True)
+    if len(last):
+        last[-1] = True
+    settle = SETTLE_TAUS * max(router.time_constant_s)
+    return np.where(last, np.maximum(settle, router.turnaround_s), pauses)
+
+
+def _link(header: Bools, first: Ints, rows: int, router: MatlabRouterController) -> Floats:
+    """(R,) s of the numbers of each job, at the first row of its way home."""
+    extra = np.zeros(rows)
+    opens = np.flatnonzero(header & ~np.concatenate([[False], header[:-1]]))
+    lines = np.add.reduceat(~header, opens) if len(opens) else np.zeros(0)
+    pause = NUMBERS_OF_HEADER * router.header_pause_s
+    extra[first[opens]] = pause + lines * NUMBERS_OF_LINE * router.number_pause_s
+    return extra
+
+
+# The machine's record as the arrays that the kernel runs on.
+
+TICK_S = 0.005
+"""The slaves' timer: (65536 − 53036) · 2 / 5 MHz (L2757)."""
+
+TICKS_PER_S = 200
+"""The same, the other way round."""
+
+SIGNS = np.array([1, 1, -1])
+"""Home is at the low ends of X and Y and at the top of Z: all distances are away from it."""
+
+TEXT_KID = (17.549, 28.152, 16.2)
+"""Table 4.1, L2872-2880, in thousandths; the table's order is Y, X, Z."""
+
+TEXT_KPD = (98.125, 159.124, 92.64)
+"""The same."""
+
+IDENTIFIED = 70.0
+"""The drive at which gains were measured (L2704): whatever the friction, that speed stays."""
+
+
+def program_of(orders: Ints, pauses_s: Floats, machine: _Machine) -> Program:
+    """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
+    from camtool.kernels.slave_record import TABLE_COUNTS, Program
+
+    router = machine.controller
+    text = router.slaves == "text"
+    axes = np.zeros((3, 8))
+    friction = np.array(router.friction_percent)
+    axes[:, 0] = np.array(router.plant_gain) * IDENTIFIED / (IDENTIFIED - friction)
+    axes[:, 1] = np.array(router.time_constant_s) * TICKS_PER_S
+    axes[:, 2] = router.friction_percent
+    axes[:, 3] = router.kid or (TEXT_KID if text else (28.0,) * 3)
+    axes[:, 4] = router.kpd or (TEXT_KPD if text else (159.0,) * 3)
+    axes[:, 5] = router.chunk_counts
+    axes[:, 6] = 0 if text else router.home_phase_counts
+    axes[:, 7] = router.home_counts
+    if not text and (axes[:, 3:5] % 1.0).any():
+        raise MachineError(
+            "the gains of the listing are whole thousandths",
+            where="table [controller], keys kid and kpd",
+            mend='round them, or say slaves = "text"',
+        )
+    share = np.arange(TABLE_COUNTS + 1) / TABLE_COUNTS
+    table = np.rint(router.table_counts * np.sqrt(share)).astype(np.int64)
+    lag = router.start_lag_s * TICKS_PER_S
+    return Program(orders, pauses_s * TICKS_PER_S, axes, table, lag, text)
+
+
+def state_of(start_mm: Floats, machine: _Machine) -> State:
+    """All motors at rest at a place."""
+    from camtool.kernels.slave_record import COUNT, PLACE, SHOWN, TARGET, TURN, State
+
+    router = machine.controller
+    coded = np.array([axis.coded_step_mm for axis in machine.axes])
+    place = np.rint((start_mm - np.array(machine.controller.machine_zero_mm)) * SIGNS / coded)
+    motors, slaves = np.zeros((3, 6)), np.zeros((3, 11), dtype=np.int64)
+    motors[:, PLACE] = place
+    slaves[:, COUNT] = slaves[:, TARGET] = slaves[:, SHOWN] = place
+    if router.slaves == "listing":
+        slaves[:, SHOWN] = (slaves[:, COUNT] + np.array(router.home_phase_counts)) % TURN
+    return State(motors, slaves, np.zeros(3, dtype=np.int64), np.zeros(2))
+
+
+def account_of(rows: int) -> Account:
+    """Nothing done yet."""
+    from camtool.kernels.slave_record import Account
+
+    zeros = np.zeros(rows)
+    return Account(zeros, zeros.astype(np.int64), np.ones(rows, dtype=np.bool_))

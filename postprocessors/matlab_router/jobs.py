@@ -18,10 +18,9 @@ import numpy as np
 
 from camtool.arrays import Bools, Ints
 from camtool.errors import ProgramError
-from camtool.machine.model import Machine
 from camtool.toolpath.program import Listing
 
-from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, Choices, dialect_of
+from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, Choices, MatlabRouterMachine, dialect_of
 
 TABLES: Final = ("xy", "lxy", "velxy")
 NAMES: Final = (*TABLES, "size_of_array", "first_pointx", "first_pointy")
@@ -451,7 +450,7 @@ def _first_y(word: bytes, place: Callable[[int], str], dialect: Choices) -> int:
 # serial stream says no names; its numbers are shown with the names of the arrays that they fill.
 
 
-def listing(data: bytes, machine: Machine) -> Listing:
+def listing(data: bytes, machine: MatlabRouterMachine) -> Listing:
     """The blocks of a program that its reader takes."""
     dialect = dialect_of(machine)
     if dialect.format == "stream":

@@ -19,10 +19,9 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 
-from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Choices
+from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Choices, MatlabRouterMachine
 from .findings import (
     FEED_ROUNDED,
     FEED_ROUNDED_TO_LIMIT,
@@ -84,7 +83,7 @@ class Jobs:
 
 
 def jobs_of(
-    cuts: Cuts, toolpath: Toolpath, machine: Machine, dialect: Choices
+    cuts: Cuts, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices
 ) -> tuple[Jobs, Notes]:
     """The jobs, and what was changed on the way to them.
 
@@ -98,7 +97,7 @@ def jobs_of(
 class _Maker:
     """One run over all lines; `notes` of what it changes."""
 
-    def __init__(self, toolpath: Toolpath, machine: Machine, dialect: Choices) -> None:
+    def __init__(self, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices) -> None:
         self.notes = Notes()
         self._toolpath = toolpath
         self._dialect = dialect

@@ -16,7 +16,6 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Sentence
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import (
@@ -25,6 +24,7 @@ from .dialect import (
     UNIT_MM,
     UNITS_PER_MM,
     Choices,
+    MatlabRouterMachine,
     cut_z_mm,
     dialect_of,
 )
@@ -51,7 +51,7 @@ TRAVEL_GUARD: Final = 1e-6
 _STREAM: Final = re.compile(rb"-?\d+\r(?!\n)")
 
 
-def read_program(data: bytes, machine: Machine) -> Toolpath:
+def read_program(data: bytes, machine: MatlabRouterMachine) -> Toolpath:
     """The moves of a program; ProgramError naming the place when it is none."""
     dialect = dialect_of(machine)
     streamed = _STREAM.match(data) is not None
@@ -74,7 +74,7 @@ def _looks_like_text(data: bytes) -> bool:
 class _Moves:
     """Jobs in, the columns of a toolpath out."""
 
-    def __init__(self, machine: Machine, dialect: Choices) -> None:
+    def __init__(self, machine: MatlabRouterMachine, dialect: Choices) -> None:
         self._machine = machine
         self._dialect = dialect
         self._home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
@@ -295,7 +295,7 @@ class Worst:
 class Seen:
     """What was noticed in all jobs."""
 
-    machine: Machine
+    machine: MatlabRouterMachine
     dialect: Choices
     odd: Worst = field(default_factory=Worst)
     empty: Worst = field(default_factory=Worst)

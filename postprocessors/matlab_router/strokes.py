@@ -17,12 +17,11 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding, Sentence
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.machine.model import Machine
 from camtool.toolpath.lower import arcs_to_lines, xy_then_z
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import refuse
 
-from .dialect import Choices, cut_z_mm
+from .dialect import Choices, MatlabRouterMachine, cut_z_mm
 from .findings import EVENT_LEFT_OUT_DWELL, EVENT_LEFT_OUT_SPEED, EVENT_LEFT_OUT_TOOL, MOVE_SPLIT
 
 DEPTH_TOLERANCE_MM: Final = 0.005
@@ -42,7 +41,9 @@ class Cuts:
     stroke: Ints
 
 
-def cuts_of(toolpath: Toolpath, machine: Machine, dialect: Choices) -> tuple[Cuts, list[Finding]]:
+def cuts_of(
+    toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices
+) -> tuple[Cuts, list[Finding]]:
     """The strokes of a toolpath, and what had to be changed to have them."""
     findings = _events(toolpath)
     apart = xy_then_z(toolpath)
@@ -88,7 +89,7 @@ def _refuse_depths(
     z: Floats,
     cut: Bools,
     rows: Ints,
-    machine: Machine,
+    machine: MatlabRouterMachine,
     dialect: Choices,
 ) -> None:
     """All cuts lie at the one depth that the machine plunges to."""

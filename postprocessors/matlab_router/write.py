@@ -16,11 +16,10 @@ from typing import Final
 import numpy as np
 
 from camtool.errors import PostError
-from camtool.machine.model import Machine
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 
-from .dialect import UNIT_MM, Choices, dialect_of
+from .dialect import UNIT_MM, Choices, MatlabRouterMachine, dialect_of
 from .lines import Jobs, jobs_of
 from .strokes import cuts_of
 
@@ -33,7 +32,7 @@ CARRIAGE_RETURN: Final = 13
 """Ends each number; a number sent as this very character would be taken for an end."""
 
 
-def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
     """The program; PostError for the first thing that this machine cannot do."""
     dialect = dialect_of(machine)
     cuts, findings = cuts_of(toolpath, machine, dialect)

@@ -1,50 +1,58 @@
-"""The dialect of the micro machine tool on a PIC18F8720: `G02X02969.00Y03400.00I03012.00...;`.
+"""The micro machine tool on a PIC18F8720: `G02X02969.00Y03400.00I03012.00...;`.
 
-docs/dialects/pic-mmh.md explains the format, its contradictions and what was chosen.
+docs/dialects/pic-mmh.md explains the format, its contradictions and what was chosen;
+docs/controllers/pic-mmh.md what the controller does with it.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from camtool.targets.target import Target
+
+from .dialect import Dialect, PicMmhController, PicMmhMachine
+
 if TYPE_CHECKING:
-    from camtool.machine.model import Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
+    from .controller import PicMmhModel
 
-class PicMmhPost:
-    """Writes and reads pic-mmh programs; the two share no code but the options of `[dialect]`."""
+
+class PicMmh(Target):
+    """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "pic-mmh"
+    controllers = (PicMmhController,)
+    dialect = Dialect
 
-    def check(self, machine: Machine) -> None:
-        """Raise MachineError when the machine's `[dialect]` table does not fit."""
-        from .dialect import dialect_of
-
-        dialect_of(machine)
-
-    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+    def write(self, toolpath: Toolpath, machine: PicMmhMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
         from .write import write_program
 
         return write_program(toolpath, machine)
 
-    def read(self, data: bytes, machine: Machine) -> Toolpath:
+    def read(self, data: bytes, machine: PicMmhMachine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block and column."""
         from .read import read_program
 
         return read_program(data, machine)
 
-    def unit_mm(self, machine: Machine) -> float:
+    def model(self) -> PicMmhModel:
+        """The model of its controller."""
+        from .controller import PicMmhModel
+
+        return PicMmhModel()
+
+    def unit_mm(self, machine: PicMmhMachine, axis: Axis) -> float:
         """The coarser of the last decimal of a coordinate and a step."""
-        from .dialect import dialect_of
         from .numbers import UNITS_PER_MM
 
-        steps = (axis.coded_step_mm for axis in machine.axes)
-        return max(1.0 / UNITS_PER_MM[dialect_of(machine).form], *steps)
+        steps = (each.coded_step_mm for each in machine.axes)
+        return max(1.0 / UNITS_PER_MM[machine.dialect.form], *steps)
 
-    def listing(self, data: bytes, machine: Machine) -> Listing:
+    def listing(self, data: bytes, machine: PicMmhMachine) -> Listing:
         """What stands before each semicolon, with it."""
         from camtool.toolpath.program import Listing
 
@@ -54,4 +62,4 @@ class PicMmhPost:
         return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks))
 
 
-POST = PicMmhPost()
+POST = PicMmh()

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import TypeAlias, get_args
 
 import numpy as np
 
@@ -40,65 +40,70 @@ from camtool.kernels.direct_search import direct_search_fill, direct_search_star
 from camtool.kernels.heading import rounded_radius
 from camtool.kernels.lattice import to_steps
 from camtool.kernels.stairs import stairs_fill, stairs_start
-from camtool.machine.controllers import Interpolator, PicMmhController
-from camtool.machine.model import Machine, controller_of
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
 from camtool.toolpath.moves import Kind, Toolpath
 
+from .dialect import Dialect, Interpolator, PicMmhController
 from .findings import ARC_END_UNSURE
 from .legs import METHODS, JudgedSteps, legs_of, positions
 
-
-def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
-    return PicMmh(toolpath, machine, options).run()
+_Machine = Machine[PicMmhController, Dialect]
 
 
-def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The same with start, ends and arc centres at their nearest steps."""
-    coded_mm = [axis.coded_step_mm for axis in machine.axes]
-    centre = _on_grid(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), coded_mm[:2])
-    return replace(
-        toolpath,
-        start=_on_grid(toolpath.start[None, :], coded_mm)[0],
-        end=_on_grid(toolpath.end, coded_mm),
-        centre=np.where(toolpath.is_arc[:, None], centre, np.nan),
-    )
+class PicMmhModel(ControllerModel[PicMmhController, Dialect]):
+    """The PIC18F8720: lines by DDA, arcs by direct search, DDA or stairs."""
 
+    interpolators = get_args(Interpolator)
 
-def judged_steps(toolpath: Toolpath, machine: Machine, options: Options) -> JudgedSteps | None:
-    """The same motion as that of `run`, judged as it is made, without chunks; None where the
-    mechanics needs these. Raises as `run` does, all at once."""
-    return PicMmh(toolpath, machine, options).judged_steps()
+    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
+        """The motion, chunk by chunk."""
+        return PicMmh(toolpath, machine, options).run()
 
+    def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
+        """The same with start, ends and arc centres at their nearest steps."""
+        coded_mm = [axis.coded_step_mm for axis in machine.axes]
+        centre = _on_grid(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), coded_mm[:2])
+        return replace(
+            toolpath,
+            start=_on_grid(toolpath.start[None, :], coded_mm)[0],
+            end=_on_grid(toolpath.end, coded_mm),
+            centre=np.where(toolpath.is_arc[:, None], centre, np.nan),
+        )
 
-def findings(toolpath: Toolpath, machine: Machine, options: Options) -> tuple[Finding, ...]:
-    """Arcs that do not end alike by every reading of the thesis."""
-    if interpolation(toolpath, machine, options) != "dsm" or not toolpath.is_arc.any():
-        return ()
+    def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
+        """How arcs are made: dsm, dda or stairs."""
+        return options.interpolator or machine.controller.arcs
 
-    return arc_end_findings(toolpath, machine, PicMmh(toolpath, machine, options).legs_as_said())
+    def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
+        """What the times take for granted."""
+        base = machine.controller.time_base
+        return (
+            f"each {base} of the interpolator takes one period of the feed (controller.time_base)",
+            f"rapids run at {machine.limits.rapid_step_rate_hz:g} steps/s "
+            "(limits.rapid_step_rate_hz)",
+            "each step of a compensation takes a period of its own",
+        )
 
+    def findings(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> tuple[Finding, ...]:
+        """Arcs that do not end alike by every reading of the thesis."""
+        if self.interpolation(toolpath, machine, options) != "dsm" or not toolpath.is_arc.any():
+            return ()
 
-def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """A step: every output is a sample."""
-    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+        return arc_end_findings(
+            toolpath, machine, PicMmh(toolpath, machine, options).legs_as_said()
+        )
 
-
-def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
-    """How arcs are made: dsm, dda or stairs."""
-    return options.interpolator or controller_of(machine, PicMmhController).arcs
-
-
-def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
-    """What the times take for granted."""
-    base = controller_of(machine, PicMmhController).time_base
-    return (
-        f"each {base} of the interpolator takes one period of the feed (controller.time_base)",
-        f"rapids run at {machine.limits.rapid_step_rate_hz:g} steps/s (limits.rapid_step_rate_hz)",
-        "each step of a compensation takes a period of its own",
-    )
+    def fused_run(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> JudgedSteps | None:
+        """The same motion as that of `run`, judged as it is made, without chunks; None where the
+        mechanics needs these. Raises as `run` does, all at once."""
+        return PicMmh(toolpath, machine, options).judged_steps()
 
 
 def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:
@@ -140,9 +145,9 @@ def _counted(fill: Filler) -> Filler:
 class PicMmh:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
-    def __init__(self, toolpath: Toolpath, machine: Machine, options: Options) -> None:
+    def __init__(self, toolpath: Toolpath, machine: _Machine, options: Options) -> None:
         self._toolpath, self._options = toolpath, options
-        self._controller = controller_of(machine, PicMmhController)
+        self._controller = machine.controller
         if machine.limits.rapid_step_rate_hz is None:
             raise MachineError(
                 "key is missing: this controller times its rapids by it",
@@ -432,7 +437,7 @@ def line_filler(a: int, b: int) -> Filler:
     return fill
 
 
-def arc_filler(arc: Arc, method: Interpolator, *, rounded: bool) -> Filler:
+def arc_filler(arc: Arc, method: str, *, rounded: bool) -> Filler:
     """An arc whose start is not its centre; `rounded`: the error at the start is that against
     the circle of the rounded radius (DSM and stairs), else 0."""
     state: Ints
@@ -488,7 +493,7 @@ def arc_reach(arc: Arc, fill: Filler) -> tuple[int, bool]:
 # was, stops there by all; of the others the machine's owner must know what may become of them.
 
 
-def arc_end_findings(toolpath: Toolpath, machine: Machine, legs: Ints) -> tuple[Finding, ...]:
+def arc_end_findings(toolpath: Toolpath, machine: _Machine, legs: Ints) -> tuple[Finding, ...]:
     """One ARC_END_UNSURE for the arcs of `legs` (L, 14), each from the end of the row before it,
     that do not stop on their end by every reading."""
     arcs = legs[
@@ -507,7 +512,7 @@ def arc_end_findings(toolpath: Toolpath, machine: Machine, legs: Ints) -> tuple[
     }
     row = int(arcs[unsure][0, columns.ROW])
     block = int(toolpath.block[row])
-    taken = controller_of(machine, PicMmhController).arc_end
+    taken = machine.controller.arc_end
     return (
         ARC_END_UNSURE(
             where=f"block {block + 1}" if block >= 0 else f"move {row}",

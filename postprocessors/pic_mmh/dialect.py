@@ -6,8 +6,7 @@ from typing import Literal
 
 import msgspec
 
-from camtool.machine.loader import convert
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, SlideStart
 from camtool.machine.ranges import Count
 
 
@@ -23,6 +22,21 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     buffer_chars: Count | None = None
 
 
-def dialect_of(machine: Machine) -> Dialect:
-    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
-    return convert(machine.dialect, Dialect, machine.target.name, "dialect")
+Interpolator = Literal["dsm", "dda", "stairs"]
+ArcEnd = Literal["equal", "final-quadrant", "nearest"]
+
+
+class PicMmhController(SlideStart, frozen=True, tag_field="model", tag="pic-mmh"):
+    """The PIC18F8720's firmware; each option is a point on which its thesis leaves a choice.
+
+    `arc_end`: how an arc knows its end, see `camtool.kernels.arc_stops`.
+    """
+
+    arcs: Interpolator = "dsm"
+    arc_end: ArcEnd = "final-quadrant"
+    initial_error: Literal["zero", "rounded-radius"] = "zero"
+    time_base: Literal["event", "iteration"] = "event"
+
+
+PicMmhMachine = Machine[SlideStart, Dialect]
+"""Any machine that speaks this dialect."""

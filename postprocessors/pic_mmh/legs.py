@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.machine.controllers import Interpolator
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Ledger
 from camtool.toolpath.moves import Kind, Toolpath
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from camtool.kernels.judge import Sums, Task
 
 
-METHODS: Final[dict[Interpolator, int]] = {"dsm": 0, "stairs": 1, "dda": 2}
+METHODS: Final[dict[str, int]] = {"dsm": 0, "stairs": 1, "dda": 2}
 """The numbers of `camtool.kernels.leg_steps`, which a run without numba need not load."""
 
 
@@ -79,7 +78,7 @@ class JudgedSteps:
         legs: Ints,
         periods_s: Floats,
         still_s: Floats,
-        how: tuple[Interpolator, bool, bool, float],
+        how: tuple[str, bool, bool, float],
         mechanics: Mechanics,
     ) -> None:
         """`legs` (L, 14); periods_s (N, 2) of an output in XY and in Z of each row; still_s (N,)

@@ -19,12 +19,11 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.machine.controllers import PicMmhController
-from camtool.machine.model import Machine, controller_of
+from camtool.machine.model import controller_of
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
-from .dialect import Dialect
+from .dialect import Dialect, PicMmhController, PicMmhMachine
 from .findings import FEED_ROUNDED
 
 HALF_STEP_TOLERANCE: Final = 1e-6
@@ -139,7 +138,7 @@ class Numbers:
     feed_finding: Finding | None
 
 
-def numbers_of(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Numbers:
+def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> Numbers:
     """All numbers of a toolpath; PostError for the first that cannot be said or done."""
     x, y, z = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     grids = (x, y, z)
@@ -169,13 +168,13 @@ def _both(values_mm: Floats, grids: tuple[Grid, Grid, Grid]) -> tuple[Ints, Ints
     return np.column_stack(units), np.column_stack(steps)
 
 
-def check_motion(toolpath: Toolpath, machine: Machine) -> None:
+def check_motion(toolpath: Toolpath, machine: PicMmhMachine) -> None:
     """What hangs on more than one number: where the path starts, and that arcs are arcs."""
     refuse_start(toolpath)
     _check_arcs(toolpath, machine)
 
 
-def _check_arcs(toolpath: Toolpath, machine: Machine) -> None:
+def _check_arcs(toolpath: Toolpath, machine: PicMmhMachine) -> None:
     """Arcs are planned for one interpolator, for equal steps, and must be arcs."""
     if not toolpath.is_arc.any():
         return
@@ -206,14 +205,14 @@ def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> No
         )
 
 
-def far_arcs(toolpath: Toolpath, machine: Machine, dialect: Dialect) -> Bools:
+def far_arcs(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> Bools:
     """(N,) true for arcs whose centre has more than five digits of µm: nearly straight ones."""
     grids = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     said = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
     return np.asarray(toolpath.is_arc & ~(said[0] & said[1]))
 
 
-def _feed_words(toolpath: Toolpath, machine: Machine) -> tuple[list[str], Finding | None]:
+def _feed_words(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[list[str], Finding | None]:
     """`F08` for each feed move, and what was lost by rounding down to the word's unit.
 
     The link carries one report per step and so bounds the step rate, feed / (60 · step)

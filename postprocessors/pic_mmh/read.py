@@ -14,11 +14,10 @@ from typing import Final, NoReturn
 
 from camtool.errors import ProgramError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .dialect import dialect_of
+from .dialect import PicMmhMachine
 from .findings import BLOCK_TOO_LONG_READ, FEED_ABOVE_LIMIT
 
 SHOWN_CHARS: Final = 48
@@ -80,7 +79,7 @@ EVENTS: Final = {
 }
 
 
-def read_program(data: bytes, machine: Machine) -> Toolpath:
+def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block and column when it is none."""
     *blocks, rest = _ascii(data).split(";")
     reader = _Reader(machine)
@@ -136,8 +135,8 @@ class _Excess:
 class _Reader:
     """Blocks in, rows out; knows where the tool stands and whether the program has ended."""
 
-    def __init__(self, machine: Machine) -> None:
-        dialect = dialect_of(machine)
+    def __init__(self, machine: PicMmhMachine) -> None:
+        dialect = machine.dialect
         self.path = ToolpathBuilder()
         self._form = dialect.form
         self._buffer_chars = dialect.buffer_chars

@@ -17,7 +17,6 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
 from camtool.toolpath.lower import Lowered, arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
@@ -34,7 +33,7 @@ from .arcs import (
     turned_rad,
     unwrapped_rad,
 )
-from .dialect import dialect_of
+from .dialect import PicMmhMachine
 from .findings import (
     ARC_MENDED,
     ARC_MENDED_FLAT,
@@ -54,7 +53,7 @@ BUFFER_CHARS: Final = 35
 XY = tuple[int, int]
 
 
-def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+def write_program(toolpath: Toolpath, machine: PicMmhMachine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
     writer = _Writer(toolpath, machine)
     writer.run()
@@ -73,8 +72,8 @@ def _refuse_chords(where: str) -> NoReturn:
 class _Writer:
     """The rows followed once; `units` and `steps` are where the controller stands (x, y, z)."""
 
-    def __init__(self, toolpath: Toolpath, machine: Machine) -> None:
-        dialect = dialect_of(machine)
+    def __init__(self, toolpath: Toolpath, machine: PicMmhMachine) -> None:
+        dialect = machine.dialect
         self.blocks: list[str] = []
         self.rows: list[int] = []
         self._machine = machine

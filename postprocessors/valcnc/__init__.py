@@ -1,53 +1,64 @@
-"""The dialect of the home-made CNC on a PIC18F4550: `G01 X1.2500 Y0.0000 Z-0.1250`.
+"""The home-made CNC on a PIC18F4550: `G01 X1.2500 Y0.0000 Z-0.1250`.
 
-docs/dialects/valcnc.md explains the format, its contradictions and what was chosen.
+docs/dialects/valcnc.md explains the format, its contradictions and what was chosen;
+docs/controllers/valcnc.md what the controller does with it.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from camtool.targets.target import Target
+
+from .dialect import Dialect, ValcncController, ValcncMachine, check, scales_of
+
 if TYPE_CHECKING:
-    from camtool.machine.model import Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
+    from .controller import ValcncModel
 
-class ValcncPost:
-    """Writes and reads valcnc programs; the two share no code but the options of `[dialect]`."""
+
+class Valcnc(Target):
+    """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "valcnc"
+    controllers = (ValcncController,)
+    dialect = Dialect
 
-    def check(self, machine: Machine) -> None:
-        """Raise MachineError when the machine's `[dialect]` table does not fit."""
-        from .dialect import dialect_of
+    def check(self, machine: ValcncMachine) -> None:
+        """Raise MachineError where values of the dialect do not go with the machine."""
+        check(machine)
 
-        dialect_of(machine)
-
-    def write(self, toolpath: Toolpath, machine: Machine) -> Program:
+    def write(self, toolpath: Toolpath, machine: ValcncMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
         from .write import write_program
 
         return write_program(toolpath, machine)
 
-    def read(self, data: bytes, machine: Machine) -> Toolpath:
+    def read(self, data: bytes, machine: ValcncMachine) -> Toolpath:
         """The moves as the controller takes them; ProgramError with block, line and column."""
         from .read import read_program
 
         return read_program(data, machine)
 
-    def unit_mm(self, machine: Machine) -> float:
-        """The last decimal of a coordinate, on the axis where it is the most."""
-        from .dialect import dialect_of, scales_of
+    def model(self) -> ValcncModel:
+        """The model of its controller."""
+        from .controller import ValcncModel
 
-        dialect = dialect_of(machine)
+        return ValcncModel()
+
+    def unit_mm(self, machine: ValcncMachine, axis: Axis) -> float:
+        """The last decimal of a coordinate, on the axis where it is the most."""
+        dialect = machine.dialect
         return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
 
-    def listing(self, data: bytes, machine: Machine) -> Listing:
+    def listing(self, data: bytes, machine: ValcncMachine) -> Listing:
         """The lines that are blocks."""
         from ..gcode.blocks import listing
 
         return listing(data)
 
 
-POST = ValcncPost()
+POST = Valcnc()

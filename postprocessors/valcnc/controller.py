@@ -26,9 +26,8 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.kernels.valcnc_arcs import arc_angles
-from camtool.machine.controllers import ValcncController
-from camtool.machine.model import Machine, controller_of
-from camtool.simulation import path
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import (
     MAX_STEPS,
     LegRun,
@@ -40,7 +39,12 @@ from camtool.simulation.legs import (
     waits_s,
 )
 from camtool.simulation.motion import Chunk, Options
+from camtool.simulation.path import on_steps
 from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import Dialect, ValcncController
+
+_Machine = Machine[ValcncController, Dialect]
 
 PIECES_AT_ONCE = 1 << 14
 """Lines, those of arcs too, that are worked out together: some 5 MB."""
@@ -49,64 +53,61 @@ PIECE_EPS = 1e-9
 """A part of a piece by which an arc may be longer than whole pieces, by rounding alone."""
 
 
-def run(toolpath: Toolpath, machine: Machine, options: Options) -> Iterator[Chunk]:
-    """The motion; see `camtool.simulation.simulate.ControllerModel`."""
-    pieces = _Pieces(toolpath, machine)
-    period_s = 1.0 / controller_of(machine, ValcncController).step_rate_hz
-    waits = waits_s(toolpath, toolpath.running)
-    standing = Standing(pieces.in_steps(toolpath.start), waits, period_s)
-    return LegRun(standing, machine, options).run(pieces.legs())
+class ValcncModel(ControllerModel[ValcncController, Dialect]):
+    """The PIC18F4550 of ValCNC: lines by a counter, arcs as lines."""
 
+    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
+        """The motion, chunk by chunk."""
+        pieces = _Pieces(toolpath, machine)
+        period_s = 1.0 / machine.controller.step_rate_hz
+        waits = waits_s(toolpath, toolpath.running)
+        standing = Standing(pieces.in_steps(toolpath.start), waits, period_s)
+        return LegRun(standing, machine, options).run(pieces.legs())
 
-def held(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The moves with their ends on whole steps, and arcs about centres as far from both.
+    def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
+        """The moves with their ends on whole steps, and arcs about centres as far from both.
 
-    ProgramError for what the controller cannot follow.
-    """
-    pieces = _Pieces(toolpath, machine)
-    if controller_of(machine, ValcncController).rounding == "nearest":
-        return path.held(toolpath, machine)
-    step_mm = coded_steps_mm(machine)
-    start, end = (pieces.in_steps(point) * step_mm for point in (toolpath.start, toolpath.end))
-    whole = replace(toolpath, start=start, end=end)
-    # Arcs of less than a step: their ends may have become one point, and they a circle.
-    closed = (whole.end == whole.starts)[:, :2].all(axis=1) & (np.abs(toolpath.sweeps()) < np.pi)
-    lost = toolpath.is_arc & closed
-    kind = np.where(lost, np.int64(Kind.LINE), whole.kind)
-    centre = np.where(lost[:, None], np.nan, whole.centre)
-    return path.held(replace(whole, kind=kind, centre=centre), machine)
+        ProgramError for what the controller cannot follow.
+        """
+        pieces = _Pieces(toolpath, machine)
+        if machine.controller.rounding == "nearest":
+            return on_steps(toolpath, machine)
+        step_mm = coded_steps_mm(machine)
+        start, end = (pieces.in_steps(point) * step_mm for point in (toolpath.start, toolpath.end))
+        whole = replace(toolpath, start=start, end=end)
+        # Arcs of less than a step: their ends may have become one point, and they a circle.
+        closed = (whole.end == whole.starts)[:, :2].all(axis=1) & (
+            np.abs(toolpath.sweeps()) < np.pi
+        )
+        lost = toolpath.is_arc & closed
+        kind = np.where(lost, np.int64(Kind.LINE), whole.kind)
+        centre = np.where(lost[:, None], np.nan, whole.centre)
+        return on_steps(replace(whole, kind=kind, centre=centre), machine)
 
+    def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
+        """Lines by the counter, arcs by lines."""
+        return "counter"
 
-def spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """A step: every pass is a sample."""
-    return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-
-
-def interpolation(toolpath: Toolpath, machine: Machine, options: Options) -> str:
-    """Lines by the counter, arcs by lines."""
-    return "counter"
-
-
-def assumptions(toolpath: Toolpath, machine: Machine) -> tuple[str, ...]:
-    """What the times and the path take for granted."""
-    controller = controller_of(machine, ValcncController)
-    pieces = f"pieces of {controller.arc_segment_mm:g} mm (controller.arc_segment_mm)"
-    if controller.arc_segments is not None:
-        pieces = f"{controller.arc_segments} pieces each (controller.arc_segments)"
-    return (
-        f"the axis with more steps makes {controller.step_rate_hz:g} a second from rest to rest "
-        "(controller.step_rate_hz): no ramps, no steps lost",
-        f"arcs are drawn in {pieces}",
-        "the controller's own arithmetic takes no time",
-    )
+    def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
+        """What the times and the path take for granted."""
+        controller = machine.controller
+        pieces = f"pieces of {controller.arc_segment_mm:g} mm (controller.arc_segment_mm)"
+        if controller.arc_segments is not None:
+            pieces = f"{controller.arc_segments} pieces each (controller.arc_segments)"
+        return (
+            f"the axis with more steps makes {controller.step_rate_hz:g} a second from rest to "
+            "rest (controller.step_rate_hz): no ramps, no steps lost",
+            f"arcs are drawn in {pieces}",
+            "the controller's own arithmetic takes no time",
+        )
 
 
 class _Pieces:
     """The lines of a toolpath: one for each straight row, several for each arc."""
 
-    def __init__(self, toolpath: Toolpath, machine: Machine) -> None:
+    def __init__(self, toolpath: Toolpath, machine: _Machine) -> None:
         check_rows(toolpath, machine)
-        self._controller = controller_of(machine, ValcncController)
+        self._controller = machine.controller
         self._step_mm = coded_steps_mm(machine)
         count = toolpath.running
         self._start, self._end = toolpath.start, toolpath.end[:count]

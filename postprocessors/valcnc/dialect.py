@@ -8,9 +8,8 @@ import msgspec
 from msgspec import Meta
 
 from camtool.arrays import Floats
-from camtool.machine.loader import convert
-from camtool.machine.model import Machine
-from camtool.machine.ranges import Count, Scale, Step, Tolerance
+from camtool.machine.model import Machine, SlideStart
+from camtool.machine.ranges import Count, Rate, Scale, Step, Tolerance
 
 from ..gcode.dialect import check_unit
 
@@ -41,13 +40,36 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     arc_spread_mm: Tolerance = 0.04
 
 
-def dialect_of(machine: Machine) -> Dialect:
-    """The machine's `[dialect]` table; MachineError naming the key that does not fit."""
-    dialect = convert(machine.dialect, Dialect, machine.target.name, "dialect")
+class ValcncController(SlideStart, frozen=True, tag_field="model", tag="valcnc"):
+    """The PIC18F4550 of ValCNC; most options are points on which its thesis is silent.
+
+    `step_rate_hz`: pulses of the axis with more steps, one delay of 166.667 µs each (L1336).
+    `rounding` of lengths to steps, and `counting`: whether a coordinate is turned into steps and
+    then compared with the one before, or the difference of the two coordinates is ("un valor
+    flotante ... convertido en una cantidad de pasos", L1226). Arcs: how long a piece of them is
+    drawn as one line ("se divide el ángulo α en pequeños tramos", by "la longitud de su arco",
+    L1330), or how many lines every arc has, where `arc_segments` says it; `arc_end`: whether the
+    last one ends where the sum of the angles leads (L1330) or at the end that was programmed.
+    """
+
+    step_rate_hz: Rate = 6000.0
+    rounding: Literal["nearest", "truncated"] = "nearest"
+    counting: Literal["coordinates", "differences"] = "coordinates"
+    arc_segment_mm: Annotated[float, Meta(ge=0.001, le=1000.0)] = 0.2
+    arc_segments: Annotated[int, Meta(ge=1, le=100_000)] | None = None
+    arc_end: Literal["computed", "programmed"] = "computed"
+
+
+ValcncMachine = Machine[SlideStart, Dialect]
+"""Any machine that speaks this dialect."""
+
+
+def check(machine: ValcncMachine) -> None:
+    """Raise MachineError where the dialect's numbers do not go with those of the machine."""
+    dialect = machine.dialect
     mm_per_unit = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     mm_per_unit /= dialect.coord_scale * dialect.nominal_step_mm
     check_unit(machine, 10.0**-dialect.decimals * mm_per_unit, dialect.arc_spread_mm)
-    return dialect
 
 
 def scales_of(machine: Machine, dialect: Dialect) -> Floats:

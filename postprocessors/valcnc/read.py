@@ -14,12 +14,11 @@ from typing import Final, NoReturn
 
 from camtool.errors import ProgramError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
 from ..gcode.blocks import Block, Lexing, blocks_of
-from .dialect import dialect_of, scales_of
+from .dialect import ValcncMachine, scales_of
 from .findings import ARC_MISSES_END, COORDINATES_SCALED_READ
 
 CODES: Final = ("00", "01", "02", "03")
@@ -41,7 +40,7 @@ SCALE_GUARD: Final = 1e-12
 Point = tuple[float, float, float]
 
 
-def read_program(data: bytes, machine: Machine) -> Toolpath:
+def read_program(data: bytes, machine: ValcncMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block, line and column when it is none."""
     reader = _Reader(machine)
     for block in blocks_of(data, reader.lexing):
@@ -65,8 +64,8 @@ class _Missed:
 class _Reader:
     """Blocks in, rows out, in mm."""
 
-    def __init__(self, machine: Machine) -> None:
-        self._dialect = dialect_of(machine)
+    def __init__(self, machine: ValcncMachine) -> None:
+        self._dialect = machine.dialect
         scale_x, scale_y, scale_z = scales_of(machine, self._dialect).tolist()
         self._scales = (scale_x, scale_y, scale_z)
         self._alike = abs(scale_x - scale_y) <= SCALE_GUARD * scale_x

@@ -18,7 +18,6 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
 from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
@@ -34,7 +33,7 @@ from ..gcode.plain import (
     plain_rows,
     split_z,
 )
-from .dialect import Dialect, dialect_of, scales_of
+from .dialect import Dialect, ValcncMachine, scales_of
 from .findings import ARC_MENDED, COORDINATES_SCALED, EVENT_LEFT_OUT, FEED_ROUNDED
 
 UNSAID: Final = (
@@ -51,9 +50,9 @@ MOST_UNITS: Final = 99_999.0
 """An arc's centre farther from its start (in units of the program) makes it lines."""
 
 
-def write_program(toolpath: Toolpath, machine: Machine) -> Program:
+def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
-    dialect = dialect_of(machine)
+    dialect = machine.dialect
     check_plain(toolpath, machine)
     _check_tools(toolpath)
     scales = scales_of(machine, dialect)
@@ -96,7 +95,7 @@ def _check_tools(toolpath: Toolpath) -> None:
 
 
 def _arcs_lowered(
-    lowered: Lowered, scales: Floats, machine: Machine, dialect: Dialect
+    lowered: Lowered, scales: Floats, machine: ValcncMachine, dialect: Dialect
 ) -> tuple[Lowered, list[Finding]]:
     """Arcs of no more than the dialect's sweep; lines where X and Y are scaled differently."""
     path = lowered.toolpath
@@ -151,7 +150,7 @@ def _scale_note(dialect: Dialect) -> list[Finding]:
     return [COORDINATES_SCALED(measured=dialect.coord_scale)]
 
 
-def _feed_note(toolpath: Toolpath, machine: Machine) -> list[Finding]:
+def _feed_note(toolpath: Toolpath, machine: ValcncMachine) -> list[Finding]:
     """Feeds that the machine will not keep: it has one speed."""
     speed = machine.max_feed_mm_min
     with np.errstate(invalid="ignore"):

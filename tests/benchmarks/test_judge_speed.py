@@ -18,11 +18,11 @@ import pytest
 from camtool.kernels.circle_bins import bin_directions
 from camtool.kernels.error_bins import BEFORE_FIRST, BINS
 from camtool.simulation.motion import Options
-from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.verification.verify import Verification, verify
+from camtool.verification.verify import Verification
 from tests.oracles.dense_moves import pic_mmh
+from tests.targets import on, simulate, verify
 
 pytestmark = pytest.mark.benchmark
 RADIUS, TURNS, STEP = 142_857, 12, 0.00014
@@ -119,7 +119,7 @@ def test_chunks_are_judged_too() -> None:
 
     machine, toolpath = pic_mmh(), circles()
     chunks = list(simulate(toolpath, machine, Options()))
-    case = Case(toolpath, machine, None, None, VerifyOptions())
+    case = Case(toolpath, on(machine), None, None, VerifyOptions())
     judge(case, chunks[:1])
     begun = time.perf_counter()
     found = judge(case, chunks)

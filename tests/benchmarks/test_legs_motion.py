@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camtool.machine.registry import load_target
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.i8751.machines import SAMPLE
+from tests.targets import simulate
 
 pytestmark = pytest.mark.benchmark
 MOVES = 200_000

@@ -14,9 +14,9 @@ import pytest
 
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
-from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import job_of
+from camtool.targets.registry import load_target
 
 pytestmark = pytest.mark.benchmark
 ROOT = Path(__file__).parents[2]

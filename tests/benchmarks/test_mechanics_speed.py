@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camtool.machine.registry import load_target
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL, CHUNK_STEPS
+from camtool.targets.registry import load_target
 
 pytestmark = pytest.mark.benchmark
 

@@ -11,9 +11,9 @@ import pytest
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.moves import Toolpath
-from camtool.verification.verify import verify
 from tests.oracles.path_machine import path_machine
 from tests.planning.test_place import drawing_of, rectangle
+from tests.targets import verify
 
 pytestmark = pytest.mark.benchmark
 FEW, MANY = 250, 2000

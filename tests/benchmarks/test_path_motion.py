@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.lower import (
     Lowered,
@@ -19,9 +18,9 @@ from camtool.toolpath.lower import (
     xy_then_z,
 )
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verification.verify import verify
 from tests.oracles.dense_moves import cut
 from tests.oracles.path_machine import both, path_machine
+from tests.targets import simulate, verify
 
 pytestmark = pytest.mark.benchmark
 MOVES = 100_000

@@ -12,10 +12,10 @@ from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.coupons import Sheet, dxf, sheet
 from camtool.calibration.measurements import Added, Lines, Measurements, Regions, RegionsOf
 from camtool.importers.read import read_drawing
-from camtool.machine.registry import LoadedTarget, load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import LoadedTarget, load_target
+from tests.targets import simulate
 
 NEAR_MM = 1e-6
 

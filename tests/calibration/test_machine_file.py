@@ -10,9 +10,9 @@ import pytest
 from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.machine_file import machine_file
 from camtool.calibration.measurements import read_measurements
-from camtool.machine.loader import read_table
 from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
+from camtool.tables import read_table
+from camtool.targets.registry import load_target
 
 MEASURED = Path(__file__).parents[2] / "samples" / "measured"
 

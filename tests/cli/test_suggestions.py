@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from camtool.errors import CamtoolError
-from camtool.machine.registry import load_target
 from camtool.patterns import guess
+from camtool.targets.registry import load_target
 
 LOGO = "samples/logo.dxf"
 PIC = ("-t", "pic-mmh")

@@ -4,28 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from camtool_postprocessors.flashcut import dialect as flashcut
-from camtool_postprocessors.grbl import dialect as grbl
-from camtool_postprocessors.i8751 import dialect as i8751
-from camtool_postprocessors.linuxcnc import dialect as linuxcnc
-from camtool_postprocessors.matlab_router import dialect as matlab_router
-from camtool_postprocessors.pic_mmh import dialect as pic_mmh
-from camtool_postprocessors.valcnc import dialect as valcnc
 from msgspec import inspect as known
 
 from camtool.calibration.measurements import KINDS, _Head
 from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
+from camtool.targets.registry import find_target, load_target, target_names
 
-DIALECTS: dict[str, type] = {
-    "flashcut": flashcut.Dialect,
-    "grbl": grbl.Dialect,
-    "i8751": i8751.Dialect,
-    "linuxcnc": linuxcnc.Dialect,
-    "matlab-router": matlab_router.Dialect,
-    "pic-mmh": pic_mmh.Dialect,
-    "valcnc": valcnc.Dialect,
-}
+DIALECTS: dict[str, type] = {name: find_target(name)[0].dialect for name in target_names()}
 
 FILES = {"i8751": Path(__file__).parents[2] / "samples" / "i8751-sample.toml"}
 """Machine files for targets that need one."""

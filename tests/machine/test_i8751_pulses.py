@@ -10,7 +10,6 @@ from camtool_postprocessors.i8751.pulses import (
     RAMP_RELOAD,
     Firmware,
     PulseTimes,
-    firmware_of,
 )
 
 from camtool.errors import MachineError
@@ -19,7 +18,7 @@ from tests.postprocessors.i8751.machines import loaded
 
 
 def firmware(*settings: str) -> Firmware:
-    return firmware_of(loaded(*settings).machine)
+    return loaded(*settings).machine.dialect
 
 
 def alone(steps: int, *settings: str) -> float:
@@ -136,12 +135,6 @@ def test_dog_legs() -> None:
     np.testing.assert_allclose(ramps[:3], 6.27, rtol=0.004)
     assert ramps[3] == pytest.approx(6.27 + 7.22, rel=0.004)
     assert legs(steps, "elbow=flows")[3] == pytest.approx(alone(300))
-
-
-def test_machines_of_other_dialects_have_the_firmware_of_the_thesis() -> None:
-    from camtool.machine.registry import load_target
-
-    assert firmware_of(load_target("grbl").machine) == Firmware()
 
 
 def test_wrong_options_are_named() -> None:

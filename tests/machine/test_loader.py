@@ -5,14 +5,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from camtool_postprocessors.pic_mmh.dialect import PicMmhController
 from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError
-from camtool.machine.controllers import PathController, PicMmhController
-from camtool.machine.loader import build_machine, missing_keys, read_table, target_of
-from camtool.machine.model import Machine, controller_of
-from camtool.machine.registry import load_target
+from camtool.machine.model import Machine, PathController, controller_of
+from camtool.tables import read_table
+from camtool.targets.loader import missing_keys, names_of
+from camtool.targets.registry import load_target
+from tests.targets import build_machine
 
 FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
 
@@ -127,7 +129,7 @@ def test_what_only_the_user_can_say_is_asked_for() -> None:
     for word in ("pic_mmh.toml", "[axes.x]", "key coded_step_mm", "missing", "--machine FILE"):
         assert word in str(caught.value)
     assert 'extends = "pic-mmh"' in str(caught.value)
-    assert target_of(needy(), "pic_mmh.toml").name == "pic-mmh"
+    assert names_of(needy(), "pic_mmh.toml").name == "pic-mmh"
 
 
 def test_what_only_the_user_can_say_is_taken_from_his_file_or_a_flag(tmp_path: Path) -> None:
@@ -227,7 +229,7 @@ def test_another_controller_model_leaves_the_options_of_the_first_behind(tmp_pat
         ("pic-mmh", "dialect.form=thesis", "use one of annex, example"),
         ("pic-mmh", "dialect.form=3", "use one of annex, example"),
         ("pic-mmh", "dialect.frm=annex", "did you mean form? known keys: "),
-        ("pic-mmh", "controller.model=grb", "did you mean grbl? use one of pic-mmh, path, "),
+        ("grbl", "controller.model=grb", "did you mean grbl? use one of grbl, path"),
         ("grbl", "controller.start_play=lost", "use one of "),
     ],
 )

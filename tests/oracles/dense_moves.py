@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Chunk, one_row
+from camtool.tables import read_table
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
+from tests.targets import build_machine
 
 MACHINE_FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
 

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
-
-FOLDER = Path(__file__).parents[2] / "postprocessors"
+from camtool.targets.registry import load_target
 
 
 def grbl_machine(*settings: str) -> Machine:
@@ -21,6 +17,4 @@ def linuxcnc_machine(*settings: str) -> Machine:
 
 
 def _machine(name: str, settings: tuple[str, ...]) -> Machine:
-    path = FOLDER / name / "machine.toml"
-    model = f"controller.model={name}"
-    return build_machine(read_table(path), str(path), settings=(model, *settings))
+    return load_target(name, settings=settings).machine

@@ -11,6 +11,7 @@ from tests.oracles.dense_moves import (
     pic_mmh,
     square,
 )
+from tests.targets import on
 
 MACHINE = pic_mmh()
 STEP = MACHINE.axes.x.coded_step_mm
@@ -33,7 +34,7 @@ def sample_part(*, shift: float = 0.0) -> ToolpathBuilder:
 def judged(
     decoded: Toolpath, wanted: Toolpath | None = None, bend=lambda points: points, **options
 ) -> Verification:
-    case = Case(decoded, MACHINE, wanted, None, VerifyOptions(**options), said=wanted)
+    case = Case(decoded, on(MACHINE), wanted, None, VerifyOptions(**options), said=wanted)
     return judge(case, follow(decoded, bend=bend))
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from camtool.machine.loader import build_machine
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.lowering import point_of, sweep_of
+from tests.targets import build_machine
 
 STEP = 0.005
 

@@ -19,8 +19,8 @@ import shapely
 
 from camtool.arrays import Floats
 from camtool.machine.model import Machine
-from camtool.simulation.simulate import simulate
 from camtool.toolpath.moves import Toolpath
+from tests.targets import simulate
 
 POINTS = 4000
 """A curve is sampled at so many places: chords of a half circle stray by a ten millionth of it."""

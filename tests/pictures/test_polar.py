@@ -11,10 +11,10 @@ from camtool.pictures.draw import draw, png
 from camtool.pictures.options import Options
 from camtool.pictures.scene import Round, Scene, rounds_of
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verification.verify import verify
 from tests.oracles import svg_page
 from tests.oracles.dense_moves import pic_mmh
 from tests.oracles.png import decode
+from tests.targets import verify
 
 CENTRE = np.array([10.0, -4.0])
 RADIUS = 2.0

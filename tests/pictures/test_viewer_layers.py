@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
-from camtool.machine.registry import load_target
 from camtool.pictures.scene import Scene
 from camtool.pipeline import verify_program
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.pictures.conftest import SCENES, circle

@@ -11,15 +11,15 @@ import numpy as np
 
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
 from camtool.planning.items import Contour, Feeds, Item, Run, Setting
 from camtool.planning.job import Operation
 from camtool.planning.link import Worked, link
 from camtool.planning.paths import flat
 from camtool.planning.reversing import Approaches, least_turn_mm, parts_of, turns_of
+from camtool.targets.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
-from camtool.verification.verify import verify
+from tests.targets import verify
 
 DEPTH_MM = 0.02
 PIC = load_target("pic-mmh")

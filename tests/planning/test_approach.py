@@ -5,12 +5,12 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh.dialect import PicMmhController
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
-from camtool.machine.controllers import PathController, PicMmhController
-from camtool.machine.model import Machine, PlayCells, PlayMap
+from camtool.machine.model import Machine, PathController, PlayCells, PlayMap
 from camtool.planning.items import Run
 from camtool.planning.reversing import (
     APPROACH_MARGIN_MM,
@@ -20,11 +20,11 @@ from camtool.planning.reversing import (
 )
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
-from camtool.simulation.simulate import simulate
 from camtool.verification.cuts import cut_moves
 from tests.paths import scaled
 from tests.planning.reversal_parts import reversals_of, run_of, square, toolpath, with_play
 from tests.strategies import contours, open_contours
+from tests.targets import simulate
 
 
 def line(*points: tuple[float, float]) -> Run:

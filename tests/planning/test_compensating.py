@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.planning.compensating import Stretch, compensated, motor_path, stretches
-from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from tests.oracles.path_machine import dense_path, path_machine
 from tests.strategies import contours, open_contours
+from tests.targets import simulate
 
 FREE = "controller.grid=none"
 DENSE = 200

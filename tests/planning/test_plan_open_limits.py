@@ -10,9 +10,9 @@ from camtool.planning.items import Feeds
 from camtool.planning.job import Job, Operation, job_of
 from camtool.planning.plan import plan
 from camtool.planning.settings import feeds_of, lowered_feeds
-from camtool.verification.verify import verify
 from tests.drawings import drawing_of
 from tests.oracles.path_machine import path_machine
+from tests.targets import verify
 
 
 def test_without_limits_every_feed_and_every_size_is_taken() -> None:

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
-from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Tabs, job_of
 from camtool.planning.link import SETTLED_DECIMALS
+from camtool.targets.registry import load_target
 from camtool.toolpath.moves import Kind
 from tests.drawings import drawing_of
 

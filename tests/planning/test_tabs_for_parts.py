@@ -8,9 +8,9 @@ import pytest
 from camtool.errors import OptionError
 from camtool.findings import Code, Finding
 from camtool.geometry.polylines import Polyline
-from camtool.machine.registry import load_target
 from camtool.planning.job import Job, Tabs, job_of
 from camtool.planning.plan import planned
+from camtool.targets.registry import load_target
 from tests.drawings import drawing_of
 
 

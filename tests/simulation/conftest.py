@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
+from camtool.tables import read_table
+from tests.targets import build_machine
 
 TARGET = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
 

@@ -10,15 +10,15 @@ from camtool_postprocessors.flashcut import controller
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.machine.loader import build_machine, read_table
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Effects, Options
-from camtool.simulation.simulate import simulate
+from camtool.tables import read_table
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.controllers import play
 from tests.oracles.flashcut_run import Pc, half_period, run_rows
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.targets import build_machine, simulate
 
 TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
 STEP = 0.0019

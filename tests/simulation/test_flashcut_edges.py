@@ -5,18 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from camtool_postprocessors.flashcut import controller
+from camtool_postprocessors.flashcut.dialect import FlashcutController
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.controllers import FlashcutController, SlideStart
-from camtool.machine.loader import build_machine, read_table
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, SlideStart
 from camtool.simulation.motion import IDEAL, Options
-from camtool.simulation.simulate import simulate
+from camtool.tables import read_table
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.targets import build_machine, model_of, simulate
 
 TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
 STEP = 0.0019
@@ -125,13 +124,14 @@ def test_bad_options_are_named(setting: str) -> None:
 
 
 def test_another_controller_is_refused() -> None:
-    with pytest.raises(MachineError, match="needs the controller flashcut"):
-        controller.assumptions(ToolpathBuilder().finish(), machine("controller.model=path"))
+    with pytest.raises(MachineError, match="use one of flashcut, path"):
+        machine("controller.model=grbl")
 
 
 def test_held_are_the_lengths_that_the_program_says() -> None:
     path = ToolpathBuilder().line(0.1234, 0.0567, feed=3.0).event(Kind.HOME_XY).finish()
-    held = controller.held(path, machine("controller.machine_zero_mm=[1.0, 2.0, 3.0]"))
+    made = machine("controller.machine_zero_mm=[1.0, 2.0, 3.0]")
+    held = model_of(made).quantised(path, made)
     assert held.end.tolist() == [[0.1234, 0.0567, 0.0], [1.0, 2.0, 0.0]]
 
 
@@ -144,9 +144,8 @@ def test_the_page_names_every_option() -> None:
 
 
 def test_the_assumptions_name_the_fastest_feed() -> None:
-    fastest, *others = controller.assumptions(
-        ToolpathBuilder().finish(), machine("controller.half_period_ms=20")
-    )
+    made = machine("controller.half_period_ms=20")
+    fastest, *others = model_of(made).assumptions(ToolpathBuilder().finish(), made)
     assert "2.71 or 14.2 mm/min" in fastest  # 1.9 µm in 42 and in 8 ms
     assert any("steps too many stay" in one for one in others)
 

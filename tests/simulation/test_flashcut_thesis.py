@@ -12,11 +12,11 @@ import pytest
 
 from camtool.arrays import Floats
 from camtool.kernels.lattice import to_steps
-from camtool.machine.loader import build_machine, read_table
 from camtool.simulation.motion import Chunk
-from camtool.simulation.simulate import simulate
+from camtool.tables import read_table
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
+from tests.targets import build_machine, simulate
 
 TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
 F3, F6, F10, F20, F40 = 14.25, 8.14, 5.18, 2.714, 1.39

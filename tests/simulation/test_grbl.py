@@ -8,14 +8,14 @@ import pytest
 from camtool.errors import MachineError, ProgramError
 from camtool.findings import Code, Severity
 from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
 from camtool.simulation.motion import CHUNK_STEPS, Options
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.gcode_machines import grbl_machine
 from tests.oracles.grbl_run import F, chord_ends, nearest_step, number_as_read, ticks
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.targets import simulate
 
 STEP = 0.004
 

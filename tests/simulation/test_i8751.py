@@ -10,16 +10,15 @@ from camtool_postprocessors.i8751.pulses import Firmware
 
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
 from camtool.simulation.motion import IDEAL, Options
-from camtool.simulation.simulate import model_of, simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verification.verify import verify
 from tests.oracles.corte_recto import walk
 from tests.oracles.i8751_run import Reading, record
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.postprocessors.i8751.machines import ROOT, SAMPLE, STEP_MM, loaded
+from tests.targets import model_of, simulate, verify
 
 
 def machine(*settings: str) -> Machine:
@@ -226,7 +225,7 @@ def test_compensation_that_a_machine_file_asks_for_takes_time() -> None:
 def test_held_moves_end_on_whole_steps() -> None:
     path = ToolpathBuilder().line(1.0004, -0.5071, feed=9).line(1.0063, -0.5, feed=9).finish()
     made = machine()
-    kept = model_of(made).held(path, made)
+    kept = model_of(made).quantised(path, made)
     assert kept.end / STEP_MM == pytest.approx(np.array([[80, -41, 0], [81, -40, 0]]))
     last = run(path, made)[-1]
     assert np.array_equal(last.commanded[-1], kept.end[-1])
@@ -260,7 +259,7 @@ def test_what_cannot_be_followed_is_named(build, words: str) -> None:
         list(simulate(path, machine()))
     assert "block 7" in str(caught.value)
     with pytest.raises(ProgramError, match=words):
-        model_of(machine()).held(path, machine())
+        model_of(machine()).quantised(path, machine())
     # Behind the end nothing is run, and nothing asked.
     ended = ToolpathBuilder().event(Kind.END)
     assert len(run(build(ended).finish(), machine())) == 1

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors.linuxcnc.controller import assumptions, merged
+from camtool_postprocessors.linuxcnc.controller import merged
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,17 +13,21 @@ from camtool.arrays import Floats
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
 from camtool.simulation.motion import CHUNK_STEPS, Options
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.gcode_machines import linuxcnc_machine
 from tests.oracles.linuxcnc_run import MEASURED, MODES, Measured, Modes, merge, off_line
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.targets import model_of, simulate
 
 PERIOD = 0.001
 V, A = 30.48, 508.0
+
+
+def said(path: Toolpath, machine: Machine) -> tuple[str, ...]:
+    return model_of(machine).assumptions(path, machine)
 
 
 def run(path: Toolpath, machine: Machine, chunk_steps: int = CHUNK_STEPS) -> list[RowMotion]:
@@ -91,10 +95,10 @@ def test_where_the_program_says_nothing_the_machine_file_does() -> None:
     assert total(path, in_mode("exact-stop")) > total(path, in_mode("blend", 0.5)) + 0.01
     modal = read("F900\nG64 P0.5 G1 X5\nY5\nM2\n", in_mode("blend"))
     assert total(modal, in_mode("exact-stop")) == total(path, in_mode("blend", 0.5))
-    assert [*assumptions(modal, in_mode("exact-stop"))][:1] == [
+    assert [*said(modal, in_mode("exact-stop"))][:1] == [
         "corners are blended within 0.5 mm (G64 P), as the speed needs"
     ]
-    assert "(G61.1)" in assumptions(path, in_mode("exact-stop"))[0]
+    assert "(G61.1)" in said(path, in_mode("exact-stop"))[0]
 
 
 def test_one_trapezoid_and_one_triangle() -> None:
@@ -338,6 +342,5 @@ def test_what_cannot_be_followed() -> None:
 
 
 def test_the_path_mode_must_be_said() -> None:
-    path = ToolpathBuilder().rapid(1.0, 0.0, 0.0).finish()
-    with pytest.raises(MachineError, match="how it meets corners"):
-        simulate(path, in_mode("round"))
+    with pytest.raises(MachineError, match=r"\[dialect\], key path: Invalid value 'round'"):
+        in_mode("round")

@@ -11,27 +11,28 @@ import pytest
 from camtool_postprocessors.matlab_router.controller import (
     TEXT_KID,
     TEXT_KPD,
-    assumptions,
-    held,
     lines_of,
-    spacing_mm,
 )
+from camtool_postprocessors.matlab_router.dialect import MatlabRouterController
 from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError, ProgramError
-from camtool.machine.controllers import MatlabRouterController
 from camtool.machine.model import Machine, controller_of
-from camtool.machine.registry import load_target
 from camtool.simulation.motion import IDEAL, Chunk, Options
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.matlab_router.parts import ROOT, STAR, STAR_LXY, STAR_VELXY
+from tests.targets import model_of, simulate
 
 TICK_S = 0.005
 COUNTS_PER_MM = 25600.0
 SETTLE_S = 12 * 0.062
+
+
+def quantised(path: Toolpath, machine: Machine) -> Toolpath:
+    return model_of(machine).quantised(path, machine)
 
 
 def router(*settings: str) -> Machine:
@@ -76,7 +77,7 @@ def unended(chunks: list[Chunk]) -> list[int]:
 def test_the_star_s_arrays_are_what_the_slaves_get() -> None:
     """lxy and velxy as printed, L3196-3228: what the reader tells gives each number back."""
     path, machine = read("matlab-router-star-thesis", "dialect.grid_mm=0.1")
-    orders = lines_of(held(path, machine), len(path), machine).orders[-10:]
+    orders = lines_of(quantised(path, machine), len(path), machine).orders[-10:]
     assert orders[:, 3:5].T.tolist() == STAR_VELXY
     assert (2 * orders[:, :2]).T.tolist() == [[d // 2 * 2 for d in row] for row in STAR_LXY]
 
@@ -87,7 +88,7 @@ def test_the_star_s_drift_by_odd_distances() -> None:
     for point, *speed in zip(STAR[1:], *STAR_VELXY, strict=True):
         path.line(point[0] / 10, point[1] / 10, feed=math.hypot(*speed) * 0.46875)
     toolpath, machine = path.finish(), router()
-    orders = lines_of(held(toolpath, machine), len(toolpath), machine).orders[1:]
+    orders = lines_of(quantised(toolpath, machine), len(toolpath), machine).orders[1:]
     done = np.sign(orders[:, 3:5]) * 2 * orders[:, :2]
     drift = (done - np.diff(np.array(STAR), axis=0)).cumsum(axis=0)
     assert drift[:, 0].tolist() == [-1, -1, 0, 0, 0, 1, 1, 1, 1, 2]
@@ -107,7 +108,7 @@ def test_all_speeds_of_the_gui_come_back(ways: list[tuple[int, int]]) -> None:
     toolpath, machine = path.finish(), router()
     inside = np.abs(toolpath.end).max() < 3276.7
     if inside:
-        orders = lines_of(held(toolpath, machine), len(toolpath), machine).orders
+        orders = lines_of(quantised(toolpath, machine), len(toolpath), machine).orders
         assert orders[:, 3:5].tolist() == wanted
 
 
@@ -428,24 +429,30 @@ def test_the_ends_of_the_ranges_are_bounded_too() -> None:
 
 def test_what_is_said_of_the_model() -> None:
     machine = router("friction_percent=[1, 0, 0]", "slaves=text")
-    assert any("dry friction" in text for text in assumptions(ToolpathBuilder().finish(), machine))
-    assert any("text" in text for text in assumptions(ToolpathBuilder().finish(), machine))
+    assert any(
+        "dry friction" in text
+        for text in model_of(machine).assumptions(ToolpathBuilder().finish(), machine)
+    )
+    assert any(
+        "text" in text
+        for text in model_of(machine).assumptions(ToolpathBuilder().finish(), machine)
+    )
     path, machine = read("matlab-router-star")
     at = places(motion(path, machine))
     apart = np.hypot(*np.diff(at[:, :2], axis=0).T)
-    assert float(np.percentile(apart, 95)) <= 1.5 * spacing_mm(path, machine)
+    assert float(np.percentile(apart, 95)) <= 1.5 * model_of(machine).spacing_mm(path, machine)
 
 
 def test_the_limits_of_the_format() -> None:
     """The farthest that an int16 of tenths can say, and the most counts: no overflow."""
     far = ToolpathBuilder().line(3276.6, feed=1023 * 0.46875).finish()
-    lines = lines_of(held(far, router()), 1, router()).orders
+    lines = lines_of(quantised(far, router()), 1, router()).orders
     assert lines[0, :6].tolist() == [16383, 0, 0, 1023, 0, 0]
     fast = ToolpathBuilder().line(0.2, feed=1e300).finish()
     assert lines_of(fast, 1, router()).orders[0, 3] == 0xFFFF
     for a, b in pairwise((0.0, 0.3, 0.7, 1.0, 1.1)):  # 0.3, 0.4, 0.3, 0.1 mm
         way = ToolpathBuilder().line(b - a, feed=225).finish()
-        chunks = lines_of(held(way, router()), 1, router()).orders[0, 0]
+        chunks = lines_of(quantised(way, router()), 1, router()).orders[0, 0]
         assert chunks == {3: 1, 4: 2, 1: 65536}[round(10 * (b - a))]
 
 
@@ -454,6 +461,6 @@ def test_the_text_divides_distances() -> None:
     wanted = {0.7: 1, 5.3: 10, 66.7: 100, 177.7: 1000}
     for way, parts in wanted.items():
         path, machine = line(way), router("slaves=text")
-        (counts,) = lines_of(held(path, machine), 1, machine).orders[:, 0].tolist()
+        (counts,) = lines_of(quantised(path, machine), 1, machine).orders[:, 0].tolist()
         assert counts % parts == 0
         assert 0 <= way * COUNTS_PER_MM - counts < parts + 1

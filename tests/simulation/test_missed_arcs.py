@@ -6,13 +6,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from camtool_postprocessors.pic_mmh.controller import Arc, arc_filler, arc_reach
+from camtool_postprocessors.pic_mmh.dialect import Interpolator
 
 from camtool.errors import OptionError
-from camtool.machine.controllers import Interpolator
 from camtool.machine.model import Machine
-from camtool.simulation import Options, simulate
+from camtool.simulation.motion import Options
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.targets import simulate
 
 STEP = 0.00014
 

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError, ProgramError
 from camtool.machine.model import Machine
-from camtool.simulation import path
+from camtool.simulation import samples
 from camtool.simulation.motion import IDEAL, Chunk, Options
-from camtool.simulation.path import PathSamples, held, move_lengths, sample_spacing_mm
-from camtool.simulation.simulate import simulate
+from camtool.simulation.samples import PathSamples, move_lengths, sample_spacing_mm
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from tests.oracles.motion_rows import rows_of
@@ -24,6 +23,7 @@ from tests.oracles.path_machine import (
     length_of,
     path_machine,
 )
+from tests.targets import model_of, simulate
 
 FREE = "controller.grid=none"
 
@@ -72,6 +72,10 @@ def machines(draw: st.DrawFn) -> Machine:
     return path_machine(*changes)
 
 
+def quantised(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    return model_of(machine).quantised(toolpath, machine)
+
+
 def gathered(chunks: list[Chunk]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Row, commanded and slide of all samples."""
     return (
@@ -114,7 +118,7 @@ def test_ends_are_met_and_samples_are_no_wider_than_a_step(toolpath: Toolpath) -
             continue
         assert mine[-1].tolist() == list(move.end)
         apart = np.linalg.norm(np.diff([move.start, *mine.tolist()], axis=0), axis=1)
-        assert apart.max() <= sample_spacing_mm(toolpath, machine) * (1.0 + path.SPACING_EPS)
+        assert apart.max() <= sample_spacing_mm(toolpath, machine) * (1.0 + samples.SPACING_EPS)
         assert len(mine) <= length_of(toolpath, index) / STEP + 5
 
 
@@ -306,12 +310,12 @@ def test_followed_ends_lie_on_the_grid_and_near(toolpath: Toolpath) -> None:
         if move.centre is None and move.kind == Kind.LINE:
             shifted.line(*(value + 0.0013 for value in move.end), feed=10.0)
     given_ = shifted.finish()
-    made = held(given_, path_machine())
+    made = quantised(given_, path_machine())
     steps = made.end / STEP
     assert steps == pytest.approx(np.round(steps), abs=1e-9)
     if len(given_):
         assert np.abs(made.end - given_.end).max() <= 0.5 * STEP + 1e-12
-    free = held(given_, path_machine(FREE))
+    free = quantised(given_, path_machine(FREE))
     assert np.array_equal(free.end, given_.end)
 
 
@@ -325,13 +329,13 @@ def test_rounding_turns_no_arc_inside_out(missing: float, ccw: bool) -> None:
             b = ToolpathBuilder((math.cos(turn), math.sin(turn), 0.0))
             b.arc(math.cos(end), math.sin(end), centre=(0, 0), ccw=ccw, feed=10)
             b.event(Kind.DWELL, 0.0)
-            made = held(b.finish(), path_machine())
+            made = quantised(b.finish(), path_machine())
             assert move_lengths(made)[0] == pytest.approx(sweep, abs=2 * math.pi * STEP)
             assert np.array_equal(made.end[0], made.end[1])
 
 
 def test_long_programs_are_sampled_more_coarsely(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(path, "MAX_SAMPLES", 100)
+    monkeypatch.setattr(samples, "MAX_SAMPLES", 100)
     b = ToolpathBuilder((3.0, 0.0, 0.0)).arc(3, 0, centre=(0, 0.0), ccw=True, feed=60)
     toolpath = b.line(-3, 1, feed=60).finish()
     machine = path_machine(*both("backlash_mm", 0.1))
@@ -381,7 +385,7 @@ def test_arcs_on_the_grid_stay_within_a_step_of_what_was_programmed(
     _, commanded, _ = gathered(list(simulate(b.finish(), machine)))
     apart = np.abs(np.hypot(commanded[:, 0], commanded[:, 1]) - radius)
     assert max(apart, default=0.0) <= 1.5 * math.hypot(STEP, y_step)
-    made = held(b.finish(), machine)
+    made = quantised(b.finish(), machine)
     start = math.dist(made.start[:2], made.centre[0])
     chord = math.dist(made.start[:2], made.end[0, :2])
     if made.is_arc[0] and chord >= max(radius * 1.01, 3 * y_step):
@@ -390,7 +394,7 @@ def test_arcs_on_the_grid_stay_within_a_step_of_what_was_programmed(
 
 def test_ends_that_the_program_put_at_two_radii_stay() -> None:
     b = ToolpathBuilder((1.0, 0.0, 0.0)).arc(0, 1.1, centre=(0, 0), ccw=True, feed=10)
-    assert held(b.finish(), path_machine()).centre[0].tolist() == [0.0, 0.0]
+    assert quantised(b.finish(), path_machine()).centre[0].tolist() == [0.0, 0.0]
     (chunk,) = simulate(b.finish(), path_machine())
     angle = np.arctan2(chunk.commanded[:, 1], chunk.commanded[:, 0])
     radius = np.hypot(chunk.commanded[:, 0], chunk.commanded[:, 1])
@@ -402,7 +406,7 @@ def test_any_machine_keeps_its_slides_within_its_play(
     toolpath: Toolpath, machine: Machine
 ) -> None:
     chunks = list(simulate(toolpath, machine, Options(chunk_steps=500)))
-    made = held(toolpath, machine)
+    made = quantised(toolpath, machine)
     seconds = np.zeros(len(toolpath))
     for chunk in chunks:
         seconds[chunk.ledger.row] += chunk.ledger.duration_s

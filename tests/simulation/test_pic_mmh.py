@@ -8,13 +8,13 @@ import pytest
 
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
-from camtool.simulation import IDEAL, Options, simulate
+from camtool.simulation.motion import IDEAL, Options
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verification.verify import verify
 from tests.oracles import motion_rows
 from tests.oracles.motion_rows import RowMotion
 from tests.oracles.pic_mmh_run import LiteralRun
+from tests.targets import simulate, verify
 
 STEP = 0.00014
 HZ = 0.8 / 60.0 / STEP

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from camtool.machine.registry import load_target
 from camtool.simulation.motion import Effects, Options
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.motion_rows import rows_of
+from tests.targets import simulate
 
 X_REGIONS_UM = (190.0, 201.0, 187.0)
 """H1, H2, H3 (L2353-2373)."""

@@ -6,18 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from camtool_postprocessors.valcnc.dialect import ValcncController
 
 from camtool.errors import MachineError, ProgramError
-from camtool.machine.controllers import SlideStart, ValcncController
-from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
+from camtool.machine.model import Machine, SlideStart
 from camtool.simulation.motion import IDEAL, Effects, Options
-from camtool.simulation.simulate import model_of, simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verification.verify import verify
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.oracles.valcnc_run import Valcnc, table_8
+from tests.targets import model_of, simulate, verify
 
 ROOT = Path(__file__).parents[2]
 STEP_MM = 0.04
@@ -230,7 +229,7 @@ def test_held_moves_end_where_the_steps_do(rounding: str) -> None:
     rng = np.random.default_rng(7)
     for _ in range(30):
         toolpath = random_program(rng)
-        kept = model_of(made).held(toolpath, made)
+        kept = model_of(made).quantised(toolpath, made)
         rows = run(toolpath, made)
         at = np.zeros(3)
         for end, row in zip(kept.end, rows, strict=True):
@@ -242,7 +241,7 @@ def test_held_moves_end_where_the_steps_do(rounding: str) -> None:
 def test_an_arc_below_a_step_is_no_circle() -> None:
     made = machine("controller.rounding=truncated")
     path = arc((5.01, 0.001), (5.01, 0.021), (0.0, 0.011), ccw=True)
-    kept = model_of(made).held(path, made)
+    kept = model_of(made).quantised(path, made)
     assert not kept.is_arc.any()
     assert len(run(path, made)[0].commanded) == 0
 
@@ -412,7 +411,7 @@ def test_what_cannot_be_followed_is_named(build, words: str) -> None:
 
 
 def held(path: Toolpath) -> Toolpath:
-    return model_of(machine()).held(path, machine())
+    return model_of(machine()).quantised(path, machine())
 
 
 def test_on_axes_of_unequal_steps_arcs_are_refused() -> None:

@@ -13,13 +13,13 @@ from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
-from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, job_of
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.targets import simulate
 
 ROOT = Path(__file__).parents[2]
 PIECES = ROOT / "samples" / "pieces"

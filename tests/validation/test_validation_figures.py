@@ -15,16 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from camtool.importers.read import read_drawing
-from camtool.machine.registry import LoadedTarget, load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
 from camtool.simulation.motion import IDEAL, Options
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.postprocessors.i8751.machines import STEP_MM as STEP_8751_MM
 from tests.postprocessors.i8751.machines import loaded
+from tests.targets import simulate
 from tests.validation.page import check, signed
 from tests.validation.pieces import ROOT
 

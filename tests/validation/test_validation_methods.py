@@ -10,15 +10,15 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh.dialect import Interpolator
 
-from camtool.machine.controllers import Interpolator
-from camtool.machine.registry import load_target
 from camtool.pipeline import Judging, verify_program
 from camtool.simulation.motion import IDEAL, Options
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.report import Report
 from tests.oracles.motion_rows import rows_of
+from tests.targets import simulate
 from tests.validation.page import check
 
 STEP_MM = 0.00014

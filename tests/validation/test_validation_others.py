@@ -11,12 +11,12 @@ import pytest
 from camtool.calibration.calibrate import calibrate
 from camtool.calibration.measurements import Measurements, Steps, read_measurements
 from camtool.importers.read import read_drawing
-from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.motion_rows import rows_of
+from tests.targets import simulate
 from tests.validation.page import check, mm, signed
 from tests.validation.pieces import ROOT, UM
 

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.machine.registry import load_target
 from camtool.simulation.motion import IDEAL, Options
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import load_target
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.targets import simulate
 from tests.validation.page import check, mm, signed
 from tests.validation.pieces import UM
 

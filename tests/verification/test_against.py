@@ -9,9 +9,9 @@ import pytest
 from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline
-from camtool.machine.registry import LoadedTarget, load_target
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Operation, Tool, job_of
+from camtool.targets.registry import LoadedTarget, load_target
 from camtool.verification.verify import Verification
 from tests.drawings import drawing_of
 

@@ -8,9 +8,10 @@ import pytest
 from camtool.findings import Code
 from camtool.simulation.motion import one_row
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verification.verify import Case, VerifyOptions, judge, verify
+from camtool.verification.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import circle, cut, follow, pic_mmh, square
 from tests.oracles.judged import MACHINE, judged
+from tests.targets import verify
 
 
 def two_squares():

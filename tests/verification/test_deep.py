@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from camtool.findings import Code, Severity
-from camtool.machine.registry import load_target
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.coverage import holes_of
 from camtool.verification.cuts import cut_moves, loops
-from camtool.verification.verify import Verification, VerifyOptions, verify
+from camtool.verification.verify import Verification, VerifyOptions
 from tests.oracles.deep_moves import Shop, everything
 from tests.oracles.path_machine import path_machine
+from tests.targets import verify
 
 I8751 = [f"axes.{axis}.coded_step_mm=0.0125" for axis in "xyz"]
 SHOPS = {

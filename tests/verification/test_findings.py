@@ -21,6 +21,7 @@ from tests.oracles.dense_moves import (
     square,
 )
 from tests.oracles.judged import MACHINE, STEP, codes, grid, judged, sample_part
+from tests.targets import on
 
 
 def test_a_dropped_contour_is_missing() -> None:
@@ -105,7 +106,7 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
             counted = np.array([[reversals, 1, 1]])
             yield replace(piece, ledger=replace(piece.ledger, reversals=counted))
 
-    case = Case(decoded, MACHINE, None, None, VerifyOptions())
+    case = Case(decoded, on(MACHINE), None, None, VerifyOptions())
     found = judge(case, chunks(1))
     cutting = 6
     assert found.report.reversals.x == len(decoded)
@@ -115,7 +116,7 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
     # Their errors do not grow with the part: the thesis's larger ones bore as many.
     assert Code.MANY_REVERSALS not in codes(judge(case, chunks(2)))
     machine = pic_mmh("limits.small_part_mm=5")
-    many = judge(replace(case, machine=machine), chunks(2))
+    many = judge(replace(case, target=on(machine)), chunks(2))
     (warning,) = [f for f in many.findings if f.code == Code.MANY_REVERSALS]
     assert (warning.measured, warning.limit) == (18.0, 16.0)
     assert warning.severity == Severity.WARNING
@@ -138,7 +139,7 @@ def test_an_arc_that_never_ends_is_an_error_with_its_block() -> None:
             else:
                 yield piece
 
-    found = judge(Case(decoded, MACHINE, None, None, VerifyOptions()), chunks())
+    found = judge(Case(decoded, on(MACHINE), None, None, VerifyOptions()), chunks())
     (finding,) = [f for f in found.findings if f.code == Code.ARC_MISSES_END]
     assert finding.severity == Severity.ERROR
     assert finding.where.startswith("block 12,")
@@ -193,7 +194,9 @@ def test_findings_of_all_stages_are_merged_once() -> None:
     off, nothing = np.tile([2e-4, 1e-4], (len(wanted), 1)), np.zeros((0, 2, 2))
     edge = np.full(len(wanted), -1)
     wanted = replace(wanted, drawn=Drawn(off, edge, nothing, nothing))
-    found = judge(Case(decoded, MACHINE, wanted, drawing, VerifyOptions()), follow(decoded, 10))
+    found = judge(
+        Case(decoded, on(MACHINE), wanted, drawing, VerifyOptions()), follow(decoded, 10)
+    )
     assert codes(found)[:3] == [Code.UNITLESS, Code.FEED_ABOVE_LIMIT, Code.CONTOUR_TOO_SMALL]
     assert codes(found).count(Code.FEED_ABOVE_LIMIT) == 1
     assert [item.code for item in found.report.findings] == [code.name for code in codes(found)]

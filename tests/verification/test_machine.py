@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from camtool.findings import Code, Severity
-from camtool.machine.registry import load_target
 from camtool.simulation.motion import Options
-from camtool.simulation.simulate import model_of, simulate
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.verification.verify import VerifyOptions, verify
+from camtool.verification.verify import VerifyOptions
 from tests.oracles.dense_moves import circle, cut, dense_distance, pic_mmh, points_of, square
 from tests.oracles.motion_rows import rows_of
+from tests.targets import model_of, simulate, verify
 
 STEP = 0.00014
 UM = 1000.0
@@ -59,7 +59,7 @@ def test_interpolation_and_total_are_those_of_dense_points() -> None:
     b.arc(0.0763, 0.0818, centre=(0.0763, 0.0718), ccw=True, feed=0.8)
     b.line(0.0763, 0.0718, feed=0.8).rapid(z=0.2)
     wanted = b.finish()
-    decoded = model_of(machine).held(wanted, machine)
+    decoded = model_of(machine).quantised(wanted, machine)
     clouds = {m.index: np.array(points_of(m, 3000)) for m in decoded if m.index in (3, 4, 5)}
     target = np.concatenate([np.array(points_of(m, 3000)) for m in wanted if m.index in clouds])
     inner, total = [], []

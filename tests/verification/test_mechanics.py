@@ -7,9 +7,10 @@ import pytest
 
 from camtool.findings import Code
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verification.verify import Verification, verify
+from camtool.verification.verify import Verification
 from tests.oracles.dense_moves import circle, square
 from tests.oracles.path_machine import both, path_machine
+from tests.targets import verify
 
 RADIUS = 20.0
 MAP = (

@@ -15,9 +15,10 @@ from camtool.findings import Code
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.report import Report
-from camtool.verification.verify import VerifyOptions, verify
+from camtool.verification.verify import VerifyOptions
 from tests.oracles.dense_moves import circle, cut, pic_mmh, square
 from tests.oracles.path_machine import STEP, both, path_machine
+from tests.targets import verify
 
 UM = 1000.0
 NOISE_UM = 1e-7

@@ -8,10 +8,10 @@ import shapely
 
 from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.machine.registry import load_target
 from camtool.planning.drawn import kept_of
 from camtool.planning.job import job_of
 from camtool.planning.plan import planned
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.wanted import Kept
@@ -27,11 +27,12 @@ from camtool.verification.shape import (
     wanted_shape,
 )
 from camtool.verification.slides import Trace
-from camtool.verification.verify import Verification, VerifyOptions, verify
+from camtool.verification.verify import Verification, VerifyOptions
 from tests.drawings import drawing_of
 from tests.oracles.contours import closed
 from tests.oracles.path_machine import path_machine
 from tests.oracles.stock_jobs import moved, rectangle
+from tests.targets import verify
 
 
 def shape_of(made: Trace, cuts: CutMoves, diameter_mm: float) -> Shape | None:

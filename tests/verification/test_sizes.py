@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from camtool.geometry.polylines import Polyline
-from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool, job_of
+from camtool.targets.registry import load_target
 from camtool.verification.report import Dimension
 from tests.drawings import drawing_of
 

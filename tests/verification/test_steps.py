@@ -6,16 +6,15 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from camtool_postprocessors.pic_mmh.controller import judged_steps
 
 from camtool.machine.model import Machine
 from camtool.simulation.motion import Options
-from camtool.simulation.simulate import simulate
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.case import Case, VerifyOptions
-from camtool.verification.verify import judge, verify
+from camtool.verification.verify import judge
 from tests.oracles.dense_moves import circle, cut, pic_mmh, square
+from tests.targets import model_of, on, simulate, verify
 
 STEP = 0.00014
 
@@ -73,8 +72,8 @@ SETTINGS = [
 def both_ways(toolpath: Toolpath, machine: Machine, wanted: Toolpath | None = None):
     """Judged as the rows are made, and by chunks."""
     options = Options()
-    case = Case(toolpath, machine, wanted, None, VerifyOptions())
-    steps = judged_steps(toolpath, machine, options)
+    case = Case(toolpath, on(machine), wanted, None, VerifyOptions())
+    steps = model_of(machine).fused_run(toolpath, machine, options)
     assert steps is not None
     return judge(case, steps), judge(case, simulate(toolpath, machine, Options(chunk_steps=777)))
 
@@ -108,7 +107,7 @@ def test_rows_judged_as_they_are_made_are_those_of_the_chunks(settings: tuple[st
 def test_mechanics_that_need_samples_are_judged_by_chunks() -> None:
     machine = pic_mmh("axes.x.repeatability_mm=0.001")
     toolpath = square(ToolpathBuilder(), 0.1, 0.1, 0.05).finish()
-    assert judged_steps(toolpath, machine, Options()) is None
+    assert model_of(machine).fused_run(toolpath, machine, Options()) is None
     assert verify(toolpath, machine).report.error_um.mechanics.max > 0.0
 
 

@@ -15,10 +15,10 @@ from camtool.api import as_drawing, read_drawing, verify
 from camtool.arrays import Floats
 from camtool.findings import Code
 from camtool.jobs.drawing import read_to_scale
-from camtool.machine.registry import load_target
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Tool, job_of
 from camtool.run import Run
+from camtool.targets.registry import load_target
 from tests.oracles.true_curves import distances, drawn, slides_cutting
 
 ROOT = Path(__file__).parents[2]

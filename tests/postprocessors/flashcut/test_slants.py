@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from camtool.errors import PostError
 from camtool.findings import Code
-from camtool.machine.registry import LoadedTarget, load_target
-from camtool.simulation.simulate import simulate
+from camtool.targets.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
+from tests.targets import simulate
 
 SPLIT = "dialect.slants=split"
 

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from camtool.findings import Code
-from camtool.machine.registry import load_target
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.gcode.plain_parts import KINDS, anywhere, judge, on_grid, part

@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 
 from camtool.errors import ProgramError
 from camtool.importers.read import read_drawing
-from camtool.machine.registry import load_target
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, interpreted, motions, needs_rs274, run_rs274

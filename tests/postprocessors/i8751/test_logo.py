@@ -8,9 +8,9 @@ from camtool.importers.read import read_drawing
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
 from camtool.toolpath.moves import Move
-from camtool.verification.verify import verify
 from tests.oracles.corte_recto import walk
 from tests.postprocessors.i8751.machines import ROOT, STEP_MM, loaded
+from tests.targets import verify
 
 LOGO = ROOT / "samples" / "logo.dxf"
 

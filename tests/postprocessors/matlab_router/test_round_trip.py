@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.findings import Severity, worst
-from camtool.machine.registry import LoadedTarget
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
+from camtool.targets.registry import LoadedTarget
 from tests.postprocessors.matlab_router.parts import (
     ROOT,
     Point,

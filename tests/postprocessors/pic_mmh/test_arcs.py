@@ -9,16 +9,15 @@ import pytest
 from camtool.errors import PostError
 from camtool.findings import Code, Severity
 from camtool.kernels.lattice import to_steps
-from camtool.machine.registry import LoadedTarget, load_target
 from camtool.simulation.motion import IDEAL, Options
-from camtool.simulation.simulate import findings_of, simulate
+from camtool.targets.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from camtool.toolpath.program import Program
-from camtool.verification.verify import verify
 from tests.oracles import arc_ends
 from tests.oracles import pic_mmh_program as oracle
 from tests.oracles.motion_rows import RowMotion, each_row, rows_of
+from tests.targets import simulate, verify
 
 STEP_MM = 0.00014
 SEED = 20240607
@@ -72,7 +71,7 @@ def check_ends(target: LoadedTarget, wanted: Toolpath, within_steps: float) -> P
     """Write, simulate, and compare each row: it ends, on time, where it was meant to, and no
     sample of an arc is farther than `within_steps` from the wanted circle. Gives the program."""
     program: Program = target.post.write(wanted, target.machine)
-    unit_mm = 0.000015 if target.machine.dialect["form"] == "example" else 0.0005
+    unit_mm = 0.000015 if target.machine.dialect.form == "example" else 0.0005
     allowed = unit_mm + 0.5 * STEP_MM + 1e-9
     at = np.zeros((len(wanted) + 1, 3))
     iterations = np.zeros(len(wanted))
@@ -184,7 +183,7 @@ def test_large_arcs_end_by_every_reading(reading: str, error: str) -> None:
     for now, motion in last_of_rows(other, program):
         assert motion.ended, f"row {now} never ends"
     decoded = other.post.read(program.data, other.machine)
-    assert not findings_of(decoded, other.machine, Options())
+    assert not other.model.findings(decoded, other.machine, Options())
 
 
 def format_block(move: Move) -> str:
@@ -216,7 +215,7 @@ def test_a_foreign_program_is_told_what_each_reading_does_to_it() -> None:
     target = load_target("pic-mmh")
     data = foreign(np.random.default_rng(SEED), 40)
     decoded = target.post.read(data, target.machine)
-    (told,) = findings_of(decoded, target.machine, Options())
+    (told,) = target.model.findings(decoded, target.machine, Options())
     assert (told.code, told.severity) == (Code.ARC_END_UNSURE, Severity.WARNING)
     fates = [
         {arc_ends.stop(start, end, False, 0, reading).met for reading in arc_ends.READINGS}

@@ -9,7 +9,7 @@ import pytest
 
 from camtool.errors import MachineError, PostError, ProgramError
 from camtool.findings import Code, Severity
-from camtool.machine.registry import load_target
+from camtool.targets.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
@@ -57,7 +57,7 @@ def test_the_worked_example_of_the_page_is_what_is_sent() -> None:
 
 def test_the_page_names_every_option() -> None:
     page = (GOLDEN.parents[1] / "docs" / "dialects" / "valcnc.md").read_text(encoding="utf-8")
-    for key in load_target("valcnc").machine.dialect:
+    for key in load_target("valcnc").values()["dialect"]:
         assert re.search(rf"`dialect\.{key}[`=]", page), key
 
 

@@ -1,12 +1,8 @@
-"""The one door for machine files: TOML in, `Machine` out, every fault named by file, table, key.
+"""TOML in, a frozen record out, strictly: every fault is named by file, table and key.
 
-A user's file `extends = "pic-mmh"` a target and says only what differs; a flag such as
-`--set axes.x.backlash_mm=0.2` changes single values. Both are laid over the target's own file
-before anything is checked, so that nothing can slip in unchecked.
-
-A target whose makers left a number out names it at the top of its file, for the user to give:
-
-    needs = ["axes.x.coded_step_mm", "axes.y.coded_step_mm"]
+Machine files, job files and measurements come through here. `read_table` reads a file, `convert`
+makes the record of it: an unknown key, a wrong type or a number out of its range is an error that
+says what may stand there.
 """
 
 from __future__ import annotations
@@ -22,8 +18,6 @@ import msgspec
 import msgspec.inspect
 
 from camtool.errors import MachineError
-from camtool.machine.controllers import Controller, SlideStart
-from camtool.machine.model import Machine, Target
 from camtool.patterns import guess
 
 DEEPEST = 50
@@ -31,9 +25,6 @@ DEEPEST = 50
 
 _PARTS = re.compile(r"[=,{}\[\]\n]")
 """Between these a TOML text holds one key or one value."""
-
-NEEDS = "needs"
-"""Key at the top of a target's file: the keys that only the user's machine file can give."""
 
 MOST_SHOWN = 40
 """Numbers of more characters are not repeated in messages."""
@@ -81,79 +72,6 @@ def _within(value: Any) -> Iterable[Any]:
     if isinstance(value, dict):
         return value.values()
     return value if isinstance(value, list) else ()
-
-
-def build_machine(
-    base: Table,
-    base_name: str,
-    user_file: Path | None = None,
-    settings: Sequence[str] = (),
-) -> Machine:
-    """The machine of a target's table, with a user's file and `key.key=value` settings over it."""
-    table = base
-    name = base_name
-    if user_file is not None:
-        extra = read_table(user_file)
-        extends = extra.pop("extends", None)
-        if extends != base["target"]["name"]:
-            raise MachineError(
-                f"extends {extends!r}, but the target is {base['target']['name']!r}",
-                file=str(user_file),
-                where="key extends",
-                mend=f'write extends = "{base["target"]["name"]}" or change --target',
-            )
-        table, name = _overlaid(table, extra), str(user_file)
-    for setting in settings:
-        table, name = _overlaid(table, _setting(setting)), f"--set {setting}"
-    _refuse_incomplete(table, str(user_file or base_name))
-    return convert({key: table[key] for key in table if key != NEEDS}, Machine, name)
-
-
-def extended_by(user_file: Path) -> str:
-    """The target that a user's machine file extends; MachineError when it names none."""
-    extends = read_table(user_file).get("extends")
-    if not isinstance(extends, str):
-        raise MachineError(
-            "does not say which target it extends",
-            file=str(user_file),
-            where="key extends",
-            mend='write extends = "grbl" (or another target) at its top, or give --target',
-        )
-    return extends
-
-
-def target_of(base: Table, base_name: str) -> Target:
-    """The `[target]` of a target's table, which may lack what the user must give."""
-    return convert(base.get("target", {}), Target, base_name, "target")
-
-
-def missing_keys(table: Table, name: str) -> tuple[str, ...]:
-    """The keys of `needs` that nobody has given yet, such as "axes.x.coded_step_mm"."""
-    keys = convert(table.get(NEEDS, []), list[str], name, NEEDS)
-    return tuple(key for key in keys if not _has(table, key.split(".")))
-
-
-def _has(table: Any, keys: list[str]) -> bool:
-    for key in keys:
-        if not isinstance(table, dict) or key not in table:
-            return False
-        table = table[key]
-    return True
-
-
-def _refuse_incomplete(table: Table, name: str) -> None:
-    """MachineError for a target that still lacks what only the user's machine file can say."""
-    missing = missing_keys(table, name)
-    if not missing:
-        return
-    *tables, key = missing[0].split(".")
-    target = table["target"]["name"]
-    raise MachineError(
-        f"key is missing: nobody can know it but the user (needed: {', '.join(missing)})",
-        file=name,
-        where=(f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}",
-        mend=f'say it in your machine file, which extends = "{target}", and give --machine FILE',
-    )
 
 
 def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -> _T:
@@ -293,59 +211,3 @@ def _finite(value: object, file: str, at: str) -> None:
     elif isinstance(value, list):
         for item in value:
             _finite(item, file, at)
-
-
-def _overlaid(below: Table, above: Table) -> Table:
-    """`_laid_over`; where `above` names another controller model, the options of the model below
-    go with it, but for those that all controllers have."""
-    old, new = below.get("controller"), above.get("controller")
-    if isinstance(old, dict) and isinstance(new, dict) and "model" in new:
-        own = _own_options(old.get("model")) if new["model"] != old.get("model") else set()
-        below = below | {"controller": {key: old[key] for key in old.keys() - own}}
-    return _laid_over(below, above)
-
-
-def _own_options(model: object) -> set[str]:
-    """The options that only this model of a controller has."""
-    shared = {field.name for field in msgspec.structs.fields(SlideStart)}
-    return {
-        field.name
-        for record in get_args(Controller)
-        if record.__struct_config__.tag == model
-        for field in msgspec.structs.fields(record)
-    } - shared
-
-
-def _laid_over(below: Table, above: Table) -> Table:
-    """`below` with the values of `above`, table by table; both stay as they are."""
-    merged = dict(below)
-    for key, value in above.items():
-        old = merged.get(key)
-        both = isinstance(old, dict) and isinstance(value, dict)
-        merged[key] = _laid_over(old, value) if both else value  # type: ignore[arg-type]
-    return merged
-
-
-def _setting(text: str) -> Table:
-    """`axes.x.backlash_mm=0.2` as nested tables; a value that is no TOML value is a string."""
-    key, equals, value = text.partition("=")
-    keys = key.strip().split(".")
-    if (
-        not equals
-        or len(keys) > DEEPEST
-        or not all(re.fullmatch(r"[A-Za-z0-9_-]+", part) for part in keys)
-    ):
-        raise MachineError(
-            f"{text!r} is no setting", where="--set", mend="write --set axes.x.backlash_mm=0.2"
-        )
-    try:
-        parsed: Any = parsed_table(f"v = {value.strip()}")["v"]
-    except tomllib.TOMLDecodeError:
-        parsed = value.strip()
-    except ValueError as error:  # a whole number of too many digits
-        raise MachineError(
-            "is a whole number of thousands of digits", where=f"--set {key.strip()}"
-        ) from error
-    for part in reversed(keys):
-        parsed = {part: parsed}
-    return dict(parsed)

@@ -1,0 +1,74 @@
+"""What every controller asks of the rows of a toolpath before it runs them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.arrays import Floats
+from camtool.errors import ProgramError
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Toolpath
+
+MAX_PATH_STEPS = 1 << 40
+"""Positions beyond this many steps (a million kilometres at 1 µm) are refused: counts must stay
+exact in a float."""
+
+
+def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
+    """The same with events where the moves before them ended, and homing at `home` (3,) mm."""
+    kind, count = toolpath.kind, len(toolpath)
+    end = toolpath.end.copy()
+    for axis, homing in ((0, Kind.HOME_XY), (1, Kind.HOME_XY), (2, Kind.HOME_Z)):
+        end[kind == homing, axis] = home[axis]
+        known = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
+        latest = np.maximum.accumulate(known)
+        end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
+    return replace(toolpath, end=end)
+
+
+def check_positions(toolpath: Toolpath, machine: Machine) -> None:
+    """ProgramError for an arc without a centre or a position that cannot be counted."""
+    bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
+    if bad.any():
+        raise ProgramError("an arc without a centre", where=row_place(toolpath, bad))
+    most = MAX_PATH_STEPS * np.array([axis.coded_step_mm for axis in machine.axes])
+    centre = np.where(toolpath.is_arc[:, None], np.abs(toolpath.centre), 0.0)
+    far = np.any(np.column_stack([np.abs(toolpath.end) > most, centre > most[:2]]), axis=1)
+    if far.any():
+        raise ProgramError(
+            "a position is beyond all that the controller can count",
+            where=row_place(toolpath, far),
+        )
+
+
+def check_rows(path: Toolpath, rows: int) -> None:
+    """ProgramError for moves without a feed and events that cannot be followed."""
+    running = np.arange(len(path)) < rows
+    with np.errstate(invalid="ignore"):
+        no_feed = running & path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
+        no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
+    if no_feed.any():
+        raise ProgramError(
+            "a move at a feed without a feed above 0",
+            where=row_place(path, no_feed),
+            mend="give it one (F)",
+        )
+    if (running & no_time).any():
+        raise ProgramError("a dwell without its seconds", where=row_place(path, running & no_time))
+    away = running & (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
+    if away.any():
+        raise ProgramError(
+            "part zero is set away from part zero",
+            where=row_place(path, away),
+            mend="set it once, before any move",
+        )
+
+
+def row_place(toolpath: Toolpath, bad: npt.ArrayLike) -> str:
+    """The block (from 1) that the first bad row was read from, or the row when planned."""
+    row = int(np.argmax(bad))
+    block = int(toolpath.block[row])
+    return f"block {block + 1}" if block >= 0 else f"move {row}"

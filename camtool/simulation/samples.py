@@ -1,0 +1,229 @@
+"""Motions whose samples are numbered from 0, any window of them at a time, none of them held.
+
+`row_chunks` makes the chunks of such a motion. `PathSamples` are those of a toolpath along its own
+lines and arcs: each line is one piece; each arc is cut where an axis turns (right, above, left,
+below of its centre), so that in every piece X and Y run one way. Each piece is sampled evenly, its
+end included: whatever the spacing, the ends of all moves and the turning points of all axes are
+samples, and with them extents and reversals are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from camtool.arrays import Floats, Ints
+from camtool.kernels.lattice import to_steps
+from camtool.machine.model import Machine
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
+from camtool.toolpath.moves import Arms, Toolpath
+
+MAX_SAMPLES = 1_000_000
+"""Samples are a coded step apart, or wider when a program would have more of them than this."""
+
+SPACING_EPS = 1e-6
+"""Samples may be wider apart by this part of their spacing: by rounding alone."""
+
+TURN_EPS_RAD = 1e-9
+"""A turning point nearer than this to an end of its arc is that end."""
+
+TURNS_OF_ARC = 4
+"""No arc passes more turning points between its ends than this."""
+
+
+class Samples(Protocol):
+    """All samples of a program. `first` (R+1,): row r owns samples first[r]:first[r+1]."""
+
+    @property
+    def first(self) -> Ints: ...
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row (K,) and commanded position (K, 3) mm of the samples low:high."""
+
+    def steps(self, bounds: Ints) -> Ints:
+        """(R, 3) steps of each axis within samples bounds[r]:bounds[r+1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class RowTotals:
+    """What each row takes in all: seconds (R,); `iterates`: each sample is a pass of the
+    interpolator."""
+
+    seconds: Floats
+    iterates: bool = False
+
+
+def row_chunks(
+    samples: Samples, totals: RowTotals, mechanics: Mechanics, chunk_steps: int
+) -> Iterator[Chunk]:
+    """The chunks of all rows, none with more than `chunk_steps` samples; the time of a row that
+    lies in several is shared out by samples."""
+    first = samples.first
+    rows, total = len(first) - 1, int(first[-1])
+    done = 0  # rows whose ledger is complete
+    for low in range(0, total, chunk_steps):
+        high = min(low + chunk_steps, total)
+        row, commanded = samples.window(low, high)
+        last = int(row[-1])
+        whole = rows if high == total else last + int(high == first[last + 1])
+        listed = np.arange(done, max(whole, last + 1))
+        offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [len(row)]])
+        ledger = still_ledger(listed)
+        moved = row[offsets[:-1]] - listed[0]
+        slide, ledger.reversals[moved] = mechanics.follow(commanded, offsets)
+        ledger.steps[moved] = samples.steps(low + offsets)
+        here = np.zeros(len(listed), dtype=np.int64)
+        here[moved] = np.diff(offsets)
+        own = (first[1:] - first[:-1])[listed]
+        ledger.duration_s[:] = totals.seconds[listed] * np.where(
+            own > 0, here / np.maximum(own, 1), 1.0
+        )
+        if totals.iterates:
+            ledger.iterations[:] = here
+        yield Chunk(row, commanded, slide, ledger)
+        done = whole
+    if total == 0 and rows:
+        ledger = still_ledger(np.arange(rows))
+        ledger.duration_s[:] = totals.seconds
+        yield Chunk(np.empty(0, np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
+
+
+def sample_spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
+    """How far apart samples are: the finer coded step of X and Y, or what `MAX_SAMPLES` allows."""
+    step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    return max(step, float(move_lengths(toolpath).sum()) / MAX_SAMPLES)
+
+
+def move_lengths(toolpath: Toolpath) -> Floats:
+    """(N,) mm of way of each row in space, whatever moves it (events have none)."""
+    if len(toolpath) == 0:
+        return np.zeros(0)
+    length = np.linalg.norm(toolpath.end - toolpath.starts, axis=1)
+    arms = Arms(toolpath, toolpath.is_arc)
+    rise = arms.end[:, 2] - arms.begin[:, 2]
+    radius = 0.5 * (arms.radius + arms.end_radius)
+    length[arms.row] = np.hypot(radius * arms.sweep, rise)
+    return np.asarray(length)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Stretches of rows from `begin` (P,) to `end` (P,), as shares of the row `row` (P,)."""
+
+    row: Ints
+    begin: Floats
+    end: Floats
+
+
+class PathSamples:
+    """The samples of all rows of a toolpath, numbered from 0 in order; none are held."""
+
+    def __init__(self, toolpath: Toolpath, spacing_mm: float) -> None:
+        """`spacing_mm` is the widest distance of two samples along the path."""
+        self._toolpath = toolpath
+        self._starts = toolpath.starts
+        self._way = toolpath.end - self._starts
+        self._arms = Arms(toolpath, toolpath.is_arc)
+        self._arm_of_row = np.full(len(toolpath), -1, dtype=np.int64)
+        self._arm_of_row[self._arms.row] = np.arange(len(self._arms.row))
+        length = move_lengths(toolpath)
+        self._pieces = _pieces(length, self._arms)
+        pieces = self._pieces
+        way = length[pieces.row] * (pieces.end - pieces.begin)
+        self._parts = np.maximum(np.ceil(way / spacing_mm - SPACING_EPS), 1.0).astype(np.int64)
+        self._offsets = np.concatenate([[0], np.cumsum(self._parts)])
+        self.first = self._offsets[np.searchsorted(pieces.row, np.arange(len(toolpath) + 1))]
+        """(N+1,) row r owns samples first[r]:first[r+1]; its start is no sample of it."""
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row (K,) and position (K, 3) mm of the samples low:high."""
+        row, share = self.places(low, high)
+        return row, self.points(row, share)
+
+    def places(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row (K,) and share (K,) of its way, in (0, 1], of the samples low:high."""
+        index = np.arange(low, high)
+        piece = np.searchsorted(self._offsets, index, side="right") - 1
+        part, parts = index - self._offsets[piece] + 1, self._parts[piece]
+        begin, end = self._pieces.begin[piece], self._pieces.end[piece]
+        share = np.where(part == parts, end, begin + (end - begin) * (part / parts))
+        return self._pieces.row[piece], share
+
+    def points(self, row: Ints, share: Floats) -> Floats:
+        """(K, 3) mm: the points at shares (K,) of the ways of rows (K,)."""
+        points = self._starts[row] + share[:, None] * self._way[row]
+        arm = self._arm_of_row[row]
+        on_arc = np.flatnonzero(arm >= 0)
+        points[on_arc] = self._arms.points(arm[on_arc], share[on_arc])
+        last = np.flatnonzero(share == 1.0)
+        points[last] = self._toolpath.end[row[last]]
+        return points
+
+
+class CountedSamples(PathSamples):
+    """The same, and the steps of each axis between them: changes of its nearest step."""
+
+    def __init__(self, toolpath: Toolpath, machine: Machine, spacing_mm: float) -> None:
+        super().__init__(toolpath, spacing_mm)
+        self._step_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._at = self._in_steps(toolpath.start[None, :])
+        self._counts = np.zeros((1, 3), dtype=np.int64)
+        self._low = 0
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row and position of the samples low:high, which follow those of the last call."""
+        row, points = super().window(low, high)
+        steps = np.concatenate([self._at, self._in_steps(points)])
+        self._at, self._low = steps[-1:], low
+        self._counts = np.zeros((len(steps), 3), dtype=np.int64)
+        np.cumsum(np.abs(np.diff(steps, axis=0)), axis=0, out=self._counts[1:])
+        return row, points
+
+    def steps(self, bounds: Ints) -> Ints:
+        """Steps of each axis between samples of the window."""
+        return np.diff(self._counts[bounds - self._low], axis=0)
+
+    def _in_steps(self, points: Floats) -> Ints:
+        columns = [to_steps(points[:, axis], step) for axis, step in enumerate(self._step_mm)]
+        return np.column_stack(columns)
+
+
+def _pieces(length: Floats, arms: Arms) -> _Pieces:
+    """All pieces in order: rows without arcs that move are one, arcs as many as they need."""
+    straight = length > 0.0
+    straight[arms.row] = False
+    rows = np.flatnonzero(straight)
+    lines = _Pieces(rows, np.zeros(len(rows)), np.ones(len(rows)))
+    arcs = _arc_pieces(arms)
+    row = np.concatenate([lines.row, arcs.row])
+    order = np.argsort(row, kind="stable")
+    return _Pieces(
+        row[order],
+        np.concatenate([lines.begin, arcs.begin])[order],
+        np.concatenate([lines.end, arcs.end])[order],
+    )
+
+
+def _arc_pieces(arms: Arms) -> _Pieces:
+    """Arcs cut at their turning points.
+
+    These lie at angles k·π/2. Seen in the direction of the arc (σ = ±1) from its start at σ·a,
+    the next ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...
+    """
+    quarter = 0.5 * np.pi
+    ahead = np.sign(arms.sweep) * arms.angle
+    next_turn = np.floor(ahead / quarter)[:, None] + np.arange(1, TURNS_OF_ARC + 1)
+    turn = next_turn * quarter - ahead[:, None]
+    sweep = np.abs(arms.sweep)[:, None]
+    inside = (turn > TURN_EPS_RAD) & (turn < sweep - TURN_EPS_RAD)
+    ends = np.ones((len(sweep), 1), dtype=np.bool_)
+    kept = np.concatenate([ends, inside, ends], axis=1)
+    bounds = np.concatenate([0.0 * sweep, turn / sweep, sweep / sweep], axis=1)
+    which, _ = np.nonzero(kept)
+    bound = bounds[kept]
+    inner = np.flatnonzero(np.diff(which) == 0)
+    return _Pieces(arms.row[which[inner]], bound[inner], bound[inner + 1])

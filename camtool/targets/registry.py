@@ -1,0 +1,269 @@
+"""The targets: found by entry point, each with its machine file beside it.
+
+A third party adds a target as camtool's own are added: an entry point of the group
+`camtool.postprocessors`, named like the target, that points at a `Target` (see
+`camtool.targets.target`) in a package that has `machine.toml` beside its `__init__.py`. Nothing is
+imported but the target that is asked for, and a broken one is named and harms nothing else.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import msgspec
+
+from camtool.errors import CamtoolError, MachineError, OptionError, PostError, UnknownTargetError
+from camtool.machine.model import Machine, PathController, TargetNames
+from camtool.tables import Table, read_table
+from camtool.targets.loader import machine_of, missing_keys, names_of, resolved_table
+from camtool.targets.target import Target
+
+if TYPE_CHECKING:
+    from camtool.simulation.controller import ControllerModel
+    from camtool.simulation.motion import Chunk, Options
+    from camtool.toolpath.moves import Toolpath
+
+GROUP = "camtool.postprocessors"
+
+MACHINE_FILE = "machine.toml"
+
+OURS = "camtool_postprocessors."
+"""Modules that are camtool's own: what goes wrong in them is a fault of camtool itself."""
+
+NOT_SAID = "not said"
+
+
+@dataclass(frozen=True)
+class LoadedTarget:
+    """A machine and the target that speaks to it. `file` is the target's own machine file, `table`
+    what was laid over it and it together. `any_machine`: the numbers are those of no particular
+    machine, and nobody has said others."""
+
+    machine: Machine
+    post: Target
+    file: Path
+    table: Table
+    any_machine: bool = False
+
+    @property
+    def model(self) -> ControllerModel[Any, Any]:
+        """The model of the machine's controller."""
+        if isinstance(self.machine.controller, PathController):
+            from camtool.simulation.path import PathModel
+
+            return PathModel()
+        return self.post.model()
+
+    def simulate(self, toolpath: Toolpath, options: Options | None = None) -> Iterator[Chunk]:
+        """The motion that the machine's controller and mechanics make of a toolpath, chunk by
+        chunk.
+
+        Rows behind the end of the program are not run. Raises OptionError, MachineError, and
+        ProgramError (some of them only when the row comes) naming the block.
+        """
+        from camtool.simulation.motion import Options
+
+        options = options or Options()
+        self.check_options(options)
+        return self.model.run(toolpath, self.machine, options)
+
+    def check_options(self, options: Options) -> None:
+        """OptionError for what the machine's controller cannot do."""
+        if options.chunk_steps < 1:
+            raise OptionError(f"chunk_steps is {options.chunk_steps}", mend="give at least 1")
+        known = self.model.interpolators
+        if options.interpolator is None or options.interpolator in known:
+            return
+        if not known:
+            raise OptionError(
+                f"the controller of {self.machine.target.name} has no interpolators to choose "
+                "from",
+                where="--interpolator",
+                mend="leave it out",
+            )
+        raise OptionError(
+            f"unknown interpolator {options.interpolator!r}",
+            mend=f"{', '.join(known[:-1])} or {known[-1]}",
+        )
+
+    def with_settings(self, settings: Sequence[str]) -> LoadedTarget:
+        """The same with `key.key=value` settings over its machine; MachineError names the wrong
+        one."""
+        if not settings:
+            return self
+        table, name = resolved_table(self.post, self.table, str(self.file), None, settings)
+        return replace(self, machine=machine_of(self.post, table, name), table=table)
+
+    def values(self) -> dict[str, Any]:
+        """All values of the machine as `--set` takes them; of its dialect those that are said."""
+        values: dict[str, Any] = msgspec.to_builtins(self.machine)
+        return values | {"dialect": self.table.get("dialect", {})}
+
+    def changed_values(self) -> list[tuple[str, str, str]]:
+        """(key, value, the target's own value) of all that differs, as `--set` takes them.
+
+        What the target leaves to the user to say differs always: its own value is `not said`.
+        """
+        now = dict(_flat("", self.values()))
+        base = read_table(self.file)
+        needs = missing_keys(base, str(self.file))
+        given = [f"{key}={json.dumps(now[key])}" for key in needs if key in now]
+        table, name = resolved_table(self.post, base, str(self.file), None, given)
+        plain = replace(self, machine=machine_of(self.post, table, name), table=table)
+        own = dict(_flat("", plain.values()))
+        return [
+            (key, _shown(now.get(key)), _shown(None if key in needs else own.get(key)))
+            for key in {**own, **now}
+            if key in needs or now.get(key) != own.get(key)
+        ]
+
+
+@dataclass(frozen=True)
+class ListedTarget:
+    """What a list says of a target: `needs` are the keys that the user's machine file must give
+    before it can be loaded, such as "axes.x.coded_step_mm"; () when it is complete."""
+
+    target: TargetNames
+    needs: tuple[str, ...]
+    file: Path
+
+
+def target_names() -> list[str]:
+    """Names of all installed targets, sorted; nothing is imported."""
+    return sorted(point.name for point in entry_points(group=GROUP))
+
+
+def load_target(
+    name: str, *, machine_file: Path | None = None, settings: Sequence[str] = ()
+) -> LoadedTarget:
+    """The target `name`, with a user's machine file and `--set` values over it.
+
+    Raises UnknownTargetError (with the nearest names) and MachineError.
+    """
+    post, file = find_target(name)
+    table, last = resolved_table(post, read_table(file), str(file), machine_file, settings)
+    machine = machine_of(post, table, last)
+    said = machine_file is not None or any(each.startswith("axes.") for each in settings)
+    return LoadedTarget(machine, post, file, table, post.any_machine and not said)
+
+
+def list_target(name: str) -> ListedTarget:
+    """What a list says of the target `name`, complete or not; raises as `load_target` does."""
+    post, file = find_target(name)
+    table = read_table(file)
+    needs = missing_keys(table, str(file))
+    if not needs:
+        machine_of(post, *resolved_table(post, table, str(file)))
+    return ListedTarget(names_of(table, str(file)), needs, file)
+
+
+def filter_target() -> str | None:
+    """The target that `camtool filter` takes where none is named."""
+    for name in target_names():
+        try:
+            post, _ = find_target(name)
+        except MachineError:  # a broken one is named where it is asked for
+            continue
+        if post.filter_default:
+            return name
+    return None
+
+
+def find_target(name: str) -> tuple[Target, Path]:
+    """The target of this name and its own machine file; raises as `load_target` does."""
+    return _load(_found(name))
+
+
+def _found(name: str) -> EntryPoint:
+    """The entry point of a target; UnknownTargetError when there is none."""
+    found = {point.name: point for point in entry_points(group=GROUP)}
+    if name not in found:
+        near = difflib.get_close_matches(name, found, n=3, cutoff=0.4) or sorted(found)
+        raise UnknownTargetError(
+            f"unknown target {name!r}", mend=f"did you mean {' or '.join(near)}?"
+        )
+    return found[name]
+
+
+def _load(point: EntryPoint) -> tuple[Target, Path]:
+    """The target and its machine file; a broken plug-in is named, nothing else."""
+    try:
+        post = point.load()
+        if not isinstance(post, Target):
+            raise TypeError(f"{point.attr} is no camtool.targets.target.Target")
+        file = Path(str(sys.modules[point.module].__file__)).with_name(MACHINE_FILE)
+    except Exception as error:  # whatever a third party's module raises belongs to it
+        raise MachineError(
+            f"target {point.name!r} cannot be loaded ({type(error).__name__}: {error})",
+            where=f"plug-in {point.value}",
+            mend="reinstall or remove the package that brings it",
+        ) from error
+    if point.module.startswith(OURS):
+        return post, file
+    return cast(Target, Guarded(post, point.value)), file
+
+
+class Guarded:
+    """A third party's target, or its model: what it raises and should not is told as its own
+    fault."""
+
+    def __init__(self, guarded: Any, value: str) -> None:
+        self._guarded = guarded
+        self._value = value
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Guarded, (self._guarded, self._value)
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._guarded, name)
+        if not callable(found) or isinstance(found, type):
+            return found
+
+        def called(*arguments: Any, **named: Any) -> Any:
+            try:
+                made = found(*arguments, **named)
+            except CamtoolError:
+                raise
+            except Exception as error:
+                raise self._fault(name, error) from error
+            if isinstance(made, Iterator):
+                return self._each(name, made)
+            return Guarded(made, self._value) if name == "model" else made
+
+        return called
+
+    def _each(self, name: str, made: Iterator[Any]) -> Iterator[Any]:
+        try:
+            yield from made
+        except CamtoolError:
+            raise
+        except Exception as error:
+            raise self._fault(name, error) from error
+
+    def _fault(self, name: str, error: Exception) -> PostError:
+        return PostError(
+            f"fails to {name} ({type(error).__name__}: {error})",
+            where=f"plug-in {self._value}",
+            mend="tell whoever made it, with the output of the same command with --debug",
+        )
+
+
+def _shown(value: Any) -> str:
+    return NOT_SAID if value is None else json.dumps(value, ensure_ascii=False)
+
+
+def _flat(prefix: str, table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Nested tables as (`axes.x.travel_mm`, value)."""
+    for key, value in table.items():
+        name = f"{prefix}.{key}" if prefix else key
+        if isinstance(value, dict):
+            yield from _flat(name, value)
+        else:
+            yield name, value
