@@ -61,11 +61,11 @@ def point_to_segment(points: Floats, segments: Segments) -> Floats:
     return _distance(points, _Rows.of(segments))
 
 
-def nearest(points: Floats, segments: Segments, *, chunk: int = POINTS_AT_A_TIME) -> Nearest:
+def nearest(points: Floats, segments: Segments) -> Nearest:
     """The nearest segment to each point (P, 2); quick when neighbours in the list are near.
 
-    `chunk` points are handled at a time. Let r be the largest distance of a point from the
-    middle m of its chunk: a segment farther from m than  least distance of m + 2r  is nearest to
+    POINTS_AT_A_TIME are handled together. Let r be the largest distance of one of them from their
+    middle m: a segment farther from m than  least distance of m + 2r  is nearest to
     none of them, and is left out. ValueError when there are no segments.
     """
     if len(segments) == 0:
@@ -73,22 +73,17 @@ def nearest(points: Floats, segments: Segments, *, chunk: int = POINTS_AT_A_TIME
     distance = np.empty(len(points))
     segment = np.empty(len(points), dtype=np.int64)
     rows = _Rows.of(segments)
-    for begin in range(0, len(points), chunk):
-        some = points[begin : begin + chunk]
+    for begin in range(0, len(points), POINTS_AT_A_TIME):
+        some = points[begin : begin + POINTS_AT_A_TIME]
         middle = 0.5 * (some.min(axis=0) + some.max(axis=0))
         reach = np.hypot(*(some - middle).T).max()
         from_middle = _distance(middle, rows)
         near = np.flatnonzero(from_middle <= from_middle.min() + 2.0 * reach)
         table = _distance(some[:, None, :], rows[near])
         best = table.argmin(axis=1)
-        segment[begin : begin + chunk] = near[best]
-        distance[begin : begin + chunk] = table[np.arange(len(some)), best]
+        segment[begin : begin + POINTS_AT_A_TIME] = near[best]
+        distance[begin : begin + POINTS_AT_A_TIME] = table[np.arange(len(some)), best]
     return Nearest(distance, segment)
-
-
-def path_distance(a: Polyline, b: Polyline) -> float:
-    """Least distance between two paths, mm, exact with arcs; 0 where they cross."""
-    return approach(a, b).distance
 
 
 def approach(a: Polyline, b: Polyline) -> Approach:

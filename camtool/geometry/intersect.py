@@ -1,4 +1,4 @@
-"""Where lines and arcs meet: one pair exactly classified, or all pairs of two sets at once.
+"""Where lines and arcs meet, and where closed paths cross themselves.
 
 Curves are told from their start (camtool.geometry.measure): with the left normal n there and the
 signed curvature k, a point p of the whole line or circle has k |p−start|² = 2 n·(p−start).
@@ -27,59 +27,8 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import box_pairs, touching_boxes
 from camtool.geometry.drawing import SelfCrossing
-from camtool.geometry.measure import Frames, dot, point_at, segment_boxes, turned
+from camtool.geometry.measure import Frames, dot, segment_boxes, turned
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
-
-
-@dataclass(frozen=True)
-class Meeting:
-    """One common point: (x, y) mm, and the fraction of the length of `a` and of `b` there.
-
-    `crosses` is false where the curves only touch, or where the point is an end of one of them.
-    """
-
-    point: tuple[float, float]
-    ta: float
-    tb: float
-    crosses: bool
-
-
-@dataclass(frozen=True)
-class NoIntersection:
-    """The two segments have no common point."""
-
-
-@dataclass(frozen=True)
-class Touch:
-    """They meet once without crossing: tangent, or at an end of one of them."""
-
-    at: Meeting
-
-
-@dataclass(frozen=True)
-class OneCrossing:
-    """They cross once."""
-
-    at: Meeting
-
-
-@dataclass(frozen=True)
-class TwoMeetings:
-    """They meet twice, in the order of `a`; each meeting says whether it crosses."""
-
-    first: Meeting
-    second: Meeting
-
-
-@dataclass(frozen=True)
-class Overlap:
-    """They share the run from `begin` to `end`, in the order of `a`."""
-
-    begin: Meeting
-    end: Meeting
-
-
-Intersection = NoIntersection | Touch | OneCrossing | TwoMeetings | Overlap
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,40 +53,6 @@ class Crossings:
         return Crossings(**{name: column[rows] for name, column in vars(self).items()})
 
 
-def intersect_segments(
-    a: Segments, b: Segments, *, position_eps_mm: float = POSITION_EPS_MM
-) -> Intersection:
-    """How two segments (each a `Segments` of one row) meet; every kind of result has its type.
-
-    Meetings nearer to each other than `position_eps_mm` are one, and so is a tangent contact that
-    is no deeper than that.
-    """
-    found = crossings(a, b, position_eps_mm=position_eps_mm)
-    if len(found) == 0:
-        return NoIntersection()
-    order = np.argsort(found.ta, kind="stable")
-    found = found[order]
-    touching = _touching(found, Frames.of(a), Frames.of(b), position_eps_mm)
-    meetings = [
-        Meeting((float(x), float(y)), float(ta), float(tb), not bool(touch))
-        for (x, y), ta, tb, touch in zip(found.point, found.ta, found.tb, touching, strict=True)
-    ]
-    first, last = meetings[0], meetings[-1]
-    if first is last:
-        return OneCrossing(first) if first.crosses else Touch(first)
-    if first.crosses or last.crosses:
-        return TwoMeetings(first, last)
-    middle = np.array([0.5 * (first.ta + last.ta)])
-    between = point_at(a, np.array([0]), middle)
-    if _within(between, Frames.of(b), position_eps_mm)[0][0] and _at_end(first, last):
-        return Overlap(first, last)
-    if not _at_end(first, last):
-        x, y = between[0]
-        tb = 0.5 * (first.tb + last.tb)
-        return Touch(Meeting((float(x), float(y)), float(middle[0]), tb, False))
-    return TwoMeetings(first, last)
-
-
 def crossings(
     segments_a: Segments, segments_b: Segments, *, position_eps_mm: float = POSITION_EPS_MM
 ) -> Crossings:
@@ -151,21 +66,17 @@ def crossings(
     return _joined(parts)
 
 
-def self_crossings(
-    segments: Segments, *, position_eps_mm: float = POSITION_EPS_MM, neighbours: bool = False
-) -> Crossings:
+def self_crossings(segments: Segments) -> Crossings:
     """All common points of two different rows, each pair once (row_a < row_b).
 
-    The end that a row shares with the next one of its path is left out unless `neighbours`.
+    The end that a row shares with the next one of its path is left out.
     """
     boxes, frames = segment_boxes(segments), Frames.of(segments)
     parts = []
-    for row_a, row_b in box_pairs(boxes, boxes, reach_mm=position_eps_mm):
+    for row_a, row_b in box_pairs(boxes, boxes, reach_mm=POSITION_EPS_MM):
         once = row_a < row_b
-        parts.append(_meetings(frames, frames, row_a[once], row_b[once], position_eps_mm))
+        parts.append(_meetings(frames, frames, row_a[once], row_b[once], POSITION_EPS_MM))
     found = _joined(parts)
-    if neighbours:
-        return found
     same = segments.path[found.row_a] == segments.path[found.row_b]
     count = np.bincount(segments.path, minlength=1)[segments.path[found.row_a]]
     apart = found.row_b - found.row_a
@@ -174,13 +85,11 @@ def self_crossings(
     return found[~(same & (a_first | b_first))]
 
 
-def meetings(
-    segments: Segments, row_a: Ints, row_b: Ints, *, position_eps_mm: float = POSITION_EPS_MM
-) -> tuple[Crossings, Bools]:
+def meetings(segments: Segments, row_a: Ints, row_b: Ints) -> tuple[Crossings, Bools]:
     """The common points of the rows a and b, pair by pair; and which of them cross, not touch."""
     frames = Frames.of(segments)
-    found = _meetings(frames, frames, row_a, row_b, position_eps_mm)
-    return found, ~_touching(found, frames, frames, position_eps_mm)
+    found = _meetings(frames, frames, row_a, row_b, POSITION_EPS_MM)
+    return found, ~_touching(found, frames, POSITION_EPS_MM)
 
 
 def _joined(parts: list[Crossings]) -> Crossings:
@@ -290,25 +199,20 @@ def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Float
     return dot(turned(tangent_a), tangent_b), np.abs(a.curvature - same_way * b.curvature)
 
 
-def _touching(found: Crossings, a: Frames, b: Frames, eps: float) -> Bools:
+def _touching(found: Crossings, frames: Frames, eps: float) -> Bools:
     """True for meetings at an end, and where the curves enter each other by `eps` at most.
 
     Two curves that meet at the angle θ, with curvatures that differ by k, part again after 2θ/k,
     and are θ²/(2k) apart at most until then.
     """
     at_end = np.isin(found.ta, (0.0, 1.0)) | np.isin(found.tb, (0.0, 1.0))
-    angle, bend = _angle_and_bend(found.point, a[found.row_a], b[found.row_b])
+    angle, bend = _angle_and_bend(found.point, frames[found.row_a], frames[found.row_b])
     return np.asarray(at_end | (angle**2 <= 2.0 * bend * eps))
-
-
-def _at_end(first: Meeting, last: Meeting) -> bool:
-    """True when both meetings are at ends of a segment."""
-    return all(each.ta in (0.0, 1.0) or each.tb in (0.0, 1.0) for each in (first, last))
 
 
 # Where closed paths cross themselves: inside and outside are not clear there.
 #
-# Pairs of segments come from their boxes; where they meet, arcs are arcs (intersect.py). Within
+# Pairs of segments come from their boxes; where they meet, arcs are arcs. Within
 # two segments a meeting is a crossing unless they only touch. At a vertex the path passes twice,
 # along four directions: it crosses itself when the two of one passage part the two of the other.
 # So a contour that touches itself, at a corner or along a run (a keyhole), does not cross itself.

@@ -10,15 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.boxes import touching_boxes
-from camtool.geometry.intersect import (
-    NoIntersection,
-    OneCrossing,
-    Overlap,
-    Touch,
-    TwoMeetings,
-    intersect_segments,
-    self_crossings_of,
-)
+from camtool.geometry.intersect import meetings, self_crossings_of
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
 from tests.paths import mirrored
@@ -82,20 +74,10 @@ def test_two_paths_may_cross_each_other() -> None:
 
 
 def inner_crossings(shape: Polyline) -> set[tuple[float, float]]:
-    """Crossings within two segments, pair by pair."""
+    """Crossings within two segments, of all pairs."""
     segments = Segments.of(shape)
-    found = set()
-    for i in range(len(segments)):
-        for j in range(i + 1, len(segments)):
-            meets = intersect_segments(segments[i : i + 1], segments[j : j + 1])
-            match meets:
-                case OneCrossing(at):
-                    found.add(at.point)
-                case TwoMeetings(first, second):
-                    found |= {at.point for at in (first, second) if at.crosses}
-                case NoIntersection() | Touch() | Overlap():
-                    pass
-    return {(round(x, 5), round(y, 5)) for x, y in found}
+    found, crosses = meetings(segments, *np.triu_indices(len(segments), 1))
+    return {(round(x, 5), round(y, 5)) for x, y in found.point[crosses].tolist()}
 
 
 @given(polylines(closed=True, max_points=7))

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.geometry.distance import approach, nearest, path_distance, points_to_segments
+from camtool.geometry import distance as distances
+from camtool.geometry.distance import approach, nearest, points_to_segments
 from camtool.geometry.polylines import Polyline, Segments, reverse, rolled, rotated
 from tests.oracles.geometry import dense_points, line_string, sagitta
 from tests.paths import mirrored, moved, scaled
@@ -96,7 +97,9 @@ def test_the_nearest_segment_is_that_of_the_whole_table(
 ) -> None:
     where = np.array(points).reshape(-1, 2)
     segments = Segments.of(path)
-    found = nearest(where, segments, chunk=chunk)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(distances, "POINTS_AT_A_TIME", chunk)
+        found = nearest(where, segments)
     table = points_to_segments(where, segments)
     assert found.distance.tolist() == table.min(axis=1).tolist()
     rows = np.arange(len(where))
@@ -107,6 +110,10 @@ def test_no_segments_have_no_nearest_one() -> None:
     nothing = Segments.of(_line(0, 0, 1, 0))[np.array([], dtype=np.int64)]
     with pytest.raises(ValueError, match="no segments"):
         nearest(np.zeros((1, 2)), nothing)
+
+
+def path_distance(a: Polyline, b: Polyline) -> float:
+    return approach(a, b).distance
 
 
 PAIRS = [

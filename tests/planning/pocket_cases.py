@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from camtool.geometry.distance import path_distance
+from camtool.geometry.distance import approach
 from camtool.geometry.nesting import oriented
 from camtool.geometry.polylines import Polyline, Polylines, rotated
 from camtool.planning.items import Chosen, Feeds, Run, Setting, Work
@@ -113,4 +113,4 @@ def shapes(draw: st.DrawFn) -> list[Polyline]:
 
 def cross(paths: Sequence[Polyline]) -> bool:
     """Whether any of the paths meets another one: such pockets are refused."""
-    return any(path_distance(one, other) == 0.0 for one, other in combinations(paths, 2))
+    return any(approach(one, other).distance == 0.0 for one, other in combinations(paths, 2))
