@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 
 import msgspec
 import numpy as np
 
-from camtool import __version__
 from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
@@ -281,7 +281,7 @@ class Result:
             contours=self.cuts.contour_count,
             time_split_s=_time_split(tally, link_s),
             interpolator=_interpolator(case),
-            camtool_version=__version__,
+            camtool_version=version("camtool"),
             contour_errors=self._contours(),
             bidirectional=self._both_ways(),
             unreached=self._unreached(),

@@ -141,6 +141,57 @@ def reached_rooms(source: str) -> set[str]:
     return {str(node.module).split(".")[0] for node in far}
 
 
+def module_of(path: Path) -> str:
+    """The name under which a file is imported."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = ("camtool_postprocessors", *parts[1:]) if parts[0] == "postprocessors" else parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def graph(sources: dict[str, tuple[str, bool]]) -> dict[str, set[str]]:
+    """Which modules each one imports, for typing and late ones too, of name -> (text, whether it
+    is a package)."""
+    arrows: dict[str, set[str]] = {}
+    for name, (text, package) in sources.items():
+        arrows[name] = set()
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Import):
+                arrows[name] |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                above = name.split(".")[: None if package else -1]
+                base = above[: len(above) - node.level + 1] if node.level else []
+                module = ".".join([*base, *([node.module] if node.module else [])])
+                inner = {f"{module}.{alias.name}" for alias in node.names}
+                arrows[name] |= (inner & sources.keys()) or {module}
+        arrows[name] &= sources.keys() - {name}
+    return arrows
+
+
+def circles(arrows: dict[str, set[str]]) -> set[str]:
+    """What is left when modules that import none of the rest are taken away, again and again."""
+    left = {name: set(others) for name, others in arrows.items()}
+    while ends := {name for name, others in left.items() if not others}:
+        left = {name: others - ends for name, others in left.items() if name not in ends}
+    return set(left)
+
+
+def test_no_circle_of_imports() -> None:
+    sources = {
+        module_of(path): (path.read_text(encoding="utf-8"), path.name == "__init__.py")
+        for path in files()
+    }
+    assert circles(graph(sources)) == set()
+
+
+def test_a_circle_would_be_found() -> None:
+    late = "def f():\n    from camtool import a\n"
+    typed = "if TYPE_CHECKING:\n    from camtool.b import B\n"
+    made = {"camtool": ("", True), "camtool.a": (typed, False), "camtool.b": (late, False)}
+    assert circles(graph(made)) == {"camtool.a", "camtool.b"}
+    beside = {"p": ("", True), "p.q": ("from .r import x", True), "p.q.r": ("import p.q", False)}
+    assert circles(graph(beside)) == {"p.q", "p.q.r"}
+
+
 @pytest.mark.parametrize("folder", MACHINES, ids=lambda path: path.name)
 def test_a_target_never_imports_another(folder: Path) -> None:
     modules = list(folder.glob("**/*.py"))
