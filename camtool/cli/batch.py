@@ -1,6 +1,6 @@
 """`camtool batch`: many drawings, each as `post` would make it.
 
-One run finds the drawings, makes what is not up to date, and says what became of each.
+One run finds the drawings, makes what is not up to date, and reports the outcome of each.
 """
 
 from __future__ import annotations
@@ -46,7 +46,6 @@ from camtool.errors import CamtoolError, OutputError
 
 EXIT_SIGNAL = 128
 """Added to the number of the signal that ended a run."""
-
 
 _RUN = "How the batch runs"
 
@@ -202,7 +201,7 @@ class BatchRun:
     def _run(
         self, sources: Sequence[str], job: JobFlags, reads: Sequence[str], *, own_jobs: bool
     ) -> tuple[Ended, int | None]:
-        """What became of them, and the signal that stopped the run."""
+        """The outcomes, and the signal that stopped the run."""
         from camtool.batches.inputs import find_tasks
         from camtool.batches.lock import alone_in
 
@@ -217,7 +216,7 @@ class BatchRun:
                 if not locked:
                     text = "warning: --out has no locks: see that no other batch writes there"
                     self._note(text)
-                manifest = Manifest(self.out)  # again: until now it may have been another one's
+                manifest = Manifest(self.out)  # again: another batch may have written it until now
                 ended = self._made(ordered, manifest, stop)
                 self._end(ended.outcomes, manifest, time.monotonic() - begin)
         return ended, stop.signal
@@ -225,8 +224,8 @@ class BatchRun:
     def _refuse_overwriting(
         self, ordered: Ordered, reads: Sequence[str], made: Collection[Path]
     ) -> None:
-        """OutputError when an output would take the place of a file that is read or of another
-        output, or a picture that of a file that no batch has `made` there."""
+        """OutputError when an output would replace a file that is read or another output, or a
+        picture would replace a file that no batch has `made` there."""
         from camtool.batches.lock import NAME as LOCK
 
         own = {task.order.file for task in ordered.tasks} - {None, *reads}
@@ -253,8 +252,8 @@ class BatchRun:
         say(f"camtool: {text}", quiet=self.verbosity.quiet)
 
     def _ordered(self, tasks: Sequence[Task], job: JobFlags, own_jobs: bool) -> Ordered:
-        """A wrong job beside a drawing fails that drawing, a wrong one of --job or of the flags
-        the whole command; flags count over both."""
+        """The tasks with their jobs. A wrong job beside a drawing fails that drawing; a wrong job
+        of --job or of the flags fails the whole command. Flags override both."""
         ordered = Ordered([], {}, [])
         common: tuple[JobOrder, str] | None = None
         for task in tasks:
@@ -313,7 +312,7 @@ class BatchRun:
     def _end(self, outcomes: Sequence[Outcome], manifest: Manifest, seconds: float) -> None:
         try:
             manifest.tidy(write_all)
-        except OutputError as error:  # its lines so far are there
+        except OutputError as error:  # the lines written so far are there
             say(f"camtool: warning: {error}", quiet=False)
         say_summary(outcomes, seconds, quiet=self.verbosity.quiet)
         if self.summary is not None:
@@ -363,8 +362,8 @@ class Stop:
 
 @contextmanager
 def stoppable() -> Iterator[Stop]:
-    """Within, the first signal is only noted, so that no file is left half-written; a second
-    Ctrl-C is a KeyboardInterrupt, for whoever will not wait."""
+    """Within the block, the first signal is only recorded, so that no file is left half-written; a
+    second Ctrl-C raises KeyboardInterrupt at once."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
         yield stop

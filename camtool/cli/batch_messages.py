@@ -1,4 +1,4 @@
-"""What `camtool batch` says: a bar on a terminal, plain lines elsewhere, a table at the end."""
+"""What `camtool batch` shows: a bar on a terminal, plain lines elsewhere, a table at the end."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 LISTED = 50
-"""So many rows of the table are shown; the JSON summary has all."""
+"""The most rows of the table that are shown; the JSON summary has all."""
 
 CODES = 3
-"""So many of the findings that made drawings fail are counted in the last line."""
+"""The most codes of findings that the last line counts."""
 
 COLOUR = {State.FAILED: "red", State.MADE: "yellow", State.UP_TO_DATE: "yellow"}
-"""Of a row of the table: what was made stands there for its warnings."""
+"""The colour of a row of the table; drawings that were made have a row for their warnings."""
 
 
 class Display(Protocol):
     """Shows every outcome as it comes."""
 
     def begins(self) -> None:
-        """What is not up to date begins to be made."""
+        """The first drawing that is not up to date begins."""
 
     def add(self, outcome: Outcome) -> None:
         """Show one."""
 
     def note(self, text: str) -> None:
-        """Say something else, unless quiet."""
+        """Show another message, unless quiet."""
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from camtool.verification.report import Gates
 
 REMARKS = 20
-"""So many findings of a drawing come back from its worker; there may be a hundred thousand."""
+"""The most findings of a drawing that its worker returns; there may be a hundred thousand."""
 
 SVG = ".svg"
-"""The pictures that may lie where a drawing is."""
+"""The kind of picture that may have the name of a drawing."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class PostWork:
         return tuple(each for each in made if each)
 
     def warm(self) -> None:
-        """Load, and compile if nobody has yet, what every drawing needs."""
+        """Load what every drawing needs, and compile it on the first run."""
         from camtool.importers.read import read_bytes
         from camtool.pipeline import post_drawing
         from camtool.planning.job import job_of

@@ -23,10 +23,10 @@ from pathlib import Path, PurePath
 from camtool.errors import OutputError, ProgramError
 
 STDOUT = "-"
-"""Stdout among outputs, stdin among inputs."""
+"""The name of stdout among outputs, and of stdin among inputs."""
 
 KEPT = 40
-"""So many characters of a file's name stand in that of its temporary file: names have an end."""
+"""The most characters of a file's name in that of its temporary file: names are limited."""
 
 
 def write_all(files: dict[str, bytes]) -> None:
@@ -115,7 +115,7 @@ def _there(place: Path) -> bool:
 
 
 def _input(name: str) -> Hashable:
-    """What tells a file that is read from all others; None for what no output can replace."""
+    """What identifies a file that is read; None for what no output can replace."""
     try:
         found = os.fstat(sys.stdin.fileno()) if name == STDOUT else Path(name).stat()
     except (OSError, ValueError, AttributeError):  # nothing there, or no file of the system's
@@ -124,7 +124,7 @@ def _input(name: str) -> Hashable:
 
 
 def _place(name: str) -> Hashable:
-    """What tells a place that is written from all others: its file, or its folder and name.
+    """What identifies a place that is written: its file, or its folder and name.
 
     Names that differ only in case, or in how accents are coded, are taken for one: they are one
     file on other computers, and programs travel.
@@ -155,7 +155,7 @@ def _is_stream(name: str) -> bool:
 
 
 def _write_stream(name: str, data: bytes) -> None:
-    """The data written and taken; BrokenPipeError where the reader of stdout is gone."""
+    """Write the data to a stream; BrokenPipeError where the reader of stdout is gone."""
     if name == STDOUT and sys.stdout is None:
         raise OutputError("is closed", file="<stdout>", mend="give a file name")
     try:
@@ -288,7 +288,7 @@ def sealed(svg: bytes, maker: str) -> bytes:
 
 
 def is_foreign(place: str | Path, maker: str) -> bool:
-    """Whether something lies there that is no picture of this maker as it was written."""
+    """Whether a file lies there that is no unchanged picture of this maker."""
     if not os.path.lexists(place):
         return False
     try:

@@ -41,17 +41,18 @@ EXIT_BAD_INPUT = 2
 EXIT_FAULT = 3
 EXIT_INTERRUPTED = 128 + signal.SIGINT
 EXIT_PIPE = 128 + 13
-"""What a shell makes of SIGPIPE, of which other tools die; not all systems know the signal."""
+"""The exit code that a shell gives for SIGPIPE, by which other tools end; not all systems have
+it."""
 
 AGAIN_S = 0.01
-"""An interruption that was lost comes again after so long."""
+"""After this, an interruption that was lost is repeated."""
 
 _FULL = (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG)
-"""Why a stream, which has no file's name in its errors, takes nothing."""
+"""Errors of a full or closed stream, which name no file."""
 
 GARBAGE_AFTER = 50_000
-"""So many more objects made than freed before Python looks for rings of garbage among them; its
-own 700 is for programs that live long. Loading the libraries makes half a million that stay."""
+"""How many more objects are made than freed before Python looks for rings of garbage; its own 700
+is for programs that live long. Loading the libraries makes half a million that stay."""
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -101,7 +102,7 @@ def main() -> NoReturn:
 
 
 def _code(*, debug: bool) -> int:
-    """What the command line gives: its exit code."""
+    """The exit code of the command line."""
     try:
         with life_signs(sys.stderr, sys.argv[1:]):
             return _run()
@@ -131,7 +132,7 @@ def _code(*, debug: bool) -> int:
 
 
 def _run() -> int:
-    """The command, and all that it says on stdout taken."""
+    """Run the command, and flush stdout."""
     try:
         try:
             code = cli.main(prog_name="camtool", standalone_mode=False)
@@ -174,7 +175,7 @@ def _keep_streams() -> None:
 
 
 def _let_go(stream: TextIO | None) -> None:
-    """What a stream does not take is lost: Python shall not try again at its end."""
+    """Flush a stream; what it does not take is dropped, so that Python does not try again."""
     if stream is None:
         return
     try:
@@ -184,7 +185,7 @@ def _let_go(stream: TextIO | None) -> None:
 
 
 def _once_more(lost: sys.UnraisableHookArgs) -> None:
-    """Ctrl-C that comes where Python can raise nothing (in the end of an object) comes again."""
+    """Repeat a Ctrl-C that came where Python can raise nothing (while an object is deleted)."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         # Not in here: it would be lost as well.
         threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
@@ -193,6 +194,6 @@ def _once_more(lost: sys.UnraisableHookArgs) -> None:
 
 
 def _seldom_collected() -> None:
-    """Spare a short run the search for garbage: seldom in between, and not at all at its end."""
+    """Spare a short run the search for garbage: seldom during it, and never at its end."""
     gc.set_threshold(GARBAGE_AFTER)
     atexit.register(gc.freeze)

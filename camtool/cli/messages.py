@@ -1,8 +1,8 @@
-"""What a command says to people: messages and findings, summaries in colour, signs of life.
+"""What a command shows to people: messages and findings, summaries in colour, signs of life.
 
-Messages are always on stderr, so that stdout stays for machines. What is no terminal gets the same
-words without colours. Colours are click's and not rich's: loading rich takes a tenth of the time
-of a whole `verify`.
+Messages always go to stderr, so that stdout stays for machines. Streams that are no terminal get
+the same words without colours. Colours are click's and not rich's: loading rich takes a tenth of
+the time of a whole `verify`.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ if TYPE_CHECKING:
 
 
 COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
-"""What a message is called, on a terminal."""
+"""The colours of the first word of a message, on a terminal."""
 
 
 def say(text: str, *, quiet: bool) -> None:
-    """One message, unless quiet: one line that can be seen, whatever names it holds."""
+    """Show one message on one line, unless quiet; characters that cannot be seen are escaped."""
     if not quiet:
         _echo(tinted(one_line(text)))
 
 
 def show_text(text: str, *, err: bool = False) -> None:
-    """Lines for people on stdout, styled or not, whose names `one_line` has gone through."""
+    """Show lines on stdout, styled or not; their names must have gone through `one_line`."""
     if err:
         _echo(text)
     else:
@@ -66,7 +66,7 @@ def in_colour(stream: TextIO | None) -> bool:
 
 
 def say_error(error: CamtoolError) -> None:
-    """One line for what went wrong; how to mend it stands out on a terminal."""
+    """Show an error on one line; how to mend it is bold on a terminal."""
     text, mend = one_line(f"camtool: error: {error}"), one_line(" ".join(error.mend.split()))
     if mend and text.endswith(mend) and in_colour(sys.stderr):
         text = text.removesuffix(mend) + click.style(mend, bold=True)
@@ -74,7 +74,7 @@ def say_error(error: CamtoolError) -> None:
 
 
 def tinted(text: str) -> str:
-    """A message with the word that says how bad it is in colour, where stderr shows colours."""
+    """The message with its severity in colour, where stderr shows colours."""
     if not in_colour(sys.stderr):
         return text
     words = "|".join(COLOURS)
@@ -86,8 +86,8 @@ def tinted(text: str) -> str:
 
 
 def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
-    """Errors always, warnings unless quiet, remarks when verbose; one line each, and one for all
-    that are like those before, unless verbose."""
+    """Show errors always, warnings unless quiet, remarks when verbose: one line each, and one line
+    for many alike, unless verbose."""
     least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
     shown = [finding for finding in findings if finding.severity >= least]
     for finding, more in [(each, 0) for each in shown] if verbose else summed(shown):
@@ -97,13 +97,13 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
             say(f"camtool: {name}: and {more} more (-v shows all)", quiet=False)
 
 
-# Summaries and tables: names bold, what exceeds a limit in colour.
+# Summaries and tables: names are bold, values that exceed a limit are coloured.
 
 Marks = Mapping[str, str]
-"""How bad the lines of these names are: "error", "warning" or "info"."""
+"""The severity of the lines of these names: "error", "warning" or "info"."""
 
 LEAST_WIDTH = 20
-"""Values are wrapped to the terminal's width, and to no less than so many columns."""
+"""Values are wrapped to the width of the terminal, but never to fewer columns than this."""
 
 REPORT_NAMES = 11
 """Columns before the values in the summary of a report."""
@@ -116,11 +116,11 @@ _LINES = {
     "END_NOT_REACHED": "ends",
     "ARC_MISSES_END": "ends",
 }
-"""The line of the summary that says what a limit, or else a finding, is about."""
+"""The line of the summary that a limit, or else a finding, is about."""
 
 
 def show_facts(plain: str, name_width: int, marks: Marks, *, err: bool = False) -> None:
-    """Lines of a name and a value; the names are `name_width` wide."""
+    """Show lines of a name and a value; the names are `name_width` wide."""
     if in_colour(sys.stderr if err else sys.stdout):
         columns = shutil.get_terminal_size().columns
         lines = plain.split("\n")
@@ -129,18 +129,18 @@ def show_facts(plain: str, name_width: int, marks: Marks, *, err: bool = False) 
 
 
 def show_compared(plain: str, rows: Sequence[ContrastRow]) -> None:
-    """The table of `--compare`: the variant with the least error in green, endless ones in red."""
+    """Show the table of `--compare`: the variant with the least error green, endless ones red."""
     if in_colour(sys.stdout):
         head, *lines = plain.split("\n")
         ends = [row.total_max_um for row in rows if not row.endless]
         least = min((error for error in ends if error is not None), default=None)
-        shown = [_way(line, row, least) for line, row in zip(lines, rows, strict=True)]
+        shown = [_variant_line(line, row, least) for line, row in zip(lines, rows, strict=True)]
         plain = "\n".join([click.style(head, bold=True), *shown])
     show_text(plain)
 
 
 def report_marks(findings: Iterable[Finding]) -> dict[str, str]:
-    """The lines of a report's summary that these findings are about, and how bad they are."""
+    """The lines of a report's summary that these findings are about, with their severities."""
     marks: dict[str, str] = {}
     for finding in sorted(findings, key=lambda finding: finding.severity):
         name = _LINES.get(finding.where) or _LINES.get(finding.code.name)
@@ -160,7 +160,7 @@ def _line(line: str, name_width: int, marks: Marks, columns: int) -> str:
     return f"{click.style(name.rstrip(), bold=True, fg=colour)}{name[len(name.rstrip()) :]}{value}"
 
 
-def _way(line: str, row: ContrastRow, least: float | None) -> str:
+def _variant_line(line: str, row: ContrastRow, least: float | None) -> str:
     if row.endless:
         return click.style(line, fg="red")
     best = least is not None and row.total_max_um == least
@@ -172,10 +172,10 @@ def _way(line: str, row: ContrastRow, least: float | None) -> str:
 # seldom long: motion is judged in chunks.
 
 AFTER_S = 3.0
-"""Whoever waits for less needs no sign."""
+"""No sign is shown before this."""
 
 EVERY_S = 1.0
-"""How often it changes."""
+"""How often the sign changes."""
 
 _OWN = ("batch", "--watch")
 _QUIET = ("-q", "--quiet")
@@ -183,8 +183,8 @@ _QUIET = ("-q", "--quiet")
 
 @contextmanager
 def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[None]:
-    """While the block runs, seconds on `stream` if that is a terminal; none for the `words` of a
-    command line that is to be quiet, or that has signs of its own."""
+    """While the block runs, show seconds on `stream` if that is a terminal, unless the `words` of
+    the command line ask for quiet, or the command has signs of its own."""
     if stream is None or not _life_signs_wanted(stream, words):
         yield
         return

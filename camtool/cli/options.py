@@ -154,11 +154,11 @@ class MachineFlags:
         return load_target(name, machine_file=file, settings=self.settings)
 
     def files(self) -> list[str]:
-        """The files that say what the machine is."""
+        """The user's machine file, if any."""
         return [] if self.machine is None else [self.machine]
 
     def name(self) -> str | None:
-        """The target's name: as given, or as the machine file says; None when nobody does."""
+        """The target's name, as given or as the machine file says; None without either."""
         if self.target is not None or self.machine is None:
             return self.target
         from camtool.targets.loader import extended_by
@@ -389,7 +389,7 @@ def drawing_options(command: Command) -> Command:
 
 
 def _switch(flag: str, text: str) -> Option:
-    """A flag that is None unless given, so that a default stays one."""
+    """A flag that is None unless given, so that defaults apply."""
     return option(_READ, flag, is_flag=True, default=None, help=text)
 
 
@@ -492,7 +492,7 @@ def job_options(command: Command) -> Command:
 
 
 def _key_flag(section: str, name: str, key: Key) -> Option:
-    """The flag of a key; None unless given, so that a default stays one."""
+    """The flag of a key; None unless given, so that defaults apply."""
     settings: dict[str, Any] = {"is_flag": True, "default": None}
     if key.value.choices:
         settings = {"type": click.Choice(key.value.choices)}

@@ -1,8 +1,7 @@
 """The flags that say how a picture looks, and the pictures of a command drawn by them.
 
-A command says with a `Canvas` what its pictures can show. What a picture cannot honour is refused
-by name before any work is done; the user is warned about empty layers that were
-named.
+A command says with a `Canvas` what its pictures can show. Flags that a picture cannot honour are
+refused by name before any work is done; the user is warned about named layers that are empty.
 """
 
 from __future__ import annotations
@@ -107,7 +106,7 @@ class PictureFlags:
         return Options(self.size, self.crop, self.dark, times, layers, self.polar)
 
     def check(self, pictures: Sequence[str | None], canvas: Canvas) -> None:
-        """A usage error for flags that say nothing to any of the `pictures`, and for those that
+        """A usage error for flags that none of the `pictures` can honour, and for flags that
         contradict each other; OptionError as `options`."""
         if not self.given:
             return
@@ -153,8 +152,8 @@ class PictureFlags:
             raise click.UsageError("--exaggerate moves the layer path, which is left out")
 
     def painter(self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False) -> Painter:
-        """What draws the scenes, several side by side, as a picture file of a name. Says what of
-        the flags they turn out not to show."""
+        """What draws the scenes, several side by side, as a picture file of a given name. It warns
+        about flags that the scenes cannot show."""
         return Painter(scenes, self, quiet)
 
 
@@ -255,7 +254,7 @@ class Painter:
 
     @cached_property
     def scenes(self) -> Sequence[Scene]:
-        """What is drawn. Says which of the flags it cannot show."""
+        """What is drawn; made once, with a warning for each flag that it cannot show."""
         scenes = self.make()
         for line in self._not_shown(scenes):
             say(f"camtool: warning: {line}", quiet=self.quiet)
@@ -283,7 +282,7 @@ class Painter:
             yield caption, render(self.scenes[-1], CLOSEUP, options)
 
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
-        """What to say of layers that hold nothing, and where nothing could be judged."""
+        """Warnings about empty layers, and about errors where nothing could be judged."""
         for name in self._missing(scenes):
             yield f"--layers {name}: nothing in this picture{layer_of(name).hint}"
         for flag in ("--exaggerate", "--polar"):

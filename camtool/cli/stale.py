@@ -78,7 +78,7 @@ class Fault:
 
 
 def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
-    """The drawings that these files are, belong to, or lie in, by their names without ending.
+    """The drawings that these files are, belong to or contain, by their names without suffix.
 
     A picture of a program may lie beside its drawing as an SVG of the same name, so that one name
     may have several; the likeliest is first. InputError for what is not there.
@@ -119,21 +119,21 @@ def _ordered(files: list[Path]) -> list[Path]:
 
 
 def _beside(name: Path) -> list[Path]:
-    """The files of this name, whatever their ending, sorted."""
+    """The files of this name with any suffix, sorted."""
     if not name.parent.is_dir():
         return []
     return sorted(other for other in name.parent.iterdir() if other.with_suffix("") == name)
 
 
 def _has_program(name: Path) -> bool:
-    """Whether anything lies there that may be a program: a dialect may have several endings."""
+    """Whether a file there may be a program: a dialect may have several suffixes."""
     return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _beside(name))
 
 
 def _posted(
     drawing: Path, posting: Posting, target: LoadedTarget, *, quiet: bool
 ) -> Program | Fault:
-    """What would be written of a drawing now, or why nothing would be."""
+    """The program that would be written of a drawing now, or why there is none."""
     try:
         run = posting.of(str(drawing)).make(str(drawing), target, quiet=quiet)
     except CamtoolError as error:
