@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -86,7 +87,7 @@ class ToolpathBuilder:
         """(N,) the run that each row is of."""
         return np.array(self._runs, dtype=np.int64)
 
-    def finish(self, findings: tuple[Finding, ...] = ()) -> Toolpath:
+    def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:
         """The rows so far as a Toolpath."""
         table = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), 11)
         return Toolpath(
@@ -101,7 +102,7 @@ class ToolpathBuilder:
             modes=tuple(self._modes),
             start=np.array(self._start, dtype=np.float64),
             texts=tuple(self._texts),
-            findings=findings,
+            findings=tuple(findings),
         )
 
     def _move(

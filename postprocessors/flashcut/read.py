@@ -124,18 +124,15 @@ class _Reader:
             self.path.event(Kind.END)
             self._ended = code
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> Iterator[Finding]:
         """What goes beyond the machine's limits."""
-        if not self._fast.count:
-            return ()
-        return (
-            FEED_ABOVE_LIMIT(
+        if self._fast.count:
+            yield FEED_ABOVE_LIMIT(
                 where=self._fast.where,
                 measured=self._fast.most,
                 limit=self._max_feed,
                 count=self._fast.count,
-            ),
-        )
+            )
 
     def _motion(self, block: Block, code: str, form: str, numbers: list[float]) -> None:
         """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""

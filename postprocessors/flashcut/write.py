@@ -8,6 +8,7 @@ is said by a G01 to where the tool is: X and Y "aún así es necesario", L985.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -49,8 +50,8 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
     dialect = machine.dialect
     check_plain(toolpath, machine)
-    feeds, feed_note = feed_units(toolpath, machine)
-    lowered, split_note = split_z(toolpath, machine)
+    feeds, rounded_feeds = feed_units(toolpath, machine)
+    lowered, split = split_z(toolpath, machine)
     if dialect.slants == "split":
         lowered = _split_slants(lowered.toolpath, machine).after(lowered)
     rules = ArcRules(dialect.decimals, dialect.full_circles, MOST_MM)
@@ -61,17 +62,17 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
     writer.run(_event_words(toolpath), of_row, feeds[of_row])
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
     first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
-    notes = [
-        *([feed_note] if feed_note else []),
-        *([split_note] if split_note else []),
+    findings = [
+        *rounded_feeds,
+        *split,
         *arc_findings(rows, first),
-        *_event_notes(toolpath, dialect),
+        *_event_findings(toolpath, dialect),
     ]
     return Program.of_lines(
         [*writer.blocks, dialect.program_end],
         machine,
         [*writer.rows, len(toolpath) - 1 if ended else -1],
-        notes,
+        findings,
     )
 
 
@@ -157,18 +158,17 @@ def _event_words(toolpath: Toolpath) -> dict[int, str]:
     return words
 
 
-def _event_notes(toolpath: Toolpath, dialect: Dialect) -> list[Finding]:
+def _event_findings(toolpath: Toolpath, dialect: Dialect) -> Iterator[Finding]:
     """What the events lose."""
-    found = left_out(toolpath, [Kind.DWELL], EVENT_LEFT_OUT_DWELL)
+    yield from left_out(toolpath, [Kind.DWELL], EVENT_LEFT_OUT_DWELL)
     kinds = toolpath.kind
     spindles = np.isin(kinds, [int(Kind.SPINDLE_CW), int(Kind.SPINDLE_CCW)])
     speeds = int((spindles & ~np.isnan(toolpath.value)).sum())
     tools = int((kinds == Kind.TOOL_CHANGE).sum())
     if speeds or tools:
-        found.append(VALUE_ROUNDED(speeds=speeds, tools=tools))
+        yield VALUE_ROUNDED(speeds=speeds, tools=tools)
     if not dialect.spindle_stops:
-        found += left_out(toolpath, [Kind.SPINDLE_OFF], EVENT_LEFT_OUT_STOP)
-    return found
+        yield from left_out(toolpath, [Kind.SPINDLE_OFF], EVENT_LEFT_OUT_STOP)
 
 
 class _Writer:

@@ -34,7 +34,7 @@ def check(toolpath: Toolpath, machine: Machine) -> None:
     _check_feeds(toolpath, machine)
 
 
-def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, Finding | None]:
+def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, list[Finding]]:
     """(N,) feeds as whole units of the F word, rounded down, 0 where none; and FEED_ROUNDED when
     one had to be."""
     scale = 10.0 ** feed_decimals(machine)
@@ -49,14 +49,15 @@ def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, Finding | No
         f"use {1.0 / scale:g} mm/min or more",
     )
     if exact.all():
-        return units, None
+        return units, []
     row = int(np.argmax(~exact))
-    return units, FEED_ROUNDED(
+    finding = FEED_ROUNDED(
         where=toolpath.place(row),
         measured=toolpath.feed[row],
         count=int((~exact).sum()),
         whole=1.0 / scale,
     )
+    return units, [finding]
 
 
 def _check_arcs(toolpath: Toolpath) -> None:

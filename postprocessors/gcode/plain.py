@@ -14,7 +14,7 @@ is the end and the offset centre − start. For each arc, by its rounded numbers
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -69,26 +69,24 @@ def check_plain(toolpath: Toolpath, machine: Machine) -> None:
             raise PostError("moves follow the end of the program", where=toolpath.place(row + 1))
 
 
-def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, Finding | None]:
+def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, list[Finding]]:
     """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
     step_mm = slope_step_mm(machine)
     lowered = helices_to_steps(toolpath, step_mm)
     twice = np.bincount(lowered.row, minlength=len(toolpath)) > 1
     twice &= toolpath.is_feed
     if not twice.any():
-        return lowered, None
-    return lowered, MOVE_SPLIT(
-        where=toolpath.place(int(twice.argmax())), measured=step_mm, count=int(twice.sum())
-    )
+        return lowered, []
+    where = toolpath.place(int(twice.argmax()))
+    return lowered, [MOVE_SPLIT(where=where, measured=step_mm, count=int(twice.sum()))]
 
 
-def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) -> list[Finding]:
+def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) -> Iterator[Finding]:
     """One EVENT_LEFT_OUT when there are rows of `kinds`: how many of what."""
     rows = np.flatnonzero(np.isin(toolpath.kind, [int(kind) for kind in kinds]))
-    if not len(rows):
-        return []
-    names = ", ".join(dict.fromkeys(Kind(kind).name for kind in toolpath.kind[rows].tolist()))
-    return [sentence(where=toolpath.place(int(rows[0])), count=len(rows), kinds=names)]
+    if len(rows):
+        names = ", ".join(dict.fromkeys(Kind(kind).name for kind in toolpath.kind[rows].tolist()))
+        yield sentence(where=toolpath.place(int(rows[0])), count=len(rows), kinds=names)
 
 
 @dataclass(frozen=True)
@@ -169,24 +167,18 @@ def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
     )
 
 
-def arc_findings(rows: PlainRows, place: str) -> list[Finding]:
+def arc_findings(rows: PlainRows, place: str) -> Iterator[Finding]:
     """ARC_MENDED, and MOVE_COLLAPSED for what is smaller than a unit, where there is any."""
-    found = []
     if rows.recentred or rows.lines:
-        found.append(
-            ARC_MENDED_PLAIN(
-                where=place,
-                measured=rows.recentred + rows.lines,
-                recentred=rows.recentred,
-                lines=rows.lines,
-            )
+        yield ARC_MENDED_PLAIN(
+            where=place,
+            measured=rows.recentred + rows.lines,
+            recentred=rows.recentred,
+            lines=rows.lines,
         )
     dropped = int(((rows.kind <= Kind.ARC_CCW) & ~rows.moves).sum())
     if dropped or rows.flat:
-        found.append(
-            MOVE_COLLAPSED_PLAIN(measured=dropped + rows.flat, dropped=dropped, flat=rows.flat)
-        )
-    return found
+        yield MOVE_COLLAPSED_PLAIN(measured=dropped + rows.flat, dropped=dropped, flat=rows.flat)
 
 
 def _halved(toolpath: Toolpath, rules: ArcRules) -> Lowered:

@@ -9,13 +9,13 @@ nothing uses is an error, and so are two words of one group: controllers refuse 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import partial
 from typing import Final
 
-from camtool.findings import Finding, Sentence
+from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
@@ -526,35 +526,23 @@ class ReadNotes:
     behind_end: tuple[int, int] | None = None
     """How many lines stand behind the end, and the first of them (from 1)."""
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> Iterator[Finding]:
         """One finding for each kind that was noticed."""
-        passed_over = (
-            (self.coolant, WORDS_PASSED_OVER_COOLANT),
-            (self.pauses, WORDS_PASSED_OVER_PAUSE),
-        )
-        return (
-            *([self._too_fast()] if self.fast else []),
-            *([self._without_speed()] if self.speedless else []),
-            *([_never_read(*self.behind_end)] if self.behind_end else []),
-            *(_passed_over(blocks, sentence) for blocks, sentence in passed_over if blocks),
-        )
-
-    def _without_speed(self) -> Finding:
-        return SPINDLE_SPEED_NOT_SAID(where=f"block {self.speedless[0] + 1}")
-
-    def _too_fast(self) -> Finding:
-        most = max(feed for _, feed in self.fast)
-        return FEED_ABOVE_LIMIT_IN_WORDS(
-            where=f"block {self.fast[0][0] + 1}",
-            measured=most,
-            limit=self.max_feed_mm_min,
-            count=len(self.fast),
-        )
-
-
-def _never_read(count: int, line: int) -> Finding:
-    return NEVER_READ(where=f"line {line}", measured=count)
-
-
-def _passed_over(blocks: list[int], sentence: Sentence) -> Finding:
-    return sentence(where=f"block {blocks[0] + 1}", count=len(blocks))
+        if self.fast:
+            yield FEED_ABOVE_LIMIT_IN_WORDS(
+                where=f"block {self.fast[0][0] + 1}",
+                measured=max(feed for _, feed in self.fast),
+                limit=self.max_feed_mm_min,
+                count=len(self.fast),
+            )
+        if self.speedless:
+            yield SPINDLE_SPEED_NOT_SAID(where=f"block {self.speedless[0] + 1}")
+        if self.behind_end:
+            count, line = self.behind_end
+            yield NEVER_READ(where=f"line {line}", measured=count)
+        if self.coolant:
+            where = f"block {self.coolant[0] + 1}"
+            yield WORDS_PASSED_OVER_COOLANT(where=where, count=len(self.coolant))
+        if self.pauses:
+            where = f"block {self.pauses[0] + 1}"
+            yield WORDS_PASSED_OVER_PAUSE(where=where, count=len(self.pauses))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
@@ -75,7 +75,7 @@ def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program
     """The program of a toolpath; PostError names the move that cannot be said or done."""
     dialect = style.dialect
     check(toolpath, machine)
-    feeds, feed_note = feed_units(toolpath, machine)
+    feeds, rounded_feeds = feed_units(toolpath, machine)
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
     sent = sent_rows(toolpath, arcs, feeds)
@@ -102,7 +102,7 @@ def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program
         machine,
         of_row,
         (
-            *([feed_note] if feed_note else []),
+            *rounded_feeds,
             *_arc_findings(toolpath, arcs.counts, sent.dropped),
             *_rounded(toolpath, events.rounded),
         ),
@@ -229,27 +229,22 @@ def _check_length(lines: list[str], dialect: GcodeDialect) -> None:
         )
 
 
-def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> list[Finding]:
-    found = []
+def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> Iterator[Finding]:
     if mended := counts.recentred + counts.split + counts.lines:
-        found.append(
-            ARC_MENDED(
-                where=toolpath.place(counts.first),
-                measured=mended,
-                recentred=counts.recentred,
-                split=counts.split,
-                lines=counts.lines,
-            )
+        yield ARC_MENDED(
+            where=toolpath.place(counts.first),
+            measured=mended,
+            recentred=counts.recentred,
+            split=counts.split,
+            lines=counts.lines,
         )
     if collapsed := dropped + counts.flat:
-        found.append(MOVE_COLLAPSED(measured=collapsed, dropped=dropped, flat=counts.flat))
-    return found
+        yield MOVE_COLLAPSED(measured=collapsed, dropped=dropped, flat=counts.flat)
 
 
-def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> list[Finding]:
-    if not rows:
-        return []
-    return [VALUE_ROUNDED(where=toolpath.place(rows[0]), count=len(rows))]
+def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> Iterator[Finding]:
+    if rows:
+        yield VALUE_ROUNDED(where=toolpath.place(rows[0]), count=len(rows))
 
 
 # The rows that are sent, and the modal text of each, by whole columns.

@@ -11,6 +11,7 @@ of two units and counts `distance / 2 − 1` of them downwards (L5589-5729), so 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -388,50 +389,32 @@ class Notes:
         self.lost_strokes += 1
         self.lost_place = self.lost_place or place
 
-    def findings(self, dialect: Choices) -> list[Finding]:
+    def findings(self, dialect: Choices) -> Iterator[Finding]:
         """One finding for each kind of change that was made."""
-        return [*self._places(dialect), *self._lines(dialect), *self._feeds()]
-
-    def _places(self, dialect: Choices) -> list[Finding]:
         grid_mm = dialect.grid_units * UNIT_MM
-        found = []
         if self.snap_mm:
-            found.append(
-                (PLACES_SNAPPED_AND_STARTS if self.late_starts else PLACES_SNAPPED)(
-                    where=self.snap_place,
-                    measured=self.snap_mm,
-                    limit=grid_mm,
-                    moved_um=self.snap_mm * 1000.0,
-                    starts=self.late_starts,
-                )
+            yield (PLACES_SNAPPED_AND_STARTS if self.late_starts else PLACES_SNAPPED)(
+                where=self.snap_place,
+                measured=self.snap_mm,
+                limit=grid_mm,
+                moved_um=self.snap_mm * 1000.0,
+                starts=self.late_starts,
             )
         if self.ones:
-            found.append(PLACES_SNAPPED_FROM_ONE(measured=self.ones))
-        return found
-
-    def _lines(self, dialect: Choices) -> list[Finding]:
-        grid_mm = dialect.grid_units * UNIT_MM
-        found = []
+            yield PLACES_SNAPPED_FROM_ONE(measured=self.ones)
         if self.lost_strokes:
-            found.append(
-                MOVE_COLLAPSED_STROKES(
-                    where=self.lost_place, measured=self.lost_strokes, grid=grid_mm
-                )
+            yield MOVE_COLLAPSED_STROKES(
+                where=self.lost_place, measured=self.lost_strokes, grid=grid_mm
             )
         if self.dropped:
-            found.append(MOVE_COLLAPSED(measured=self.dropped, grid=grid_mm))
+            yield MOVE_COLLAPSED(measured=self.dropped, grid=grid_mm)
         if self.bent:
-            found.append(MOVE_SPLIT_BENT(measured=self.bent, tolerance=dialect.bend_tolerance_mm))
+            yield MOVE_SPLIT_BENT(measured=self.bent, tolerance=dialect.bend_tolerance_mm)
         if self.more_jobs:
-            found.append(MOVE_SPLIT_INTO_JOBS(measured=self.more_jobs, most=dialect.max_lines))
-        return found
-
-    def _feeds(self) -> list[Finding]:
-        found = []
+            yield MOVE_SPLIT_INTO_JOBS(measured=self.more_jobs, most=dialect.max_lines)
         if self.limited:
-            found.append(FEED_ROUNDED_TO_LIMIT(measured=self.limited))
+            yield FEED_ROUNDED_TO_LIMIT(measured=self.limited)
         if self.feed_off > FEED_NOTICE:
-            found.append(FEED_ROUNDED(measured=self.feed_off))
+            yield FEED_ROUNDED(measured=self.feed_off)
         if self.faster > 1.0:
-            found.append(FEED_ROUNDED_UP(measured=self.faster))
-        return found
+            yield FEED_ROUNDED_UP(measured=self.faster)

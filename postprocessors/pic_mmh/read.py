@@ -9,6 +9,7 @@ not is walked word by word, to say where it goes wrong.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
@@ -167,28 +168,22 @@ class _Reader:
         fault = fault_of(text, self._form)
         _fail(index, fault.column, fault.message, fault.mend)
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> Iterator[Finding]:
         """What goes beyond the controller's limits."""
-        found = []
         if self._long.count:
-            found.append(
-                BLOCK_TOO_LONG_READ(
-                    where=f"block {self._long.first + 1}",
-                    measured=self._long.most,
-                    limit=self._buffer_chars or 0,
-                    count=self._long.count,
-                )
+            yield BLOCK_TOO_LONG_READ(
+                where=f"block {self._long.first + 1}",
+                measured=self._long.most,
+                limit=self._buffer_chars or 0,
+                count=self._long.count,
             )
         if self._fast.count:
-            found.append(
-                FEED_ABOVE_LIMIT(
-                    where=f"block {self._fast.first + 1}",
-                    measured=self._fast.most,
-                    limit=self._max_feed,
-                    count=self._fast.count,
-                )
+            yield FEED_ABOVE_LIMIT(
+                where=f"block {self._fast.first + 1}",
+                measured=self._fast.most,
+                limit=self._max_feed,
+                count=self._fast.count,
             )
-        return tuple(found)
 
     def _motion(self, code: str, letters: str, match: re.Match[str], index: int) -> None:
         """G00 to G03: coordinates are absolute µm, F counts the feed word's unit."""

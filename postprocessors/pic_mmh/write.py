@@ -9,6 +9,7 @@ step position: a block is sent only when it moves that position, and every arc i
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
@@ -133,13 +134,12 @@ class _Writer:
                 self._event(row, kind)
         self._send("M30;", last if last < len(kinds) else -1)
 
-    def findings(self) -> tuple[Finding, ...]:
-        """What was noticed, one finding per kind."""
-        return (
-            *([self._feed_finding] if self._feed_finding else []),
-            *self._notes.findings(self._grid.step_mm * 1000.0),
-            *too_long(self.blocks, self._dialect.buffer_chars),
-        )
+    def findings(self) -> Iterator[Finding]:
+        """What was changed, one finding for each kind."""
+        if self._feed_finding:
+            yield self._feed_finding
+        yield from self._notes.findings(self._grid.step_mm * 1000.0)
+        yield from too_long(self.blocks, self._dialect.buffer_chars)
 
     def _place(self, row: int) -> str:
         """The given row that a row of the lowered toolpath came from."""
@@ -322,44 +322,32 @@ class Notes:
     rounded: int = 0
     rounded_place: str = ""
 
-    def findings(self, step_um: float) -> list[Finding]:
+    def findings(self, step_um: float) -> Iterator[Finding]:
         """One finding for each count that is not 0."""
-        found = []
         if self.split:
-            found.append(
-                MOVE_SPLIT(where=self.split_place, measured=self.split_step_mm, count=self.split)
-            )
+            yield MOVE_SPLIT(where=self.split_place, measured=self.split_step_mm, count=self.split)
         if collapsed := self.dropped + self.arcs_as_lines:
-            found.append(
-                MOVE_COLLAPSED(measured=collapsed, dropped=self.dropped, arcs=self.arcs_as_lines)
-            )
+            yield MOVE_COLLAPSED(measured=collapsed, dropped=self.dropped, arcs=self.arcs_as_lines)
         if self.far:
-            found.append(ARC_MENDED_FLAT(where=self.far_place, measured=self.far))
+            yield ARC_MENDED_FLAT(where=self.far_place, measured=self.far)
         if self.mended:
-            found.append(
-                ARC_MENDED(
-                    where=self.remainder_place,
-                    measured=self.remainder_um,
-                    count=self.mended,
-                    steps=self.remainder_um / step_um,
-                )
+            yield ARC_MENDED(
+                where=self.remainder_place,
+                measured=self.remainder_um,
+                count=self.mended,
+                steps=self.remainder_um / step_um,
             )
         if self.rounded:
-            found.append(VALUE_ROUNDED(where=self.rounded_place, count=self.rounded))
-        return found
+            yield VALUE_ROUNDED(where=self.rounded_place, count=self.rounded)
 
 
-def too_long(blocks: list[str], buffer_chars: int | None) -> list[Finding]:
+def too_long(blocks: list[str], buffer_chars: int | None) -> Iterator[Finding]:
     """One BLOCK_TOO_LONG finding when blocks do not fit the controller's buffer: a remark where
     it is that of the thesis, which contradicts itself, and a warning where the user knows it."""
     lengths = [len(block) for block in blocks]
     limit = BUFFER_CHARS if buffer_chars is None else buffer_chars
-    count = sum(length > limit for length in lengths)
-    if not count:
-        return []
-    longest = max(lengths)
-    return [
-        (BLOCK_TOO_LONG_PERHAPS if buffer_chars is None else BLOCK_TOO_LONG)(
+    if count := sum(length > limit for length in lengths):
+        longest = max(lengths)
+        yield (BLOCK_TOO_LONG_PERHAPS if buffer_chars is None else BLOCK_TOO_LONG)(
             where=f"block {lengths.index(longest) + 1}", measured=longest, limit=limit, count=count
         )
-    ]

@@ -9,6 +9,7 @@ option of `[dialect]` says what happens.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
@@ -115,21 +116,17 @@ class _Reader:
                     f"a second {letter}: only the first counts", word=at, mend="one block a line"
                 )
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> Iterator[Finding]:
         """The scale that was taken, and arcs that the controller's angle does not bring home."""
-        found = []
         if not self._dialect.coord_scale_checked:
-            found.append(COORDINATES_SCALED_READ(measured=self._dialect.coord_scale))
+            yield COORDINATES_SCALED_READ(measured=self._dialect.coord_scale)
         if self._missed.count:
-            found.append(
-                ARC_MISSES_END(
-                    where=self._missed.where,
-                    measured=self._missed.most_mm,
-                    limit=self._step_mm,
-                    count=self._missed.count,
-                )
+            yield ARC_MISSES_END(
+                where=self._missed.where,
+                measured=self._missed.most_mm,
+                limit=self._step_mm,
+                count=self._missed.count,
             )
-        return tuple(found)
 
     def _end(self, block: Block, values: dict[str, float]) -> Point:
         """Where the block goes, in the program's units; absolute (L1135)."""

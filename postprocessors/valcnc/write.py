@@ -10,6 +10,7 @@ numbers: there arcs become lines.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -56,7 +57,7 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     check_plain(toolpath, machine)
     _check_tools(toolpath)
     scales = scales_of(machine, dialect)
-    lowered, split_note = split_z(toolpath, machine)
+    lowered, split = split_z(toolpath, machine)
     lowered, squeezed = _arcs_lowered(lowered, scales, machine, dialect)
     rules = ArcRules(dialect.decimals, "halves", MOST_UNITS, chord_fits=True)
     rows = plain_rows(_scaled(lowered.toolpath, scales), rules)
@@ -74,11 +75,11 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
         machine,
         of_row[sent],
         (
-            *_scale_note(dialect),
-            *([split_note] if split_note else []),
+            *_scale_finding(dialect),
+            *split,
             *squeezed,
             *arc_findings(rows, first),
-            *_feed_note(toolpath, machine),
+            *_feed_finding(toolpath, machine),
             *left_out(toolpath, UNSAID, EVENT_LEFT_OUT),
         ),
     )
@@ -143,26 +144,22 @@ def _check_length(blocks: list[str], dialect: Dialect) -> None:
         )
 
 
-def _scale_note(dialect: Dialect) -> list[Finding]:
+def _scale_finding(dialect: Dialect) -> Iterator[Finding]:
     """The warning that a wrong scale makes parts 8 times too large or too small."""
-    if dialect.coord_scale_checked:
-        return []
-    return [COORDINATES_SCALED(measured=dialect.coord_scale)]
+    if not dialect.coord_scale_checked:
+        yield COORDINATES_SCALED(measured=dialect.coord_scale)
 
 
-def _feed_note(toolpath: Toolpath, machine: ValcncMachine) -> list[Finding]:
+def _feed_finding(toolpath: Toolpath, machine: ValcncMachine) -> Iterator[Finding]:
     """Feeds that the machine will not keep: it has one speed."""
     speed = machine.max_feed_mm_min
     with np.errstate(invalid="ignore"):
         other = toolpath.is_feed & (np.abs(toolpath.feed - speed) > FEED_TOLERANCE * speed)
-    if not other.any():
-        return []
-    row = int(other.argmax())
-    return [
-        FEED_ROUNDED(
+    if other.any():
+        row = int(other.argmax())
+        yield FEED_ROUNDED(
             where=toolpath.place(row),
             measured=toolpath.feed[row],
             limit=speed,
             count=int(other.sum()),
         )
-    ]
