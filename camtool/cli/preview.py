@@ -41,10 +41,6 @@ if TYPE_CHECKING:
     Findings = tuple[Finding, ...]
 
 
-NO_DRAWING = ("is a machine program", "is no drawing")
-"""How an importer begins to say that a file is something else than a drawing."""
-
-
 @click.command(cls=SectionedCommand, short_help="Picture of a drawing, toolpath or program.")
 @click.argument("source", metavar="FILE")
 @click.option(
@@ -135,7 +131,7 @@ class Seen:
 
     def _is_no_drawing(self, source: str) -> bool:
         """Whether a file's content says that it is none: then it is a program of the target."""
-        from camtool.importers.formats import find_format
+        from camtool.importers.formats import NoDrawingError, find_format
         from camtool.importers.read import file_bytes
 
         if source == STDOUT or self.drawing.format is not None:
@@ -143,8 +139,10 @@ class Seen:
         data = file_bytes(Path(source))
         try:
             find_format(data, Path(source).suffix, source)
-        except DrawingError as error:
-            return error.message.startswith(NO_DRAWING)
+        except NoDrawingError:
+            return True
+        except DrawingError:  # a drawing with something wrong: its reader says what
+            return False
         return False
 
     def _of_drawing(self, source: str) -> tuple[Scene, Findings]:

@@ -94,12 +94,16 @@ _XML_BEFORE = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE(?:[^\[>]|\[.*?\]\s
 _XML_ELEMENT = re.compile(r"<(?:[\w.-]+:)?([A-Za-z_][\w.-]*)")
 
 
+class NoDrawingError(DrawingError):
+    """The content is a machine program, or of no format that is known."""
+
+
 def find_format(data: bytes, suffix: str, file: str) -> str:
     """One of FORMATS for this content; DrawingError when it is none of them."""
     suffix = suffix.lower()
     name = _by_bytes(data, file) or _by_text(data, suffix, file)
     if name is None:
-        raise DrawingError(
+        raise NoDrawingError(
             "is no drawing that camtool knows",
             file=file,
             mend="give DXF, SVG, points, STEP or BREP, "
@@ -210,7 +214,7 @@ def _refuse_program(head: str, file: str) -> None:
             break
         at = comment.end()
     if _G_BLOCK.match(head, at) and _G_CODE.search(head):
-        raise DrawingError(
+        raise NoDrawingError(
             "is a machine program (G-code), no drawing",
             file=file,
             mend="camtool verify judges programs; give the drawing that it was made from",
