@@ -15,13 +15,27 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from camtool.errors import OptionError
-from camtool.pictures import axes, legend, polar
+from camtool.pictures import polar
 from camtool.pictures.colours import DRAWING, LAYER_COLOURS
 from camtool.pictures.content import Content, Group, content_of
 from camtool.pictures.draw import panel, rendered
 from camtool.pictures.layers import Entry, legend_of
 from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
-from camtool.pictures.page import HEAD_GAP, LEGEND_DROP, Page, fitted, foot_of, sheet, table_of
+from camtool.pictures.page import (
+    HEAD_GAP,
+    LEGEND_DROP,
+    Page,
+    colour_bar,
+    colour_bar_width,
+    fitted,
+    foot_of,
+    legend_rows,
+    scale_bar,
+    sheet,
+    table_of,
+    ticks_of,
+    title_and_notes,
+)
 from camtool.pictures.polar import ROOM, dial_of, plot
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import element, number
@@ -61,7 +75,7 @@ def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
         return _polars(scenes, options.polar, options)
     contents = _alike([content_of(scene, options) for scene in scenes])
     grid, views = _views(contents, options)
-    view, ticks = views[0], axes.ticks_of(views[0])
+    view, ticks = views[0], ticks_of(views[0])
     panels = [
         panel(content, Page(head, own, ticks, [], 0.0, 0.0, 0.0))
         for content, head, own in zip(contents, grid.heads, views, strict=True)
@@ -75,9 +89,9 @@ def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
         (grid.page, foot_of(table, legend_y)),
         options,
         *grid.placed(panels),
-        "" if top_um is None else legend.colour_bar(top_um, plots),
-        legend.legend(table, plots.left, legend_y),
-        axes.scale_bar(view, plots.right, bar_y),
+        "" if top_um is None else colour_bar(top_um, plots),
+        legend_rows(table, plots.left, legend_y),
+        scale_bar(view, plots.right, bar_y),
     )
 
 
@@ -96,7 +110,7 @@ def _views(contents: Sequence[Content], options: Options) -> tuple[Grid, list[Vi
         views = [fitted(window, top + HEAD_GAP, grid.width, shapes)[0] for top in grid.downs]
         grid = grid.with_bodies(HEAD_GAP + views[0].box.height + NUMBERS_FOOT)
         if top_um is not None:
-            bar = legend.bar_width(top_um, grid.around([view.box for view in views]).height)
+            bar = colour_bar_width(top_um, grid.around([view.box for view in views]).height)
     return grid, views
 
 
@@ -246,7 +260,7 @@ def panel_width(columns: int, room: float) -> float:
 def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) -> Grid:
     """The grid for panels of these titles and notes, `bar` of the page's width left free."""
     width = panel_width(columns, page - bar)
-    drawn = [legend.head(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
+    drawn = [title_and_notes(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
     downs = [down for _, down in drawn]
     lowest = [max(downs[k - k % columns :][:columns]) for k in range(len(downs))]
     return Grid(columns, page, width, tuple(head for head, _ in drawn), tuple(lowest))

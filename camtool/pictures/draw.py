@@ -15,12 +15,22 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from camtool.errors import OutputError
-from camtool.pictures import axes, legend, text
+from camtool.pictures import text
 from camtool.pictures.colours import QUIET
 from camtool.pictures.content import Content, content_of
 from camtool.pictures.layers import drawn
 from camtool.pictures.options import AS_USUAL, PNG_WIDTH_PX, SVG_WIDTH_PX, Options, check_width
-from camtool.pictures.page import Page, mat, page_of, sheet
+from camtool.pictures.page import (
+    Page,
+    axes_around,
+    colour_bar,
+    ground,
+    legend_rows,
+    mat,
+    page_of,
+    scale_bar,
+    sheet,
+)
 from camtool.pictures.plot import Plot
 from camtool.pictures.polar import draw_polar
 from camtool.pictures.scene import Scene
@@ -48,11 +58,11 @@ def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUA
         scene.title,
         sizes,
         options,
-        axes.frame(view, page.ticks),
+        ground(view, page.ticks),
         element("g", {"id": "plot"}, *_plot(content, view)),
         mat(view.box, *sizes),
         page.head,
-        axes.axes(view, page.ticks),
+        axes_around(view, page.ticks),
         *_beside(content, page),
     )
 
@@ -66,10 +76,10 @@ def panel(content: Content, page: Page) -> list[str]:
     clip = "clip-" + "-".join(number(side, 0) for side in sides)
     return [
         page.head,
-        axes.frame(page.view, page.ticks),
+        ground(page.view, page.ticks),
         element("clipPath", {"id": clip}, element("rect", plot)),
         element("g", {"clip-path": f"url(#{clip})"}, *_plot(content, page.view)),
-        axes.axes(page.view, page.ticks),
+        axes_around(page.view, page.ticks),
     ]
 
 
@@ -97,9 +107,9 @@ def _beside(content: Content, page: Page) -> list[str]:
     """Colour bar, legend and scale bar."""
     box, parts = page.view.box, []
     if content.trace is not None:
-        parts.append(legend.colour_bar(content.trace.top_um, box))
-    parts.append(legend.legend(page.rows, box.left, page.legend_y))
-    parts.append(axes.scale_bar(page.view, box.right, page.bar_y))
+        parts.append(colour_bar(content.trace.top_um, box))
+    parts.append(legend_rows(page.rows, box.left, page.legend_y))
+    parts.append(scale_bar(page.view, box.right, page.bar_y))
     return parts
 
 

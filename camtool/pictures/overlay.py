@@ -11,13 +11,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from camtool.arrays import Floats
-from camtool.pictures import axes, legend
 from camtool.pictures.colours import FEED_PALE, LAYER_COLOURS
 from camtool.pictures.content import cropped
 from camtool.pictures.draw import rendered
 from camtool.pictures.layers import Entry, line_swatch
 from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
-from camtool.pictures.page import HEAD_GAP, LEGEND_DROP, fitted, foot_of, mat, sheet, table_of
+from camtool.pictures.page import (
+    HEAD_GAP,
+    LEGEND_DROP,
+    axes_around,
+    fitted,
+    foot_of,
+    ground,
+    legend_rows,
+    mat,
+    scale_bar,
+    sheet,
+    table_of,
+    title_and_notes,
+)
 from camtool.pictures.plot import Plot
 from camtool.pictures.strokes import strokes_of
 from camtool.pictures.svg import Look, PathData, element
@@ -49,7 +61,7 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
     """The paths as SVG text; equal input gives equal bytes."""
     size_px = options.size_px or SVG_WIDTH_PX
     page = page_width(size_px)
-    head, down = legend.head(overlay.title, overlay.notes, page)
+    head, down = title_and_notes(overlay.title, overlay.notes, page)
     window = overlay.window if options.crop_mm is None else cropped(*options.crop_mm)
     shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
     view, ticks = fitted(window, down + HEAD_GAP, page, shapes)
@@ -60,13 +72,13 @@ def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
         overlay.title,
         sizes,
         options,
-        axes.frame(view, ticks),
+        ground(view, ticks),
         element("g", {"id": "plot"}, _paths(overlay, view)),
         mat(view.box, *sizes),
         head,
-        axes.axes(view, ticks),
-        legend.legend(table, view.box.left, legend_y),
-        axes.scale_bar(view, view.box.right, bar_y),
+        axes_around(view, ticks),
+        legend_rows(table, view.box.left, legend_y),
+        scale_bar(view, view.box.right, bar_y),
     )
 
 

@@ -1,5 +1,7 @@
-"""Where everything lies on the page (head, plot, numbers, colour bar, legend, scale bar), and the
-page itself."""
+"""The page of a picture: where its parts lie, and all that stands around the plot.
+
+Head, axes with their numbers, legend, colour bar and scale bar; `sheet` puts everything on paper.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +10,37 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from camtool.arrays import Floats
-from camtool.pictures import axes, legend
-from camtool.pictures.axes import Ticks, ticks_of
-from camtool.pictures.colours import PAPER, darkened
+from camtool.pictures import text
+from camtool.pictures.colours import (
+    BINS,
+    FRAME,
+    GRID,
+    INK,
+    PAPER,
+    PLOT,
+    QUIET,
+    bin_colours,
+    darkened,
+)
 from camtool.pictures.content import Content
-from camtool.pictures.layers import Entry, legend_of
+from camtool.pictures.layers import SWATCH, Entry, legend_of
 from camtool.pictures.options import SMALLEST_PX, SVG_WIDTH_PX, Options
-from camtool.pictures.svg import Look, PathData, element, number, title
-from camtool.pictures.view import CROP_SHAPES, MARGIN, PAGE, TALLEST, WIDEST, Box, View, fit
+from camtool.pictures.svg import Look, PathData, element, number, one_line, title
+from camtool.pictures.text import Style
+from camtool.pictures.view import (
+    CROP_SHAPES,
+    MARGIN,
+    PAGE,
+    TALLEST,
+    WIDEST,
+    Box,
+    View,
+    decimals_of,
+    fit,
+    multiples,
+    round_length,
+    round_step,
+)
 
 HEAD_GAP = 50.0
 """Room between the head and the plot, for the names above it."""
@@ -46,13 +71,13 @@ class Page:
 
 def page_of(content: Content, width: float = PAGE) -> Page:
     """The page of a picture alone."""
-    head, down = legend.head(content.scene.title, content.notes, width)
+    head, down = title_and_notes(content.scene.title, content.notes, width)
     top = down + HEAD_GAP
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES
 
     def bar(view: View) -> float:
         trace = content.trace
-        return 0.0 if trace is None else legend.bar_width(trace.top_um, view.box.height)
+        return 0.0 if trace is None else colour_bar_width(trace.top_um, view.box.height)
 
     view, ticks = fitted(content.window, top, width, shapes, bar)
     table, bar_y = table_of(legend_of(content, view), view, view.box)
@@ -62,9 +87,9 @@ def page_of(content: Content, width: float = PAGE) -> Page:
 
 def table_of(entries: Sequence[Entry], view: View, plots: Box) -> tuple[list[list[Entry]], float]:
     """The rows of the legend below the plots, and the middle of the view's scale bar in them."""
-    bar = axes.scale_bar_width(view) + BAR_ROOM
-    table, row = legend.table_of(entries, bar, plots.width)
-    return table, plots.bottom + LEGEND_DROP + row * legend.ROW_STEP
+    bar = scale_bar_width(view) + BAR_ROOM
+    table, row = rows_beside(entries, bar, plots.width)
+    return table, plots.bottom + LEGEND_DROP + row * ROW_STEP
 
 
 def fitted(
@@ -80,14 +105,14 @@ def fitted(
     for _ in range(FITS):
         view = fit(window, left, top, right, shapes)
         ticks = ticks_of(view)
-        left = MARGIN + ticks.left_width + axes.TICK + axes.LABEL_GAP
+        left = MARGIN + ticks.left_width + TICK + LABEL_GAP
         right = width - MARGIN - beside(view)
     return view, ticks
 
 
 def foot_of(rows: list[list[Entry]], legend_y: float) -> float:
     """Height of a page whose legend of these rows begins at `legend_y`."""
-    return round(legend_y + max(len(rows) - 1, 0) * legend.ROW_STEP + FOOT)
+    return round(legend_y + max(len(rows) - 1, 0) * ROW_STEP + FOOT)
 
 
 def mat(box: Box, width: float, height: float) -> str:
@@ -121,3 +146,316 @@ def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) 
     paper = element("rect", {"width": width, "height": height + below, "fill": PAPER})
     picture = element("svg", root, title(name or "camtool picture"), paper, *parts)
     return (darkened(picture) if options.dark else picture) + "\n"
+
+
+# Title and notes, legend, and the colour bar of errors.
+
+TITLE = Style(cap=22.0, colour=INK, weight=0.13)
+NOTE = Style(cap=14.5, colour=QUIET)
+ENTRY = Style(cap=14.5, colour=QUIET)
+TITLE_STEP = 34.0
+NOTE_STEP = 28.0
+ROW_STEP = 33.0
+SWATCH_GAP, ENTRY_GAP = 11.0, 28.0
+LONGEST_ENTRY = 330.0
+BAR_WIDTH, BAR_GAP = 18.0, 26.0
+LEAST_BAR_SPACING = 85.0
+CLEAR_OF_TOP = 2.3
+"""Round numbers stay this many letters' heights below the largest error."""
+
+BAR_TITLE = "error (µm)"
+
+
+def _name(entry: Entry) -> str:
+    """The text of an entry, shortened where it must be."""
+    return text.shortened(entry.name, ENTRY.cap, LONGEST_ENTRY)
+
+
+def _width(entry: Entry) -> float:
+    """Room of an entry on its row, with the gap to the next."""
+    return SWATCH + SWATCH_GAP + text.width(_name(entry), ENTRY.cap) + ENTRY_GAP
+
+
+def title_and_notes(
+    name: str, notes: Sequence[str], page: float = PAGE, *, lines: int = 1
+) -> tuple[str, float]:
+    """Title, on at most so many lines, and notes at the top of a page so wide, and the height at
+    which they end."""
+    room = page - 2.0 * MARGIN
+    down = MARGIN
+    parts = []
+    for index, line in enumerate(_title_lines(name, room, lines)):
+        down += TITLE.cap if index == 0 else TITLE_STEP
+        full = name if index == 0 else line
+        parts.append(text.label(line, (MARGIN, down), TITLE, full=full))
+    if parts:
+        down += 6.0
+    for note in notes:
+        for line in text.wrapped(note, NOTE.cap, room):
+            down += NOTE_STEP
+            parts.append(text.label(line, (MARGIN, down), NOTE))
+    return element("g", {"id": "head"}, *parts), down + 6.0
+
+
+def _title_lines(name: str, room: float, most: int) -> list[str]:
+    """The title broken at blanks, and what follows the last line on it as far as it goes."""
+    words = one_line(name).split()
+    lines: list[str] = []
+    while words and len(lines) < most - 1:
+        count = 1
+        while count < len(words) and text.width(" ".join(words[: count + 1]), TITLE.cap) <= room:
+            count += 1
+        lines.append(text.shortened(" ".join(words[:count]), TITLE.cap, room))
+        words = words[count:]
+    if words:
+        lines.append(text.shortened(" ".join(words), TITLE.cap, room))
+    return lines
+
+
+def rows_of(entries: Sequence[Entry], first: float, room: float) -> list[list[Entry]]:
+    """The entries in rows: the first no wider than `first`, the others than `room`; the first
+    one stays empty when there is no room in it."""
+    found: list[list[Entry]] = []
+    if entries and _width(entries[0]) - ENTRY_GAP > first:
+        found.append([])
+    used = math.inf
+    for entry in entries:
+        limit = first if len(found) <= 1 else room
+        if used + _width(entry) - ENTRY_GAP > limit:
+            found.append([])
+            used = 0.0
+        found[-1].append(entry)
+        used += _width(entry)
+    return found
+
+
+def rows_beside(
+    entries: Sequence[Entry], bar: float, room: float
+) -> tuple[list[list[Entry]], int]:
+    """The rows, and which of them ends with something `bar` wide: the first where an entry fits
+    beside it, else the last with room for it, else one of its own."""
+    first = room - bar
+    if not entries or _width(entries[0]) - ENTRY_GAP <= first:
+        return rows_of(entries, first, room), 0
+    found = rows_of(entries, room, room)
+    for row in reversed(range(len(found))):
+        if sum(_width(entry) for entry in found[row]) - ENTRY_GAP <= first:
+            return found, row
+    return [[], *found], 0
+
+
+def legend_rows(table: Sequence[Sequence[Entry]], left: float, middle: float) -> str:
+    """The rows of the legend, the first centred on height `middle`."""
+    parts = []
+    for index, row in enumerate(table):
+        across, height = left, middle + index * ROW_STEP
+        for entry in row:
+            move = f"translate({number(across)} {number(height)})"
+            at = (across + SWATCH + SWATCH_GAP, height + ENTRY.cap / 2.0)
+            parts.append(element("g", {"transform": move}, entry.swatch))
+            parts.append(text.label(_name(entry), at, ENTRY, full=entry.name))
+            across += _width(entry)
+    return element("g", {"id": "legend"}, *parts) if parts else ""
+
+
+def colour_bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
+    """(value µm, text) along the colour bar: round numbers, and the largest error at the top."""
+    step = round_step(top_um * LEAST_BAR_SPACING / height)
+    room = top_um * CLEAR_OF_TOP * TICK_CAP / height
+    labels = [
+        (value, number(value, decimals_of(step)))
+        for value in multiples(0.0, top_um, step)
+        if value <= top_um - room
+    ]
+    return [*labels, (top_um, number(top_um, max(2, 2 - math.floor(math.log10(top_um)))))]
+
+
+def colour_bar_width(top_um: float, height: float) -> float:
+    """Room right of the plot that the colour bar needs."""
+    widest = max(text.width(name, TICK_CAP) for _, name in colour_bar_labels(top_um, height))
+    header = text.width(BAR_TITLE, TICK_CAP)
+    return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, header)
+
+
+def colour_bar(top_um: float, box: Box) -> str:
+    """The map with its numbers, as high as the plot, right of it."""
+    left = box.right + BAR_GAP
+    step = box.height / BINS
+    parts = []
+    for index, colour in reversed(list(enumerate(bin_colours()))):
+        # Each step reaches down to the foot, and the lower ones cover it: no seams.
+        down = round(box.bottom - (index + 1) * step, 2)
+        piece: Look = {"x": left, "y": number(down), "width": BAR_WIDTH}
+        parts.append(
+            element(
+                "rect",
+                {
+                    **piece,
+                    "height": box.bottom - down,
+                    "fill": colour,
+                    "shape-rendering": "crispEdges",
+                },
+            )
+        )
+    edge: Look = {"x": left, "y": box.top, "width": BAR_WIDTH, "height": box.height}
+    parts.append(element("rect", {**edge, "fill": "none", "stroke": FRAME, "stroke-width": 1.4}))
+    ticks = PathData()
+    for value, name in colour_bar_labels(top_um, box.height):
+        down = box.bottom - value / top_um * box.height
+        ticks.move(left + BAR_WIDTH, down)
+        ticks.line(left + BAR_WIDTH + 5.0, down)
+        at = (left + BAR_WIDTH + 12.0, down + TICK_CAP / 2.0)
+        parts.append(text.label(name, at, Style(TICK_CAP, QUIET)))
+    line: Look = {"d": str(ticks), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
+    parts.append(element("path", line))
+    parts.append(text.label(BAR_TITLE, (left, box.top - NAME_LIFT), Style(TICK_CAP, QUIET)))
+    return element("g", {"id": "error-scale"}, *parts)
+
+
+# Grid, ticks with their numbers in mm, scale bar.
+
+TICK_CAP = 14.5
+NAME_LIFT = 19.0
+"""Names of axes stand this far above the plot."""
+
+TICK, MINOR_TICK = 8.0, 4.5
+LABEL_GAP = 7.0
+LEAST_SPACING = 78.0
+BAR_SHARE = 0.2
+"""The scale bar is at most this share of the plot's width."""
+
+BAR_MARK = 5.0
+NUMBERS = Style(TICK_CAP, QUIET)
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """Round numbers along both axes, the same `step_mm` on each."""
+
+    step_mm: float
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+    def text(self, value: float) -> str:
+        """The number at a tick."""
+        return number(value, decimals_of(self.step_mm))
+
+    @property
+    def left_width(self) -> float:
+        """Width of the widest number along Y."""
+        return max((text.width(self.text(y), TICK_CAP) for y in self.y), default=0.0)
+
+
+def ticks_of(view: View) -> Ticks:
+    """Ticks so far apart that their numbers cannot touch."""
+    spacing = LEAST_SPACING
+    while True:
+        step = round_step(spacing / view.scale)
+        ticks = Ticks(
+            step, tuple(multiples(*view.x_range, step)), tuple(multiples(*view.y_range, step))
+        )
+        widest = max((text.width(ticks.text(x), TICK_CAP) for x in ticks.x), default=0.0)
+        if widest + 2.0 * TICK_CAP <= step * view.scale:
+            return ticks
+        spacing = widest + 2.0 * TICK_CAP
+
+
+def ground(view: View, ticks: Ticks) -> str:
+    """Ground and grid of the plot: goes below everything."""
+    box, grid = view.box, PathData()
+    for x in ticks.x:
+        grid.move(view.page(x, 0.0)[0], box.top)
+        grid.line(view.page(x, 0.0)[0], box.bottom)
+    for y in ticks.y:
+        grid.move(box.left, view.page(0.0, y)[1])
+        grid.line(box.right, view.page(0.0, y)[1])
+    ground: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
+    lines: Look = {"d": str(grid), "fill": "none", "stroke": GRID, "stroke-width": 1.2}
+    return element(
+        "g",
+        {"id": "grid"},
+        element("rect", {**ground, "fill": PLOT}),
+        element("path", lines) if grid else "",
+    )
+
+
+def axes_around(view: View, ticks: Ticks) -> str:
+    """Frame, ticks and numbers: goes above the plot."""
+    box, marks, labels = view.box, PathData(), []
+    unit = text.width("X (mm)", TICK_CAP)
+    base = box.bottom + TICK + LABEL_GAP + TICK_CAP
+    for x in ticks.x:
+        across = view.page(x, 0.0)[0]
+        _tick(marks, (across, box.bottom), (0.0, TICK))
+        room = text.width(ticks.text(x), TICK_CAP) / 2.0 + TICK_CAP
+        if across + room <= box.right - unit:
+            centred = Style(TICK_CAP, QUIET, "middle")
+            labels.append(text.label(ticks.text(x), (across, base), centred))
+    for y in ticks.y:
+        down = view.page(0.0, y)[1]
+        _tick(marks, (box.left, down), (-TICK, 0.0))
+        at = (box.left - TICK - LABEL_GAP, down + TICK_CAP / 2.0)
+        labels.append(text.label(ticks.text(y), at, Style(TICK_CAP, QUIET, "end")))
+    _minor(marks, view, ticks)
+    labels.append(text.label("X (mm)", (box.right, base), Style(TICK_CAP, QUIET, "end")))
+    labels.append(text.label("Y (mm)", (box.left, box.top - NAME_LIFT), NUMBERS))
+    pen: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.4}
+    edge: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
+    return element(
+        "g",
+        {"id": "axes"},
+        element("rect", {**edge, **pen}),
+        element("path", {"d": str(marks), **pen}) if marks else "",
+        *labels,
+    )
+
+
+def _tick(marks: PathData, at: tuple[float, float], by: tuple[float, float]) -> None:
+    marks.move(*at)
+    marks.line(at[0] + by[0], at[1] + by[1])
+
+
+def _minor(marks: PathData, view: View, ticks: Ticks) -> None:
+    """Short ticks between: four to a step of 2, else five."""
+    is_two = f"{ticks.step_mm:.0e}".startswith("2")
+    step = ticks.step_mm / (4.0 if is_two else 5.0)
+    for x in multiples(*view.x_range, step):
+        _tick(marks, (view.page(x, 0.0)[0], view.box.bottom), (0.0, MINOR_TICK))
+    for y in multiples(*view.y_range, step):
+        _tick(marks, (view.box.left, view.page(0.0, y)[1]), (-MINOR_TICK, 0.0))
+
+
+def scale_bar_length(view: View) -> tuple[float, str]:
+    """A round length in mm, and how it is called."""
+    length = round_length(BAR_SHARE * view.box.width / view.scale)
+    if length < 1.0:
+        return length, f"{number(length * 1000.0, decimals_of(length * 1000.0))} µm"
+    return length, f"{number(length, 0)} mm"
+
+
+def scale_bar_width(view: View) -> float:
+    """Room that the bar and its label need."""
+    length, name = scale_bar_length(view)
+    return length * view.scale + 12.0 + text.width(name, TICK_CAP)
+
+
+def scale_bar(view: View, right: float, middle: float) -> str:
+    """A bar of round length with its label, ending at `right`, centred on height `middle`."""
+    length, name = scale_bar_length(view)
+    begin = right - length * view.scale
+    data = PathData()
+    data.move(begin, middle - BAR_MARK)
+    data.line(begin, middle + BAR_MARK)
+    data.move(begin, middle)
+    data.line(right, middle)
+    data.move(right, middle - BAR_MARK)
+    data.line(right, middle + BAR_MARK)
+    return element(
+        "g",
+        {"id": "scale-bar"},
+        title(f"scale bar: {name}"),
+        element("path", {"d": str(data), "fill": "none", "stroke": INK, "stroke-width": 2.2}),
+        text.label(
+            name, (begin - 12.0, middle + TICK_CAP / 2.0), Style(TICK_CAP, QUIET, anchor="end")
+        ),
+    )

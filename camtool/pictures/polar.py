@@ -12,11 +12,11 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.pictures import legend, text
+from camtool.pictures import text
 from camtool.pictures.colours import BACK, BACK_SPREAD, FEED, FRAME, GRID, INK, PLOT, QUIET, SPREAD
 from camtool.pictures.layers import Entry, line_swatch
 from camtool.pictures.options import SVG_WIDTH_PX, Options
-from camtool.pictures.page import foot_of, sheet
+from camtool.pictures.page import ROW_STEP, foot_of, legend_rows, rows_of, sheet, title_and_notes
 from camtool.pictures.scene import Round, Scene
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import Style
@@ -60,7 +60,7 @@ def draw_polar(scene: Scene, which: int, options: Options) -> str:
     circles = shown(scene, which)
     errors = [circle.errors_um for circle in circles]
     dial = dial_of(errors, width)
-    head, down = legend.head(scene.title, notes(circles, dial), width)
+    head, down = title_and_notes(scene.title, notes(circles, dial), width)
     dial = dial.placed(down, width)
     foot = dial.middle[1] + dial.outer + ROOM
     below, foot = legend_below(entries(circles), foot, width)
@@ -72,9 +72,9 @@ def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[st
     if not entries:
         return "", round(top + MARGIN)
     room = width - 2.0 * MARGIN
-    table = legend.rows(entries, room, room)
-    legend_y = top + 0.5 * legend.ROW_STEP
-    return legend.legend(table, MARGIN, legend_y), foot_of(table, legend_y)
+    table = rows_of(entries, room, room)
+    legend_y = top + 0.5 * ROW_STEP
+    return legend_rows(table, MARGIN, legend_y), foot_of(table, legend_y)
 
 
 def entries(circles: Sequence[Shown]) -> list[Entry]:

@@ -13,13 +13,12 @@ import pytest
 
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Branch, Gap, Healing, Mark, SelfCrossing
-from camtool.pictures.axes import TICK_CAP
 from camtool.pictures.colours import FEED, PAPER, PLUNGE, RAPID, bin_colours, on_dark
 from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw, png
 from camtool.pictures.layers import ALONE_PEN, TRACE_PEN
 from camtool.pictures.options import Options
-from camtool.pictures.page import page_of
+from camtool.pictures.page import TICK_CAP, page_of
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import clean
 from tests.oracles import svg_page

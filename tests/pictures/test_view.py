@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.pictures.axes import ticks_of
+from camtool.pictures.page import ticks_of
 from camtool.pictures.view import (
     EMPTY_WINDOW_MM,
     TALLEST,
