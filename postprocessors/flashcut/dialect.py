@@ -1,4 +1,4 @@
-"""The `[dialect]` table of a flashcut machine, and the words: all that writer and reader share."""
+"""What `[dialect]` and `[controller]` of a flashcut machine may say, and what its words share."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class Style:
     own_mode: PathMode | None = None
 
 
-def write_program(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
+def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     """The program of a toolpath; PostError names the move that cannot be said or done."""
     dialect = style.dialect
     check(toolpath, machine)

@@ -33,15 +33,15 @@ class Grbl(Target):
 
     def write(self, toolpath: Toolpath, machine: GrblMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
-        from .write import write_grbl
+        from .write import write_program
 
-        return write_grbl(toolpath, machine)
+        return write_program(toolpath, machine)
 
     def read(self, data: bytes, machine: GrblMachine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block, line and column."""
-        from .read import read_grbl
+        from .read import read_program
 
-        return read_grbl(data, machine)
+        return read_program(data, machine)
 
     def model(self) -> GrblModel:
         """The model of its controller."""

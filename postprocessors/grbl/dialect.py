@@ -1,4 +1,4 @@
-"""The `[dialect]` table of a grbl machine."""
+"""What `[dialect]` and `[controller]` of a grbl machine may say."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ REFUSED: Final = {
 }
 
 
-def read_grbl(data: bytes, machine: GrblMachine) -> Toolpath:
+def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
     """The moves of a program; ProgramError with block, line and column."""
     dialect = machine.dialect
     lexing = Lexing(

@@ -7,7 +7,7 @@ from dataclasses import replace
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
-from ..gcode.write import Event, Style, common_words, tool_number, write_program
+from ..gcode.write import Event, Style, common_words, tool_number, write_modal
 from .dialect import MOST_TOOL, Dialect, GrblMachine
 from .findings import EVENT_LEFT_OUT
 
@@ -16,11 +16,11 @@ HEADER = ("G17 G21 G90 G94", "G54")
 so it is not told so (G91.1)."""
 
 
-def write_grbl(toolpath: Toolpath, machine: GrblMachine) -> Program:
+def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
     """The program; PostError names the move that cannot be said or done."""
     dialect = machine.dialect
     style = Style(dialect, HEADER, lambda event: _words(event, dialect))
-    program = write_program(toolpath, machine, style)
+    program = write_modal(toolpath, machine, style)
     if dialect.tool_change == "pause" or not mounted_before(toolpath).any():
         return program
     return replace(program, findings=(*program.findings, EVENT_LEFT_OUT()))

@@ -1,4 +1,4 @@
-"""The `[dialect]` table of an i8751 machine: all that the writer and the reader share.
+"""What `[dialect]` and `[controller]` of an i8751 machine may say.
 
 Where the thesis contradicts itself or is silent, an option says which reading is meant;
 docs/dialects/i8751.md explains each, with the lines of the thesis.

@@ -34,15 +34,15 @@ class Linuxcnc(Target):
 
     def write(self, toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""
-        from .write import write_linuxcnc
+        from .write import write_program
 
-        return write_linuxcnc(toolpath, machine)
+        return write_program(toolpath, machine)
 
     def read(self, data: bytes, machine: LinuxcncMachine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block, line and column."""
-        from .read import read_linuxcnc
+        from .read import read_program
 
-        return read_linuxcnc(data, machine)
+        return read_program(data, machine)
 
     def model(self) -> LinuxcncModel:
         """The model of its controller."""

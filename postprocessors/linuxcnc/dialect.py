@@ -1,4 +1,4 @@
-"""The `[dialect]` table of a LinuxCNC machine."""
+"""What `[dialect]` and `[controller]` of a LinuxCNC machine may say."""
 
 from __future__ import annotations
 

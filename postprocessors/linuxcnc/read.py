@@ -58,7 +58,7 @@ SAYS_SOMETHING: Final = re.compile(rb"\s*[^\s%(;]")
 """A line that is not blank, a % or a comment."""
 
 
-def read_linuxcnc(data: bytes, machine: LinuxcncMachine) -> Toolpath:
+def read_program(data: bytes, machine: LinuxcncMachine) -> Toolpath:
     """The moves of a program; ProgramError with block, line and column."""
     dialect = machine.dialect
     lexing = Lexing(

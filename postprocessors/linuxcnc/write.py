@@ -8,7 +8,7 @@ from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from camtool.toolpath.program import Program
 
 from ..gcode.format import NumberStyle, say_number
-from ..gcode.write import Event, Style, common_words, tool_number, write_program
+from ..gcode.write import Event, Style, common_words, tool_number, write_modal
 from .dialect import LinuxcncMachine
 
 MODES: Final = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
@@ -21,7 +21,7 @@ MOST_TOOL: Final = 99_999
 TOLERANCE: Final = NumberStyle(6, strip=True)
 
 
-def write_linuxcnc(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
+def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     """The program; PostError names the move that cannot be said or done."""
     dialect = machine.dialect
     style = Style(
@@ -33,7 +33,7 @@ def write_linuxcnc(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
         path_mode=_path_mode,
         own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
     )
-    return write_program(toolpath, machine, style)
+    return write_modal(toolpath, machine, style)
 
 
 def _path_mode(mode: PathMode) -> str:

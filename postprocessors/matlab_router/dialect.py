@@ -1,4 +1,4 @@
-"""The `[dialect]` table of a matlab-router machine: all that the writer and the reader share.
+"""What `[dialect]` and `[controller]` of a matlab-router machine may say.
 
 The thesis's text, its listing and what is safe to send differ; `profile` chooses between them as
 a whole, and each option of its own overrides its profile. `Lnnnn` are lines of the thesis.

@@ -1,4 +1,4 @@
-"""The `[dialect]` table of a pic-mmh machine: all that the writer and the reader share."""
+"""What `[dialect]` and `[controller]` of a pic-mmh machine may say."""
 
 from __future__ import annotations
 

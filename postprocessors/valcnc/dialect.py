@@ -1,4 +1,4 @@
-"""The `[dialect]` table of a valcnc machine and its scale: all that writer and reader share."""
+"""What `[dialect]` and `[controller]` of a valcnc machine may say, and its scale."""
 
 from __future__ import annotations
 

@@ -204,7 +204,9 @@ def test_every_target_is_looked_at() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     points = settings["project"]["entry-points"]["camtool.postprocessors"]
     assert {f"camtool_postprocessors.{path.name}:POST" for path in MACHINES} == {*points.values()}
-    assert reached_rooms("from ..grbl.read import read_grbl\nfrom .dialect import x") == {"grbl"}
+    assert reached_rooms("from ..grbl.read import read_program\nfrom .dialect import x") == {
+        "grbl"
+    }
 
 
 @pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
