@@ -1,10 +1,10 @@
 """Open paths joined end to end: drawings give contours as loose lines and arcs.
 
-    ends ──pairs.py──▶ joints ──walk──▶ chains ──joined.py──▶ paths ──gaps.py──▶ what stays open
+    ends ──joints──▶ pairs ──walk──▶ chains ──joined──▶ paths ──open_gaps──▶ what stays open
 
-Each end takes part in one joint only. Where more than two ends meet, the straightest way goes on
-and the place is told as a branch. A joint moves a line to meet its neighbour (both lines to the
-middle); arcs stay exact, and two arcs with a gap get a short line between them.
+Each end takes part in one joint only. Where more than two ends meet, the straightest pair is
+joined and the place is reported as a branch. A joint moves a line to meet its neighbour (both
+lines to the middle); arcs stay exact, and two arcs with a gap get a short line between them.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def _closed_gaps(lots: Sequence[Joined], layers: Sequence[str]) -> list[Gap]:
     return [gap for _, gap in found]
 
 
-# Which open ends are joined: near ends paired, and the straightest way taken at branches.
+# Which open ends are joined: near ends are paired, at branches the straightest of them.
 #
 #     ends ──grid──▶ pairs within the gap ──clusters──▶ two ends: joined
 #                                                 └───▶ more ends: a branch, best pairs first
@@ -474,7 +474,7 @@ def _bridged(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
     rows, counts = _rows(lines, chains)
     vertices = lines.vertices[rows]
     turned = np.repeat(chains.entries & 1, counts) == 1
-    # The segment that left vertex i now leaves vertex i + 1 and bends the other way.
+    # The segment that left vertex i now leaves vertex i + 1 and bends to the other side.
     vertices[turned, 2] = 0.0 - lines.vertices[rows[turned] - 1, 2]
     last = np.cumsum(counts) - 1
     first = last - counts + 1

@@ -74,7 +74,7 @@ class SelfCrossing:
 class Healing:
     """What was mended on reading, counted, lengths in mm.
 
-    `duplicates`: pieces drawn twice as a whole and left out; `overlaps`: stretches of pieces that
+    `duplicates`: pieces drawn twice as a whole and left out; `overlaps`: parts of pieces that
     lie on others and were left out; `tiny_merged`: segments too short to matter that went into
     their neighbours; `arcs_recognised`: arcs made of chords. `branches` and `crossings` are the
     places where the drawing leaves a choice, or is wrong.

@@ -1,7 +1,7 @@
 """Curves to tangent-continuous chains of arcs and lines, as few as the tolerance allows.
 
-Nodes are laid on the curve, dense where it bends (`nodes`, `kernels/bezier.py`); between them the
-longest biarcs, arcs and lines within the tolerance are chained so that their number is small
+Nodes are laid on the curve, dense where it bends (`curve_nodes`, kernels/bezier.py); between them
+the longest biarcs, arcs and lines within the tolerance are chained so that their number is small
 (`kernels/spans.py`). Chains break their tangent only where the curve does.
 
 Errors are distances from dense points of the true curve to the arcs. The other direction needs no
@@ -193,7 +193,7 @@ def _checked(vertices: Floats, judged: Judged, ends: Floats) -> Fit:
 # turns when it is as short as one position (`POSITION_EPS_MM`) is a corner or a cusp.
 
 _ASIDE = tuple(10.0**k for k in range(ASIDE_FROM, ASIDE_TO))
-"""How far aside (share of the way to the next break) to look for the direction of a tangent."""
+"""How far aside (share of what is left to the next break) a tangent is looked for."""
 
 
 @dataclass(frozen=True, eq=False)

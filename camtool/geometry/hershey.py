@@ -1,4 +1,4 @@
-"""Letters as single strokes: Hershey's Roman simplex, with the signs that it lacks put together.
+"""Letters as single strokes: Hershey's Roman simplex, and the characters that it lacks.
 
 The font is "rowmans" of the package Hershey-Fonts, on its own grid: capitals are 21 units high,
 the baseline lies at y = 9, y grows downwards. It serves engraving and the labels of pictures alike

@@ -1,6 +1,6 @@
 """Where lines and arcs meet, and where closed paths cross themselves.
 
-Curves are told from their start (camtool.geometry.measure): with the left normal n there and the
+Curves are described from their start (`measure.Frames`): with the left normal n there and the
 signed curvature k, a point p of the whole line or circle has k |p−start|² = 2 n·(p−start).
 
 For two curves, let R be the rounder one and F the flatter one, both written about the start of R:

@@ -1,4 +1,4 @@
-"""Lengths, areas, extents and points of polylines; arcs are taken as arcs, never as chords.
+"""Lengths, areas, extents, points and tangents of lines and arcs; never of chords in their place.
 
 Nothing here uses the centre of an arc. With the chord vector d, the bulge b = tan(sweep/4) and
 f the part of the sweep that is done, a point of the arc is
@@ -34,8 +34,8 @@ def segment_lengths(segments: Segments) -> Floats:
     straight = np.hypot(chord[:, 0], chord[:, 1])
     # length = radius · |sweep| = chord · (1 + b²) · atan(b)/b
     safe = np.where(segments.is_arc, segments.bulge, 1.0)
-    stretch = np.where(segments.is_arc, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
-    return np.asarray(straight * stretch)
+    ratio = np.where(segments.is_arc, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
+    return np.asarray(straight * ratio)
 
 
 def signed_areas(lines: Polylines) -> Floats:
@@ -159,7 +159,7 @@ def sample(p: Polyline, step_mm: float) -> Floats:
     return points if p.closed else np.concatenate([points, p.end[None, :]])
 
 
-# Lines and arcs told from their start, so that both share one formula and need no centre.
+# Lines and arcs described from their start, so that both share one formula and need no centre.
 #
 # With the unit tangent and the left normal n at the start, the signed curvature k (left positive,
 # 0 for lines) and q = p − start,
@@ -171,7 +171,7 @@ def sample(p: Polyline, step_mm: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Segments told from their start: `start`, `end`, `tangent`, `normal` (K, 2), `curvature`
+    """Segments described from their start: `start`, `end`, `tangent`, `normal` (K, 2), `curvature`
     1/mm (left positive), `length` mm and `sweep` rad (K,)."""
 
     start: Floats
@@ -236,8 +236,8 @@ class Frames:
         half = np.where(before, np.pi - np.abs(half), np.abs(half))
         chord = np.hypot(q[:, 0], q[:, 1])
         on_line = (self.curvature == 0.0) | (half == 0.0)
-        stretch = np.where(on_line, 1.0, half / np.sin(np.where(on_line, 1.0, half)))
-        return np.where(before, -chord, chord) * stretch
+        ratio = np.where(on_line, 1.0, half / np.sin(np.where(on_line, 1.0, half)))
+        return np.where(before, -chord, chord) * ratio
 
 
 def turned(vectors: Floats) -> Floats:

@@ -5,12 +5,12 @@ the medial axis, and runs along it without a jump when the point runs along the 
 region the whole axis is passed, each of its branches from both sides. So nothing needs to be
 approximated or pruned: the axis is traced by the boundary itself.
 
-    boundary ──samples──▶ discs ──where the partner changes: bisection──▶ stretches
+    boundary ──samples──▶ discs ──where the partner changes: bisection──▶ intervals
              ──halved until chords are within the tolerance──▶ Trace
 
-A stretch is what one element sees of one partner. A sample that one element has of another shows
-that other a place where the first must be seen; so stretches that fall between the first samples
-are found from their other side.
+An *interval* is what one element sees of one partner. A sample that one element has of another
+shows that other a place where the first must be seen; so intervals that fall between the first
+samples are found from their other side.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which closed path holds which path, exact with arcs.
+"""Which closed path holds which path, exact with arcs; and regions: outer paths with their holes.
 
 A point is inside a closed path when it is inside the polygon of its chords, or when it lies
 between a chord and its arc, but not both (XOR, arc by arc). A point exactly on a chord is taken
@@ -96,7 +96,7 @@ def _held(points: Floats, first_point: Ints, inner: Ints, ring: Segments) -> tup
     return inner[said == HELD], inner[said == ON_LINE]
 
 
-# Regions: closed paths by which of them holds which, outer ones CCW and their holes CW.
+# Regions: outer paths CCW, their holes CW.
 
 
 def oriented(lines: Polylines) -> Polylines:

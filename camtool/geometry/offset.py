@@ -13,7 +13,7 @@ Algorithm, for a distance to the left (the right is the left of the reversed pat
    meets itself, the elements of its other side cut too. (`slice_elements`)
 4. *Validity.* A slice is kept when no point of it is nearer to the source than the distance, or
    within a mitre. In exact numbers that is the same for all points of a slice. (`valid_slices`)
-5. *Loops.* Pairs of slices that run the same way to and fro are taken out, then all that leads
+5. *Loops.* Pairs of slices that run to and fro along each other are taken out, then all that leads
    nowhere; what is left is followed from node to node, at each to the leftmost.
    (`without_doubles`, `without_dead_ends`, `trace_loops`)
 6. *Paths.* Slices of one element are joined again, slivers and degenerate loops dropped.
@@ -221,7 +221,7 @@ class Corners:
 
     @classmethod
     def of(cls, frames: Frames, lines: Polylines) -> Corners:
-        """The corners of closed paths, whose segments are told by `frames`."""
+        """The corners of closed paths, whose segments `frames` describe."""
         before = frames.tangent_at(np.ones(len(frames.length)))
         following = _next_rows(lines)
         after = frames.tangent[following]
@@ -508,7 +508,7 @@ def valid_slices(slices: Slices, elements: Segments, source: Arrays, asked: Offs
 
 
 def without_doubles(slices: Slices, elements: Segments) -> Slices:
-    """The slices without repetitions, and without pairs that run the same way to and fro.
+    """The slices without repetitions, and without pairs that run to and fro along each other.
 
     Such a pair encloses nothing: it is where the offset falls apart, or collapses to a line.
     """

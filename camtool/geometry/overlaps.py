@@ -47,7 +47,7 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
     What is shorter than `within_mm` is left out with the overlap beside it.
     """
     whole = Unlapped(lines, np.arange(len(lines)), 0, 0.0)
-    of = _stretches(lines, groups, within_mm)
+    of = _intervals(lines, groups, within_mm)
     if not of.loose.any():
         return whole
     found = covers(of, within_mm)
@@ -72,8 +72,8 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
     return Unlapped(_together(parts).select(order), origin[order], len(left), gone)
 
 
-def _stretches(lines: Polylines, groups: Ints, within: float) -> Stretches:
-    """One stretch for each loose path, and one for each segment of the others."""
+def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:
+    """One interval for each loose path, and one for each segment of the others."""
     segments = Segments.of(lines)
     counts = np.bincount(segments.path, minlength=len(lines))
     first = np.cumsum(counts) - counts
@@ -98,7 +98,7 @@ def _stretches(lines: Polylines, groups: Ints, within: float) -> Stretches:
     width = np.where(loose_arc[path], sweep[path], np.abs(segments.sweep[rows]))
     length = np.where(arc, width * radius[rows], length)
     begins = segments.start_angle[rows] - np.where(segments.bulge[rows] < 0.0, width, 0.0)
-    return Stretches(
+    return Intervals(
         path=path,
         group=groups[path],
         loose=(loose_line | loose_arc)[path],
@@ -111,10 +111,10 @@ def _stretches(lines: Polylines, groups: Ints, within: float) -> Stretches:
     )
 
 
-def _left(of: Stretches, found: Covers, within: float) -> dict[int, _Spans]:
-    """For each loose stretch that is covered by what stays, the spans of it that are left."""
+def _left(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
+    """For each loose interval that is covered by what stays, the spans of it that are left."""
     rank = _ranks(of, np.unique(np.concatenate([found.a, found.b])))
-    # A loose stretch yields to what is not loose, and to loose ones that rank before it.
+    # A loose interval yields to what is not loose, and to loose ones that rank before it.
     yields = ~of.loose[found.b] | (rank[found.b] < rank[found.a])
     order = np.argsort(rank[found.a], kind="stable")
     order = order[yields[order]]
@@ -136,7 +136,7 @@ def _left(of: Stretches, found: Covers, within: float) -> dict[int, _Spans]:
     return {a: spans for a, spans in left.items() if a not in whole}
 
 
-def _ranks(of: Stretches, rows: Ints) -> Ints:
+def _ranks(of: Intervals, rows: Ints) -> Ints:
     """(K,) who stays: the longest first, then by place, whatever was drawn first."""
     of_line = of.start + 0.5 * of.length[:, None] * of.direction
     middle = np.where(np.isnan(of.centre), of_line, of.centre)
@@ -162,8 +162,8 @@ def _cut(spans: _Spans, low: float, high: float, within: float) -> _Spans:
     return cut
 
 
-def _part(lines: Polylines, of: Stretches, row: int, span: tuple[float, float]) -> Polylines:
-    """A span of a loose stretch as a path that runs as the stretch was drawn."""
+def _part(lines: Polylines, of: Intervals, row: int, span: tuple[float, float]) -> Polylines:
+    """A span of a loose interval as a path that runs as the interval was drawn."""
     path = lines[int(of.path[row])].vertices
     begin, end = span
     if math.isnan(of.radius[row]):
@@ -198,29 +198,29 @@ def _together(parts: list[Polylines]) -> Polylines:
     )
 
 
-# Lines and arcs as stretches of a carrier (a whole line or circle), and which cover which.
+# Lines and arcs as intervals of a carrier (a whole line or circle), and which cover which.
 #
-# A stretch of a line runs from its start; one of a circle runs CCW from its first angle. Places on
-# it are told in mm from there. Stretches that come from one loose path carry its number, so that
-# what is left of it can be told later; all others stay as they are.
+# An interval of a line runs from its start; one of a circle runs CCW from its first angle. Places
+# on it are given in mm from there. Intervals that come from one loose path carry its number, so
+# that what is left of it can be found later; all others stay as they are.
 #
 # Two lines lie on each other when they do so within `within_mm` along all they share, two arcs
 # when centres and radii agree within that. What they share must be `SHORTEST_SHARES` times as
 # long, or its direction would not be known well enough to say that they are on one line.
 
 SHORTEST_SHARES = 32.0
-"""Stretches share so many times their tolerance at least, or they count as apart."""
+"""Intervals share so many times their tolerance at least, or they count as apart."""
 
 BINS = 50
 """Directions of lines are sorted into so many bins; 2/SHORTEST_SHARES rad is less than one."""
 
 MOST_PAIRS = 2_000_000
-"""No more pairs of stretches on each other than this are looked at."""
+"""No more pairs of intervals on each other than this are looked at."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stretches:
-    """K stretches: `path` (K,) that each came from, `group` (K,), `loose` (K,), `length` (K,) mm.
+class Intervals:
+    """K intervals: `path` (K,) that each came from, `group` (K,), `loose` (K,), `length` (K,) mm.
 
     Lines have `start` (K, 2) and the unit `direction` (K, 2); circles `centre` (K, 2), `radius`
     (K,) and the first angle `low` (K,) rad. The others are NaN.
@@ -239,7 +239,7 @@ class Stretches:
 
 @dataclass(frozen=True, eq=False)
 class Covers:
-    """Pairs of stretches on one carrier: of the stretch `a`, `begin` to `end` mm lie on `b`.
+    """Pairs of intervals on one carrier: of the interval `a`, `begin` to `end` mm lie on `b`.
 
     A place s mm along b is at  shift + sense·s  along a.
     """
@@ -256,8 +256,8 @@ class Covers:
         return Covers(**{name: column[rows] for name, column in vars(self).items()})
 
 
-def covers(all_of: Stretches, within_mm: float) -> Covers:
-    """Every stretch that covers part of a loose one of another path of its group."""
+def covers(all_of: Intervals, within_mm: float) -> Covers:
+    """Every interval that covers part of a loose one of another path of its group."""
     found: list[Covers] = []
     count = 0
     for part in chain(_on_lines(all_of, within_mm), _on_circles(all_of, within_mm)):
@@ -272,7 +272,7 @@ def covers(all_of: Stretches, within_mm: float) -> Covers:
     )
 
 
-def _on_lines(of: Stretches, within_mm: float) -> Iterator[Covers]:
+def _on_lines(of: Intervals, within_mm: float) -> Iterator[Covers]:
     """Bin by bin: lines of nearly one direction, turned level so that their boxes are flat."""
     lines = np.flatnonzero(~np.isnan(of.direction[:, 0]))
     angle = np.arctan2(of.direction[lines, 1], of.direction[lines, 0])
@@ -287,7 +287,7 @@ def _on_lines(of: Stretches, within_mm: float) -> Iterator[Covers]:
             yield _shared_line(of, near[a[wanted]], near[b[wanted]], within_mm)
 
 
-def _level_boxes(of: Stretches, rows: Ints, angle: float, margin: float) -> Floats:
+def _level_boxes(of: Intervals, rows: Ints, angle: float, margin: float) -> Floats:
     """(R, 4) boxes of lines turned by −angle, grown by the margin."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     start = of.start[rows]
@@ -297,7 +297,7 @@ def _level_boxes(of: Stretches, rows: Ints, angle: float, margin: float) -> Floa
     return np.concatenate([low, high], axis=1)
 
 
-def _shared_line(of: Stretches, a: Ints, b: Ints, within: float) -> Covers:
+def _shared_line(of: Intervals, a: Ints, b: Ints, within: float) -> Covers:
     """What the lines a lie on the lines b, pair by pair.
 
     Along a, the distance of b's line is linear: it is largest at the ends of what they share.
@@ -319,7 +319,7 @@ def _shared_line(of: Stretches, a: Ints, b: Ints, within: float) -> Covers:
     return Covers(a, b, begin, end, shift, np.where(sense < 0.0, -1.0, 1.0))[good]
 
 
-def _on_circles(of: Stretches, within_mm: float) -> Iterator[Covers]:
+def _on_circles(of: Intervals, within_mm: float) -> Iterator[Covers]:
     """Arcs on one circle. Circles of a grid of holes have equal centres in x, or in y, and equal
     radii: on a slanted line their centres are apart."""
     arcs = np.flatnonzero(~np.isnan(of.radius))
@@ -337,7 +337,7 @@ def _on_circles(of: Stretches, within_mm: float) -> Iterator[Covers]:
         yield from _shared_circle(of, a[same], b[same], within_mm)
 
 
-def _shared_circle(of: Stretches, a: Ints, b: Ints, within: float) -> Iterator[Covers]:
+def _shared_circle(of: Intervals, a: Ints, b: Ints, within: float) -> Iterator[Covers]:
     """What arcs a lie on arcs b: b may cover a's beginning and its end, from two turns."""
     radius, turn = of.radius[a], 2.0 * np.pi
     ahead = np.mod(of.low[b] - of.low[a], turn)

@@ -265,23 +265,23 @@ def _refuse(bad: Bools, message: str, offsets: Ints) -> None:
     raise GeometryError(message, where=f"path {path}, vertex {row - int(offsets[path])}")
 
 
-# Polylines reversed, moved, turned, mirrored, scaled, and begun elsewhere: always new ones.
+# Polylines reversed, rotated, and begun elsewhere: always new ones.
 
 
 def reverse(p: Polyline) -> Polyline:
-    """The same path travelled the other way; a closed one still begins at its first vertex."""
+    """The same path travelled backwards; a closed one still begins at its first vertex."""
     count = len(p.vertices)
     order = np.arange(count)[::-1]
     if p.closed:
         order = np.roll(order, 1)
     vertices = p.vertices[order]
-    # The segment that left vertex i now leaves vertex i + 1 and bends the other way.
+    # The segment that left vertex i now leaves vertex i + 1 and bends to the other side.
     vertices[:, 2] = 0.0 - p.vertices[(order - 1) % count, 2]
     return Polyline(vertices, p.closed)
 
 
 def lines_reversed(lines: Polylines) -> Polylines:
-    """Every path travelled the other way, as `reverse` does."""
+    """Every path travelled backwards, as `reverse` does."""
     counts = np.diff(lines.offsets)
     low, count = np.repeat(lines.offsets[:-1], counts), np.repeat(counts, counts)
     place = np.arange(len(low)) - low

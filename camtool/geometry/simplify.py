@@ -1,4 +1,4 @@
-"""Polylines that were arcs become arcs again: chords whose ends lie on one circle.
+"""Polylines with fewer segments: chords on one circle become an arc, specks are merged.
 
 Drawings are often exploded into chords. A run of chords becomes an arc when
 

@@ -107,8 +107,8 @@ def assemble(
     )
     # What is drawn twice has a finding of its own.
     once = [item for item in clean.skipped if item.reason != IS_DRAWN_TWICE]
-    noticed = [*findings, *skip_findings(skipped, [*unwanted, *once, *repeated])]
-    return replace(drawing, findings=(*noticed, *_judged(drawing, options)))
+    found = [*findings, *skip_findings(skipped, [*unwanted, *once, *repeated])]
+    return replace(drawing, findings=(*found, *_judged(drawing, options)))
 
 
 def _unchosen(

@@ -126,7 +126,7 @@ def _by_bytes(data: bytes, file: str) -> str | None:
         raise DrawingError("is compressed with gzip", file=file, mend="unpack it first (gunzip)")
     if data.startswith(_ZIP):
         what, mend = next(
-            (told for sign, told in _ZIPPED.items() if sign in data[:HEAD_BYTES]),
+            (answer for sign, answer in _ZIPPED.items() if sign in data[:HEAD_BYTES]),
             ("is a ZIP archive", "unpack it first"),
         )
         raise DrawingError(what, file=file, mend=mend)

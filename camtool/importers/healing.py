@@ -246,7 +246,7 @@ def _members(chains: tuple[tuple[int, ...], ...], of: Ints) -> tuple[tuple[int, 
 
 
 def _chained(pieces: Sequence[Piece], lines: Polylines, of: Ints, options: ReadOptions) -> Chained:
-    """The paths joined, within their layers unless told otherwise."""
+    """The paths joined, within their layers unless `across_layers`."""
     chosen = [pieces[index] for index in of.tolist()]
     layers = [piece.layer for piece in chosen]
     kinds = Kinds(
@@ -273,7 +273,7 @@ def _recognised(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]
 # measured, not followed through the stages that clean and mend, so that nothing can be left out:
 #
 #     pieces × paths ──same segments──▶ as the reader says
-#                    └─other ones─────▶ distances both ways, and what the reader says on top
+#                    └─other ones─────▶ distances there and back, and what the reader says
 #
 # Distances are to true lines and arcs, from points along each segment (`PLACES`). Between lines
 # the ends have the largest one, between the chords of an arc and the arc their middles.
@@ -332,7 +332,7 @@ def _drawn(pieces: Sequence[Piece]) -> tuple[Floats, Floats, Floats]:
 
 def _changed(drawn: Segments, said: Floats, made: Segments, gone: Bools, new: Bools) -> Floats:
     """(K, 2) of the segments `made`: what `gone` of the drawn ones, and which of them are `new`,
-    tells of them, measured both ways."""
+    says of them, measured both there and back."""
     off = np.zeros((len(made), 2))
     # What was drawn, to what is there now: the nearest of it, and what is about as near.
     points, of = _samples(drawn, np.flatnonzero(gone))

@@ -69,9 +69,9 @@ def file_bytes(path: Path) -> bytes:
     file = str(path)
     try:
         with path.open("rb") as stream:
-            # The size that the system tells spares reading; pipes and devices tell none.
-            told = os.fstat(stream.fileno())
-            if stat.S_ISREG(told.st_mode) and told.st_size > MAX_FILE_BYTES:
+            # The size that the system gives spares reading; pipes and devices have none.
+            status = os.fstat(stream.fileno())
+            if stat.S_ISREG(status.st_mode) and status.st_size > MAX_FILE_BYTES:
                 raise _too_large(file)
             return _bounded(stream, file)
     except FileNotFoundError as error:

@@ -1,4 +1,4 @@
-"""Chaining against its literal twin, and under changes that must not matter."""
+"""Chaining against its literal oracle, and under changes that must not matter."""
 
 from __future__ import annotations
 

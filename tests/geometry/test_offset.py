@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -19,9 +20,11 @@ from camtool.geometry.measure import (
 )
 from camtool.geometry.offset import (
     Offset,
+    Slices,
     merge_points,
     offset_shape,
     shape_stages,
+    trace_loops,
 )
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
 from tests.geometry.test_offset_random import missing
@@ -337,3 +340,32 @@ def test_arcs_of_a_rounded_polygon_keep_their_centres() -> None:
     assert np.abs(np.abs(arcs.centre - [10, 5]) - [8, 3]).max() < 1e-9
     assert arcs.radius == pytest.approx(3.0, abs=1e-9)
     assert arcs.bulge == pytest.approx(QUARTER, abs=1e-12)
+
+
+# Stitching on its own: kept slices become loops, in whatever order they come.
+
+
+def lines_between(nodes: list[tuple[float, float]], ways: list[tuple[int, int]]) -> Slices:
+    count = len(ways)
+    return Slices(
+        element=np.arange(count),
+        t0=np.zeros(count),
+        t1=np.ones(count),
+        from_node=np.array([a for a, _ in ways]),
+        to_node=np.array([b for _, b in ways]),
+        nodes=np.array(nodes, dtype=np.float64),
+    )
+
+
+def test_a_loop_that_hangs_on_another_is_taken_off_once() -> None:
+    # A triangle with a second one at its node 1: begun anywhere, both come back, and only they.
+    # Begun before node 1, the second loop closes while the first is still open.
+    slices = lines_between(
+        [(0, 0), (2, 0), (4, 0), (4, 1), (0, 2)], [(0, 1), (1, 2), (2, 3), (3, 1), (1, 4), (4, 0)]
+    )
+    places = slices.nodes
+    elements = Segments.between(places[slices.from_node], places[slices.to_node], np.zeros(6))
+    for order in permutations(range(6)):
+        rows = np.array(order)
+        loops = [rows[loop] for loop in trace_loops(slices[rows], elements)]
+        assert sorted(sorted(loop.tolist()) for loop in loops) == [[0, 4, 5], [1, 2, 3]]

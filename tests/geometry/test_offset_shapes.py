@@ -1,4 +1,4 @@
-"""Offsets of whole shapes with islands, and mitred corners, judged by slow, obvious twins."""
+"""Offsets of whole shapes with islands, and mitred corners, judged by slow, obvious oracles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which points a ring holds, against its twin; paths held, against all their points asked."""
+"""Which points a ring holds, against its oracle; paths held, against all their points asked."""
 
 import numpy as np
 from hypothesis import given
@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import Polylines, Segments
-from tests.oracles import inside as twin
+from tests.oracles import inside as oracle
 from tests.oracles.contours import CIRCLE, CRESCENT, FILLETED, KEYHOLE, RANDOM, SQUARE, comb
 
 
@@ -21,7 +21,7 @@ def test_random_contours(seed: int, kind: str) -> None:
     # Level with vertices, and on them.
     points[:50, 1] = rng.choice(ring.start[:, 1], 50)
     points[50:60] = rng.choice(ring.start, 10)
-    assert (inside(points, ring) == twin.inside(points, ring)).all()
+    assert (inside(points, ring) == oracle.inside(points, ring)).all()
 
 
 def test_on_a_grid() -> None:
@@ -30,5 +30,5 @@ def test_on_a_grid() -> None:
     points = np.column_stack([x.ravel(), y.ravel()])
     for p in (CIRCLE, CRESCENT, FILLETED, KEYHOLE, SQUARE, comb(6)):
         ring = Segments.of(p)
-        assert (inside(points, ring) == twin.inside(points, ring)).all()
+        assert (inside(points, ring) == oracle.inside(points, ring)).all()
         assert 0 < inside(points, ring).sum() < len(points)

@@ -1,4 +1,4 @@
-"""The kernels of offsets against literal twins."""
+"""The kernels of offsets against literal oracles."""
 
 import math
 
@@ -26,7 +26,7 @@ from camtool.geometry.offset import (
 )
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.kernels import offset_curves, offset_kites, offset_meet, offset_near
-from tests.oracles import offset_stages as twin
+from tests.oracles import offset_stages as oracle
 from tests.oracles.contours import RANDOM, gear
 from tests.oracles.offset_shapes import kites
 from tests.paths import offset
@@ -130,7 +130,7 @@ def test_merged_points(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points = np.round(rng.uniform(0.0, 4.0, (60, 2)), 1) + rng.uniform(0.0, 0.02, (60, 2))
     node, nodes = merge_points(points, 0.09)
-    wanted = twin.groups(points, 0.09)
+    wanted = oracle.groups(points, 0.09)
     assert [set(np.flatnonzero(node == k)) for k in range(len(nodes))] == wanted
     assert nodes.tolist() == [points[min(group)].tolist() for group in wanted]
 
@@ -154,19 +154,19 @@ def test_stages(seed: int, kind: str, share: float, outward: bool) -> None:
     asked = Offset(share * drawn[1])
     stages = shape_stages(Polylines.of([p]), asked)
     elements, least = stages.trimmed.elements, asked.distance_mm - VALIDITY_EPS_MM
-    wanted = twin.valid(stages.slices, elements, Segments.of(p), least)
+    wanted = oracle.valid(stages.slices, elements, Segments.of(p), least)
     assert (stages.valid == wanted).all()
     kept = stages.slices[stages.valid]
     eps = 2.0 * NODE_EPS_MM
     one = without_doubles(kept, elements)
-    other = twin.without_doubles(kept, elements, eps)
+    other = oracle.without_doubles(kept, elements, eps)
     assert one.element.tolist() == other.element.tolist()
-    one, other = without_dead_ends(one), twin.without_dead_ends(other)
+    one, other = without_dead_ends(one), oracle.without_dead_ends(other)
     assert (one.t0.tolist(), one.to_node.tolist()) == (other.t0.tolist(), other.to_node.tolist())
-    loops, walked = trace_loops(one, elements), twin.trace_loops(other, elements)
+    loops, walked = trace_loops(one, elements), oracle.trace_loops(other, elements)
     assert sorted(map(cycle, loops)) == sorted(map(cycle, walked))
     eps = POSITION_EPS_MM
-    clean = [twin.without_slivers(twin.vertices_of(r, other, elements), eps) for r in walked]
+    clean = [oracle.without_slivers(oracle.vertices_of(r, other, elements), eps) for r in walked]
     left = [each for each in clean if each is not None and len(each) > 1]
     found = offset(p, asked.distance_mm)
     if len(found) == len(left):
@@ -191,9 +191,9 @@ def test_loops_in_any_tangle(seed: int) -> None:
     slices = Slices(
         np.arange(24), np.zeros(24), np.ones(24), ends[:, 0].copy(), ends[:, 1].copy(), nodes
     )
-    one, other = without_dead_ends(slices), twin.without_dead_ends(slices)
+    one, other = without_dead_ends(slices), oracle.without_dead_ends(slices)
     assert one.element.tolist() == other.element.tolist()
-    loops, walked = trace_loops(one, elements), twin.trace_loops(one, elements)
+    loops, walked = trace_loops(one, elements), oracle.trace_loops(one, elements)
     assert sorted(map(cycle, loops)) == sorted(map(cycle, walked))
     used = np.concatenate([*loops, np.empty(0, dtype=np.int64)])
     assert len(np.unique(used)) == len(used)

@@ -1,1 +1,1 @@
-"""Slow, obvious twins: what the fast code is compared with."""
+"""Slow, obvious oracles: what the fast code is compared with."""

@@ -1,4 +1,4 @@
-"""The literal twin of camtool.geometry.chain: every pair of ends looked at, one path at a time."""
+"""The literal oracle of camtool.geometry.chain: every pair of ends, one path at a time."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ class Result:
 
 def chained(paths: list[Polyline], gap: float, groups: list[str], styles: list[str]) -> Result:
     """What `chain` must give."""
-    twin = _Twin(paths, max(gap, POSITION_EPS_MM), groups, styles)
-    twin.pair()
-    twin.split()
+    oracle = _Oracle(paths, max(gap, POSITION_EPS_MM), groups, styles)
+    oracle.pair()
+    oracle.split()
     results: list[tuple[tuple[int, ...], Polyline]] = []
     gaps: list[float] = []
-    for members, turned, ring in twin.walk():
+    for members, turned, ring in oracle.walk():
         for of, path, sizes in _assembled(paths, members, turned, ring):
             results.append((of, path))
             gaps.extend(sizes)
     results.extend(((i,), path) for i, path in enumerate(paths) if path.closed)
     results.sort(key=lambda item: min(item[0]))
-    return Result(results, gaps, twin.branches())
+    return Result(results, gaps, oracle.branches())
 
 
-class _Twin:
+class _Oracle:
     def __init__(
         self, paths: list[Polyline], reach: float, groups: list[str], styles: list[str]
     ) -> None:

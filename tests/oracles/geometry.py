@@ -1,4 +1,4 @@
-"""Slow obvious twins of camtool.geometry: paths as very many points.
+"""Slow obvious oracles of camtool.geometry: paths as very many points.
 
 Points of an arc come from its centre and angles, by trigonometry alone.
 """

@@ -1,4 +1,4 @@
-"""Slow, obvious twins for offsets: distances by angles about centres, insides by fine chords.
+"""Slow, obvious oracles for offsets: distances by angles about centres, insides by fine chords.
 
 Nothing here uses camtool.geometry beyond the record of a polyline.
 """

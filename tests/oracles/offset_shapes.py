@@ -1,4 +1,4 @@
-"""Slow, obvious twins for offsets of whole shapes: regions of shapely, with what mitres cover.
+"""Slow, obvious oracles for offsets of whole shapes: regions of shapely, with what mitres cover.
 
 Shapes are lists of closed paths that do not cross; their region lies on the left of all of them.
 Nothing here uses camtool.geometry beyond the record of a polyline.

@@ -1,4 +1,4 @@
-"""Literal twins of the kernels of offsets: every pair looked at, every loop walked in Python."""
+"""Literal oracles of the kernels of offsets: every pair looked at, every loop walked in Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Slow, obvious twin of a pocket: discs put down along the moves, and regions of fine chords.
+"""Slow, obvious oracle of a pocket: discs put down along the moves, and regions of fine chords.
 
 Arcs are chords here; nothing of camtool is used beyond the records.
 """

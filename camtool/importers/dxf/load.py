@@ -1,4 +1,4 @@
-"""The bytes of a DXF file to ezdxf's document, and what had to be repaired on the way.
+"""The bytes of a DXF file to ezdxf's document, and what had to be repaired for that.
 
     tags, each checked → sections → whole? → ezdxf's ordinary reader → the document
                                        └── faulty order ──▶ ezdxf's recovery ──┘

@@ -242,7 +242,7 @@ _SPELLINGS = {"inches": "inch", "in": "inch", "feet": "foot", "ft": "foot"}
 
 @dataclass(frozen=True)
 class FileUnit:
-    """`mm` per unit of the file, which its reader has applied already; None: cannot be told."""
+    """`mm` per unit of the file, which its reader has applied already; None: unknown."""
 
     why: str
     mm: float | None = 1.0

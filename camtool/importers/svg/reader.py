@@ -42,7 +42,7 @@ from camtool.importers.svg.tree import MAX_DEPTH, Node, parse_tree, ready, write
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     """The Drawing of an SVG, also a gzipped one; DrawingError naming element and line when it
-    cannot be read. What is wrong in one element alone leaves that element out, and is told."""
+    cannot be read. What is wrong in one element alone leaves that element out, with a finding."""
     try:
         content = ready(data)
         root = parse_tree(content)
@@ -403,7 +403,7 @@ def _cost(found: list[Subpath]) -> int:
 
 @dataclass
 class Notes:
-    """Counts by kind and reason; of faults the first of each kind is told."""
+    """Counts by kind and reason; of faults the first of each kind is kept."""
 
     used: Counter[str] = field(default_factory=Counter)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)

@@ -112,8 +112,8 @@ def _pair(z: complex) -> Floats:
 # Path data.
 #
 # The words of path data are checked here to the letter: what stands before the first wrong sign is
-# drawn, as the standard wants it, and the fault is told. Lines and arcs are done with that; the
-# Bézier curves, with their smooth and relative forms, are svgpathtools' to make.
+# drawn, as the standard wants it, and the fault is reported. Lines and arcs are done with that;
+# the Bézier curves, with their smooth and relative forms, are svgpathtools' to make.
 #
 # Source: Scalable Vector Graphics 1.1, chapter 8 (paths; 8.3.9 for their grammar) and appendix F.2
 # (drawing up to an error).
