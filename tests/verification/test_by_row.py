@@ -11,7 +11,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import circle, cut, follow, pic_mmh, square
 from tests.oracles.judged import MACHINE, judged
-from tests.targets import verify
+from tests.targets import on, verify
 
 
 def two_squares():
@@ -52,7 +52,7 @@ def test_the_worst_moves_come_first_and_know_their_blocks() -> None:
     decoded = replace(two_squares(), block=np.arange(len(two_squares())) + 10)
     options = VerifyOptions(worst=3)
     chunks = follow(decoded, 50, further_out)
-    found = judge(Case(decoded, MACHINE, two_squares(), None, options), chunks).report
+    found = judge(Case(decoded, on(MACHINE), two_squares(), None, options), chunks).report
     assert len(found.worst) == 3
     errors = [one.total_um for one in found.worst]
     assert errors == sorted(errors, reverse=True)
@@ -61,7 +61,7 @@ def test_the_worst_moves_come_first_and_know_their_blocks() -> None:
     assert all(one.at_mm[0] > 3.0 for one in found.worst[:2])
     assert found.worst_text().splitlines()[0].startswith(f"block {found.worst[0].block} ")
     none = judge(
-        Case(decoded, MACHINE, None, None, VerifyOptions(worst=0)), follow(decoded, 5)
+        Case(decoded, on(MACHINE), None, None, VerifyOptions(worst=0)), follow(decoded, 5)
     ).report
     assert none.worst == ()
 
@@ -77,7 +77,7 @@ def test_ends_that_the_controller_does_not_reach() -> None:
         return one_row(row, commanded, commanded)
 
     chunks = [short(index, one) for index, one in enumerate(follow(decoded, 20))]
-    made = judge(Case(decoded, MACHINE, decoded, None, VerifyOptions()), chunks)
+    made = judge(Case(decoded, on(MACHINE), decoded, None, VerifyOptions()), chunks)
     assert made.report.unreached is not None
     assert made.report.unreached.moves == 2
     assert made.report.unreached.max_um == pytest.approx(30.0, abs=0.15)

@@ -20,6 +20,7 @@ from tests.oracles.dense_moves import (
     points_of,
 )
 from tests.oracles.judged import MACHINE, STEP, UM, grid, judged, sample_part
+from tests.targets import on
 
 
 def test_a_perfect_machine_makes_no_error() -> None:
@@ -68,7 +69,7 @@ def test_every_figure_is_that_of_dense_points() -> None:
         commanded[:, :2] += shake[:, :2]
         slide[:, :2] = commanded[:, :2] + shake[:, 2:]
         chunks.append(replace(piece, commanded=commanded, slide=slide))
-    case = Case(decoded, MACHINE, wanted, None, VerifyOptions())
+    case = Case(decoded, on(MACHINE), wanted, None, VerifyOptions())
     error = judge(case, chunks).report.error_um
 
     feeds = [m for m in decoded if m.kind != Kind.RAPID and m.start[:2] != m.end[:2]]
@@ -187,7 +188,7 @@ def test_air_moves_count_in_time_and_steps_but_not_in_errors() -> None:
 def test_places_beyond_all_machines_are_refused_and_never_judged(mover: str, value: float) -> None:
     """The judge is compiled with the promise of finite numbers: others led its indices astray."""
     decoded = sample_part().finish()
-    case = Case(decoded, MACHINE, decoded, None, VerifyOptions(), None)
+    case = Case(decoded, on(MACHINE), decoded, None, VerifyOptions(), None)
     for axis in (0, 1):
         for sample in (0, 37, 999):
             points = np.zeros((1000, 3))
@@ -202,7 +203,7 @@ def test_places_beyond_all_machines_are_refused_and_never_judged(mover: str, val
 
 def test_positions_at_the_very_limit_are_judged() -> None:
     decoded = sample_part().finish()
-    case = Case(decoded, MACHINE, decoded, None, VerifyOptions(), None)
+    case = Case(decoded, on(MACHINE), decoded, None, VerifyOptions(), None)
     row = int(np.flatnonzero(cut_moves(decoded, flat_cuts=False).is_cut)[0])
     points = np.full((1000, 3), 1e9)
     found = judge(case, [one_row(row, points, -points)]).report

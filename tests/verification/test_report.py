@@ -14,6 +14,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.report import Report, certain, clock, number
 from camtool.verification.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import circle, follow, pic_mmh, square
+from tests.targets import on
 
 MACHINE = pic_mmh()
 
@@ -24,13 +25,13 @@ def some_report(**options) -> Report:
     decoded = replace(toolpath, block=np.arange(len(toolpath)))
     given = VerifyOptions(source="logo.dxf", size_bytes=1234, **options)
     return judge(
-        Case(decoded, MACHINE, toolpath, None, given), follow(decoded, 50, lambda p: p * 1.002)
+        Case(decoded, on(MACHINE), toolpath, None, given), follow(decoded, 50, lambda p: p * 1.002)
     ).report
 
 
 def empty_report() -> Report:
     nothing = ToolpathBuilder().finish()
-    return judge(Case(nothing, MACHINE, None, None, VerifyOptions()), []).report
+    return judge(Case(nothing, on(MACHINE), None, None, VerifyOptions()), []).report
 
 
 WANTED_KEYS = {

@@ -14,11 +14,12 @@ from tests.oracles.dense_moves import (
     follow,
 )
 from tests.oracles.judged import MACHINE, STEP, UM, grid, sample_part
+from tests.targets import on
 
 
 def test_chunk_size_changes_nothing() -> None:
     decoded, wanted = sample_part(shift=3 * STEP).finish(), sample_part().finish()
-    case = Case(decoded, MACHINE, wanted, None, VerifyOptions())
+    case = Case(decoded, on(MACHINE), wanted, None, VerifyOptions())
 
     def bend(points: np.ndarray) -> np.ndarray:
         return points * 1.001
@@ -54,8 +55,10 @@ def test_a_moved_turned_or_mirrored_case_has_the_same_figures(move: str) -> None
         )
         for piece in chunks
     ]
-    one = judge(Case(decoded, MACHINE, wanted, None, VerifyOptions()), chunks).report
-    two = judge(Case(carry(decoded), MACHINE, carry(wanted), None, VerifyOptions()), there).report
+    one = judge(Case(decoded, on(MACHINE), wanted, None, VerifyOptions()), chunks).report
+    two = judge(
+        Case(carry(decoded), on(MACHINE), carry(wanted), None, VerifyOptions()), there
+    ).report
     for source in ("rounding", "interpolation", "mechanics", "total"):
         for name in ("max", "rms"):
             here, other = (getattr(getattr(r.error_um, source), name) for r in (one, two))
@@ -78,7 +81,7 @@ def test_the_trace_is_bounded_and_keeps_the_peak_and_the_row_ends() -> None:
         bent[np.hypot(*(points - [grid(4.75), grid(2.0)]).T).argmin()] = peak
         return bent
 
-    case = Case(decoded, MACHINE, decoded, None, VerifyOptions(trace_points=300))
+    case = Case(decoded, on(MACHINE), decoded, None, VerifyOptions(trace_points=300))
     chunks = [
         piece if piece.ledger.row[0] != 11 else chunk(11, piece.commanded, spike)
         for piece in follow(decoded, 5000)
@@ -101,5 +104,5 @@ def test_more_rows_than_trace_points_are_thinned() -> None:
     for number in range(400):
         b.line(1 + 0.01 * number, 1 + 0.01 * (number % 2), feed=1)
     decoded = b.finish()
-    case = Case(decoded, MACHINE, None, None, VerifyOptions(trace_points=100))
+    case = Case(decoded, on(MACHINE), None, None, VerifyOptions(trace_points=100))
     assert len(judge(case, follow(decoded, 5)).trace.points) <= 100
