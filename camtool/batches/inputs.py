@@ -18,7 +18,7 @@ import unicodedata
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path, PurePath
 
-from camtool.batches.manifest import Places
+from camtool.batches.manifest import RealPaths
 from camtool.batches.run import Task
 from camtool.errors import InputError, OutputError
 
@@ -36,7 +36,7 @@ def find_tasks(
     source gives none; OutputError, which names both, when two drawings have one output.
     """
     tasks: dict[Path, Task] = {}
-    places = Places()
+    places = RealPaths()
     for source in sources:
         found = False
         for path, stem in _found(source, places.of(out)):

@@ -49,7 +49,7 @@ class Manifest:
     def outputs(self) -> frozenset[Path]:
         """All files that it knows of, resolved."""
         names = (name for entry in self._entries.values() for name in entry.files)
-        places = Places()
+        places = RealPaths()
         return frozenset(places.of(self._out / name) for name in names)
 
     def add(self, stem: str, entry: Entry) -> None:
@@ -177,7 +177,7 @@ def _version(name: str) -> str:
 # Where files really are: as `Path.resolve`, quick for many files of few folders.
 
 
-class Places:
+class RealPaths:
     """Real paths; each folder is looked up once."""
 
     def __init__(self) -> None:

@@ -19,7 +19,7 @@ from types import FrameType
 import click
 
 from camtool.batches.manifest import NAME as MANIFEST
-from camtool.batches.manifest import Manifest, Places
+from camtool.batches.manifest import Manifest, RealPaths
 from camtool.batches.run import Made, Outcome, Pool, State, Task
 from camtool.cli.batch_messages import Display, Verbosity, display, say_summary, summary_json
 from camtool.cli.batch_work import SVG, JobOrder, PostWork
@@ -238,7 +238,7 @@ class BatchRun:
         ]
         sources = [task.source for task in ordered.tasks]
         refuse_same([*sources, *reads, *jobs], [*ours, self.summary, *makes])
-        places = Places()
+        places = RealPaths()
         for task in ordered.tasks if self.work.preview == SVG else ():
             picture = self.out / f"{task.stem}{SVG}"
             if is_foreign(picture, task.stem) and places.of(picture) not in made:

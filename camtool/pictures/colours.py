@@ -9,7 +9,6 @@ Layers of a drawing are told apart by the colours of Okabe and Ito (jfly.uni-koe
 
 from __future__ import annotations
 
-import math
 import re
 from itertools import pairwise
 
@@ -108,15 +107,6 @@ def darkened(svg: str) -> str:
     """A picture of the light palette in the dark one: only colours of fills and strokes change."""
     instead = _DARK | dict(zip(bin_colours(), bin_colours(dark=True), strict=True))
     return _PAINT.sub(lambda found: f'{found[1]}="{instead[found[2]]}"', svg)
-
-
-def lightness(colour: str) -> float:
-    """Relative luminance 0 … 1 of "#rrggbb" (WCAG 2.1)."""
-    linear = [
-        c / 12.92 if c <= 0.04045 else math.pow((c + 0.055) / 1.055, 2.4)
-        for c in (channel / 255.0 for channel in _channels(colour))
-    ]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
 def _channels(colour: str) -> tuple[int, int, int]:

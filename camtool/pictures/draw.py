@@ -1,11 +1,8 @@
-"""Pictures of drawings, toolpaths and predicted results.
+"""Pictures of drawings, toolpaths and predicted results: a Scene as SVG, and that as PNG.
 
-    draw   Scene → SVG (the source of truth)
-    png    SVG → PNG
-
-Read in this order: content.py sorts the scene into lines and marks, page.py decides where things
-lie, this file lays the layers one over the other. Equal scenes give equal bytes: no dates, no
-random ids, no fonts. Inside the group "mm" coordinates are those of the part, in mm, Y up.
+`content.py` sorts the scene into lines and marks, `layers.py` says how each layer draws them, and
+`page.py` where things lie; this file puts them together. Equal scenes give equal bytes: no dates,
+no random ids, no fonts. Inside the group "mm" coordinates are those of the part, in mm, Y up.
 """
 
 from __future__ import annotations
@@ -42,17 +39,12 @@ PNG_DPI = 96
 """resvg's own default of 0 makes lengths in mm vanish."""
 
 
-def draw(scene: Scene, *, size_px: int | None = None, options: Options = AS_USUAL) -> str:
-    """The scene as SVG text, `size_px` wide, else as the options say; OptionError when that is no
-    sensible width."""
-    if size_px is None:
-        size_px = options.size_px or SVG_WIDTH_PX
-    check_width(size_px)
-    options = replace(options, size_px=size_px)
+def draw(scene: Scene, options: Options = AS_USUAL) -> str:
+    """The scene as SVG text; OptionError for a circle that it does not have."""
     if options.polar is not None:
         return draw_polar(scene, options.polar, options)
     content = content_of(scene, options)
-    page = page_of(content, page_width(size_px))
+    page = page_of(content, page_width(options.size_px or SVG_WIDTH_PX))
     view, sizes = page.view, (page.width, page.height)
     return sheet(
         scene.title,
@@ -113,9 +105,6 @@ def _beside(content: Content, page: Page) -> list[str]:
     return parts
 
 
-# A scene as the bytes of a picture file, by the file's extension.
-
-
 def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
     """SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
     extensions. HTML is the viewer, which has no options."""
@@ -123,7 +112,7 @@ def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
         from camtool.pictures.viewer.page import viewer_page
 
         return viewer_page(scene)
-    return rendered(lambda sized: draw(scene, options=sized), name, options)
+    return rendered(lambda sized: draw(scene, sized), name, options)
 
 
 def rendered(drawn: Callable[[Options], str], name: str, options: Options) -> bytes:

@@ -37,7 +37,7 @@ class Picture:
             return draw_beside(self.scene, self.options)
         if isinstance(self.scene, Overlay):
             return draw_overlay(self.scene, self.options)
-        return draw(self.scene, options=self.options)
+        return draw(self.scene, self.options)
 
     def render(self, name: str) -> bytes:
         """The bytes of a file of this name: .svg, .png, or .html, which is the viewer (it has no

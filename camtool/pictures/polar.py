@@ -25,7 +25,7 @@ from camtool.units import UM_PER_MM
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class CircleErrors:
     """A circle of the plot: its number, and its errors (B, 3) µm."""
 
     which: int
@@ -37,7 +37,7 @@ class Shown:
         return "counterclockwise" if self.one.ccw else "clockwise"
 
 
-def shown(scene: Scene, which: int) -> tuple[Shown, ...]:
+def shown(scene: Scene, which: int) -> tuple[CircleErrors, ...]:
     """The `which`-th circle of the scene, from 1, and the same one gone round the other way where
     there is that, counterclockwise first; OptionError when there is no such circle."""
     if not 1 <= which <= len(scene.rounds):
@@ -51,7 +51,7 @@ def shown(scene: Scene, which: int) -> tuple[Shown, ...]:
     numbers = [which] if partner is None else [which, partner]
     rounds = [(number, scene.rounds[number - 1]) for number in numbers]
     rounds.sort(key=lambda found: not found[1].ccw)
-    return tuple(Shown(number, one, one.errors() * UM_PER_MM) for number, one in rounds)
+    return tuple(CircleErrors(number, one, one.errors() * UM_PER_MM) for number, one in rounds)
 
 
 def draw_polar(scene: Scene, which: int, options: Options) -> str:
@@ -77,7 +77,7 @@ def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[st
     return legend_rows(table, MARGIN, legend_y), foot_of(table, legend_y)
 
 
-def entries(circles: Sequence[Shown]) -> list[Entry]:
+def entries(circles: Sequence[CircleErrors]) -> list[Entry]:
     """Which way is which, where there are two."""
     if len(circles) < 2:
         return []
@@ -87,7 +87,7 @@ def entries(circles: Sequence[Shown]) -> list[Entry]:
     ]
 
 
-def notes(circles: Sequence[Shown], dial: Dial) -> tuple[str, ...]:
+def notes(circles: Sequence[CircleErrors], dial: Dial) -> tuple[str, ...]:
     """The circle, its figures, and how much its errors are magnified."""
     first = circles[0].one
     x, y = first.centre_mm

@@ -209,6 +209,7 @@ def scene_of(
 
         drawing = place(drawing, job)
     trace = verification.trace if verification is not None else None
+    worst = () if verification is None else verification.report.worst
     # A V bit is as wide as it is deep: one width for all of its path would be false.
     even = job is not None and cone_of(job) is None
     return Scene(
@@ -221,7 +222,7 @@ def scene_of(
         travel_mm=_travel(toolpath, machine),
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
-        worst=worst_places(verification),
+        worst=tuple(one.at_mm for one in worst),
         tool_mm=tool_mm(job) if job is not None and even else None,
         rounds=() if verification is None else rounds_of(verification),
         playback=_playback(toolpath, verification, machine, listing),
@@ -261,13 +262,6 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
             )
         )
     return tuple(found)
-
-
-def worst_places(verification: Verification | None) -> tuple[tuple[float, float], ...]:
-    """Where the largest errors are, mm, the largest first."""
-    if verification is None:
-        return ()
-    return tuple(one.at_mm for one in verification.report.worst)
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from camtool.batches.inputs import find_tasks
-from camtool.batches.manifest import Places
+from camtool.batches.manifest import RealPaths
 from camtool.errors import InputError, OutputError
 
 
@@ -158,7 +158,7 @@ def test_real_places_are_those_of_resolve() -> None:
     drawn("d/a.svg", "e/b.svg")
     Path("d/link.svg").symlink_to("../e/b.svg")
     Path("f").symlink_to("e")
-    places = Places()
+    places = RealPaths()
     for name in ("d/a.svg", "d/link.svg", "f/b.svg", "f/../e/b.svg", "f/none", ".", "f", "d/.."):
         assert places.of(name) == Path(name).resolve(), name
         assert places.of(Path(name).absolute()) == Path(name).resolve(), name

@@ -290,7 +290,7 @@ def test_the_picture_is_the_right_way_up() -> None:
 
 
 def test_pictures_of_ordinary_size_are_alike() -> None:
-    small, large = draw(SCENES["drawing"], size_px=1000), draw(SCENES["drawing"], size_px=1200)
+    small, large = (draw(SCENES["drawing"], Options(size_px=px)) for px in (1000, 1200))
     assert small.split("viewBox")[1] == large.split("viewBox")[1]
     assert 'width="1200"' in large
 
@@ -298,7 +298,7 @@ def test_pictures_of_ordinary_size_are_alike() -> None:
 @pytest.mark.parametrize("size", [400, 4000])
 def test_letters_and_lines_suit_the_size(size: int) -> None:
     """Pixels of a capital and of a line: neither too small to read nor as coarse as a poster."""
-    root = svg_page.parse(draw(SCENES["result"], size_px=size))
+    root = svg_page.parse(draw(SCENES["result"], Options(size_px=size)))
     pixels = size / float(root.attrib["viewBox"].split()[2])
     assert 9.0 < pixels * TICK_CAP < 36.0
     assert 1.5 < pixels * TRACE_PEN < 8.0
@@ -307,7 +307,7 @@ def test_letters_and_lines_suit_the_size(size: int) -> None:
 @pytest.mark.parametrize("size", [400, 4000])
 @pytest.mark.parametrize("name", list(SCENES))
 def test_no_two_labels_touch_at_any_size(name: str, size: int) -> None:
-    root = svg_page.parse(draw(SCENES[name], size_px=size))
+    root = svg_page.parse(draw(SCENES[name], Options(size_px=size)))
     page = [float(part) for part in root.attrib["viewBox"].split()]
     boxes = list(svg_page.label_boxes(root).items())
     for (one, box), (other, other_box) in combinations(boxes, 2):
@@ -320,7 +320,7 @@ def test_a_part_is_shown_as_it_was_asked_for() -> None:
     view = page_of(content_of(SCENES["result"], crop)).view
     assert view.x_range == pytest.approx((1.0, 3.0), abs=0.005)
     assert view.y_range == pytest.approx((2.0, 3.5), abs=0.005)
-    svg = draw(SCENES["result"], options=crop)
+    svg = draw(SCENES["result"], crop)
     assert "part-zero" not in ids(svg_page.parse(svg))
     whole = draw(SCENES["result"])
     assert bar_numbers(svg)[-1] == bar_numbers(whole)[-1]
@@ -336,7 +336,7 @@ def test_lines_of_a_part_are_not_thinned_by_what_lies_outside() -> None:
     far = [circle(50.0, 50.0, 1.0 + k / 200) for k in range(200)]
     scene = Scene("", drawing_of([circle(0.0, 0.0, 1.0), *far], ["0"] * 201))
     options = Options(crop_mm=(-2.0, -2.0, 4.0, 4.0))
-    root = svg_page.parse(draw(scene, options=options))
+    root = svg_page.parse(draw(scene, options))
     factor = float(named(root, "mm").attrib["transform"][7:].split()[0])
     width = float(named(root, "drawing").attrib["stroke-width"])
     assert factor * width == pytest.approx(ALONE_PEN, rel=1e-3)
@@ -349,14 +349,14 @@ def test_senseless_parts_are_refused(crop: tuple[float, float, float, float]) ->
 
 
 def test_the_dark_palette_changes_colours_only(scene: Scene) -> None:
-    light, dark = draw(scene), draw(scene, options=Options(dark=True))
+    light, dark = draw(scene), draw(scene, Options(dark=True))
     paint = re.compile('"#[0-9a-f]{6}"')
     assert paint.sub("", dark) == paint.sub("", light)
     assert f'fill="{PAPER}"' not in dark
 
 
 def test_png_of_a_dark_picture_is_dark() -> None:
-    svg = draw(SCENES["result"], options=Options(dark=True))
+    svg = draw(SCENES["result"], Options(dark=True))
     image = decode(png(svg, 320))[..., :3].astype(int)
     assert np.median(image.max(axis=2)) < 48
     top = rgb(bin_colours(dark=True)[-1])
@@ -365,7 +365,7 @@ def test_png_of_a_dark_picture_is_dark() -> None:
 
 @pytest.mark.parametrize("width", [251, 400])
 def test_the_paper_covers_the_last_row_of_pixels(width: int) -> None:
-    svg = draw(SCENES["wide"], options=Options(size_px=width))
+    svg = draw(SCENES["wide"], Options(size_px=width))
     assert (decode(png(svg, width))[..., 3] == 255).all()
 
 
@@ -386,7 +386,7 @@ def test_what_leaves_the_plot_is_not_seen(dark: bool) -> None:
 @pytest.mark.parametrize("width", [0, -5, 15, 20_001])
 def test_senseless_widths_are_refused(width: int) -> None:
     with pytest.raises(OptionError, match="pixels wide"):
-        draw(SCENES["empty"], size_px=width)
+        draw(SCENES["empty"], Options(size_px=width))
     with pytest.raises(OptionError, match="pixels wide"):
         png("<svg/>", width)
 
@@ -412,7 +412,7 @@ def test_points_alone_are_a_picture() -> None:
 
 @pytest.mark.parametrize("size", [400, 1000])
 def test_the_scale_bar_has_a_row_to_itself_only_when_it_must(size: int) -> None:
-    root = svg_page.parse(draw(SCENES["no error"], size_px=size))
+    root = svg_page.parse(draw(SCENES["no error"], Options(size_px=size)))
     bar, legend = named(root, "scale-bar"), named(root, "legend")
     rows = {
         float(g.attrib["transform"].split()[1][:-1]) for g in legend if "transform" in g.attrib

@@ -48,7 +48,7 @@ GROUPS = {
 
 
 def ids(scene: Scene, *layers: str) -> set[str]:
-    svg = draw(scene, options=Options(layers=frozenset(layers)))
+    svg = draw(scene, Options(layers=frozenset(layers)))
     return {g.attrib["id"] for g in svg_page.parse(svg).iter() if "id" in g.attrib}
 
 
@@ -203,7 +203,7 @@ def test_turns_are_those_of_the_literal_loop(seed: int) -> None:
 
 def test_pictures_of_all_layers_are_drawn() -> None:
     scene = scene_of_toolpath(followed(drawing_of([circle(1.0, 1.0, 1.0)], ["0"])), title="all")
-    assert draw(scene, options=Options(layers=frozenset(LAYERS)))
+    assert draw(scene, Options(layers=frozenset(LAYERS)))
 
 
 def rows_of_marks(count: int) -> Scene:

@@ -61,7 +61,7 @@ def compared() -> Overlay:
 
 
 def one(scene: Scene, **looks: object) -> Callable[[], str]:
-    return lambda: draw(scene, options=Options(**looks))
+    return lambda: draw(scene, Options(**looks))
 
 
 def beside(*scenes: Scene, **looks: object) -> Callable[[], str]:

@@ -134,22 +134,22 @@ def strokes_of(svg: str) -> list[str]:
 
 def test_both_ways_round_are_in_one_plot() -> None:
     scene = both_ways(seen(lambda a: 0.002 + 0 * a), seen(lambda a: -0.004 + 0 * a))
-    svg = draw(scene, options=Options(polar=2))
+    svg = draw(scene, Options(polar=2))
     strokes = strokes_of(svg)
     assert len(strokes) == len(set(strokes)) == 4
-    assert len(strokes_of(draw(scene, options=Options(polar=1)))) == 2
+    assert len(strokes_of(draw(scene, Options(polar=1)))) == 2
     labels = [g.get("aria-label") or "" for g in svg_page.parse(svg).iter()]
     assert "counterclockwise (circle 2)" in labels
     assert "clockwise (circle 3)" in labels
     assert any("both ways together: G(b) 30.00" in label for label in labels)
     assert sum(label.startswith("clockwise: G 20.00") for label in labels) == 1
-    assert svg == draw(scene, options=Options(polar=3))
+    assert svg == draw(scene, Options(polar=3))
 
 
 @pytest.mark.parametrize("size_px", [300, 1000])
 def test_the_legend_of_both_ways_lies_on_the_page(size_px: int) -> None:
     scene = both_ways(seen(lambda a: 0.002 + 0 * a), seen(lambda a: -0.004 + 0 * a))
-    root = svg_page.parse(draw(scene, options=Options(polar=2, size_px=size_px)))
+    root = svg_page.parse(draw(scene, Options(polar=2, size_px=size_px)))
     _, _, width, height = map(float, root.attrib["viewBox"].split())
     for _, top, right, bottom in svg_page.label_boxes(root).values():
         assert right < width
