@@ -1,3 +1,196 @@
+// Play, pause, the slider and the clock.
+
+const SLIDER_STEPS = 10000;
+const WHOLE_SECONDS = 20;
+const WAITED_MS = 250;
+
+class Player {
+  constructor(run, moved) {
+    this.run = run;
+    this.moved = moved;
+    this.playing = false;
+    this.slider = find("slider");
+    this.slider.max = String(SLIDER_STEPS);
+    this.slider.addEventListener("input", () => {
+      const share = Number(this.slider.value) / SLIDER_STEPS;
+      if (share >= 1) this.run.toEnd();
+      else this.run.toTime(share * this.run.total);
+      this.show();
+    });
+    find("play").addEventListener("click", () => this.toggle());
+    this.show();
+  }
+
+  /** Seconds of the machine for one of ours. */
+  get speed() {
+    const chosen = find("speed").value;
+    return chosen === "whole" ? this.run.total / WHOLE_SECONDS : Number(chosen);
+  }
+
+  toggle() {
+    if (this.playing) this.pause();
+    else this.play();
+  }
+
+  play() {
+    if (this.run.isAtEnd) this.run.toStart();
+    this.playing = true;
+    this.then = performance.now();
+    this.label();
+    requestAnimationFrame((now) => this.step(now));
+  }
+
+  pause() {
+    this.playing = false;
+    this.label();
+  }
+
+  label() {
+    find("play").textContent = this.playing ? "Pause" : "Play";
+    find("play").setAttribute("aria-pressed", String(this.playing));
+  }
+
+  step(now) {
+    if (!this.playing) return;
+    // A page that slept goes on from where it was.
+    const passed = Math.min(WAITED_MS, Math.max(0, now - this.then)) / 1000;
+    this.then = now;
+    const time = this.run.time + passed * this.speed;
+    if (time >= this.run.total) {
+      this.run.toEnd();
+      this.pause();
+    } else this.run.toTime(time);
+    this.show();
+    if (this.playing) requestAnimationFrame((next) => this.step(next));
+  }
+
+  toRow(row) {
+    this.pause();
+    this.run.toRow(row);
+    this.show();
+  }
+
+  toStart() {
+    this.pause();
+    this.run.toStart();
+    this.show();
+  }
+
+  faster(way) {
+    const speed = find("speed"), next = speed.selectedIndex + way;
+    speed.selectedIndex = Math.min(speed.options.length - 1, Math.max(0, next));
+  }
+
+  show() {
+    const { run } = this, share = run.total ? run.time / run.total : 1;
+    this.slider.value = String(Math.round(share * SLIDER_STEPS));
+    this.slider.setAttribute("aria-valuetext", `${clock(run.time)}, move ${run.row + 1}`);
+    find("clock").textContent = `${clock(run.time)} of ${clock(run.total)}`;
+    this.moved();
+  }
+}
+
+// The mouse, fingers and keys on the picture.
+
+const REACH_PX = 8;
+const CLICK_PX = 4;
+const WHEEL_RATE = 0.0015;
+const KEY_ZOOM = 1.4;
+const KEY_PAN_PX = 60;
+
+/** Drag to move, wheel or two fingers to zoom, hover to ask, click to go there. */
+class Hand {
+  constructor(stage, hovered, clicked) {
+    this.stage = stage;
+    this.hovered = hovered;
+    this.fingers = new Map();
+    const { place } = stage, at = (event) => {
+      const box = place.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    place.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const lines = event.deltaMode === 1 ? 30 : 1;
+      stage.view.zoom(Math.exp(-event.deltaY * lines * WHEEL_RATE), ...at(event));
+      stage.changed();
+    }, { passive: false });
+    place.addEventListener("pointerdown", (event) => {
+      place.setPointerCapture(event.pointerId);
+      this.fingers.set(event.pointerId, at(event));
+      this.travel = 0;
+    });
+    place.addEventListener("pointermove", (event) => {
+      if (this.fingers.has(event.pointerId)) this.drag(event.pointerId, at(event));
+      else this.hover(...at(event));
+    });
+    const lift = (event) => {
+      const tapped = this.fingers.delete(event.pointerId) && this.travel < CLICK_PX;
+      if (tapped && event.type === "pointerup") clicked();
+    };
+    place.addEventListener("pointerup", lift);
+    place.addEventListener("pointercancel", lift);
+    place.addEventListener("pointerleave", () => hovered(-1, -1, 0, 0));
+    place.addEventListener("dblclick", () => stage.fit());
+  }
+
+  drag(id, [x, y]) {
+    const { view } = this.stage, [oldX, oldY] = this.fingers.get(id);
+    this.travel += Math.hypot(x - oldX, y - oldY);
+    const other = [...this.fingers].find(([finger]) => finger !== id);
+    if (other) {
+      const [u, v] = other[1], before = Math.hypot(oldX - u, oldY - v);
+      if (before > 0) view.zoom(Math.hypot(x - u, y - v) / before, u, v);
+    } else view.pan(x - oldX, y - oldY);
+    this.fingers.set(id, [x, y]);
+    this.stage.changed();
+  }
+
+  hover(px, py) {
+    const { view, layers, grids, run } = this.stage, reach = REACH_PX / view.scale;
+    const x = view.mmX(px), y = view.mmY(py);
+    // What has been done counts before what is still to come.
+    const rank = (row) => (run.row < row ? -row : row);
+    const move = grids.moves().nearest(x, y, reach, (row) => layers.shows(row), rank);
+    const { drawn_layer: of } = layers.columns, shown = (row) => layers.on.get(`drawing ${of[row]}`);
+    const drawn = grids.drawing().nearest(x, y, reach, shown, (row) => row);
+    this.hovered(move, drawn, px, py);
+  }
+}
+
+/** What each key does; false for a key that means nothing here. */
+function pressed(event, { stage, player, panel }) {
+  const { view } = stage, middle = [view.width / 2, view.height / 2];
+  const pan = (dx, dy) => { view.pan(dx * KEY_PAN_PX, dy * KEY_PAN_PX); stage.changed(); };
+  const zoom = (factor) => { view.zoom(factor, ...middle); stage.changed(); };
+  const step = (way) => player && player.toRow(player.run.row + way);
+  const arrows = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  if (event.shiftKey && arrows[event.key]) { pan(...arrows[event.key]); return true; }
+  const deeds = {
+    " ": () => player && player.toggle(),
+    ArrowLeft: () => step(-1),
+    ArrowRight: () => step(1),
+    PageUp: () => step(-100),
+    PageDown: () => step(100),
+    Home: () => player && player.toStart(),
+    End: () => player && player.toRow(player.run.count - 1),
+    ArrowUp: () => player && player.faster(1),
+    ArrowDown: () => player && player.faster(-1),
+    "+": () => zoom(KEY_ZOOM),
+    "=": () => zoom(KEY_ZOOM),
+    "-": () => zoom(1 / KEY_ZOOM),
+    0: () => stage.fit(),
+    f: () => stage.fit(),
+    e: () => panel.nextColour(),
+    m: () => panel.nextTimes(1),
+    M: () => panel.nextTimes(-1),
+    "?": () => showHelp(find("help").hidden),
+    Escape: () => showHelp(false),
+  };
+  if (deeds[event.key]) deeds[event.key]();
+  else return panel.toggle(event.key);
+  return true;
+}
+
 // Put together what the page holds.
 
 function begin() {

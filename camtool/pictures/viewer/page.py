@@ -42,23 +42,7 @@ from camtool.pictures.svg import Look, element, number
 from camtool.pictures.viewer.columns import Traced, columns_of, layer_names, packed, traced_of
 from camtool.units import UM_PER_MM
 
-SCRIPTS = (
-    "read.js",
-    "track.js",
-    "grid.js",
-    "view.js",
-    "paint.js",
-    "marks.js",
-    "signs.js",
-    "run.js",
-    "layers.js",
-    "stage.js",
-    "words.js",
-    "panel.js",
-    "player.js",
-    "hand.js",
-    "main.js",
-)
+SCRIPTS = ("data.js", "paint.js", "stage.js", "panel.js", "main.js")
 """The files of the script in their order; the last one begins."""
 
 LEAST_TOP_UM = 1e-3

@@ -1,3 +1,72 @@
+// Which part of the work frame the canvases show.
+
+const FIT_MARGIN = 0.06;
+const LEAST_MM_ACROSS = 1e-4;
+const NEAR_PX = 12;
+
+class View {
+  constructor() {
+    this.width = this.height = 1;
+    this.x = this.y = 0;
+    this.scale = 1;
+  }
+
+  /** A size in CSS pixels. */
+  resize(width, height) {
+    this.width = Math.max(1, width);
+    this.height = Math.max(1, height);
+  }
+
+  fit([left, low, right, high]) {
+    const room = 1 - 2 * FIT_MARGIN;
+    const wide = Math.max(right - left, LEAST_MM_ACROSS), tall = Math.max(high - low, LEAST_MM_ACROSS);
+    this.scale = Math.min((this.width * room) / wide, (this.height * room) / tall);
+    this.x = (left + right) / 2;
+    this.y = (low + high) / 2;
+    this.isFitted = true;
+  }
+
+  px(x) { return (x - this.x) * this.scale + this.width / 2; }
+  py(y) { return (this.y - y) * this.scale + this.height / 2; }
+  mmX(px) { return (px - this.width / 2) / this.scale + this.x; }
+  mmY(py) { return this.y - (py - this.height / 2) / this.scale; }
+
+  pan(dx, dy) {
+    this.x -= dx / this.scale;
+    this.y += dy / this.scale;
+    this.isFitted = false;
+  }
+
+  /** Zoom about a point of the canvas, which stays where it is. */
+  zoom(factor, px, py) {
+    const x = this.mmX(px), y = this.mmY(py);
+    const most = this.width / LEAST_MM_ACROSS;
+    this.scale = Math.min(most, Math.max(most * 1e-12, this.scale * factor));
+    this.x = x - (px - this.width / 2) / this.scale;
+    this.y = y + (py - this.height / 2) / this.scale;
+    this.isFitted = false;
+  }
+
+  copy() { return Object.assign(new View(), this); }
+
+  /** [left, low, right, high] mm, and so many mm more on each side. */
+  box(more = 0) {
+    const { width, height } = this;
+    return [this.mmX(0) - more, this.mmY(height) - more, this.mmX(width) + more, this.mmY(0) + more];
+  }
+
+  /** Whether a line on the canvas lies beyond one of its edges. */
+  isBeside(x0, y0, x1, y1) {
+    const beyond = (a, b, size) => (a < -NEAR_PX && b < -NEAR_PX) || (a > size + NEAR_PX && b > size + NEAR_PX);
+    return beyond(x0, x1, this.width) || beyond(y0, y1, this.height);
+  }
+
+  /** Whether a place on the canvas is to be seen, or not far from that. */
+  shows(px, py) {
+    return px > -NEAR_PX && py > -NEAR_PX && px < this.width + NEAR_PX && py < this.height + NEAR_PX;
+  }
+}
+
 // Moves on a canvas: all of one style as one path, and what is smaller than a pixel as one line.
 
 const MERGED_PX = 0.7;
@@ -115,4 +184,222 @@ function strokePens(ctx, pens, styles) {
     ctx.stroke(pen.path);
   });
   ctx.setLineDash([]);
+}
+
+// What is drawn beside moves: the grid with its numbers, points of the drawing, travel, the tool.
+
+const GRID_PX = 90;
+const TOOL_PX = 5;
+
+/** 1, 2 or 5 times a power of ten that is not below `least`. */
+function roundStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return power * [1, 2, 5, 10].find((digit) => digit * power >= least * 0.999999);
+}
+
+function paintGrid(ctx, view, colours) {
+  const step = roundStep(GRID_PX / view.scale), [left, low, right, high] = view.box();
+  const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  ctx.font = "11px system-ui, sans-serif";
+  ctx.lineWidth = 1;
+  ctx.lineCap = "butt";
+  ctx.setLineDash([]);
+  ctx.strokeStyle = colours.grid;
+  ctx.fillStyle = colours.quiet;
+  ctx.beginPath();
+  for (let n = Math.ceil(left / step); n * step <= right; n++) {
+    const x = Math.round(view.px(n * step)) + 0.5;
+    ctx.moveTo(x, 0);
+    ctx.lineTo(x, view.height);
+    ctx.fillText((n * step).toFixed(decimals), x + 3, view.height - 4);
+  }
+  for (let n = Math.ceil(low / step); n * step <= high; n++) {
+    const y = Math.round(view.py(n * step)) + 0.5;
+    ctx.moveTo(0, y);
+    ctx.lineTo(view.width, y);
+    ctx.fillText((n * step).toFixed(decimals), 3, y - 3);
+  }
+  ctx.stroke();
+}
+
+/** The table's travel from part zero. */
+function paintTravel(ctx, view, [width, height], colours) {
+  ctx.strokeStyle = colours.travel;
+  ctx.lineWidth = 2;
+  ctx.setLineDash([]);
+  ctx.strokeRect(view.px(0), view.py(height), width * view.scale, height * view.scale);
+}
+
+/** Single points of the drawing. */
+function paintMarks(ctx, view, layers, colours) {
+  const { mark_at: at, mark_layer: of } = layers.columns;
+  ctx.fillStyle = colours.feed;
+  for (let index = 0; index < of.length; index++) {
+    if (!layers.on.get(`drawing ${of[index]}`)) continue;
+    ctx.beginPath();
+    ctx.arc(view.px(at[2 * index]), view.py(at[2 * index + 1]), 3, 0, TURN);
+    ctx.fill();
+  }
+}
+
+/** The tool where it is now, and the part of its move that is done. */
+function paintTool(ctx, view, moves, run, toolMm, colours) {
+  const [x, y] = moves.at(run.row, run.share), px = view.px(x), py = view.py(y);
+  ctx.setLineDash([]);
+  if (run.share < 1) {
+    const arc = moves.arc(run.row);
+    ctx.strokeStyle = colours.tool;
+    ctx.lineWidth = 2;
+    ctx.beginPath();
+    if (arc) {
+      const angle = arc.angle + run.share * arc.sweep;
+      ctx.arc(view.px(arc.x), view.py(arc.y), arc.radius * view.scale, -arc.angle, -angle, arc.sweep > 0);
+    } else {
+      ctx.moveTo(view.px(moves.from[2 * run.row]), view.py(moves.from[2 * run.row + 1]));
+      ctx.lineTo(px, py);
+    }
+    ctx.stroke();
+  }
+  ctx.strokeStyle = ctx.fillStyle = colours.tool;
+  ctx.lineWidth = 1.5;
+  ctx.beginPath();
+  ctx.arc(px, py, TOOL_PX, 0, TURN);
+  ctx.fill();
+  if (toolMm === null || (toolMm / 2) * view.scale <= TOOL_PX) return;
+  ctx.beginPath();
+  ctx.arc(px, py, (toolMm / 2) * view.scale, 0, TURN);
+  ctx.stroke();
+}
+
+// Signs of one size at places in mm: starts, plunges, reversals, arrows, numbers, worst places.
+
+const FULL_SIZE_UP_TO = 120;
+const SMALLEST_SIGN = 0.3;
+const ARROW_PX = 13;
+const ARROW_EVERY_PX = 240;
+const MOST_ARROWS = 150;
+const MOST_NUMBERS = 400;
+const NUMBER_PX = 13;
+
+/** All signs of a picture, from the ground up. */
+function paintSigns(ctx, view, moves, layers, colours) {
+  const { columns, head, on } = layers, ring = { fill: colours.paper, line: colours.feed, width: 2 };
+  const disc = (fill) => ({ fill, line: colours.paper, width: 1.2 });
+  ctx.setLineDash([]);
+  if (on.get("turn")) paintDots(ctx, view, columns.turn_at, 3.2, disc(colours.turn));
+  if (on.get("arrow")) paintArrows(ctx, view, moves, columns.move_sort, colours);
+  if (on.get("start")) {
+    paintDots(ctx, view, columns.bare_at, 4.5, ring);
+    paintDots(ctx, view, columns.plunge_at, 4.5, disc(colours.plunge));
+  }
+  if (on.get("order")) paintNumbers(ctx, view, columns.start_at, colours.ink, colours);
+  if (on.get("zero")) paintZero(ctx, view, colours);
+  const red = { line: colours.tool, width: 2 };
+  if (on.get("doubt")) paintDots(ctx, view, head.doubts.flat(), 7, red);
+  if (!on.get("worst")) return;
+  const worst = head.worst.flatMap(({ at, off }) => at.map((mm, k) => mm + (layers.times - 1) * off[k]));
+  paintDots(ctx, view, worst, 8, red);
+  paintNumbers(ctx, view, worst, colours.tool, colours);
+}
+
+/** Round signs at `places` (2 P) mm, smaller where there are very many; one for each pixel. */
+function paintDots(ctx, view, places, radius, { fill, line, width }) {
+  const seen = new Set(), shown = [];
+  for (let at = 0; at < places.length; at += 2) {
+    const x = view.px(places[at]), y = view.py(places[at + 1]), pixel = `${x | 0} ${y | 0}`;
+    if (!view.shows(x, y) || seen.has(pixel)) continue;
+    seen.add(pixel);
+    shown.push([x, y]);
+  }
+  const size = radius * Math.max(Math.sqrt(Math.min(1, FULL_SIZE_UP_TO / shown.length)), SMALLEST_SIGN);
+  const path = new Path2D();
+  for (const [x, y] of shown) {
+    path.moveTo(x + size, y);
+    path.arc(x, y, size, 0, TURN);
+  }
+  ctx.lineWidth = width * Math.min(1, size / radius + 0.3);
+  ctx.strokeStyle = line;
+  ctx.stroke(path);
+  if (!fill) return;
+  ctx.fillStyle = fill;
+  ctx.fill(path);
+}
+
+/** Arrows along level feeds, so far apart that they stay few. */
+function paintArrows(ctx, view, moves, sortOf, colours) {
+  const [left, low, right, high] = view.box(), { boxes } = moves;
+  const isSeen = (row) => sortOf[row] === 1 && boxes[4 * row] <= right && boxes[4 * row + 2] >= left
+    && boxes[4 * row + 1] <= high && boxes[4 * row + 3] >= low;
+  let whole = 0, way = 0;
+  for (let row = 0; row < moves.count; row++) if (isSeen(row)) whole += moves.length(row) * view.scale;
+  const every = Math.max(ARROW_EVERY_PX, whole / MOST_ARROWS), path = new Path2D();
+  for (let row = 0; row < moves.count; row++) {
+    if (sortOf[row] !== 1) way = every / 2;
+    if (!isSeen(row)) continue;
+    way += moves.length(row) * view.scale;
+    if (way < every) continue;
+    way = 0;
+    const share = [0.5, 0.25, 0.75, 0.1, 0.9].find((part) => {
+      const [x, y] = moves.at(row, part);
+      return x > left && x < right && y > low && y < high;
+    });
+    if (share !== undefined) addArrow(path, view, moves, row, share);
+  }
+  ctx.fillStyle = colours.feed;
+  ctx.fill(path);
+}
+
+function addArrow(path, view, moves, row, share) {
+  const [[x0, y0], [x1, y1]] = [share - 0.01, share + 0.01].map((part) => moves.at(row, part));
+  const [x, y] = moves.at(row, share), angle = Math.atan2(y0 - y1, x1 - x0);
+  const cos = Math.cos(angle), sin = Math.sin(angle), half = ARROW_PX / 2;
+  [[half, 0], [-half, 0.7 * half], [-half / 2, 0], [-half, -0.7 * half]].forEach(([u, v], index) => {
+    const to = [view.px(x) + u * cos - v * sin, view.py(y) + u * sin + v * cos];
+    if (index) path.lineTo(...to);
+    else path.moveTo(...to);
+  });
+  path.closePath();
+}
+
+/** Numbers from 1 beside places; one that finds no room is left out. */
+function paintNumbers(ctx, view, places, colour, colours) {
+  ctx.font = `bold ${NUMBER_PX}px system-ui, sans-serif`;
+  ctx.lineJoin = "round";
+  ctx.lineWidth = 4;
+  ctx.strokeStyle = colours.paper;
+  ctx.fillStyle = colour;
+  const taken = [], count = Math.min(places.length / 2, MOST_NUMBERS);
+  for (let index = 0; index < count; index++) {
+    const x = view.px(places[2 * index]), y = view.py(places[2 * index + 1]);
+    if (!view.shows(x, y)) continue;
+    const name = String(index + 1), wide = ctx.measureText(name).width;
+    for (const [across, up] of [[1, 1], [-1, 1], [1, -1], [-1, -1]]) {
+      const from = across > 0 ? x + 9 : x - 9 - wide, base = up > 0 ? y - 5 : y + 5 + NUMBER_PX;
+      const box = [from, base - NUMBER_PX, from + wide, base + 2];
+      if (taken.some((other) => touches(box, other))) continue;
+      taken.push(box);
+      ctx.strokeText(name, from, base);
+      ctx.fillText(name, from, base);
+      break;
+    }
+  }
+}
+
+function touches(a, b) {
+  return a[0] < b[2] + 2 && b[0] < a[2] + 2 && a[1] < b[3] && b[1] < a[3];
+}
+
+/** Part zero: a cross with a ring. */
+function paintZero(ctx, view, colours) {
+  const x = view.px(0), y = view.py(0);
+  ctx.strokeStyle = colours.ink;
+  ctx.lineWidth = 1.2;
+  ctx.beginPath();
+  ctx.moveTo(x - 10, y);
+  ctx.lineTo(x + 10, y);
+  ctx.moveTo(x, y - 10);
+  ctx.lineTo(x, y + 10);
+  ctx.moveTo(x + 5, y);
+  ctx.arc(x, y, 5, 0, TURN);
+  ctx.stroke();
 }
