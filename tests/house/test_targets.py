@@ -1,0 +1,65 @@
+"""Adding a machine touches one folder: nothing in `camtool` knows any target by its name."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = sorted(path.parent.name for path in ROOT.glob("postprocessors/*/machine.toml"))
+NAMES = re.compile("|".join(name.replace("_", "[-_]?") for name in FOLDERS), re.IGNORECASE)
+
+
+def files() -> list[Path]:
+    found = sorted(ROOT.glob("camtool/**/*.py"))
+    assert len(found) > 50
+    return found
+
+
+def words(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """(line, word) of every identifier, and of every literal that is one word: keys, names of
+    modules. Sentences may have a target as their example."""
+    for node in ast.walk(tree):
+        line = getattr(node, "lineno", 0)
+        match node:
+            case ast.Name(id=word) | ast.Attribute(attr=word) | ast.arg(arg=word):
+                yield line, word
+            case ast.FunctionDef(name=word) | ast.ClassDef(name=word):
+                yield line, word
+            case ast.keyword(arg=str(word)) | ast.ImportFrom(module=str(word)):
+                yield line, word
+            case ast.alias(name=word, asname=other):
+                yield from ((line, each) for each in (word, other or ""))
+            case ast.Constant(value=str(text)) if not re.search(r"\s", text.strip()):
+                yield line, text
+
+
+def named(source: str) -> list[str]:
+    return [f"line {n}: {word}" for n, word in words(ast.parse(source)) if NAMES.search(word)]
+
+
+def test_every_folder_is_looked_for() -> None:
+    assert len(FOLDERS) > 5
+    assert "pic_mmh" in FOLDERS
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_target_is_named(path: Path) -> None:
+    assert named(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "if name == 'pic-mmh': pass",
+        "from camtool_postprocessors.grbl.controller import GrblModel",
+        "class PicMmhController: pass",
+        "def f(linuxcnc): pass",
+        "made = {'flashcut': 1}",
+        "x = y.matlab_router",
+    ],
+)
+def test_the_rule_can_be_broken(source: str) -> None:
+    assert named(source)
