@@ -194,7 +194,7 @@ def left_out(names: Sequence[str]) -> Effects:
 
 
 def _interpolators(target: LoadedTarget, judging: Judging) -> list[Way]:
-    names = target.model.interpolators
+    names = target.interpolators
     return [Way(name, target, replace(judging, interpolator=name)) for name in names]
 
 

@@ -242,6 +242,8 @@ def _answer_for(param: click.Parameter) -> _Answer | None:
         return _picture_layers
     if "--set" in flags:
         return _keys
+    if "--interpolator" in flags:
+        return _interpolators
     if "--without" in flags:
         return _effects
     metavar = str(param.metavar).removesuffix("...")
@@ -319,6 +321,17 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
         for key, _ in flat("", values):
             if key.startswith(incomplete):
                 yield CompletionItem(f"{key}=")
+
+
+def _interpolators(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
+    """What the controller of the target that the line names before has to choose from."""
+    from camtool.targets.registry import load_target
+
+    target = ctx.params.get("target")
+    if isinstance(target, str):
+        for name in load_target(target).interpolators:
+            if name.startswith(incomplete):
+                yield CompletionItem(name)
 
 
 def _effects(ctx: click.Context, incomplete: str) -> list[CompletionItem]:

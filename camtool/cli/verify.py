@@ -52,16 +52,13 @@ if TYPE_CHECKING:
     from camtool.targets.registry import LoadedTarget
 
 
-INTERPOLATORS = ("dsm", "dda", "stairs")
-
-
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")
 @click.argument("program", metavar="PROGRAM")
 @machine_options
 @click.option("--against", metavar="DRAWING", help="The drawing that it should make.")
 @click.option(
     "--interpolator",
-    type=click.Choice(INTERPOLATORS),
+    metavar="[dsm|dda|stairs]",
     help="How the controller draws arcs, to compare; default: as the machine does.",
 )
 @click.option(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Any, ClassVar, Generic, Protocol
+from typing import Any, Generic, Protocol
 
 import numpy as np
 
@@ -34,9 +34,6 @@ class FusedRun(Protocol):
 
 class ControllerModel(ABC, Generic[ControllerT, DialectT]):
     """One controller's own arithmetic."""
-
-    interpolators: ClassVar[tuple[str, ...]] = ()
-    """What `Options.interpolator` may be, where there is anything to choose from."""
 
     @abstractmethod
     def run(

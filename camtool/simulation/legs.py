@@ -12,14 +12,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from camtool.arrays import Floats, Ints
-from camtool.errors import ProgramError
 from camtool.kernels.legs import legs_fill
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options, still_ledger
+from camtool.simulation.rows import refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
 
@@ -60,8 +59,14 @@ class LegRun:
             yield from self._block(legs)
         rows = np.arange(self._row + 1, len(self._standing.waits))
         if len(rows):
-            ledger = _still(rows, self._standing.waits[rows])
+            ledger = self._still(rows)
             yield Chunk(np.empty(0, dtype=np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
+
+    def _still(self, rows: Ints) -> Ledger:
+        """A ledger of rows that only wait."""
+        ledger = still_ledger(rows)
+        ledger.duration_s[:] = self._standing.waits[rows]
+        return ledger
 
     def _block(self, legs: Legs) -> Iterator[Chunk]:
         first = np.concatenate([[0], np.cumsum(np.abs(legs.way).max(axis=1, initial=0))])
@@ -83,7 +88,7 @@ class LegRun:
         slide, reversals = self._mechanics.follow(commanded, offsets)
         rows = np.arange(self._row + (0 if moving[0] == self._row else 1), moving[-1] + 1)
         self._row = int(moving[-1])
-        ledger = _still(rows, self._standing.waits[rows])
+        ledger = self._still(rows)
         here = moving - rows[0]
         added = reversals @ self._mechanics.compensation_steps * self._standing.compensation_s
         ledger.compensation_s[here] = added
@@ -120,20 +125,6 @@ class _Share:
         return np.asarray(self._to[:, None] * size // whole - self._from[:, None] * size // whole)
 
 
-def _still(rows: Ints, waits: Floats) -> Ledger:
-    """A ledger of rows that only wait."""
-    count = len(rows)
-    return Ledger(
-        row=rows,
-        duration_s=waits.copy(),
-        compensation_s=np.zeros(count),
-        iterations=np.zeros(count, dtype=np.int64),
-        steps=np.zeros((count, 3), dtype=np.int64),
-        reversals=np.zeros((count, 3), dtype=np.int64),
-        ended=np.ones(count, dtype=np.bool_),
-    )
-
-
 # What controllers that count whole steps ask of the rows of a toolpath before they run it.
 
 MAX_STEPS = 1 << 30
@@ -149,33 +140,34 @@ def coded_steps_mm(machine: Machine) -> Floats:
 def check_rows(toolpath: Toolpath, machine: Machine) -> None:
     """ProgramError for rows that no controller without homing can follow, naming the block."""
     kind, step_mm = toolpath.kind, coded_steps_mm(machine)
-    far = (np.abs(toolpath.end) > MAX_STEPS * step_mm).any(axis=1)
-    _refuse(toolpath, far, "a position is beyond all that the controller can count")
-    homing = np.isin(kind, (Kind.HOME_XY, Kind.HOME_Z))
-    _refuse(toolpath, homing, "this controller cannot return to machine zero", "move there")
     with np.errstate(invalid="ignore"):
         endless = (kind == Kind.DWELL) & ~((toolpath.value >= 0.0) & np.isfinite(toolpath.value))
-    _refuse(toolpath, endless, "a dwell without its seconds")
-    away = (kind == Kind.SET_ZERO) & toolpath.end.any(axis=1)
-    mend = "set it once, before any move"
-    _refuse(toolpath, away, "part zero is set away from part zero", mend)
-    pushed = ~toolpath.is_motion & (toolpath.end != toolpath.starts).any(axis=1)
-    _refuse(toolpath, pushed, "an event that moves the tool")
+    for bad, message, mend in (
+        (
+            (np.abs(toolpath.end) > MAX_STEPS * step_mm).any(axis=1),
+            "a position is beyond all that the controller can count",
+            "",
+        ),
+        (
+            np.isin(kind, (Kind.HOME_XY, Kind.HOME_Z)),
+            "this controller cannot return to machine zero",
+            "move there",
+        ),
+        (endless, "a dwell without its seconds", ""),
+        (
+            (kind == Kind.SET_ZERO) & toolpath.end.any(axis=1),
+            "part zero is set away from part zero",
+            "set it once, before any move",
+        ),
+        (
+            ~toolpath.is_motion & (toolpath.end != toolpath.starts).any(axis=1),
+            "an event that moves the tool",
+            "",
+        ),
+    ):
+        refuse(toolpath, np.asarray(bad)[: toolpath.running], message, mend)
 
 
 def waits_s(toolpath: Toolpath, rows: int) -> Floats:
     """(rows,) s that rows wait."""
     return np.where(toolpath.kind == Kind.DWELL, toolpath.value, 0.0)[:rows]
-
-
-def _refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "") -> None:
-    """ProgramError for the first bad row."""
-    rows = np.flatnonzero(np.asarray(bad)[: toolpath.running])
-    if len(rows):
-        raise ProgramError(message, where=place(toolpath, int(rows[0])), mend=mend)
-
-
-def place(toolpath: Toolpath, row: int) -> str:
-    """The block (from 1) that a row was read from, or the row when it was planned."""
-    block = int(toolpath.block[row])
-    return f"block {block + 1}" if block >= 0 else f"move {row}"

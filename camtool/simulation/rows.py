@@ -32,43 +32,36 @@ def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:
     """ProgramError for an arc without a centre or a position that cannot be counted."""
     bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
-    if bad.any():
-        raise ProgramError("an arc without a centre", where=row_place(toolpath, bad))
+    refuse(toolpath, bad, "an arc without a centre")
     most = MAX_PATH_STEPS * np.array([axis.coded_step_mm for axis in machine.axes])
     centre = np.where(toolpath.is_arc[:, None], np.abs(toolpath.centre), 0.0)
     far = np.any(np.column_stack([np.abs(toolpath.end) > most, centre > most[:2]]), axis=1)
-    if far.any():
-        raise ProgramError(
-            "a position is beyond all that the controller can count",
-            where=row_place(toolpath, far),
-        )
+    refuse(toolpath, far, "a position is beyond all that the controller can count")
 
 
 def check_rows(path: Toolpath, rows: int) -> None:
     """ProgramError for moves without a feed and events that cannot be followed."""
     running = np.arange(len(path)) < rows
     with np.errstate(invalid="ignore"):
-        no_feed = running & path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
+        no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
         no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
-    if no_feed.any():
-        raise ProgramError(
-            "a move at a feed without a feed above 0",
-            where=row_place(path, no_feed),
-            mend="give it one (F)",
-        )
-    if (running & no_time).any():
-        raise ProgramError("a dwell without its seconds", where=row_place(path, running & no_time))
-    away = running & (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
-    if away.any():
-        raise ProgramError(
-            "part zero is set away from part zero",
-            where=row_place(path, away),
-            mend="set it once, before any move",
-        )
+    away = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
+    for bad, message, mend in (
+        (no_feed, "a move at a feed without a feed above 0", "give it one (F)"),
+        (no_time, "a dwell without its seconds", ""),
+        (away, "part zero is set away from part zero", "set it once, before any move"),
+    ):
+        refuse(path, running & bad, message, mend)
 
 
-def row_place(toolpath: Toolpath, bad: npt.ArrayLike) -> str:
-    """The block (from 1) that the first bad row was read from, or the row when planned."""
-    row = int(np.argmax(bad))
+def refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "") -> None:
+    """ProgramError for the first bad row, if there is one."""
+    rows = np.flatnonzero(bad)
+    if len(rows):
+        raise ProgramError(message, where=block_of(toolpath, int(rows[0])), mend=mend)
+
+
+def block_of(toolpath: Toolpath, row: int) -> str:
+    """The block (from 1) that a row was read from, or the row when it was planned."""
     block = int(toolpath.block[row])
     return f"block {block + 1}" if block >= 0 else f"move {row}"

@@ -61,6 +61,12 @@ class LoadedTarget:
             return PathModel()
         return self.post.model()
 
+    @property
+    def interpolators(self) -> tuple[str, ...]:
+        """What the machine's controller has to choose from."""
+        exact = isinstance(self.machine.controller, PathController)
+        return () if exact else self.post.interpolators
+
     def simulate(self, toolpath: Toolpath, options: Options | None = None) -> Iterator[Chunk]:
         """The motion that the machine's controller and mechanics make of a toolpath, chunk by
         chunk.
@@ -78,7 +84,7 @@ class LoadedTarget:
         """OptionError for what the machine's controller cannot do."""
         if options.chunk_steps < 1:
             raise OptionError(f"chunk_steps is {options.chunk_steps}", mend="give at least 1")
-        known = self.model.interpolators
+        known = self.interpolators
         if options.interpolator is None or options.interpolator in known:
             return
         if not known:
@@ -198,6 +204,9 @@ def _load(point: EntryPoint) -> tuple[Target, Path]:
         post = point.load()
         if not isinstance(post, Target):
             raise TypeError(f"{point.attr} is no camtool.targets.target.Target")
+        for code in post.codes:
+            if not code.name.startswith(f"{post.name}."):
+                raise ValueError(f"the code {code.name} does not begin with {post.name}.")
         file = Path(str(sys.modules[point.module].__file__)).with_name(MACHINE_FILE)
     except Exception as error:  # whatever a third party's module raises belongs to it
         raise MachineError(

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
 
+from camtool.findings import TargetCode
 from camtool.machine.model import Axis, Machine, SlideStart
 
 if TYPE_CHECKING:
@@ -41,6 +42,10 @@ class Target(ABC):
     controllers: ClassVar[tuple[type[SlideStart], ...]] = ()
     dialect: ClassVar[type[msgspec.Struct]] = NoDialect
 
+    interpolators: ClassVar[tuple[str, ...]] = ()
+    """What `--interpolator` may put in the place of the controller's own, if anything."""
+    codes: ClassVar[tuple[TargetCode, ...]] = ()
+    """Codes of its own findings; each name begins with the target's and a dot."""
     starts_spindle: ClassVar[bool] = False
     """Whether a program starts the spindle, at the speed that it says."""
     any_machine: ClassVar[bool] = False

@@ -26,7 +26,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.kernels.timers import (
     HOME_X,
@@ -44,7 +43,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.rows import check_positions, check_rows, placed, row_place
+from camtool.simulation.rows import check_positions, check_rows, placed, refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect, FlashcutController
@@ -213,11 +212,7 @@ def followed(toolpath: Toolpath, machine: _Machine) -> Toolpath:
     far = (np.abs(toolpath.end) > most).any(axis=1) | (np.abs(toolpath.start) > most).any()
     spoke = np.where(toolpath.is_arc[:, None], toolpath.centre - toolpath.starts[:, :2], 0.0)
     far |= (np.abs(spoke) > most[:2]).any(axis=1)
-    if far.any():
-        raise ProgramError(
-            "a position is beyond all that the controller can count",
-            where=row_place(toolpath, far),
-        )
+    refuse(toolpath, far, "a position is beyond all that the controller can count")
     return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
 
 
@@ -231,11 +226,8 @@ def half_periods(toolpath: Toolpath, machine: _Machine, step_mm: float, alone: B
     wanted = half_periods_ms(feed, step_mm, alone, machine.controller)
     slow = wanted >= MOST_LONG
     if slow.any():
-        raise ProgramError(
-            f"a feed of {float(feed[slow][0]):g} mm/min is a step in weeks",
-            where=row_place(toolpath, slow),
-            mend="give it a higher one (F)",
-        )
+        message = f"a feed of {float(feed[slow][0]):g} mm/min is a step in weeks"
+        refuse(toolpath, slow, message, "give it a higher one (F)")
     return wanted.astype(np.int64)
 
 

@@ -20,20 +20,12 @@ from dataclasses import replace
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
-from camtool.simulation.legs import (
-    LegRun,
-    Legs,
-    Standing,
-    check_rows,
-    coded_steps_mm,
-    place,
-    waits_s,
-)
+from camtool.simulation.legs import LegRun, Legs, Standing, check_rows, coded_steps_mm, waits_s
 from camtool.simulation.motion import Chunk, Options
+from camtool.simulation.rows import refuse
 from camtool.toolpath.moves import Toolpath
 
 from .dialect import Dialect, I8751Controller
@@ -89,12 +81,7 @@ class I8751Model(ControllerModel[I8751Controller, Dialect]):
 def _check(toolpath: Toolpath, machine: _Machine) -> None:
     check_rows(toolpath, machine)
     arcs = toolpath.is_arc[: toolpath.running]
-    if arcs.any():
-        raise ProgramError(
-            "this controller has no arcs",
-            where=place(toolpath, int(arcs.argmax())),
-            mend="write them as lines",
-        )
+    refuse(toolpath, arcs, "this controller has no arcs", "write them as lines")
 
 
 def _in_steps(points: Floats, machine: _Machine) -> Ints:

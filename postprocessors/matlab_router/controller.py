@@ -19,24 +19,33 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.errors import MachineError, ProgramError
+from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
+from camtool.kernels.slave_record import (
+    COUNT,
+    PLACE,
+    SECOND_ROW,
+    SHOWN,
+    TABLE_COUNTS,
+    TARGET,
+    TURN,
+    Account,
+    Program,
+    State,
+)
+from camtool.kernels.slaves import slaves_fill
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.rows import placed
+from camtool.simulation.rows import placed, refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect, MatlabRouterController
-
-if TYPE_CHECKING:
-    from camtool.kernels.slave_record import Account, Program, State
 
 _Machine = Machine[MatlabRouterController, Dialect]
 
@@ -57,19 +66,11 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, Dialect]):
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with all ends on whole counts from home, homing at home. ProgramError for arcs,
         which no slave has, and for what lies farther from home than the program can say."""
-        if toolpath.is_arc.any():
-            raise ProgramError(
-                "this machine has no arcs",
-                where=block_of(toolpath, int(toolpath.is_arc.argmax())),
-                mend="post the drawing for it: arcs become lines then",
-            )
+        mend = "post the drawing for it: arcs become lines then"
+        refuse(toolpath, toolpath.is_arc, "this machine has no arcs", mend)
         home = np.array(machine.controller.machine_zero_mm)
         far = (np.abs(toolpath.end - home) > FARTHEST_UNITS * UNIT_MM).any(axis=1)
-        if far.any():
-            raise ProgramError(
-                "a position is beyond all that the controller can count",
-                where=block_of(toolpath, int(far.argmax())),
-            )
+        refuse(toolpath, far, "a position is beyond all that the controller can count")
         end = placed(toolpath, home).end
         coded = [axis.coded_step_mm for axis in machine.axes]
         columns = [
@@ -128,9 +129,6 @@ class _Run:
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
-        from camtool.kernels.slave_record import SECOND_ROW
-        from camtool.kernels.slaves import slaves_fill
-
         complete, finished = 0, False
         while not finished:
             out = np.empty((self._samples, 3), dtype=np.int64)
@@ -232,12 +230,6 @@ class Lines:
     extra_s: Floats
 
 
-def block_of(toolpath: Toolpath, row: int) -> str:
-    """The block (from 1) that a row was read from, or the row when it was planned."""
-    block = int(toolpath.block[row])
-    return f"block {block + 1}" if block >= 0 else f"move {row}"
-
-
 def lines_of(path: Toolpath, rows: int, machine: _Machine) -> Lines:
     """The orders for the first `rows` rows of a held toolpath.
 
@@ -282,8 +274,7 @@ def _check(path: Toolpath, rows: int) -> None:
         (no_time, "a dwell without its seconds"),
         (away, "part zero is set away from part zero"),
     ):
-        if (bad & running).any():
-            raise ProgramError(message, where=block_of(path, int((bad & running).argmax())))
+        refuse(path, bad & running, message)
 
 
 def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
@@ -422,8 +413,6 @@ IDENTIFIED = 70.0
 
 def program_of(orders: Ints, pauses_s: Floats, machine: _Machine) -> Program:
     """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
-    from camtool.kernels.slave_record import TABLE_COUNTS, Program
-
     router = machine.controller
     text = router.slaves == "text"
     axes = np.zeros((3, 8))
@@ -450,8 +439,6 @@ def program_of(orders: Ints, pauses_s: Floats, machine: _Machine) -> Program:
 
 def state_of(start_mm: Floats, machine: _Machine) -> State:
     """All motors at rest at a place."""
-    from camtool.kernels.slave_record import COUNT, PLACE, SHOWN, TARGET, TURN, State
-
     router = machine.controller
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     place = np.rint((start_mm - np.array(machine.controller.machine_zero_mm)) * SIGNS / coded)
@@ -465,7 +452,5 @@ def state_of(start_mm: Floats, machine: _Machine) -> State:
 
 def account_of(rows: int) -> Account:
     """Nothing done yet."""
-    from camtool.kernels.slave_record import Account
-
     zeros = np.zeros(rows)
     return Account(zeros, zeros.astype(np.int64), np.ones(rows, dtype=np.bool_))

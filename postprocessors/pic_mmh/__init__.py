@@ -6,11 +6,11 @@ docs/controllers/pic-mmh.md what the controller does with it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from camtool.targets.target import Target
 
-from .dialect import Dialect, PicMmhController, PicMmhMachine
+from .dialect import Dialect, Interpolator, PicMmhController, PicMmhMachine
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
@@ -26,6 +26,7 @@ class PicMmh(Target):
     name = "pic-mmh"
     controllers = (PicMmhController,)
     dialect = Dialect
+    interpolators = get_args(Interpolator)
 
     def write(self, toolpath: Toolpath, machine: PicMmhMachine) -> Program:
         """The program; PostError naming the move that cannot be said or done."""

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TypeAlias, get_args
+from typing import TypeAlias
 
 import numpy as np
 
@@ -44,9 +44,10 @@ from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
+from camtool.simulation.rows import block_of, refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .dialect import Dialect, Interpolator, PicMmhController
+from .dialect import Dialect, PicMmhController
 from .findings import ARC_END_UNSURE
 from .legs import METHODS, JudgedSteps, legs_of, positions
 
@@ -55,8 +56,6 @@ _Machine = Machine[PicMmhController, Dialect]
 
 class PicMmhModel(ControllerModel[PicMmhController, Dialect]):
     """The PIC18F8720: lines by DDA, arcs by direct search, DDA or stairs."""
-
-    interpolators = get_args(Interpolator)
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
@@ -224,8 +223,6 @@ class PicMmh:
         stops = np.full(len(toolpath), -1, dtype=np.int64)
         if controller.arc_end == "equal" or not toolpath.is_arc.any():
             return stops
-        from camtool.kernels import arc_stops as stopping
-
         homes = toolpath.kind == Kind.HOME_XY
         moves = (toolpath.is_motion | homes).astype(np.int64)
         moves[toolpath.kind == Kind.ARC_CCW] = 2
@@ -290,7 +287,7 @@ class PicMmh:
         if not (math.isfinite(feed) and feed > 0.0):
             raise ProgramError(
                 "a move at a feed without a feed above 0",
-                where=self._place(row),
+                where=block_of(self._toolpath, row),
                 mend="give it one (F)",
             )
         return max(60.0 * float(self._coded_mm[axis]) / feed, self._least_period_s)
@@ -369,11 +366,12 @@ class PicMmh:
         if kind == Kind.DWELL:
             seconds = float(self._toolpath.value[row])
             if not (math.isfinite(seconds) and seconds >= 0.0):
-                raise ProgramError("a dwell without its seconds", where=self._place(row))
+                where = block_of(self._toolpath, row)
+                raise ProgramError("a dwell without its seconds", where=where)
         elif kind == Kind.SET_ZERO and position.any():
             raise ProgramError(
                 "part zero is set away from part zero",
-                where=self._place(row),
+                where=block_of(self._toolpath, row),
                 mend="set it once, before any move",
             )
         return one_row(row, NO_SAMPLES, NO_SAMPLES, duration_s=seconds)
@@ -382,8 +380,7 @@ class PicMmh:
         """(N, 2) steps; 0 where the row is no arc."""
         toolpath = self._toolpath
         bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
-        if bad.any():
-            raise ProgramError("an arc without a centre", where=self._place(int(bad.argmax())))
+        refuse(toolpath, bad, "an arc without a centre")
         return self._steps(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), range(2))
 
     def _steps(self, points: Floats, axes: range, *, named: bool = True) -> Ints:
@@ -393,15 +390,10 @@ class PicMmh:
         if far.any():
             raise ProgramError(
                 "a position is beyond all that the controller can count",
-                where=self._place(int(far.argmax())) if named else None,
+                where=block_of(self._toolpath, int(far.argmax())) if named else None,
             )
         columns = [to_steps(points[:, axis], float(coded_mm[axis])) for axis in axes]
         return np.column_stack(columns)
-
-    def _place(self, row: int) -> str:
-        """The block (from 1) that a row was read from, or the row when it was planned."""
-        block = int(self._toolpath.block[row])
-        return f"block {block + 1}" if block >= 0 else f"move {row}"
 
 
 # The interpolators as one kind of thing: a filler that writes the next positions to a buffer.
@@ -511,11 +503,10 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, legs: Ints) -> tuple
         if number != stopping.EQUAL
     }
     row = int(arcs[unsure][0, columns.ROW])
-    block = int(toolpath.block[row])
     taken = machine.controller.arc_end
     return (
         ARC_END_UNSURE(
-            where=f"block {block + 1}" if block >= 0 else f"move {row}",
+            where=block_of(toolpath, row),
             measured=int(unsure.sum()),
             limit=0.0,
             arcs=len(arcs),

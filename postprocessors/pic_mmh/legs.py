@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camtool.arrays import Floats, Ints
+from camtool.kernels import leg_steps as columns
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Ledger
 from camtool.toolpath.moves import Kind, Toolpath
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from camtool.kernels.judge import Sums, Task
 
 
-METHODS: Final[dict[str, int]] = {"dsm": 0, "stairs": 1, "dda": 2}
-"""The numbers of `camtool.kernels.leg_steps`, which a run without numba need not load."""
+METHODS: Final = {"dsm": columns.DSM, "stairs": columns.STAIRS, "dda": columns.DDA}
+"""The numbers that the kernels know the methods of arcs by."""
 
 
 def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
@@ -41,8 +42,6 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
 def legs_of(toolpath: Toolpath, places: Ints, centres: Ints, stops: Ints) -> Ints:
     """(L, 14) legs of `camtool.kernels.judge_steps` of all rows; `places` (N + 1, 3) of
     `positions`, `centres` (N, 2) steps, `stops` (N,) samples of arcs or −1."""
-    from camtool.kernels import leg_steps as columns
-
     count = len(toolpath)
     begin, way = places[:-1], np.diff(places, axis=0)
     flat = np.zeros((count, columns.LEG_COLUMNS), dtype=np.int64)
@@ -96,7 +95,6 @@ class JudgedSteps:
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
         """Run the rows low:high, which follow those run before, and judge them."""
         from camtool.kernels import judge_steps as judging
-        from camtool.kernels import leg_steps as columns
 
         method, rounded, by_event, step_mm = self._how
         first, last = np.searchsorted(self._legs[:, columns.ROW], [low, high])

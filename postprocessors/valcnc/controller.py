@@ -35,11 +35,11 @@ from camtool.simulation.legs import (
     Standing,
     check_rows,
     coded_steps_mm,
-    place,
     waits_s,
 )
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.path import on_steps
+from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect, ValcncController
@@ -170,7 +170,7 @@ class _Pieces:
         if bad >= 0:
             raise ProgramError(
                 "an arc about its own start, or with a chord longer than its diameter",
-                where=place(toolpath, bad),
+                where=block_of(toolpath, bad),
                 mend="give I and J from the start to the centre",
             )
         return angles
@@ -190,7 +190,7 @@ class _Pieces:
             (unequal, "on axes of unequal steps an arc is an ellipse"),
         ):
             if bad.any():
-                raise ProgramError(message, where=place(toolpath, int(rows[bad.argmax()])))
+                raise ProgramError(message, where=block_of(toolpath, int(rows[bad.argmax()])))
 
     def _parts(self, arcs: Floats) -> Ints:
         """(J,) pieces of arcs (J, 5)."""
