@@ -1,20 +1,7 @@
-"""Least squares with weights, and what the readings cannot tell.
+"""Measurements of coupons in, the machine's numbers with their uncertainties out.
 
-    minimise  Σ ((measured_i − predicted_i(p)) / u_i)²
-
-by Gauss-Newton: each round solves the linear problem about the last values, and one is enough
-where the equations are linear, as all are but diagonals and circles. u_i is the standard
-uncertainty of a reading; where not all are known, all count alike. With A the weighted
-derivatives and s² = Σ residual² / (n − p),
-
-    covariance = s² (AᵀA)⁻¹,
-
-where s is not taken below 1 if the u_i are known: residuals that happen to be small make no
-reading better than its instrument.
-
-Parameters that the readings cannot tell are held at what the machine's file says: those that no
-reading depends on, and of those that only occur together the least wanted one, until the rest can
-be told. The null space of A shows which they are.
+measurements ─▶ readings, each an equation ─▶ `solve`, least squares ─▶ `calibrate`, in the
+machine's own words ─▶ `to_text`, `to_data`
 """
 
 from __future__ import annotations
@@ -32,6 +19,24 @@ from camtool.calibration.model import SQUARENESS, Model, Parameter, Reading, rea
 from camtool.errors import InputError
 from camtool.machine.model import Axis, Machine
 from camtool.units import UM_PER_MM
+
+# Least squares with weights, and what the readings cannot tell.
+#
+#     minimise  Σ ((measured_i − predicted_i(p)) / u_i)²
+#
+# by Gauss-Newton: each round solves the linear problem about the last values, and one is enough
+# where the equations are linear, as all are but diagonals and circles. u_i is the standard
+# uncertainty of a reading; where not all are known, all count alike. With A the weighted
+# derivatives and s² = Σ residual² / (n − p),
+#
+#     covariance = s² (AᵀA)⁻¹,
+#
+# where s is not taken below 1 if the u_i are known: residuals that happen to be small make no
+# reading better than its instrument.
+#
+# Parameters that the readings cannot tell are held at what the machine's file says: those that no
+# reading depends on, and of those that only occur together the least wanted one, until the rest
+# can be told. The null space of A shows which they are.
 
 ROUNDS = 50
 """Rounds of Gauss-Newton at most; a handful is usual."""
@@ -159,12 +164,7 @@ def _wish(parameter: Parameter) -> int:
     return ("play", "squareness", "scale").index(parameter.what)
 
 
-# Measurements of coupons in, the machine's numbers with their uncertainties out.
-#
-# read_measurements   a file, checked                            measurements.py
-# readings_of         each coupon as equations                   readings.py, model.py
-# solve               least squares, and what cannot be told     solve.py
-# calibrate           all of it, in the machine's own words      here
+# The numbers of the machine.
 
 NONE_LEFT_SIGMAS = 3.0
 """A play below zero by no more than so many standard uncertainties, or than a step, is none;

@@ -1,7 +1,20 @@
-"""The grid on which the coupons of a sheet lie, and the cells that the sheet is divided into.
+"""The drawings that calibration needs, and what is measured on each.
 
-Lengths are whole units, round numbers of mm that the machine can say: what is drawn is then what
-is cut, and easy to measure.
+The side from which each edge is reached must follow from the drawing, wherever the tool came
+from. Lines and rulers are closed, so that they are cut the way they are drawn; begun in the
+middle of their longest line, they reach every mark behind a run-up.
+
+    lines                                       steps
+
+    ┌────┐                                      ┌───┐ ┌─┐ ┌─┐ ┌─┐ ┌──┐
+    │    └────────────────┐  second, in −       │   └─┘ └─┘ └─┘ └─┘  │   reached in −
+    │    ┌────────────────┘  first, in +        │   ┌─┐ ┌─┐ ┌─┐ ┌─┐ ┌┘   reached in +
+    └────┘                   run-up             └───┘ └─┘ └─┘ └─┘ └─┘
+
+Squares are open, with a hook beside a corner at either end: cut from either one, opposite edges
+are reached from opposite sides. Circles are closed, and begin where X reverses. (Two joined
+lines: PIC thesis, L2353-2423; parallel-port thesis, L1165; squares and circles: PIC thesis,
+L2457-2594; steps: ValCNC thesis, L1645.)
 """
 
 from __future__ import annotations
@@ -18,6 +31,11 @@ from camtool.errors import OptionError
 from camtool.machine.model import Machine
 
 Point = tuple[float, float]
+
+# The grid on which the coupons of a sheet lie, and the cells that the sheet is divided into.
+#
+# Lengths are whole units, round numbers of mm that the machine can say: what is drawn is then what
+# is cut, and easy to measure.
 
 FINENESS = 50.0
 """The shorter side of a region has so many units of the grid on which its coupons lie, or a few
@@ -133,23 +151,7 @@ def clean(value: float) -> float:
     return round(value, 9) + 0.0
 
 
-# The drawings that calibration needs, and what is measured on each.
-#
-# The side from which each edge is reached must follow from the drawing, wherever the tool came
-# from. Lines and rulers are closed, so that they are cut the way they are drawn; begun in the
-# middle of their longest line, they reach every mark behind a run-up.
-#
-#     lines                                       steps
-#
-#     ┌────┐                                      ┌───┐ ┌─┐ ┌─┐ ┌─┐ ┌──┐
-#     │    └────────────────┐  second, in −       │   └─┘ └─┘ └─┘ └─┘  │   reached in −
-#     │    ┌────────────────┘  first, in +        │   ┌─┐ ┌─┐ ┌─┐ ┌─┐ ┌┘   reached in +
-#     └────┘                   run-up             └───┘ └─┘ └─┘ └─┘ └─┘
-#
-# Squares are open, with a hook beside a corner at either end: cut from either one, opposite edges
-# are reached from opposite sides. Circles are closed, and begin where X reverses. (Two joined
-# lines: PIC thesis, L2353-2423; parallel-port thesis, L1165; squares and circles: PIC thesis,
-# L2457-2594; steps: ValCNC thesis, L1645.)
+# Coupons on the grid.
 
 Kind = Literal["lines", "squares", "circles", "steps"]
 KINDS: tuple[Kind, ...] = ("lines", "squares", "circles", "steps")
@@ -334,7 +336,7 @@ def _turned(axis: str, ways: Sequence[Point]) -> tuple[tuple[float, float, float
     return tuple((clean(x), clean(y), 0.0) for x, y in points)
 
 
-# A sheet of coupons as DXF and as SVG: mm, the same bytes every time.
+# A sheet as DXF and as SVG: mm, the same bytes every time.
 
 COLOUR = 5
 """Index of the colour of all lines in DXF: blue."""

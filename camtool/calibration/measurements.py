@@ -1,4 +1,15 @@
-"""The kinds of coupon as a file of measurements may say them: types, signs, sizes."""
+"""Measurements of coupons as their TOML file may say them, strictly: types, signs, sizes.
+
+    target = "pic-mmh"               # whose coupons they are
+    uncertainty_mm = 0.001           # standard uncertainty of each reading; left out: not known
+    compensation_mm = { x = 0.0 }    # added at reversals while cutting; left out: the machine's
+
+    [[lines]]                        # and [[squares]], [[circles]], [[steps]], [[closures]]
+    axis = "x"
+    ...
+
+A coupon may say its own `uncertainty_mm` and `compensation_mm`, and the `source` of its numbers.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +24,8 @@ from msgspec import Meta
 from camtool.errors import InputError, MachineError
 from camtool.machine.ranges import Length, Lost, Place, Reading, Tolerance
 from camtool.tables import convert, read_table
+
+# The kinds of coupon as a file of measurements may say them: types, signs, sizes.
 
 Pair = tuple[Length, Length]
 Flat = Literal["x", "y"]
@@ -232,17 +245,7 @@ KINDS: tuple[type[Coupon], ...] = (Lines, Square, Circle, Steps, Closure)
 """The tables of a file, in order."""
 
 
-# Measurements of coupons as their TOML file may say them, strictly: types, signs, sizes.
-#
-#     target = "pic-mmh"               # whose coupons they are
-#     uncertainty_mm = 0.001           # standard uncertainty of each reading; left out: not known
-#     compensation_mm = { x = 0.0 }    # added at reversals while cutting; left out: the machine's
-#
-#     [[lines]]                        # and [[squares]], [[circles]], [[steps]], [[closures]]
-#     axis = "x"
-#     ...
-#
-# A coupon may say its own `uncertainty_mm` and `compensation_mm`, and the `source` of its numbers.
+# The file.
 
 
 class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -283,7 +283,7 @@ def _said(parameter: Parameter, machine: Machine) -> float:
     return axis.backlash_mm
 
 
-# The coupons of a file as readings: `camtool.calibration.model` derives what each one means.
+# The coupons of a file as readings.
 
 
 def readings_of(measurements: Measurements, machine: Machine) -> list[Reading]:

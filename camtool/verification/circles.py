@@ -1,4 +1,4 @@
-"""Full circles of a toolpath, and the figures of ISO 230-4 for what became of them.
+"""Full circles of a toolpath, the figures of ISO 230-4 for what became of them, and reversals.
 
 About a programmed circle (centre c, radius R) the slides are seen as radii over the angle, kept
 in bins of half a degree (`camtool.kernels.circle_bins`): of each bin the points with the least and

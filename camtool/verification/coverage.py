@@ -1,4 +1,4 @@
-"""Is everything cut that was wanted, and nothing else? And which row belongs to which contour?
+"""Is everything cut that was wanted, and nothing else: contours, holes, and the way round?
 
 Decoded moves are sampled and compared with the wanted moves: that gives the error of rounding,
 extra cuts, and for each decoded row the wanted contour that it belongs to. Wanted moves are

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
@@ -195,8 +196,6 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
     """Points on the true lines and arcs (on these segments `only`), about spacing_mm apart
     (coarser when they would exceed `MOST_SAMPLES`, but never fewer than `FEWEST_SAMPLES` parts of
     a segment)."""
-    from camtool.geometry.measure import point_at, segment_lengths
-
     which = np.arange(len(cuts.segments)) if only is None else only
     lengths = segment_lengths(cuts.segments[which])
     spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
@@ -245,14 +244,14 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     return found
 
 
-def of_loops(cuts: CutMoves, found: Ints) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def of_loops(cuts: CutMoves, found: Ints) -> Bools:
     """(N,) true for the cutting rows that belong to the loop of their contour."""
     rows = np.arange(len(cuts.contour))
     first, last = np.append(found, [[NO_LOOP, NO_LOOP]], axis=0)[cuts.contour].T
     return np.asarray(cuts.is_cut & (first >= 0) & (rows >= first) & (rows <= last))
 
 
-def _level(cuts: CutMoves) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _level(cuts: CutMoves) -> Bools:
     """(C,) true for contours at one height."""
     contour = cuts.contour[cuts.segments.path]
     low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)

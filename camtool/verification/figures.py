@@ -1,11 +1,13 @@
-"""Figures of a stream of errors, in memory that does not grow with the stream.
+"""The figures of a verification: of streams of errors, of rows, of contours, of the whole motion.
 
 `Figure` takes errors in mm, batch by batch, and gives the maximum (exact, with its place), the
-root of the mean square (exact, every sample counts alike) and the 95th percentile. The percentile
-comes from a histogram: the middle of the bin that holds the sample of that rank.
+root of the mean square (exact, every sample counts alike) and the 95th percentile, in memory that
+does not grow with the stream. The percentile comes from a histogram: the middle of the bin that
+holds the sample of that rank. Bins (`camtool.kernels.error_bins`) are between 1/256 and 1/128 of
+their value wide. So the percentile is within 0.4 % of a sample's true value.
 
-Bins (`camtool.kernels.error_bins`) are between 1/256 and 1/128 of their value wide. So the
-percentile is within 0.4 % of a sample's true value.
+`RowFigures` hold what became of each row of the program; all figures of contours, of the worst
+moves and of the whole motion (`Tally`) are sums and maxima over rows.
 """
 
 from __future__ import annotations
@@ -96,7 +98,7 @@ class Figure:
         return min(middle, self._max)
 
 
-# What became of each row of the program: the figures that all others are made of.
+# Figures of rows.
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +186,7 @@ def add_ledger(whole: Ledger, part: Ledger) -> None:
     whole.ended[rows] &= part.ended
 
 
-# What is counted over the whole motion: steps, reversals, time, and arcs that never end.
+# Figures of the whole motion: steps, reversals, time, and arcs that never end.
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +232,7 @@ def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
     )
 
 
-# Figures that are sums and maxima over rows: contours, the worst moves, unreached ends.
+# Figures of contours, the worst moves, and ends that are not reached.
 
 END_STEPS = 1.5
 """A move has missed its end when the controller stands more than so many steps beside it: one

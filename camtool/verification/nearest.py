@@ -6,8 +6,8 @@ Distances are exact: to true lines and arcs, never to chords.
     arc:       | |p − c| − r |  inside the wedge that the arc spans at its centre c (≤ 180°, so two
                signs of cross products tell), otherwise the distance to its nearer end.
 
-The nearest of many is searched by groups of neighbouring points. A tree of boxes, of moves and
-pieces of long ones, gives those within a margin of the group's box. When the largest distance
+The nearest of many is searched by groups of neighbouring points. Boxes of the moves, of long ones
+piece by piece (`Layers`), give those within a margin of the group's box. When the largest distance
 found is within the margin, no move outside could be nearer; otherwise the margin grows to that
 distance. So the result is exact whatever the first margin was; a good guess only saves time.
 """

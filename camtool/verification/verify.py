@@ -1,7 +1,13 @@
-"""How deep the tool really goes: play, scale and scatter of Z.
+"""Judge a program: run its decoded moves on the machine's model and compare with what was wanted.
 
-Z runs one way within each row and ends where the program says, so what becomes of it follows from
-the ends of the rows alone, whatever the controller does in between.
+    decoded ─held─▶ as the controller rounds it
+    held, wanted ─cuts─▶ lines and arcs that cut, by contour
+    held × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
+    decoded ─simulate─▶ chunks ─slides─▶ rows: errors, circles, extents, trace
+    all of it ─▶ Report and Trace
+
+Every distance is to true lines and arcs. Memory grows with the rows of the program, not with the
+steps of the machine.
 """
 
 from __future__ import annotations
@@ -18,6 +24,7 @@ from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.simulation.controller import FusedRun
+from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk
 from camtool.targets.registry import LoadedTarget
 from camtool.toolpath.moves import Bent, Toolpath, toolpath_extents
@@ -61,31 +68,6 @@ from camtool.verification.shape import (
     wanted_shape,
 )
 from camtool.verification.slides import SeenCircle, SlidePass, Trace, largest, trace_size
-
-
-def depth_error_mm(case: Case, cuts: CutMoves) -> float:
-    """The largest difference in height between the slide and the moves as held, at the ends of
-    rows that cut, mm; NaN when none does."""
-    from camtool.simulation.mechanics import Mechanics
-
-    toolpath = cuts.toolpath
-    if not cuts.is_cut.any():
-        return math.nan
-    mechanics = Mechanics(case.machine, toolpath.start, case.options.effects)
-    slide, _ = mechanics.follow(toolpath.end, np.array([0, len(toolpath)]))
-    return float(np.abs(slide[:, 2] - toolpath.end[:, 2])[cuts.is_cut].max())
-
-
-# Judge a program: run its decoded moves on the machine's model and compare with what was wanted.
-#
-#     decoded ─held─▶ as the controller rounds it
-#     held, wanted ─cuts─▶ lines and arcs that cut, by contour
-#     held × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
-#     decoded ─simulate─▶ chunks ─slides─▶ rows: errors, circles, extents, trace
-#     all of it ─▶ Report and Trace
-#
-# Every distance is to true lines and arcs. Memory grows with the rows of the program, not with the
-# steps of the machine.
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
@@ -318,7 +300,7 @@ class Result:
                 number(total.p95, UM_PER_MM),
                 number(mean_error_mm(self.rows), UM_PER_MM),
             ),
-            depth_max=number(depth_error_mm(self.case, self.cuts), UM_PER_MM),
+            depth_max=number(_depth_error_mm(self.case, self.cuts), UM_PER_MM),
         )
 
     def _fit(self) -> record.MaxRms:
@@ -459,9 +441,23 @@ class Result:
         )
 
 
+def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
+    """The largest difference in height between the slide and the moves as held, at the ends of
+    rows that cut, mm; NaN when none does.
+
+    Z runs one way within each row and ends where the program says, so what becomes of it follows
+    from the ends of the rows alone, whatever the controller does in between.
+    """
+    toolpath = cuts.toolpath
+    if not cuts.is_cut.any():
+        return math.nan
+    mechanics = Mechanics(case.machine, toolpath.start, case.options.effects)
+    slide, _ = mechanics.follow(toolpath.end, np.array([0, len(toolpath)]))
+    return float(np.abs(slide[:, 2] - toolpath.end[:, 2])[cuts.is_cut].max())
+
+
 def assumptions(case: Case) -> tuple[str, ...]:
     """What the times and figures take for granted."""
-
     link = case.machine.link
     said = case.target.model.assumptions(case.decoded, case.machine)
     if link.baud is None:
@@ -482,7 +478,6 @@ def _max_rms(figure: Figure) -> record.MaxRms:
 
 def _interpolator(case: Case) -> str:
     """How the controller makes lines and arcs."""
-
     return case.target.model.interpolation(case.decoded, case.machine, case.simulation)
 
 
