@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from camtool_postprocessors.gcode.arcs import arcs_hold, arcs_of
-from camtool_postprocessors.grbl.dialect import Dialect, dialect_of
+from camtool_postprocessors.grbl.dialect import Dialect
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,7 +17,8 @@ from tests.oracles.gcode_paths import farthest_mm
 
 
 def dialect(*settings: str) -> Dialect:
-    return dialect_of(load_target("grbl", settings=settings).machine)
+    options: Dialect = load_target("grbl", settings=settings).machine.dialect
+    return options
 
 
 def coarse(decimals: int) -> Dialect:
