@@ -165,6 +165,9 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
         if cells is not None:
             show_text("\n" + "\n".join(_play_table(name, cells, loaded.machine)), err=True)
+    for code in loaded.post.codes:
+        grave = " or ".join(severity.name.lower() for severity in code.severities)
+        show_text(f"\n{code.name} ({grave}): {code.means}; mend: {code.mend}", err=True)
     show_text(
         f"\nhighest feed {_speed(loaded.machine.max_feed_mm_min)}, "
         f"rapids {_speed(loaded.machine.rapid_mm_min)}; "

@@ -33,6 +33,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (package / "machine.toml").write_text(listing("machine"))
     (package / "__init__.py").write_text(listing("target"))
     (package / "controller.py").write_text(listing("controller"))
+    (package / "findings.py").write_text(listing("findings"))
     offline = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
     command = [sys.executable, "-m", "pip", "install", *offline, "--target", place, source]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S)
@@ -109,6 +110,19 @@ def test_its_controller_is_simulated(installed: Path, tmp_path: Path) -> None:
     assert exact["time_s"] != own["time_s"]
 
 
+def test_it_finds_what_no_other_machine_knows(installed: Path, tmp_path: Path) -> None:
+    (tmp_path / "far.plt").write_text("IN;SP2;" + "PD999999,0;PU0,0;" * 17 + "PU;")
+    done = camtool(installed, tmp_path, "verify", "far.plt", *FLAGS, "--json", "-")
+    found = [each for each in json.loads(done.stdout)["findings"] if each["code"][0].islower()]
+    assert [(each["code"], each["severity"]) for each in found] == [
+        ("tiny-plotter.DRY", "warning")
+    ]
+    assert "m, its ink lasts for 400 m" in found[0]["message"]
+    assert "warning tiny-plotter.DRY: the pen draws 4" in done.stderr
+    shown = camtool(installed, tmp_path, "targets", "tiny-plotter")
+    assert "tiny-plotter.DRY (warning): the pen draws farther than its ink lasts" in shown.stderr
+
+
 def test_its_records_check_the_machine_file(installed: Path, tmp_path: Path) -> None:
     for setting, said in (
         ("controller.down_hz=-1", "key down_hz: -1 is not between 0.001 and"),
@@ -130,14 +144,27 @@ def test_its_reader_refuses_noise(installed: Path, tmp_path: Path) -> None:
         assert "noise.plt" in done.stderr
 
 
-def test_a_fault_of_its_model_is_its_own(installed: Path, tmp_path: Path) -> None:
-    faulty = tmp_path / "faulty"
-    (faulty / "tiny_plotter").mkdir(parents=True)
+def copied(installed: Path, folder: Path) -> Path:
+    """The installed package in another folder, to break it there."""
     for file in installed.glob("tiny_plotter*/*"):
         if file.is_file():
-            copy = faulty / file.relative_to(installed)
-            copy.parent.mkdir(exist_ok=True)
+            copy = folder / file.relative_to(installed)
+            copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_bytes(file.read_bytes())
+    return folder
+
+
+def test_its_codes_bear_its_name(installed: Path, tmp_path: Path) -> None:
+    faulty = copied(installed, tmp_path / "faulty")
+    findings = faulty / "tiny_plotter" / "findings.py"
+    findings.write_text(findings.read_text().replace("tiny-plotter.DRY", "DRY"))
+    done = camtool(faulty, tmp_path, "targets", "tiny-plotter")
+    assert done.returncode == 2, done.stderr
+    assert "the code DRY does not begin with tiny-plotter." in done.stderr
+
+
+def test_a_fault_of_its_model_is_its_own(installed: Path, tmp_path: Path) -> None:
+    faulty = copied(installed, tmp_path / "faulty")
     model = faulty / "tiny_plotter" / "controller.py"
     model.write_text(model.read_text().replace("check_rows(toolpath, machine)", "1 / 0", 1))
     (tmp_path / "line.plt").write_text("IN;SP2;PD1600,800;PU;")
