@@ -51,8 +51,6 @@ class Target(ABC):
     any_machine: ClassVar[bool] = False
     """Whether the machine file stands for any machine, with travel and rates of none in
     particular."""
-    codes: ClassVar[tuple[TargetCode, ...]] = ()
-    """Codes of its own findings; each name begins with the target's name and a dot."""
     filter_default: ClassVar[bool] = False
     """Whether `camtool filter` takes it where no target is named."""
 
