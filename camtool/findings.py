@@ -316,8 +316,7 @@ class Code(IntEnum):
     BLOCK_TOO_LONG = (
         301,
         (INFO, WARNING),
-        "blocks are longer than the controller's buffer; a remark where nobody has said how "
-        "long that is",
+        "blocks are longer than the controller's buffer; a remark where that length is not known",
         "for `pic-mmh`: `--set dialect.form=annex`",
     )
     FEED_ROUNDED = (
@@ -396,14 +395,14 @@ class Code(IntEnum):
         312,
         INFO,
         "a program switches coolant or waits for the operator (M0, M1): that moves nothing, "
-        "and no other dialect is told of it",
+        "and is written in no other dialect",
         "none",
     )
     ARC_END_UNSURE = (
         316,
         WARNING,
         "arcs of a foreign program stop on their ends by some readings of the controller's "
-        "stop test and not by others; what becomes of them by each is said",
+        "stop test and not by others; what becomes of them by each is given",
         "post the drawing with camtool, whose arcs end by every reading; or try the arc on the "
         "machine and set `controller.arc_end`",
     )
@@ -438,7 +437,7 @@ class Code(IntEnum):
     READ_TWO_WAYS = (
         323,
         WARNING,
-        "a program says something that its machine's thesis leaves two readings for, and they "
+        "a program says something that its machine's thesis allows two readings of, and they "
         "lead to different places",
         "post again (what camtool writes means the same in both), or set the option where you "
         "know",
@@ -474,7 +473,7 @@ class Code(IntEnum):
     PLAY_NOT_KNOWN = (
         405,
         (INFO, WARNING),
-        "an axis that moves has no known play, so its error is not predicted; a warning where "
+        "an axis that moves has no known backlash, so its error is not predicted; a warning where "
         "fewer reversals were asked for and neither X nor Y has any",
         "measure it: `--set axes.z.backlash_mm=...`",
     )
@@ -532,7 +531,7 @@ class Code(IntEnum):
         415,
         (INFO, ERROR),
         "moves cut with the spindle off, turning the other way or at another speed than the "
-        "job names; told where it names none",
+        "job names; a remark where it names none",
         "post again; give `camtool verify` the flags of the post",
     )
     CUT_OTHER_WAY = (
@@ -551,8 +550,8 @@ class Code(IntEnum):
     END_DIFFERS = (
         418,
         (INFO, WARNING, ERROR),
-        "the program lacks its end, or the tool ends lower than it should; told where it ends "
-        "at another place in XY",
+        "the program lacks its end, or the tool ends lower than it should; a remark where it "
+        "ends at another place in XY",
         "end the program, with the tool up",
     )
     SETTING_DIFFERS = (
@@ -576,7 +575,7 @@ class TargetCode:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing noticed, with its place, the measured value and the limit where there are any.
+    """One thing found, with its place, the measured value and the limit where there are any.
 
     `unit` belongs to both `measured` and `limit` ("mm", "um", "chars", "mm_min", ...).
     """
@@ -656,28 +655,28 @@ _TEXTS: Final = _Texts()
 
 
 MOST_ALIKE = 3
-"""So many findings of one code and severity are told one by one where people read them."""
+"""So many findings of one code and severity are listed one by one where people read them."""
 
 
-class Noticed(Protocol):
-    """What a finding is, here or in a report."""
+class AnyFinding(Protocol):
+    """A finding, here or in a report."""
 
     @property
     def code(self) -> Code | TargetCode | str:
-        """What was noticed."""
+        """What was found."""
 
     @property
     def severity(self) -> Severity | str:
         """How grave it is."""
 
 
-_N = TypeVar("_N", bound=Noticed)
+_F = TypeVar("_F", bound=AnyFinding)
 
 
-def summed(findings: Iterable[_N]) -> list[tuple[_N, int]]:
+def summed(findings: Iterable[_F]) -> list[tuple[_F, int]]:
     """The first findings of each code and severity, in their order; the last of them with the
     number of those that are left out behind it, the others with 0."""
-    alike: dict[tuple[object, object], list[_N]] = {}
+    alike: dict[tuple[object, object], list[_F]] = {}
     order = list(findings)
     for each in order:
         alike.setdefault((each.code, each.severity), []).append(each)
