@@ -56,8 +56,8 @@ if TYPE_CHECKING:
 
 
 def scenes_of(run: Run, *, before: bool) -> list[Scene]:
-    """The predicted result; `before` it that of the job without what it does against reversals and
-    play. OptionError where it does nothing of that kind."""
+    """The predicted result; with `before`, also that of the job without its measures against
+    reversals and backlash. OptionError where the job has none."""
     if not before or run.failed:
         return [run.scene()]
     if run.before is None:

@@ -86,7 +86,7 @@ def preview(
     if beside is not None:
         check_beside("--beside", [output])
     check_places([*sources, *machine.files(), *job.files()], [output])
-    # What is to be played needs its times, which only the machine's model knows.
+    # A viewer plays the program, which needs the times of the machine's model.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
     say_first_run(quiet=quiet, judging=simulate)

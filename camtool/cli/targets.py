@@ -164,7 +164,7 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
         show_text(f"{key} = {to_json(value, indent=0)}".rstrip("\n"))
     for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
         if cells is not None:
-            show_text("\n" + "\n".join(_play_table(name, cells, loaded.machine)), err=True)
+            show_text("\n" + "\n".join(_backlash_table(name, cells, loaded.machine)), err=True)
     for code in loaded.post.codes:
         grave = " or ".join(severity.name.lower() for severity in code.severities)
         show_text(f"\n{code.name} ({grave}): {code.means}; mend: {code.mend}", err=True)
@@ -177,7 +177,7 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     say(f"{loaded.file}", quiet=False)
 
 
-def _play_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:
+def _backlash_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:
     """The cells as they lie on the table: +X to the right, +Y up."""
     mean_um = getattr(machine.axes, name).backlash_mm * 1000.0
     instead = "" if machine.play_map.use else f", not used: play_map.use; {mean_um:g} everywhere"

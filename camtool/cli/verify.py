@@ -1,4 +1,4 @@
-"""`camtool verify`: simulate and judge any program of a machine, one way or several."""
+"""`camtool verify`: simulate and judge any program of a machine, or compare variants of it."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def verify(
 
 
 def _ways(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
-    """What `--compare SPEC` stands for; OptionError when it is nothing."""
+    """The variants that `--compare SPEC` names; OptionError when it names none."""
     from camtool.comparison import ways_of
 
     def load(more: Sequence[str]) -> LoadedTarget:
@@ -243,7 +243,7 @@ def _judge(file: str, case: Case, wishes: Wishes) -> int:
 
 
 def _compare(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
-    """The table of all ways to run a program, and their picture; the exit code."""
+    """The table of all variants, and their picture; the exit code."""
     from camtool.comparison import compare_program
     from camtool.verification.contrast import to_json
 
