@@ -1,1 +1,1 @@
-"""The records that planning, posts and simulation share."""
+"""The records that planning, targets and simulation share."""

@@ -1,4 +1,4 @@
-"""A friendly way to write a Toolpath row by row."""
+"""Building a Toolpath row by row."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ToolpathBuilder:
         self.mode: PathMode | None = None
         """How the rows that follow meet their corners; None: as the machine does."""
         self.run = -1
-        """The run of the plan that the rows that follow are of; −1: links between runs."""
+        """Index of the run in the plan for the rows that follow; −1: links between runs."""
         self._start = start
         self._rows: list[tuple[float, ...]] = []
         self._runs: list[int] = []
@@ -84,7 +84,7 @@ class ToolpathBuilder:
 
     @property
     def runs(self) -> Ints:
-        """(N,) the run that each row is of."""
+        """(N,) index of the run of each row."""
         return np.array(self._runs, dtype=np.int64)
 
     def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:

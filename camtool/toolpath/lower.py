@@ -1,4 +1,4 @@
-"""Toolpaths made fit for a machine: what a dialect cannot say, said by what it can.
+"""Toolpaths made fit for a machine: moves that a dialect lacks, replaced by those that it has.
 
     xy_then_z           moves of XY and Z at once become two: up before XY, down after
     helices_to_steps    slopes and helices become flat pieces with small plunges between
@@ -152,8 +152,8 @@ def _of_rows(toolpath: Toolpath, arms: Arms, parts: Floats) -> _Parts:
 
 
 def _split(toolpath: Toolpath, arms: Arms, parts: _Parts, *, lines: bool = False) -> Lowered:
-    """Each row in so many parts of equal way, arcs of `arms` in equal sweeps; `lines`: chords of
-    these."""
+    """Each row in so many parts of equal length, arcs of `arms` in equal sweeps; `lines`: chords
+    of these."""
     if float(parts.count.sum()) > MAX_PARTS:
         raise PostError(
             f"the toolpath would become more than {MAX_PARTS} moves",
@@ -210,7 +210,7 @@ def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:
 
 def within_feeds(toolpath: Toolpath, machine: Machine) -> Toolpath:
     """The same moves with every cut at no more than the machine's highest feed; FEED_ABOVE_LIMIT
-    tells of it where one was faster."""
+    where one was faster."""
     limit = machine.max_feed_mm_min
     with np.errstate(invalid="ignore"):
         fast = toolpath.is_feed & (toolpath.feed > limit)

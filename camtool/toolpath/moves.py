@@ -4,7 +4,7 @@ A row is either a move (RAPID, LINE, ARC_CW, ARC_CCW) or an event (spindle, dwel
 in the XY plane; G02 is ARC_CW seen from +Z. A full circle is an arc whose end is its start. An arc
 that ends at another height is a helix of one turn at most, Z in proportion to the angle.
 Frame: work frame (part zero), mm; feeds in mm/min. Row i starts where row i−1 ended; row 0 starts
-at `start`. Planning builds it, posts write it, a post's reader gives it back, simulation runs it.
+at `start`. Planning builds it, a target writes it and reads it back, simulation runs it.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from camtool.findings import Finding
 from camtool.toolpath.wanted import Drawn
 
 COLUMNS = ("kind", "end", "centre", "feed", "value", "source", "block", "mode")
-"""What a Toolpath says of each row ..."""
+"""The columns of a Toolpath ..."""
 
 WHOLE = ("kind", "source", "block", "mode")
-"""... and which of it are whole numbers."""
+"""... and those of whole numbers."""
 
 
 class Kind(IntEnum):
@@ -88,7 +88,7 @@ class Toolpath:
     no arc; feed (N,) mm/min, NaN for rapids and events; value (N,), NaN where none; source (N,)
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
     program block that the row was read from, −1 when planned; start (3,) mm; `made_from` the name
-    of the drawing, "" when nobody knows; mode (N,) index into `modes` or −1, where the program
+    of the drawing, "" when it is not known; mode (N,) index into `modes` or −1, where the program
     leaves to the machine how it meets the corner behind the row; without modes all of them are;
     `drawn` what the rows stand for, None but for plans. ValueError when columns disagree.
     """
@@ -174,7 +174,7 @@ class Toolpath:
 
     @property
     def running(self) -> int:
-        """How many rows run: those behind the end of the program do not."""
+        """How many rows are executed: those behind the end of the program are not."""
         ends = np.flatnonzero(self.kind == Kind.END)
         return int(ends[0]) + 1 if len(ends) else len(self)
 
@@ -229,9 +229,9 @@ def _or_none(number: np.float64) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class Bent:
-    """A toolpath bent beforehand so that a machine's slides come out on another one: `toolpath` is
-    what the controller is told, `row` (N,) of each of its rows the row of the wanted toolpath that
-    it is there for."""
+    """A toolpath compensated beforehand, so that the slides come out on the wanted one: `toolpath`
+    is what the controller is sent, `row` (N,) the row of the wanted toolpath for each of its
+    rows."""
 
     toolpath: Toolpath
     row: Ints

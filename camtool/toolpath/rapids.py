@@ -124,7 +124,7 @@ def _pieces(toolpath: Toolpath, row: int) -> Iterator[tuple[Floats, Floats]]:
 
 
 class _Swarf:
-    """What the cuts of a toolpath have cleared, asked for rapid by rapid."""
+    """What the cuts of a toolpath have cleared, queried rapid by rapid."""
 
     def __init__(self, toolpath: Toolpath, reach: Reach, tolerance_mm: float) -> None:
         import shapely
@@ -176,9 +176,9 @@ class _Swarf:
         low = np.where(rise < 0.0, crossing, 0.0)
         high = np.where(rise > 0.0, crossing, 1.0)
         deep = np.minimum(begin[:, 2], end[:, 2]) <= floor
-        way = (end - begin)[:, :2]
-        first = begin[:, :2] + low[:, None] * way
-        last = begin[:, :2] + high[:, None] * way
+        travel = (end - begin)[:, :2]
+        first = begin[:, :2] + low[:, None] * travel
+        last = begin[:, :2] + high[:, None] * travel
         for radius in np.unique(self._radius[near[deep]]).tolist():
             these = deep & (self._radius[near] == radius)
             yield radius, list(np.stack([first[these], last[these]], axis=1))

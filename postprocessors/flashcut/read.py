@@ -1,7 +1,7 @@
 """Reading flashcut, one block a line, by the four templates of the thesis (L980-1016).
 
 The real program hands each line to the routine of its code; what it does with a line that fits no
-template is not said, so here such a line is an error with block, line and column.
+template is not known, so here such a line is an error with block, line and column.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ LEXING: Final = Lexing(letters="GMXYZIJF")
 FEED_GUARD: Final = 1e-9
 """Part of a feed: a feed above its limit by less is at the limit."""
 
-HELD_GUARD: Final = 0.01
+LIMITED_GUARD: Final = 0.01
 """Part of a feed: whole milliseconds bring it no nearer than this at the fastest."""
 
 WARNED_PART: Final = 0.5
-"""Of the feed that a program says: a cut that gets less is a warning, not a remark."""
+"""Part of the programmed feed: a cut that gets less is a warning, not a remark."""
 
 MOST_MS: Final = 1e9
 """Half periods longer than this make no shorter axis too long."""
@@ -84,7 +84,7 @@ class _Excess:
 
 
 class _Reader:
-    """Blocks in, rows out; knows the feed that holds and whether the program has ended."""
+    """Blocks in, rows out; knows the feed in force and whether the program has ended."""
 
     def __init__(self, machine: FlashcutMachine) -> None:
         self.path = ToolpathBuilder()
@@ -221,22 +221,22 @@ def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> tuple[Finding, 
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
         return ()
-    return (*_held(path, machine, controller), *_too_long(path, machine, controller))
+    return (*_limited_feeds(path, machine, controller), *_too_long(path, machine, controller))
 
 
-def _held(
+def _limited_feeds(
     path: Toolpath, machine: FlashcutMachine, controller: FlashcutController
 ) -> Iterator[Finding]:
     """FEED_HELD: cuts whose feed the shortest half period does not let them have."""
     rows = np.flatnonzero(path.is_feed)
     steps_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    way = (path.end - path.starts)[rows]
-    moves = np.column_stack([to_steps(way[:, k], float(steps_mm[k])) != 0 for k in range(3)])
+    travel = (path.end - path.starts)[rows]
+    moves = np.column_stack([to_steps(travel[:, k], float(steps_mm[k])) != 0 for k in range(3)])
     alone = (moves.sum(axis=1) == 1) & ~path.is_arc[rows]
     step_mm = np.where(moves[:, 2] & alone, steps_mm[2], steps_mm[:2].max())
     asked = path.feed[rows]
     fastest = feeds_of(shortest_ms(alone, controller), step_mm, controller)
-    late = np.flatnonzero(asked > fastest * (1.0 + HELD_GUARD))
+    late = np.flatnonzero(asked > fastest * (1.0 + LIMITED_GUARD))
     if len(late):
         worst = int(late[(asked[late] / fastest[late]).argmax()])
         gets = float(fastest[worst])
@@ -255,8 +255,8 @@ def _too_long(
 ) -> tuple[Finding, ...]:
     rows = np.flatnonzero(path.is_motion & ~path.is_arc)
     x_mm, y_mm = machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm
-    way = np.abs(path.end - path.starts)[rows]
-    steps = np.column_stack([to_steps(way[:, 0], x_mm), to_steps(way[:, 1], y_mm)])
+    travel = np.abs(path.end - path.starts)[rows]
+    steps = np.column_stack([to_steps(travel[:, 0], x_mm), to_steps(travel[:, 1], y_mm)])
     feed = np.where(path.is_feed, path.feed, np.inf)[rows]
     alone = (steps == 0).any(axis=1)
     half_period = half_periods_ms(feed, max(x_mm, y_mm), alone, controller)

@@ -1,9 +1,9 @@
-"""Writing flashcut: a Toolpath to blocks that each say everything anew, but for the feed.
+"""Writing flashcut: a Toolpath to blocks that repeat every word but the feed.
 
-    rows ──checked──▶ XY and Z apart ──units, arcs mended──▶ blocks, F where it changes
+    rows ──checked──▶ XY and Z apart ──units, arcs repaired──▶ blocks, F where it changes
 
 The syntax has F in G01 of XY alone (L989-992). So a feed that changes before a Z move or an arc
-is said by a G01 to where the tool is: X and Y "aún así es necesario", L985.
+is written as a G01 to where the tool is: X and Y "aún así es necesario", L985.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from camtool.toolpath.refusals import refuse
 
 from ..gcode.checks import feed_units
 from ..gcode.dialect import feed_decimals
-from ..gcode.format import CODE, NumberStyle, say_units
+from ..gcode.format import CODE, NumberStyle, format_units
 from ..gcode.plain import (
     ArcRules,
     PlainRows,
@@ -47,7 +47,7 @@ EVENT: Final = {
 
 
 def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    """The program of a toolpath; PostError names the move that cannot be written or done."""
     dialect = machine.dialect
     check_plain(toolpath, machine)
     feeds, rounded_feeds = feed_units(toolpath, machine)
@@ -83,7 +83,7 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
     The timers make the shorter axis too long where it has more steps than the half period P has
     milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes
     K = ⌈m / (P − 1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its
-    start, so that the controller, which rounds the way of each piece by itself, has nothing to
+    start, so that the controller, which rounds the travel of each piece by itself, has nothing to
     round.
     """
     controller = machine.controller
@@ -91,8 +91,8 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
         return Lowered(toolpath, np.arange(len(toolpath)))
     q_mm = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
     begin = toolpath.starts
-    way = toolpath.end[:, :2] - begin[:, :2]
-    steps = np.column_stack([to_steps(way[:, axis], float(q_mm[axis])) for axis in (0, 1)])
+    travel = toolpath.end[:, :2] - begin[:, :2]
+    steps = np.column_stack([to_steps(travel[:, axis], float(q_mm[axis])) for axis in (0, 1)])
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
     alone = (steps == 0).any(axis=1)
     half_period = half_periods_ms(feed, float(q_mm.max()), alone, controller)
@@ -110,7 +110,7 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
 
 
 def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
-    """Each row in `count` (N,) pieces; `steps` (N, 2) of its whole way."""
+    """Each row in `count` (N,) pieces; `steps` (N, 2) of the whole row."""
     row = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     inner = np.flatnonzero(part + 1 < count[row])
@@ -134,7 +134,7 @@ def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: Dia
 
 def _texts(units: Ints, dialect: Dialect) -> list[str]:
     """Column of units (M,) as texts: "1.0", "-0.25"; zero has no minus."""
-    texts = say_units(units, NumberStyle(dialect.decimals))
+    texts = format_units(units, NumberStyle(dialect.decimals))
     if dialect.trailing_zeros:
         return texts
     return [text if text[-1] != "0" else _short(text) for text in texts]
@@ -172,7 +172,7 @@ def _event_findings(toolpath: Toolpath, dialect: Dialect) -> Iterator[Finding]:
 
 
 class _Writer:
-    """Blocks one by one; knows which feed the controller holds."""
+    """Blocks one by one; knows which feed is in force."""
 
     def __init__(self, rows: PlainRows, dialect: Dialect, machine: FlashcutMachine) -> None:
         self.blocks: list[str] = []
@@ -181,7 +181,7 @@ class _Writer:
         self._dialect = dialect
         self._feed_decimals = max(1, feed_decimals(machine))
         self._feed_scale = 10 ** feed_decimals(machine)
-        self._said_feeds: dict[int, str] = {}
+        self._feed_texts: dict[int, str] = {}
         self._feed = 0
 
     def run(self, events: dict[int, str], of_row: Ints, feeds: Ints) -> None:
@@ -222,13 +222,13 @@ class _Writer:
         return [f"X{one} Y{two}" for one, two in zip(x, y, strict=True)]
 
     def _corner(self, at: str, target: str, row: int) -> None:
-        """The way along X of a rapid of both axes, before that along Y."""
+        """The part along X of a rapid of both axes, before that along Y."""
         corner = f"{target.partition(' ')[0]} {at.partition(' ')[2]}"
         if corner not in (at, target):
             self._send(f"{CODE[Kind.RAPID]} {corner}", row)
 
     def _move(self, word: str, target: str, row: int, feed: int, at: str) -> None:
-        """One move, and a block in front that says the feed where its own cannot."""
+        """One move, and a block in front that sets the feed where its own cannot."""
         tail = ""
         if word != "G00" and feed != self._feed:
             tail = f" {self._feed_word(feed)}"
@@ -240,10 +240,10 @@ class _Writer:
         self._send(f"{word} {target}{tail}", row)
 
     def _feed_word(self, units: int) -> str:
-        word = self._said_feeds.get(units)
+        word = self._feed_texts.get(units)
         if word is None:
             word = f"F{units / self._feed_scale:.{self._feed_decimals}f}"
-            self._said_feeds[units] = word
+            self._feed_texts[units] = word
         return word
 
     def _send(self, block: str, row: int) -> None:

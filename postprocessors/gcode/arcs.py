@@ -1,15 +1,15 @@
 """Writing arcs of grbl and linuxcnc: every arc re-checked after its numbers were rounded.
 
-A *unit* is the last decimal that is said. Start, end and centre lie on whole units; what is sent
-is the end and the offset centre − start. For each arc, by its rounded numbers:
+A *unit* is the last decimal that is written. Start, end and centre lie on whole units; what is
+sent is the end and the offset centre − start. For each arc, by its rounded numbers:
 
-    sagitta below half a unit           one line says it as well
-    the controller's rule holds         as it is
-    otherwise                           1. re-centred: a centre close by for which it holds
+    sagitta below half a unit           one line does as well
+    the controller accepts it           unchanged
+    otherwise                           1. re-centred: a centre close by that it accepts
                                         2. split into two arcs at its middle (each re-centred)
                                         3. lines within a unit of the arc
 
-"The rule holds" also means that the rounded arc turns as the wanted one does: an arc of a few
+"Accepts" also means that the rounded arc turns as the wanted one does: an arc of a few
 units may come out as nearly a full turn, and a short one of a large radius as a full circle.
 """
 
@@ -100,19 +100,19 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
     centre[said] = units_of(toolpath.centre[rows[said]], dialect.decimals)
     begin, stop = start[rows, :2], end[rows, :2]
     offset[rows[said]] = (centre - begin)[said]
-    holds = arcs_hold(np.abs(sweep), (begin, stop, centre), kind[rows], dialect)
+    holds = arcs_accepted(np.abs(sweep), (begin, stop, centre), kind[rows], dialect)
     halves = dialect.full_circles == "halves"
     full = (begin == stop).all(axis=1) & said & holds
     special = huge | (said & ~holds) | (full & halves)
     for at in np.flatnonzero(special).tolist():
-        _mended(arcs, toolpath, int(rows[at]), float(sweep[at]), dialect)
+        _repair(arcs, toolpath, int(rows[at]), float(sweep[at]), dialect)
     return arcs
 
 
-def arcs_hold(
+def arcs_accepted(
     sweep_rad: Floats, points: tuple[Ints, Ints, Ints], kind: Ints, dialect: GcodeDialect
 ) -> Bools:
-    """Which arcs the controller takes, and takes for what they are.
+    """Which arcs the controller accepts, and executes as they were meant.
 
     `sweep_rad` (K,) > 0 as wanted; `points` start, end, centre (K, 2) in units.
     """
@@ -150,7 +150,7 @@ def turns_of(out: Floats, back: Floats, clockwise: Bools) -> Floats:
     return np.where(angle == 0.0, 2.0 * math.pi, angle)
 
 
-def _mended(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: GcodeDialect) -> None:
+def _repair(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: GcodeDialect) -> None:
     """Replace one arc by pieces: re-centred, split, or lines."""
     begin = arcs.end[row - 1, :2] if row else units_of(toolpath.start[:2], dialect.decimals)
     stop, kind = arcs.end[row, :2], Kind(int(toolpath.kind[row]))
@@ -163,8 +163,8 @@ def _mended(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: Gco
         return
     whole = bool((wanted.start == wanted.end).all())
     huge = math.dist(wanted.start, wanted.centre) > dialect.arc_most_radius_mm
-    one = None if huge or whole else _one(wanted, (begin, stop), kind, dialect)
-    two = None if huge or one else _two(wanted, (begin, stop), kind, dialect)
+    one = None if huge or whole else _recentred(wanted, (begin, stop), kind, dialect)
+    two = None if huge or one else _halves(wanted, (begin, stop), kind, dialect)
     if whole and two:
         arcs.pieces[row] = two
         return
@@ -178,7 +178,7 @@ def _mended(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: Gco
         arcs.pieces[row] = two
     else:
         counts.lines += 1
-        arcs.pieces[row] = _lines(wanted, begin, stop, dialect)
+        arcs.pieces[row] = _chords(wanted, begin, stop, dialect)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ class _Wanted:
         )
 
 
-def _one(
+def _recentred(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> Piece | None:
     """The arc about the nearest centre that the controller takes; None when there is none close.
@@ -227,13 +227,13 @@ def _one(
     same = np.ones((len(tried), 1), dtype=np.int64)
     points = (begin * same, stop * same, tried)
     sweeps = np.full(len(tried), abs(wanted.sweep))
-    holds = arcs_hold(sweeps, points, np.full(len(tried), int(kind)), dialect)
+    holds = arcs_accepted(sweeps, points, np.full(len(tried), int(kind)), dialect)
     if not holds.any():
         return None
     return Piece(kind, _pair(stop), _pair(tried[int(np.argmax(holds))] - begin))
 
 
-def _two(
+def _halves(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> list[Piece] | None:
     """Two arcs that meet at the middle; None when the controller would refuse one of them."""
@@ -244,15 +244,17 @@ def _two(
     first = _Wanted(wanted.start, wanted.centre, mid_mm, half)
     second = _Wanted(mid_mm, wanted.centre, wanted.end, half)
     pieces = [
-        _as_it_is(first, (begin, mid), kind, dialect) or _one(first, (begin, mid), kind, dialect),
-        _as_it_is(second, (mid, stop), kind, dialect) or _one(second, (mid, stop), kind, dialect),
+        _unchanged(first, (begin, mid), kind, dialect)
+        or _recentred(first, (begin, mid), kind, dialect),
+        _unchanged(second, (mid, stop), kind, dialect)
+        or _recentred(second, (mid, stop), kind, dialect),
     ]
     if pieces[0] is None or pieces[1] is None:
         return None
     return [replace(pieces[0], share=0.5), pieces[1]]
 
 
-def _as_it_is(
+def _unchanged(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> Piece | None:
     """The arc with its own centre, if the controller takes it."""
@@ -260,12 +262,12 @@ def _as_it_is(
     centre = units_of(wanted.centre, dialect.decimals)
     points = (begin[None, :], stop[None, :], centre[None, :])
     sweep = np.array([abs(wanted.sweep)])
-    if not arcs_hold(sweep, points, np.array([kind]), dialect)[0]:
+    if not arcs_accepted(sweep, points, np.array([kind]), dialect)[0]:
         return None
     return Piece(kind, _pair(stop), _pair(centre - begin))
 
 
-def _lines(wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> list[Piece]:
+def _chords(wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> list[Piece]:
     """The fewest equal chords within a unit of the arc: a chord over the angle a strays by
     R (1 − cos(a/2)) = 2 R sin²(a/4)."""
     radius = math.dist(wanted.start, wanted.centre)
@@ -279,7 +281,7 @@ def _lines(wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> l
         if (point != at).any():
             pieces.append(Piece(Kind.LINE, _pair(point), share=share))
             at = point
-    # Says nothing when the last chord was too small, but for the rest of a helix's rise.
+    # Moves nothing when the last chord was too small, but for the rest of a helix's rise.
     return [*pieces, Piece(Kind.LINE, _pair(stop))]
 
 

@@ -9,10 +9,10 @@ What a *block* is: a line with at least one word. `Block.index` counts them from
 `Toolpath.block`), `Block.line` counts lines of the file from 1; empty lines and comments are lines
 but no blocks. Lines end with LF, CR LF or CR, also mixed. N words in front are taken off
 where `Lexing.block_numbers` allows them. Columns are those of the file's own line, from 1, and
-are only worked out when something is wrong: that is why words carry none.
+are only worked out when something is wrong, so that words need not carry them.
 
-`Block.comments` holds the texts of the line's comments, without their signs; a line of comments
-alone is given too when `Lexing.comment_lines` (with no words and an index of −1).
+`Block.comments` holds the texts of the line's comments, without their delimiters; a line of
+comments alone is given too when `Lexing.comment_lines` (with no words and an index of −1).
 
 Writers never use this module, readers never `format.py`.
 """
@@ -63,7 +63,7 @@ class Lexing:
     `letters`: those that begin words. `lower_case`: small letters count as capitals. `blanks`:
     spaces and tabs "anywhere" (even inside a number), "between" words (and around them), or
     "none". `parentheses`, `semicolon`: comments of that sign. `block_numbers`: a leading N word.
-    `line_chars`: longest line; `counts_blanks` tells whether blanks and comments count for it (the
+    `line_chars`: longest line; `counts_blanks`: whether blanks and comments count for it (the
     controller may drop them as they come in). `foreign_comments`: comments may hold signs beyond
     ASCII (grbl takes such bytes for commands, even there).
     """

@@ -26,7 +26,7 @@ FEED_TOLERANCE: Final = 1e-6
 
 
 def check(toolpath: Toolpath, machine: Machine) -> None:
-    """Refuse what cannot be said or done, whatever the order of the rows."""
+    """Refuse what cannot be written or done, whatever the order of the rows."""
     refuse_start(toolpath)
     far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MOST_MM
     refuse(toolpath, far, f"a coordinate beyond {MOST_MM:g} mm", "check the units")

@@ -1,9 +1,9 @@
-"""Writing RS274-like text: numbers of fixed decimals by columns, comments that say nothing else,
-lines that fit. Shared by the dialects that write words of a letter and a number.
+"""Writing RS274-like text: numbers of fixed decimals by columns, comments that cannot be taken for
+words, lines that fit. Shared by the dialects that write words of a letter and a number.
 
     units = units_of(values_mm, 3)             whole thousandths, half away from zero
-    say_units(units, NumberStyle(3))           ["1.500", "-0.020"], never "-0.000"
-    say_column(values, NumberStyle(3, strip=True))   both at once: ["1.5", "-0.02"]
+    format_units(units, NumberStyle(3))        ["1.500", "-0.020"], never "-0.000"
+    format_column(values, NumberStyle(3, strip=True))   both at once: ["1.5", "-0.02"]
     comment("logo (v2).dxf")                   "(logo _v2_.dxf)"
     first_too_long(lines, 80)                    index of the first line over the limit, or −1
 
@@ -23,7 +23,7 @@ from camtool.arrays import Floats, Ints
 from camtool.toolpath.moves import Kind
 
 MOST_UNITS: Final = 10**15
-"""Whole units beyond this are not said: their decimals would no longer be exact in a float."""
+"""Whole units beyond this are not written: their decimals would no longer be exact in a float."""
 
 COMMENT_CHARS: Final = 60
 """No comment is longer, its parentheses not counted."""
@@ -45,7 +45,7 @@ CODE: Final[dict[int, str]] = {
 
 @dataclass(frozen=True)
 class NumberStyle:
-    """How a number is said: digits after the point; `strip` their trailing zeros (and the point
+    """How a number is written: digits after the point; `strip` their trailing zeros (and the point
     if nothing follows it)."""
 
     decimals: int
@@ -64,11 +64,11 @@ def units_of(values: Floats, decimals: int) -> Ints:
 
 
 def values_of(units: Ints, decimals: int) -> Floats:
-    """The floats nearest to the decimal numbers that units say: what a reader must find."""
+    """The floats nearest to the decimal numbers of the units: what a reader must find."""
     return np.asarray(units / 10.0**decimals)
 
 
-def say_units(units: Ints, style: NumberStyle) -> list[str]:
+def format_units(units: Ints, style: NumberStyle) -> list[str]:
     """Whole units (N,) as N texts; zero has no minus."""
     values = values_of(units, style.decimals).tolist()
     # One formatting of the whole column: several times as fast as one per number.
@@ -79,21 +79,21 @@ def say_units(units: Ints, style: NumberStyle) -> list[str]:
     return column
 
 
-def say_column(values: Floats, style: NumberStyle) -> list[str]:
+def format_column(values: Floats, style: NumberStyle) -> list[str]:
     """Values (N,) rounded to the style's decimals, as N texts; ValueError as `units_of`."""
-    return say_units(units_of(values, style.decimals), style)
+    return format_units(units_of(values, style.decimals), style)
 
 
-def say_number(value: float, style: NumberStyle) -> str:
+def format_number(value: float, style: NumberStyle) -> str:
     """A single number; ValueError as `units_of`."""
-    return say_column(np.array([value]), style)[0]
+    return format_column(np.array([value]), style)[0]
 
 
 def comment(text: str) -> str:
     """`text` as a comment that may stand in any program: ASCII letters, digits, spaces and
     ._+:/=- only.
 
-    All else becomes _ (line ends and tabs a space); runs of spaces become one; cut to
+    Every other character becomes _ (line ends and tabs a space); runs of spaces become one; cut to
     `COMMENT_CHARS`. It cannot end a comment, begin one, or be obeyed by a controller within one.
     """
     flat = " ".join(text.split())

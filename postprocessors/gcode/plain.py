@@ -1,10 +1,10 @@
 """Writing flashcut and valcnc: what both refuse, split or leave out, and how their arcs survive.
 
 Their theses give no rule for arcs whose radii differ, so both radii are equal to within a unit. A
-*unit* is the last decimal that is said. Start, end and centre lie on whole units; what is sent
+*unit* is the last decimal that is written. Start, end and centre lie on whole units; what is sent
 is the end and the offset centre − start. For each arc, by its rounded numbers:
 
-    sagitta below half a unit        one line says it as well
+    sagitta below half a unit        one line does as well
     a centre within RECENTRE_REACH units of the rounded one, from which start and end are equally
     far to within a unit, and about which the arc turns as wanted
                                      the one nearest to the wanted centre
@@ -91,7 +91,7 @@ def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) ->
 
 @dataclass(frozen=True)
 class ArcRules:
-    """What a dialect wants of arcs: `most_mm` that an offset may say; `chord_fits`: the chord must
+    """What a dialect wants of arcs: `most_mm` of an offset; `chord_fits`: the chord must
     not exceed twice the radius at the start (a controller that takes its arcsine)."""
 
     decimals: int
@@ -182,7 +182,8 @@ def arc_findings(rows: PlainRows, place: str) -> Iterator[Finding]:
 
 
 def _halved(toolpath: Toolpath, rules: ArcRules) -> Lowered:
-    """Full and nearly full circles, whose rounded ends coincide, in halves; all else as it is."""
+    """Full and nearly full circles, whose rounded ends coincide, in halves; other rows
+    unchanged."""
     begin = units_of(toolpath.starts, rules.decimals)
     stop = units_of(toolpath.end, rules.decimals)
     full = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)

@@ -1,7 +1,7 @@
 """Reading grbl and linuxcnc: blocks of words to rows, with the modes that both know.
 
 A block is decoded as RS274 orders it: modes and numbers first, then feed, spindle, tool, dwell,
-and its motion last. What a dialect has of its own it says in `Rules`: which G and M codes it
+and its motion last. What is a dialect's own stands in `Rules`: which G and M codes it
 takes, which it takes and ignores, which cannot be simulated, and its rule for arcs. A word that
 nothing uses is an error, and so are two words of one group: controllers refuse both.
 """
@@ -103,12 +103,12 @@ class Rules:
 
     `groups`: the G codes it takes and the group of each; two of a group in a block are an error.
     `refused`: codes ("G55", "M6") that the controller knows but that have no place in a program
-    here, and why. `first_motion`: the motion mode before any word says one (None: none).
+    here, and why. `first_motion`: the motion mode before the first motion word (None: none).
     `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
-    `circle_without_end`: an arc that says only its centre is a full circle. `path_modes`: the
-    group "path" tells how corners are met. `turns`: P tells how many turns an arc begins.
+    `circle_without_end`: an arc that has only its centre is a full circle. `path_modes`: the
+    group "path" sets how corners are met. `turns`: P is how many turns an arc begins.
     `forgets_feed`: G94 does, and G1 to G3 want a feed even where nothing moves.
-    `ends_in_plane`: an arc must say X or Y. `feed_first`: a feed beside a change of units is in
+    `ends_in_plane`: an arc must have X or Y. `feed_first`: a feed beside a change of units is in
     the units before. `m_codes`: the M codes it takes and the group of each.
     `tools`: "change" (M6), "pause" (M0 beside a T word), or "none"; T words go up to `most_tool`.
     """
@@ -131,7 +131,7 @@ class Rules:
 
 
 class ModalReader:
-    """Blocks in, rows out; knows the modes, where the tool stands and whether the end came."""
+    """Blocks in, rows out; knows the modes, the tool's position and whether the program ended."""
 
     def __init__(self, machine: Machine, rules: Rules) -> None:
         self.path = ToolpathBuilder()
@@ -144,8 +144,8 @@ class ModalReader:
         self._frame: int = G.FIRST_FRAME
         self._moved = False
         self._codes: dict[tuple[str, str], int] = {}
-        self._notes = ReadNotes(machine.max_feed_mm_min)
-        self._machine = MachineWords(self.path, rules, self._notes)
+        self._findings = ReadFindings(machine.max_feed_mm_min)
+        self._machine = MachineWords(self.path, rules, self._findings)
         self._zero = machine.controller.machine_zero_mm
 
     def block(self, block: Block) -> None:
@@ -197,18 +197,18 @@ class ModalReader:
             self._move(block, numbers, said=MOTION_GROUP in modes)
 
     def finish(self) -> Toolpath:
-        """The rows, with what was noticed."""
-        return self.path.finish(self._notes.findings())
+        """The rows, with the findings."""
+        return self.path.finish(self._findings.findings())
 
     @property
     def ended(self) -> bool:
-        """Whether the program's end came."""
+        """Whether the program has ended."""
         return self._machine.ended
 
     def unread(self, lines: list[int]) -> None:
         """Lines (from 1) behind the end, which no controller reads."""
         if lines:
-            self._notes.behind_end = len(lines), lines[0]
+            self._findings.behind_end = len(lines), lines[0]
 
     def message(self, text: str) -> None:
         """A comment that the operator is shown."""
@@ -244,7 +244,7 @@ class ModalReader:
             self._absolute_centres = modes["arc distance"] == G.ABSOLUTE_CENTRES
         if "path" in modes:
             self._set_path_mode(modes["path"], numbers)
-        if modes.get("tool length") == G.TOOL_LENGTH:  # H tells of which tool
+        if modes.get("tool length") == G.TOOL_LENGTH:  # H is the tool
             numbers.pop("H", None)
         if "feed mode" in modes and self._rules.forgets_feed:
             self._feed = 0.0
@@ -253,8 +253,8 @@ class ModalReader:
 
     def _set_path_mode(self, code: int, numbers: dict[str, float]) -> None:
         """G61, G61.1, and G64 with P, its tolerance, and Q, that of merging lines (P where it is
-        not said): how the moves from this block on meet their corners. Below 0 they count as not
-        said."""
+        missing): how the moves from this block on meet their corners. Below 0 they count as
+        missing."""
         if not self._rules.path_modes:
             return
         if code != G.BLEND:
@@ -276,8 +276,8 @@ class ModalReader:
     def _set_feed(self, block: Block, feed: float) -> None:
         if feed <= 0.0:
             block.fail_at("F", "a feed that is not above 0")
-        if feed > self._notes.max_feed_mm_min * (1.0 + FEED_GUARD):
-            self._notes.fast.append((block.index, feed))
+        if feed > self._findings.max_feed_mm_min * (1.0 + FEED_GUARD):
+            self._findings.fast.append((block.index, feed))
         self._feed = feed
 
     def _dwell(self, block: Block, numbers: dict[str, float]) -> None:
@@ -395,7 +395,7 @@ class ModalReader:
         return turns
 
     def _centre(self, block: Block, start: Point, numbers: dict[str, float]) -> Point:
-        """The centre that I and J say."""
+        """The centre that I and J give."""
         if "I" not in numbers and "J" not in numbers:
             block.fail("an arc without I, J or R", mend="say where its centre is")
         if not self._absolute_centres:
@@ -414,13 +414,13 @@ SPINDLE: Final = {
 
 
 class MachineWords:
-    """S, T and M words in, rows out; knows the speed, the tool and whether the end came."""
+    """S, T and M words in, rows out; knows the speed, the tool and whether the program ended."""
 
-    def __init__(self, path: ToolpathBuilder, rules: Rules, notes: ReadNotes) -> None:
+    def __init__(self, path: ToolpathBuilder, rules: Rules, notes: ReadFindings) -> None:
         self.ended = False
         self._path = path
         self._rules = rules
-        self._notes = notes
+        self._findings = notes
         self._speed: float | None = None
         self._spindle: Kind | None = None
         self._tool: int | None = None
@@ -443,7 +443,7 @@ class MachineWords:
             self._change(block)
         self._turn(block, codes, said=speed is not None)
         if any(M_CODES[code] == "coolant" for code in codes):
-            self._notes.coolant.append(block.index)
+            self._findings.coolant.append(block.index)
 
     def stop(self, block: Block, codes: list[int]) -> None:
         """Behind the block's motion: M2 and M30 end the program; M0 and M1 wait."""
@@ -452,17 +452,17 @@ class MachineWords:
                 self._path.event(Kind.END)
                 self.ended = True
             elif M_CODES[code] == "stop" and not self._changed:
-                self._notes.pauses.append(block.index)
+                self._findings.pauses.append(block.index)
 
     def _turn(self, block: Block, codes: list[int], *, said: bool) -> None:
-        """The spindle's words; a speed alone tells the running spindle."""
+        """The spindle's words; a speed alone is for the running spindle."""
         turn = next((SPINDLE[M(code)] for code in codes if code in SPINDLE), None)
         if turn == Kind.SPINDLE_OFF:
             self._spindle = None
             self._path.event(turn)
         elif turn is not None:
             if self._speed is None:
-                self._notes.speedless.append(block.index)
+                self._findings.speedless.append(block.index)
             self._spindle = turn
             self._path.event(turn, self._speed)
         elif said and self._spindle is not None:
@@ -490,7 +490,7 @@ def centre_of_radius(
     """The centre of an arc given by its radius, or why there is none.
 
     With m the middle of the chord of length d, the centre lies √(R² − d²/4) beside it: on the left
-    of the way for a CCW arc of at most half a turn; a negative R asks for more than half a turn,
+    of the chord for a CCW arc of at most half a turn; a negative R asks for more than half a turn,
     whose centre is on the other side. Half the chord may exceed |R| by the slack.
     """
     dx, dy = end[0] - start[0], end[1] - start[1]
@@ -515,7 +515,7 @@ def turn_of(start: Point, end: Point, centre: Point) -> float:
 
 
 @dataclass
-class ReadNotes:
+class ReadFindings:
     """Blocks (index from 0) of one run of a reader; `fast` with their feeds, mm/min."""
 
     max_feed_mm_min: float
@@ -527,7 +527,7 @@ class ReadNotes:
     """How many lines stand behind the end, and the first of them (from 1)."""
 
     def findings(self) -> Iterator[Finding]:
-        """One finding for each kind that was noticed."""
+        """One finding of each kind."""
         if self.fast:
             yield FEED_ABOVE_LIMIT_IN_WORDS(
                 where=f"block {self.fast[0][0] + 1}",

@@ -1,10 +1,10 @@
 """Writing grbl and linuxcnc: a Toolpath to modal blocks of words.
 
-    rows ──checked──▶ units, arcs mended ──▶ rows to send ──modal──▶ blocks, comments between them
+    rows ──checked──▶ units, arcs repaired ──▶ rows to send ──modal──▶ blocks and comments
 
-Coordinates, feeds and motion words are said when they change; an arc always says X Y I J. The
-first move in XY says both, and so does the first after homing: the real tool may then stand
-anywhere. Comment lines and `%` are lines, but no blocks.
+Coordinates, feeds and motion words are written when they change; an arc always has X Y I J. The
+first move in XY has both coordinates, and so has the first after homing: the real tool may then
+stand anywhere. Comment lines and `%` are lines, but no blocks.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from .format import (
     NumberStyle,
     comment,
     first_too_long,
-    say_column,
-    say_number,
-    say_units,
+    format_column,
+    format_number,
+    format_units,
     values_of,
 )
 
-WORD: Final = np.array([" G0", " G1", " G2", " G3"], dtype=object)
+MOTION_WORDS: Final = np.array([" G0", " G1", " G2", " G3"], dtype=object)
 
 VALUE: Final = NumberStyle(3, strip=True)
-"""Spindle speeds and dwells are said to a thousandth."""
+"""Spindle speeds and dwells are written to a thousandth."""
 
 ROUNDING_PART: Final = 1e-9
-"""A value said within this part of itself was not rounded."""
+"""A value written within this part of itself was not rounded."""
 
 SPINDLE: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}
 
@@ -72,7 +72,7 @@ class Style:
 
 
 def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    """The program of a toolpath; PostError names the move that cannot be written or done."""
     dialect = style.dialect
     check(toolpath, machine)
     feeds, rounded_feeds = feed_units(toolpath, machine)
@@ -116,13 +116,13 @@ def _path_modes(
     that are sent; none for dialects that know no such thing."""
     if style.path_mode is None or style.own_mode is None:
         return (), {}
-    said = [style.path_mode(mode) for mode in (*toolpath.modes, style.own_mode)]
+    written = [style.path_mode(mode) for mode in (*toolpath.modes, style.own_mode)]
     moving = np.flatnonzero(sent.is_motion)
     asked = toolpath.mode[sent.row[moving]]
     if len(asked) == 0:
-        return (said[-1],), {}
+        return (written[-1],), {}
     turns = np.flatnonzero(np.diff(asked)) + 1
-    return (said[asked[0]],), {int(moving[k]): said[asked[k]] for k in turns.tolist()}
+    return (written[asked[0]],), {int(moving[k]): written[asked[k]] for k in turns.tolist()}
 
 
 def _in_order(
@@ -151,7 +151,7 @@ def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[s
     retract = dialect.retract and last < 0.0
     style = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
     return [
-        *([f"G0 Z{say_number(float(heights.max()), style)}"] if retract else []),
+        *([f"G0 Z{format_number(float(heights.max()), style)}"] if retract else []),
         *(["M5"] if events.spindle_on else []),
         dialect.program_end,
     ]
@@ -163,7 +163,7 @@ def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list
         return []
     style = NumberStyle(dialect.decimals)
     bounds = [
-        f"{axis} {' to '.join(say_column(reach, style))}"
+        f"{axis} {' to '.join(format_column(reach, style))}"
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
     ]
     made = [toolpath.made_from, f"settings {_digest(machine)}"] if toolpath.made_from else []
@@ -177,7 +177,7 @@ def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list
 
 
 def _digest(machine: Machine) -> str:
-    """Eight signs that change with any value of the machine."""
+    """Eight hexadecimal digits that change with any value of the machine."""
     return hashlib.sha256(msgspec.json.encode(machine)).hexdigest()[:8]
 
 
@@ -196,7 +196,7 @@ def _with_comments(
         wanted.setdefault(row, []).append(_message(toolpath, row, style))
     if not wanted:
         return blocks
-    # A row that was left out hands its comments to the next block that is sent.
+    # The comments of a row that was left out stand before the next block that is sent.
     waiting = sorted(wanted)
     lines: list[str] = []
     following = 0
@@ -253,15 +253,15 @@ def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> Iterator[Finding]:
 @dataclass(frozen=True, eq=False)
 class Sent:
     """The rows to send, events among them: kind (M,), end (M, 3) and offset (M, 2) in units,
-    feed (M,) in units of the F word, row (M,) of the toolpath; `says` (M, 3): which coordinates
-    are said; `forget` (M,): homing came since the last motion. `dropped` moves were too small."""
+    feed (M,) in units of the F word, row (M,) of the toolpath; `written` (M, 3): which coordinates
+    are written; `forget` (M,): homing since the last motion. `dropped` moves were too small."""
 
     kind: Ints
     end: Ints
     offset: Ints
     feed: Ints
     row: Ints
-    says: Bools
+    written: Bools
     forget: Bools
     dropped: int
 
@@ -288,17 +288,17 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     before = np.concatenate([np.zeros((1, 3), dtype=np.int64), end])[: len(end)]
     motion = kind <= Kind.ARC_CCW
     is_arc = motion & (kind >= Kind.ARC_CW)
-    says = (end != before) & motion[:, None]
+    written = (end != before) & motion[:, None]
     home_xy, home_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
-    flat = says[:, :2].any(axis=1) | is_arc
-    # A rapid to where X and Y should be already is not left out before they were ever said.
-    still = (kind == Kind.RAPID) & ~says.any(axis=1)
-    still &= _unsaid(flat, home_xy) & ~_unsaid(says[:, 2], home_z)
-    still &= _unsaid(flat | still, home_xy)
-    both = is_arc | still | (flat & _unsaid(flat | still, home_xy))
-    says[both, :2] = True
+    flat = written[:, :2].any(axis=1) | is_arc
+    # A rapid to where X and Y should be already is not left out before they were ever written.
+    still = (kind == Kind.RAPID) & ~written.any(axis=1)
+    still &= _not_yet_written(flat, home_xy) & ~_not_yet_written(written[:, 2], home_z)
+    still &= _not_yet_written(flat | still, home_xy)
+    both = is_arc | still | (flat & _not_yet_written(flat | still, home_xy))
+    written[both, :2] = True
     wanted = (toolpath.end != toolpath.starts).any(axis=1)[of]
-    kept = ~motion | says.any(axis=1)
+    kept = ~motion | written.any(axis=1)
     homes = np.cumsum(home_xy | home_z)[kept]
     return Sent(
         kind[kept],
@@ -306,18 +306,18 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
         offset[kept],
         feeds[of][kept],
         of[kept],
-        says[kept],
+        written[kept],
         np.diff(_at_motions(homes, motion[kept]), prepend=0) > 0,
         int((~kept & wanted).sum()) + arcs.counts.dropped,
     )
 
 
-def _unsaid(said: Bools, home: Bools) -> Bools:
-    """(M,) true where nothing was said before the row since the start, or since homing."""
-    rows = np.arange(len(said))
-    last_said = np.maximum.accumulate(np.where(said, rows, -1))
+def _not_yet_written(written: Bools, home: Bools) -> Bools:
+    """(M,) true where nothing was written before the row since the start, or since homing."""
+    rows = np.arange(len(written))
+    last_written = np.maximum.accumulate(np.where(written, rows, -1))
     last_home = np.maximum.accumulate(np.where(home, rows, -1))
-    before = np.concatenate([[-1], last_said])[: len(said)]
+    before = np.concatenate([[-1], last_written])[: len(written)]
     return np.asarray(before <= last_home)
 
 
@@ -329,25 +329,28 @@ def _at_motions(homes: Ints, motion: Bools) -> Ints:
 def block_texts(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[str]:
     """The blocks of the motions among the rows."""
     take = sent.is_motion
-    kind, end, says = sent.kind[take], sent.end[take], sent.says[take]
+    kind, end, written = sent.kind[take], sent.end[take], sent.written[take]
     number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
     is_arc = kind >= Kind.ARC_CW
     is_feed = kind >= Kind.LINE
     feed = sent.feed[take]
     columns = [
-        _words(kind, (np.diff(kind, prepend=-1) != 0) | sent.forget[take]),
-        *(_said(f" {axis}", end[:, at], says[:, at], number) for at, axis in enumerate("XYZ")),
+        _motion_words(kind, (np.diff(kind, prepend=-1) != 0) | sent.forget[take]),
         *(
-            _said(f" {axis}", sent.offset[take][:, at], is_arc, number)
+            _column_words(f" {axis}", end[:, at], written[:, at], number)
+            for at, axis in enumerate("XYZ")
+        ),
+        *(
+            _column_words(f" {axis}", sent.offset[take][:, at], is_arc, number)
             for at, axis in enumerate("IJ")
         ),
-        _said(" F", feed, _changes(feed, is_feed), NumberStyle(feed_decimals, strip=True)),
+        _column_words(" F", feed, _changes(feed, is_feed), NumberStyle(feed_decimals, strip=True)),
     ]
     return ["".join(words)[1:] for words in zip(*columns, strict=True)]
 
 
-def _words(kind: Ints, said: Bools) -> list[str]:
-    words: list[str] = np.where(said, WORD[kind], "").tolist()
+def _motion_words(kind: Ints, written: Bools) -> list[str]:
+    words: list[str] = np.where(written, MOTION_WORDS[kind], "").tolist()
     return words
 
 
@@ -359,11 +362,11 @@ def _changes(values: Ints, counts: Bools) -> Bools:
     return changed
 
 
-def _said(letter: str, units: Ints, said: Bools, style: NumberStyle) -> list[str]:
-    """(M,) the word of a letter where it is said, "" elsewhere."""
-    rows = np.flatnonzero(said)
+def _column_words(letter: str, units: Ints, written: Bools, style: NumberStyle) -> list[str]:
+    """(M,) the word of a letter where it is written, "" elsewhere."""
+    rows = np.flatnonzero(written)
     words = [""] * len(units)
-    for row, text in zip(rows.tolist(), say_units(units[rows], style), strict=True):
+    for row, text in zip(rows.tolist(), format_units(units[rows], style), strict=True):
         words[row] = letter + text
     return words
 
@@ -382,7 +385,7 @@ class Event:
     mounted_before: bool = False
 
     def refuse(self, message: str, mend: str = "") -> PostError:
-        """The error that says why this event cannot be sent."""
+        """The error for an event that cannot be sent."""
         return PostError(message, where=self.where, mend=mend)
 
 
@@ -441,11 +444,11 @@ def common_words(event: Event) -> str:
     if event.kind not in (*SPINDLE, Kind.DWELL):
         raise event.refuse(f"a {event.kind.name} has no block in this dialect")
     if event.kind in SPINDLE and math.isnan(event.value):
-        return SPINDLE[event.kind]  # its speed is nobody's word
+        return SPINDLE[event.kind]  # its speed is not known
     if not (math.isfinite(event.value) and event.value >= 0.0):
         raise event.refuse(f"a {event.kind.name} without a value of 0 or more")
-    said = say_number(event.value, VALUE)
-    return f"G4 P{said}" if event.kind == Kind.DWELL else f"{SPINDLE[event.kind]} S{said}"
+    written = format_number(event.value, VALUE)
+    return f"G4 P{written}" if event.kind == Kind.DWELL else f"{SPINDLE[event.kind]} S{written}"
 
 
 def tool_number(event: Event) -> int:
@@ -458,5 +461,5 @@ def tool_number(event: Event) -> int:
 def _is_rounded(event: Event) -> bool:
     if math.isnan(event.value):
         return False
-    said = float(values_of(round(event.value * 10.0**VALUE.decimals), VALUE.decimals))  # type: ignore[arg-type]
-    return abs(said - event.value) > ROUNDING_PART * abs(event.value)
+    written = float(values_of(round(event.value * 10.0**VALUE.decimals), VALUE.decimals))  # type: ignore[arg-type]
+    return abs(written - event.value) > ROUNDING_PART * abs(event.value)

@@ -89,9 +89,9 @@ def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
     if not isinstance(machine.controller, GrblController):
         return
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    way = np.abs(path.end - path.starts)
-    steps = (way / step_mm).max(axis=1, initial=0.0)
-    along = np.linalg.norm(way, axis=1) / np.maximum(steps, 1.0)
+    travel = np.abs(path.end - path.starts)
+    steps = (travel / step_mm).max(axis=1, initial=0.0)
+    along = np.linalg.norm(travel, axis=1) / np.maximum(steps, 1.0)
     along = np.where(path.is_arc, step_mm[:2].min(), along)
     least = 60.0 * machine.controller.least_step_hz * along
     with np.errstate(invalid="ignore"):

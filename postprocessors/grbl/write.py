@@ -17,7 +17,7 @@ so it is not told so (G91.1)."""
 
 
 def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
-    """The program; PostError names the move that cannot be said or done."""
+    """The program; PostError names the move that cannot be written or done."""
     dialect = machine.dialect
     style = Style(dialect, HEADER, lambda event: _words(event, dialect))
     program = write_modal(toolpath, machine, style)

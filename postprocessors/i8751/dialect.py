@@ -19,11 +19,11 @@ RECORDS_PER_PACKET: Final = 5
 """15 blocks of three motors (L4106-4134)."""
 
 MOST_DWELL_BYTE_S: Final = 255
-"""Seconds that one byte of a dwell pair can say (L4136-4147)."""
+"""Seconds that one byte of a dwell pair can hold (L4136-4147)."""
 
 
 MOST_LOW_BYTE: Final = 255
-"""Pulses that PL says alone."""
+"""Pulses that PL alone can hold."""
 
 
 class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -32,7 +32,8 @@ class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
     `tolerance_mm`: how far the dog-leg of a line may stray from it; `arc_tolerance_mm`: how far
     the chords of an arc may. `plus_backward`: axes ("xz") whose motors turn backward for +. The
     options of `Firmware` are those on pulses. `long_runs`: a motor may be sent more steps at once
-    than the low byte can say; without them a program means the same whatever the high byte counts.
+    than the low byte can hold; without them a program means the same whatever the high byte
+    counts.
     """
 
     tolerance_mm: Tolerance
@@ -59,11 +60,11 @@ class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
     @property
     def most_steps(self) -> int:
         """Steps that one record may move a motor."""
-        return self.sayable_steps if self.long_runs else MOST_LOW_BYTE - self.lost_pulses
+        return self.encodable_steps if self.long_runs else MOST_LOW_BYTE - self.lost_pulses
 
     @property
-    def sayable_steps(self) -> int:
-        """Steps that PH and PL can say."""
+    def encodable_steps(self) -> int:
+        """Steps that PH and PL can hold."""
         return MOST_LOW_BYTE * self.high_byte_steps + MOST_LOW_BYTE - self.lost_pulses
 
     @property

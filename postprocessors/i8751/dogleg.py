@@ -20,7 +20,7 @@ L·t(1−t)/(1+t²), t = b/a, at most 0.2071·L (at 22.5°), and 0 along the axe
 To stay within a tolerance, the line is walked as runs of diagonal and of single steps, each as
 long as |D·b − M·d| ≤ reach = tolerance·L/(sx·sy) allows; one record is a diagonal run and the
 single run after it. Both ends and the elbow of every record are then within the tolerance of the
-line itself, not only of their own chord, and nothing is rounded on the way. A run of at least
+line itself, not only of their own chord, and nothing is rounded in between. A run of at least
 one step is always possible: otherwise reach + value < d and reach − value < b, so 2·reach < a,
 but tolerance ≥ half of the coarser step gives 2·reach ≥ a.
 

@@ -3,10 +3,10 @@
 A record becomes up to four rows: X and Y, the wait T1, Z, the wait T2. Its block is its number,
 from 0; the END has the block after the last record. Ends are steps times the coded step.
 
-The machine has one speed, so nothing tells a rapid from a cut. Part zero is the top of the stock:
-in a program that goes below it, what stays at or above it and what rises straight up are rapids,
-all else are lines. Their feed is the way along the line over the controller's time for it, ramps
-and dog-leg included.
+The machine has one speed, so nothing distinguishes a rapid from a cut. Part zero is the top of the
+stock: in a program that goes below it, what stays at or above it and what rises straight up are
+rapids, the rest are lines. Their feed is the length of the line over the controller's time for it,
+ramps and dog-leg included.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Decoded:
 class ByteFault(Exception):
     """A byte (offset from 0) that no controller could take at this place of a record (from 0).
 
-    The reader of packets or of a hex dump turns it into a ProgramError that says the place.
+    The reader of packets or of a hex dump turns it into a ProgramError with its place.
     """
 
     def __init__(self, offset: int, record: int, message: str, mend: str = "") -> None:
@@ -146,17 +146,17 @@ def _kinds(ends: Ints, steps: Ints, slot: Ints) -> Ints:
 
 def _feeds(steps: Ints, step_mm: Floats, times: PulseTimes) -> list[Floats]:
     """Feeds (R,) in X and Y, and in Z, mm/min; NaN where nothing moves."""
-    way_xy = np.hypot(*(steps[:, :2] * step_mm[:2]).T)
-    way_z = np.abs(steps[:, 2]) * step_mm[2]
+    travel_xy = np.hypot(*(steps[:, :2] * step_mm[:2]).T)
+    travel_z = np.abs(steps[:, 2]) * step_mm[2]
     with np.errstate(invalid="ignore", divide="ignore"):
         return [
-            60.0 * way_xy / times.legs_s(steps[:, :2]).sum(axis=1),
-            60.0 * way_z / times.alone_s(steps[:, 2]),
+            60.0 * travel_xy / times.legs_s(steps[:, :2]).sum(axis=1),
+            60.0 * travel_z / times.alone_s(steps[:, 2]),
         ]
 
 
 def _two_ways(decoded: Decoded, dialect: Dialect) -> Iterator[Finding]:
-    """READ_TWO_WAYS: runs that say a high byte, whose unit is 256 steps or 255."""
+    """READ_TWO_WAYS: runs with a high byte, whose unit is 256 steps or 255."""
     pulses = dialect.pulses(decoded.steps)
     high = pulses // dialect.high_byte_steps
     count = int((high > 0).sum())
@@ -179,7 +179,7 @@ def _findings(decoded: Decoded) -> tuple[Finding, ...]:
 # Packets: bytes as the controller stores them, and refused where it could not.
 #
 # One pattern takes a whole record; only a record that does not match is walked byte by byte, to
-# say where it goes wrong.
+# find where it goes wrong.
 
 
 class PacketReader:
@@ -353,7 +353,7 @@ class ListingReader:
 
     def __init__(self, machine: I8751Machine, dialect: Dialect) -> None:
         self._step_mm = [axis.coded_step_mm for axis in machine.axes]
-        self._most = dialect.sayable_steps
+        self._most = dialect.encodable_steps
         self._steps: list[list[int]] = []
         self._waits: list[tuple[int, int]] = []
         self._rounded = 0
@@ -370,7 +370,7 @@ class ListingReader:
                 continue
             indent = len(line) - len(line.lstrip(" \t"))
             if ended:
-                raise self._error(indent, f"{shown(text)} after END", "remove it")
+                raise self._error(indent, f"{quoted(text)} after END", "remove it")
             ended = text == LAST_LINE
             if not ended:
                 self._record(text, indent)
@@ -436,7 +436,7 @@ class ListingReader:
         blanks = re.compile("[ \t]*").match(text, at)
         column = blanks.end() if blanks else at
         mend = "write a point, no comma" if "," in text[: column + SHOWN_AHEAD] else ""
-        return self._error(indent + column, f"{shown(text)}: wanted {wanted}", mend)
+        return self._error(indent + column, f"{quoted(text)}: wanted {wanted}", mend)
 
     def _error(self, column: int, message: str, mend: str = "") -> ProgramError:
         """ProgramError in the present line at a column from 0."""
@@ -449,8 +449,8 @@ class ListingReader:
 
 # The hex dump: offset, bytes, and after `;` a comment that may state the replies.
 #
-# Offsets must be those of the bytes, and replies those that the bytes get; all else in a comment
-# is passed over.
+# Offsets must be those of the bytes, and replies those that the bytes get; other comments are
+# ignored.
 
 _LINE: Final = re.compile(r"([0-9A-Fa-f]{4,8})[ \t]+([0-9A-Fa-f][0-9A-Fa-f \t]*)(?:;(.*))?")
 
@@ -527,7 +527,7 @@ def _no_line(number: int, line: str) -> ProgramError:
         good = re.match(r"[ \t]*(?:[0-9A-Fa-f]{2}(?:[ \t]+|$))*", line[offset.end() :])
         column = offset.end() + (good.end() if good else 0) + 1
     return ProgramError(
-        f"{shown(line)} is no line of a hex dump: wanted an offset of four digits or more, bytes "
+        f"{quoted(line)} is no line of a hex dump: wanted an offset of four digits or more, bytes "
         "of two digits, and perhaps a comment behind a semicolon",
         where=f"line {number}, column {column}",
         mend="for a listing, use --set dialect.format=listing",
@@ -561,7 +561,7 @@ def _check_replies(runs: list[_Run], expected: list[str]) -> None:
         unknown = [a if b == "?" else b for a, b in zip(wanted, given, strict=False)]
         if len(given) != len(wanted) or unknown != wanted:
             raise ProgramError(
-                f"replies {shown(' '.join(given))}, expected {shown(' '.join(wanted))}",
+                f"replies {quoted(' '.join(given))}, expected {quoted(' '.join(wanted))}",
                 where=f"offset {run.offset:04X}, line {run.line}",
                 mend="see dialect.motor_reply and dialect.dwell_reply, or leave out the replies",
             )
@@ -584,6 +584,6 @@ def text_lines(data: bytes) -> list[str]:
     return re.split("\r\n|\n|\r", data.decode("ascii"))
 
 
-def shown(text: str) -> str:
+def quoted(text: str) -> str:
     """A line for a message: quoted, and cut when long."""
     return repr(text if len(text) <= SHOWN_CHARS else text[:SHOWN_CHARS] + "…")

@@ -3,7 +3,7 @@
 A record moves X and Y, waits T1, moves Z, waits T2 (L4151-4167). Every end is rounded to whole
 steps from part zero, never from the record before, so that rounding does not add up. Arcs become
 chords, slopes become flat moves and small ones of Z, lines are cut where their dog-leg would stray
-too far (`dogleg.py`) and where a motor would make more steps than two bytes can say.
+too far (`dogleg.py`) and where a motor would make more steps than two bytes can hold.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def _check_coordinates(toolpath: Toolpath, machine: I8751Machine) -> None:
 
 @dataclass
 class Counts:
-    """What was changed on the way, for the findings; places name the first of each kind."""
+    """What was changed, for the findings; places name the first of each kind."""
 
     arcs: int = 0
     chords: int = 0

@@ -90,7 +90,7 @@ BYTES_WIDTH: Final = 24
 
 
 def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    """The program of a toolpath; PostError names the move that cannot be written or done."""
     dialect = machine.dialect
     check_toolpath(toolpath, machine, dialect)
     records = records_of(toolpath, machine, dialect)
@@ -154,7 +154,7 @@ def _high_low(steps: Ints, dialect: Dialect) -> tuple[Ints, Ints]:
 
 
 def decimals_of(machine: I8751Machine) -> int:
-    """Decimals of mm that say every step of the machine without doubt."""
+    """Decimals of mm that distinguish all steps of the machine."""
     finest = min(axis.coded_step_mm for axis in machine.axes)
     return max(LEAST_DECIMALS, math.ceil(-math.log10(STEPS_PER_LAST_DIGIT * finest)))
 
@@ -238,8 +238,8 @@ class _Dump:
     ) -> tuple[bytes, str]:
         if not steps:
             return row[column : column + 2], f"{head} stands <- {self._standing_reply}"
-        way = steps * self._steps_mm[axis]
-        meaning = f"{head} {steps:+d} steps ({way:+.{self._digits}f} mm)"
+        travel = steps * self._steps_mm[axis]
+        meaning = f"{head} {steps:+d} steps ({travel:+.{self._digits}f} mm)"
         return row[column : column + 4], f"{meaning} <- {self._moving_reply}"
 
 

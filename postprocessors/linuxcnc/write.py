@@ -7,7 +7,7 @@ from typing import Final
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from camtool.toolpath.program import Program
 
-from ..gcode.format import NumberStyle, say_number
+from ..gcode.format import NumberStyle, format_number
 from ..gcode.write import Event, Style, common_words, tool_number, write_modal
 from .dialect import LinuxcncMachine
 
@@ -22,7 +22,7 @@ TOLERANCE: Final = NumberStyle(6, strip=True)
 
 
 def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
-    """The program; PostError names the move that cannot be said or done."""
+    """The program; PostError names the move that cannot be written or done."""
     dialect = machine.dialect
     style = Style(
         dialect,
@@ -42,9 +42,9 @@ def _path_mode(mode: PathMode) -> str:
         return "G61"
     if mode.corners == "exact-stop":
         return "G61.1"
-    corner = f" P{say_number(mode.tolerance_mm, TOLERANCE)}" if mode.tolerance_mm else ""
+    corner = f" P{format_number(mode.tolerance_mm, TOLERANCE)}" if mode.tolerance_mm else ""
     apart = mode.merging_mm != mode.tolerance_mm
-    return f"G64{corner}" + (f" Q{say_number(mode.merging_mm, TOLERANCE)}" if apart else "")
+    return f"G64{corner}" + (f" Q{format_number(mode.merging_mm, TOLERANCE)}" if apart else "")
 
 
 def _words(event: Event) -> str:

@@ -62,7 +62,7 @@ class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 PROFILES: Final[dict[str, dict[str, Any]]] = {
-    # What the machine of the listing executes, with the faults of the way there mended.
+    # What the machine of the listing executes, with the faults of its transmission mended.
     "safe": {
         "grid_mm": 0.2,
         "max_lines": 128,
@@ -114,7 +114,7 @@ class Choices:
     home (L3319-3321).
     `max_lines` of one job; `arc_tolerance_mm` chords of arcs; `bend_tolerance_mm` how far whole
     speeds may bend a line. `plunge_mm` down from home, at `plunge_mm_min`. `spindle_rpm` is what
-    the reader says of the tool, which can only be switched.
+    the reader gives for the tool, which can only be switched.
     """
 
     profile: str

@@ -2,7 +2,7 @@
 receiving one, checked as a whole; and the same for people.
 
 A number that would make a slave run away or never end is an error here, with its place, because
-no path could be told: the loop of the slaves runs `distance / 2 − 1` times in an unsigned int16
+no path could be given: the loop of the slaves runs `distance / 2 − 1` times in an unsigned int16
 (L5589-5729), so a distance of 1 (or a first point below 2) runs 65535 times, and a speed of 0
 never gets there.
 """
@@ -66,7 +66,7 @@ class ReadJob:
 
     @property
     def steps(self) -> Ints:
-        """(2, n) units, signed: the ways that the program asks for."""
+        """(2, n) units, signed: the distances that the program asks for."""
         return np.asarray(np.where(self.speed < 0, -self.length, self.length))
 
 
@@ -200,7 +200,7 @@ def _job_of_arrays(
 
 
 def _agree(job: ReadJob, xy: Ints) -> None:
-    """xy says again what first point, lxy and the signs of velxy say."""
+    """xy repeats the first point, lxy and the signs of velxy."""
     for axis, name in enumerate(("first_pointx", "first_pointy")):
         if int(job.first[axis]) != int(xy[axis, 0]):
             fail(
@@ -254,7 +254,7 @@ class _Text:
         at = self.at
         match = _NAME.match(self.text, at)
         if match is None:
-            self.fail(at, f"{self._shown(at)} is no `name = numbers;`", "remove it")
+            self.fail(at, f"{self._quoted(at)} is no `name = numbers;`", "remove it")
             raise AssertionError
         self.at = match.end()
         return match[1], match[2], at
@@ -263,7 +263,7 @@ class _Text:
         """One whole number and the end of its statement."""
         match = _TEXT_NUMBER.match(self.text, self.at)
         if match is None:
-            self.fail(self.at, f"{self._shown(self.at)} is no whole number")
+            self.fail(self.at, f"{self._quoted(self.at)} is no whole number")
             raise AssertionError
         self._finish(match.end())
         return _Value(np.array([[self._int(match[0], match.start())]]), match.start())
@@ -319,7 +319,7 @@ class _Text:
     def _fail_rows(self) -> None:
         """Where an array goes wrong: its opening, a sign in it, or its end."""
         if self.text[self.at : self.at + 1] != "[":
-            self.fail(self.at, f"{self._shown(self.at)} is no array", "write [ and ]")
+            self.fail(self.at, f"{self._quoted(self.at)} is no array", "write [ and ]")
         odd = re.compile(r"[^0-9 \t\r\n,;+-]").search(self.text, self.at + 1)
         if odd is None:
             self.fail(len(self.text), "the program breaks off inside an array")
@@ -327,13 +327,13 @@ class _Text:
             mend = "numbers are whole tenths of a millimetre, without decimals"
             self.fail(odd.start(), "a decimal point in an array", mend)
         else:
-            self.fail(odd.start(), f"{self._shown(odd.start())} stands in an array")
+            self.fail(odd.start(), f"{self._quoted(odd.start())} stands in an array")
 
     def _finish(self, offset: int) -> None:
         """Nothing but ; and a comment stands behind a value on its line."""
         match = _END.match(self.text, offset)
         if match is None:
-            self.fail(offset, f"{self._shown(offset)} stands behind a value")
+            self.fail(offset, f"{self._quoted(offset)} stands behind a value")
             raise AssertionError
         self.at = self._blank(match.end())
 
@@ -341,7 +341,7 @@ class _Text:
         match = _BLANK.match(self.text, offset)
         return match.end() if match else offset
 
-    def _shown(self, offset: int) -> str:
+    def _quoted(self, offset: int) -> str:
         line = self.text[offset : offset + SHOWN_CHARS].splitlines()
         return repr(line[0]) if line else "nothing"
 
@@ -446,8 +446,8 @@ def _first_y(word: bytes, place: Callable[[int], str], dialect: Choices) -> int:
 #
 # The .m file has no lines that are blocks. A block is a column of three arrays, so it is shown as
 # those columns, in the words of the language: `xy(:,13) = [400; 265]; lxy(:,12) = [249; 179];
-# velxy(:,12) = [480; 345];`. A job's own block, its way to the first point, is that point. The
-# serial stream says no names; its numbers are shown with the names of the arrays that they fill.
+# velxy(:,12) = [480; 345];`. A job's own block, the move to its first point, is that point. The
+# serial stream has no names; its numbers are shown with the names of the arrays that they fill.
 
 
 def listing(data: bytes, machine: MatlabRouterMachine) -> Listing:

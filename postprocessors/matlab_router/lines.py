@@ -85,21 +85,21 @@ class Jobs:
 
 def jobs_of(
     cuts: Cuts, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices
-) -> tuple[Jobs, Notes]:
-    """The jobs, and what was changed on the way to them.
+) -> tuple[Jobs, Changes]:
+    """The jobs, and what was changed for them.
 
-    PostError for what lies outside of the area or has a feed that cannot be said.
+    PostError for what lies outside of the area or has a feed that cannot be written.
     """
     maker = _Maker(toolpath, machine, dialect)
     lines = maker.lines(cuts)
-    return Jobs(lines, maker.speeds(lines), maker.offsets(lines)), maker.notes
+    return Jobs(lines, maker.speeds(lines), maker.offsets(lines)), maker.changes
 
 
 class _Maker:
-    """One run over all lines; `notes` of what it changes."""
+    """One run over all lines; `changes` counts what it changes."""
 
     def __init__(self, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices) -> None:
-        self.notes = Notes()
+        self.changes = Changes()
         self._toolpath = toolpath
         self._dialect = dialect
         self._machine = machine
@@ -125,11 +125,11 @@ class _Maker:
         first = np.concatenate([np.diff(cuts.stroke, prepend=-1) != 0, np.zeros(count, np.bool_)])
         early = first & (units < CHUNK_UNITS).any(axis=1)
         units[early] = np.maximum(units[early], self._least)
-        self.notes.late_starts += int(early.sum())
+        self.changes.late_starts += int(early.sum())
         if count:
             moved = np.hypot(*(units - wanted).T)
             row = int(rows[int(np.argmax(moved))])
-            self.notes.snapped(float(moved.max()) * UNIT_MM, self._toolpath.place(row))
+            self.changes.snapped(float(moved.max()) * UNIT_MM, self._toolpath.place(row))
         whole = units.astype(np.int64)
         return Lines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
 
@@ -164,11 +164,11 @@ class _Maker:
         if (np.abs(lines.end - lines.start) == 1).any():
             lines = self._without_ones(lines)
         keep = (lines.end != lines.start).any(axis=1)
-        self.notes.dropped += int(len(keep) - keep.sum())
+        self.changes.dropped += int(len(keep) - keep.sum())
         left = np.unique(lines.stroke[keep])
         for stroke in np.setdiff1d(lines.stroke, left).tolist():
             row = int(lines.row[int(np.searchsorted(lines.stroke, stroke))])
-            self.notes.lost(self._toolpath.place(row))
+            self.changes.lost(self._toolpath.place(row))
         return lines.chosen(keep)
 
     def _without_ones(self, lines: Lines) -> Lines:
@@ -181,7 +181,7 @@ class _Maker:
             for axis in (0, 1):
                 if abs(end[axis] - starts[line][axis]) == 1:
                     end[axis] = starts[line][axis]
-                    self.notes.ones += 1
+                    self.changes.ones += 1
         return replace(lines, start=np.array(starts), end=np.array(ends))
 
     def _majors(self, lines: Lines) -> tuple[Ints, Floats, Ints]:
@@ -194,16 +194,16 @@ class _Maker:
         counts = np.floor(wanted + 0.5).astype(np.int64)
         fast = counts > self._most_counts
         if self._dialect.too_fast == "limited":
-            self.notes.limited = max(self.notes.limited, int(fast.sum()))
+            self.changes.limited = max(self.changes.limited, int(fast.sum()))
             wanted = np.where(fast, self._most_counts, wanted)
             counts = np.minimum(counts, self._most_counts)
         else:
             self._refuse_feed(lines, fast, "above what its axes run at")
         self._refuse_feed(lines, counts < 1, "below one count of the encoder in 5 ms")
         off = np.abs(wanted - counts) * self._unit
-        self.notes.feed_off = max(self.notes.feed_off, float(off.max(initial=0.0)))
+        self.changes.feed_off = max(self.changes.feed_off, float(off.max(initial=0.0)))
         if self._dialect.speed == "axis":
-            self.notes.faster = max(self.notes.faster, float(slant.max(initial=1.0)))
+            self.changes.faster = max(self.changes.faster, float(slant.max(initial=1.0)))
         return distance, larger, counts
 
     def _refuse_feed(self, lines: Lines, bad: Bools, what: str) -> None:
@@ -236,7 +236,7 @@ class _Maker:
         bad = np.flatnonzero(bends(larger, distance.min(axis=1), counts, limits.tolerance))
         if len(bad) == 0:
             return lines
-        self.notes.bent += len(bad)
+        self.changes.bent += len(bad)
         starts, ends = lines.start[bad].tolist(), lines.end[bad].tolist()
         pieces = [
             split_line(start, end, count, limits)
@@ -265,7 +265,7 @@ class _Maker:
             while begin < last:
                 offsets.append(begin)
                 begin = self._cut_at(lines, begin, last)
-                self.notes.more_jobs += begin < last
+                self.changes.more_jobs += begin < last
         return [*offsets, count]
 
     def _cut_at(self, lines: Lines, first: int, last: int) -> int:
@@ -363,7 +363,7 @@ def _pieces(longer: int, shorter: int, counts: int, limits: Limits) -> list[tupl
 
 
 @dataclass
-class Notes:
+class Changes:
     """What one run of the writer changed; places name the worst or the first of each kind."""
 
     snap_mm: float = 0.0

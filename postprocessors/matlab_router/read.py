@@ -85,12 +85,12 @@ class _Moves:
         self._value: list[Floats] = []
         self._block: list[Ints] = []
         self._blocks = 0
-        self._seen = Seen(machine, dialect)
+        self._findings = JobFindings(machine, dialect)
 
     def add(self, job: ReadJob) -> None:
         """The rows of one job."""
         done = execute(job, self._dialect)
-        self._seen.add(job, done)
+        self._findings.add(job, done)
         self._go_home(self._blocks)
         x, y = self._home[:2] + done.points[0] / UNITS_PER_MM
         up, down = self._home[2], cut_z_mm(self._machine, self._dialect)
@@ -120,13 +120,13 @@ class _Moves:
             source=np.full(len(kind), -1),
             block=np.concatenate(self._block),
             start=np.zeros(3),
-            findings=tuple(self._seen.findings()),
+            findings=tuple(self._findings.findings()),
         )
 
     def _lines(self, job: ReadJob, done: Executed, z: float) -> None:
         """One row a line; two where its speeds bend it by more than the tolerance."""
         run = DrivenLines(done.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
-        self._seen.bent.add(
+        self._findings.bent.add(
             run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"
         )
         if len(run.end) == 0:
@@ -203,9 +203,9 @@ class DrivenLines:
 
         the line bends at t₁ · v, by (1 − t₁/t₂) of the distance of the later axis.
 
-    A line becomes two ways when it bends by more than the tolerance, or when a speed is off by
-    more than `MOST_OFF` from that of its distance: from the ways and the speed along them the
-    speeds of the axes can be told again. `end` (m, 2) units, `speed` (m,) counts in 5 ms of both
+    A line becomes two rows when it bends by more than the tolerance, or when a speed is off by
+    more than `MOST_OFF` from that of its distance: from the rows and the speed along them the
+    speeds of the axes can be found again. `end` (m, 2) units, `speed` (m,) counts in 5 ms of both
     axes together, `line` (m,) its index; `bent` counts the lines beyond the tolerance.
     """
 
@@ -292,8 +292,8 @@ class Worst:
 
 
 @dataclass
-class Seen:
-    """What was noticed in all jobs."""
+class JobFindings:
+    """What all jobs have that the machine does otherwise, or cannot do."""
 
     machine: MatlabRouterMachine
     dialect: Choices
@@ -342,7 +342,7 @@ class Seen:
             self.outside.add(int(bad.sum()), most, f"{place}, line {line}")
 
     def findings(self) -> list[Finding]:
-        """One finding for each kind that was noticed."""
+        """One finding of each kind."""
         return [
             *self.outside.finding(OUT_OF_TRAVEL),
             *self.fast.finding(FEED_ABOVE_LIMIT),

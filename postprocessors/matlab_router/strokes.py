@@ -138,7 +138,7 @@ def _refuse_holes(toolpath: Toolpath, number: Ints, below: Bools, cut: Bools, ro
 
 
 def _events(toolpath: Toolpath) -> list[Finding]:
-    """Which events the master has in its own order, and which nobody can tell it."""
+    """Refuses events that the machine cannot do; findings for those that have no place here."""
     kind = toolpath.kind
     message = "the tool turns one way only: it can be switched on and off, no more"
     refuse(toolpath, kind == Kind.SPINDLE_CCW, message)

@@ -3,7 +3,7 @@
     toolpath ──cuts_of──▶ lines (mm) ──jobs_of──▶ jobs (0.1 mm, counts) ──▶ text or bytes
 
 Nothing of a drawing's own text is ever written: a program holds numbers and camtool's words only.
-Blocks, for the map to the toolpath: each job has one for its way to the first point, then one for
+Blocks, for the map to the toolpath: each job has one for the move to its first point, then one for
 each line.
 """
 
@@ -36,7 +36,7 @@ def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
     """The program; PostError for the first thing that this machine cannot do."""
     dialect = dialect_of(machine)
     cuts, findings = cuts_of(toolpath, machine, dialect)
-    made, notes = jobs_of(cuts, toolpath, machine, dialect)
+    made, changes = jobs_of(cuts, toolpath, machine, dialect)
     if len(made.lines.row) == 0:
         raise PostError(
             "nothing is left to cut"
@@ -44,19 +44,19 @@ def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
             mend="scale the drawing up" if len(cuts.row) else "cut below the stock's top, Z < 0",
         )
     stream = dialect.format == "stream"
-    jobs = _said(made)
+    jobs = _numbers_of(made)
     heads = np.array(made.offsets[:-1])
     return Program(
         data=_stream(jobs, dialect) if stream else _matlab(jobs, dialect),
         extension=STREAM_EXTENSION if stream else machine.target.extension,
         target=machine.target.name,
         row_of_block=np.insert(made.lines.row, heads, -1),
-        findings=(*findings, *notes.findings(dialect)),
+        findings=(*findings, *changes.findings(dialect)),
     )
 
 
 @dataclass(frozen=True)
-class _Said:
+class _JobNumbers:
     """One job as the words of its numbers: x and y in a pair each."""
 
     count: int
@@ -66,7 +66,7 @@ class _Said:
     velxy: tuple[list[int], list[int]]
 
 
-def _said(jobs: Jobs) -> list[_Said]:
+def _numbers_of(jobs: Jobs) -> list[_JobNumbers]:
     """All jobs as plain numbers."""
     lines = jobs.lines
     start, end = lines.start.T.tolist(), lines.end.T.tolist()
@@ -77,11 +77,11 @@ def _said(jobs: Jobs) -> list[_Said]:
         xy = [x, *end[0][low:high]], [y, *end[1][low:high]]
         lxy = length[0][low:high], length[1][low:high]
         velxy = speed[0][low:high], speed[1][low:high]
-        said.append(_Said(high - low, (x, y), xy, lxy, velxy))
+        said.append(_JobNumbers(high - low, (x, y), xy, lxy, velxy))
     return said
 
 
-def _matlab(jobs: list[_Said], dialect: Choices) -> bytes:
+def _matlab(jobs: list[_JobNumbers], dialect: Choices) -> bytes:
     """One section a job: the last job's arrays remain when all are run; `jobs` then holds all."""
     lines = [
         f"% camtool: matlab-router, profile {dialect.profile}, {_count(len(jobs), 'job')}",
@@ -116,7 +116,7 @@ def _matrix(name: str, rows: tuple[list[int], list[int]]) -> list[str]:
     return [f"{name} = [", first, second, "];"]
 
 
-def _stream(jobs: list[_Said], dialect: Choices) -> bytes:
+def _stream(jobs: list[_JobNumbers], dialect: Choices) -> bytes:
     """Each number in digits and a carriage return: lines, first x and y, all lx, ly, velx, vely
     (L4294-4360)."""
     parts = []

@@ -1,12 +1,12 @@
 """Where an arc block may end, so that the controller really stops there.
 
-How the controller knows the end of an arc is not said (L1859-1862), nor with which error D it
+How the controller knows the end of an arc is not described (L1859-1862), nor with which error D it
 starts; by the strictest reading it stops only when it stands exactly on the end step. Start, end
 and centre are rounded each on its own: with such numbers nearly half of all arcs never stand
-there. So the writer walks the controller's own paths (camtool.kernels), one for each start of D,
+there. So the writer follows the controller's own paths (camtool.kernels), one for each start of D,
 from the step where the controller will stand, and lets the block end on a step that all of them
-pass: there every reading stops (`camtool.kernels.arc_stops`). What is left to the wanted end is
-mended by a line.
+pass: there every reading stops (`camtool.kernels.arc_stops`). A line
+closes the gap to the wanted end.
 
 Two such paths lie about circles whose radii differ by half a step at most. Each is the best of
 the lattice beside its circle, so they part only for runs, longest where they run along an axis:
@@ -48,7 +48,7 @@ LEAST_RADIUS_STEPS: Final = 4.0
 
 LINE_SAGITTA: Final = 1.0
 """A line in place of a piece of arc may stray from it by this many resolutions (the coarser of
-step and unit); it bounds how far before its end an arc may be left for its mending line."""
+step and unit); it bounds how far before its end an arc may be left for its closing line."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Arc:
     """An arc in the controller's steps, relative to its centre.
 
     `start` is where the controller stands, `end` the wanted end, `sweep_rad` > 0 the wanted
-    sweep; `centre` (absolute) only serves to tell which steps can be said.
+    sweep; `centre` (absolute) only serves to find the steps that can be written.
     """
 
     start: tuple[int, int]
@@ -102,11 +102,11 @@ def hits(arc: Arc, at: tuple[int, int], low: int, high: int) -> int:
 def land(arc: Arc, grid: Grid) -> Landing | None:
     """Where to end the arc: at its end if the paths meet it, otherwise at a step before it.
 
-    In this order: the end itself; the last step from which the mending line goes on without
+    In this order: the end itself; the last step from which the closing line goes on without
     turning an axis round (each such reversal costs the machine a whole compensation) and does not
     leave the arc by more than `LINE_SAGITTA`; the step nearest to the end within that reach; the
-    last step that can be said at all. None when lines do as well: the whole arc lies within that
-    reach, or no step of its paths can be said.
+    last step that can be written at all. None when lines do as well: the whole arc lies within
+    that reach, or no step of its paths can be written.
     """
     length = arc.radius * arc.sweep_rad
     low = max(1, math.floor(WINDOW[0] * length) - WINDOW_SLACK)
@@ -118,7 +118,7 @@ def land(arc: Arc, grid: Grid) -> Landing | None:
     near = int(direct_search_nearest(*state, *arc.end, low, high)[0])
     first = max(0, near - _reach(arc, grid))
     path, common = _common(arc, first, near - first)
-    common &= _sayable(arc, grid, path)
+    common &= _representable(arc, grid, path)
     onward = common & _onward(arc, path)
     for row in np.flatnonzero(onward)[::-1].tolist():
         if landing := _landing(arc, path, row, first):
@@ -131,7 +131,7 @@ def land(arc: Arc, grid: Grid) -> Landing | None:
         if landing := _landing(arc, path, row, first):
             return landing
     path, common = _common(arc, 0, first)
-    for row in np.flatnonzero(common & _sayable(arc, grid, path))[::-1].tolist():
+    for row in np.flatnonzero(common & _representable(arc, grid, path))[::-1].tolist():
         if landing := _landing(arc, path, row, 0):
             return landing
     return None
@@ -165,9 +165,9 @@ def _reach(arc: Arc, grid: Grid) -> int:
     return max(1, math.floor(math.sqrt(4.0 * arc.radius * sagitta)))
 
 
-def _sayable(arc: Arc, grid: Grid, path: Ints) -> Bools:
-    """Which steps of the path the form can say in both axes."""
-    return np.asarray(grid.says(path + np.array(arc.centre)).all(axis=1))
+def _representable(arc: Arc, grid: Grid, path: Ints) -> Bools:
+    """Which steps of the path the form can represent in both axes."""
+    return np.asarray(grid.represents(path + np.array(arc.centre)).all(axis=1))
 
 
 def _onward(arc: Arc, path: Ints) -> Bools:

@@ -11,7 +11,7 @@ from camtool.machine.ranges import Count
 
 
 class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which of the thesis's two forms of a coordinate is spoken, and how long a block may be.
+    """Which of the thesis's two forms of a coordinate is used, and how long a block may be.
 
     `form` "example": `X02969.00`, sign only when negative (L1731); "annex": `X+02969` (L3284).
     `buffer_chars`: characters that the controller's buffer takes, `;` included; None: as many as

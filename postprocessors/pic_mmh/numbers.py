@@ -3,9 +3,9 @@
 Nothing is sent from here. What this machine or its dialect cannot do is a PostError that names
 the move, its source and the value.
 
-A *unit* is the finest difference that the form can say: 0.01 µm in the example form, 1 µm in the
-annex form. A position is held twice, as whole units (what is sent) and as whole steps (where the
-controller then stands):  steps = round(units · unit / step), half away from zero.
+A *unit* is the finest difference that the form can represent: 0.01 µm in the example form, 1 µm in
+the annex form. A position is kept twice, as whole units (what is sent) and as whole steps (where
+the controller then stands):  steps = round(units · unit / step), half away from zero.
 """
 
 from __future__ import annotations
@@ -46,27 +46,27 @@ MOST_DWELL_S: Final = 9900.0
 """A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
 
 DWELL_DIGITS_S: Final = 99
-"""Seconds that the two digits of one G04 can say (L3359-3366)."""
+"""Seconds that the two digits of one G04 can hold (L3359-3366)."""
 
 MOST_SPINDLE: Final = 9999
-"""Rev/min that the four digits of S can say (L3418-3426)."""
+"""Rev/min that the four digits of S can hold (L3418-3426)."""
 
 MOST_TOOL: Final = 99
-"""Tools that the two digits of T can say (L3455-3464)."""
+"""Tools that the two digits of T can hold (L3455-3464)."""
 
 
-def say_example(units: int) -> str:
+def format_example(units: int) -> str:
     """`02969.00`, `-00000.14`: five digits, a point, two digits; whole units in, so never `-0`."""
     whole, rest = divmod(abs(units), 100)
     return f"{'-' if units < 0 else ''}{whole:05d}.{rest:02d}"
 
 
-def say_annex(units: int) -> str:
+def format_annex(units: int) -> str:
     """`+02969`, `-00001`: always a sign, then five digits."""
     return f"{units:+06d}"
 
 
-SAY: Final = {"example": say_example, "annex": say_annex}
+FORMATS: Final = {"example": format_example, "annex": format_annex}
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,9 @@ class Grid:
     def units(self, values_mm: Floats) -> Ints:
         """Values (mm, any shape) as whole units; they must fit.
 
-        A value that would lie half-way between two steps is said one unit farther from zero: the
-        step stays the same, and no longer hangs on the last bit of the controller's division.
+        A value that would lie half-way between two steps is written one unit farther from zero:
+        the step stays the same, and no longer depends on the last bit of the controller's
+        division.
         """
         scaled = values_mm * self.units_per_mm
         units = (np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64)
@@ -110,11 +111,11 @@ class Grid:
         return np.asarray((np.sign(units) * np.floor(in_steps + 0.5)).astype(np.int64))
 
     def nearest_units(self, steps: Ints) -> Ints:
-        """The units nearest to these steps; `says` tells which of them really mean the step."""
+        """The units nearest to these steps; `represents`: which of them really mean the step."""
         scaled = steps * (self.units_per_mm * self.step_mm)
         return np.asarray(np.rint(scaled).astype(np.int64))
 
-    def says(self, steps: Ints) -> Bools:
+    def represents(self, steps: Ints) -> Bools:
         """Which steps some whole unit means (the nearest one, if any does)."""
         units = self.nearest_units(steps)
         return np.asarray((self.steps(units) == steps) & (np.abs(units) <= self.most_units))
@@ -124,8 +125,8 @@ class Grid:
 class Numbers:
     """One item per row: ends (x, y, z) and centres (x, y) as units and as steps, feed words.
 
-    `centre_*` are (0, 0) and `feed_words` "" where the row has none; a centre that cannot be said
-    is none (`far_arcs`).
+    `centre_*` are (0, 0) and `feed_words` "" where the row has none; a centre that cannot be
+    written is none (`far_arcs`).
     """
 
     grids: tuple[Grid, Grid, Grid]
@@ -139,7 +140,7 @@ class Numbers:
 
 
 def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> Numbers:
-    """All numbers of a toolpath; PostError for the first that cannot be said or done."""
+    """All numbers of a toolpath; PostError for the first that cannot be written or done."""
     x, y, z = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     grids = (x, y, z)
     _check_coordinates(toolpath, grids)

@@ -3,7 +3,7 @@
 
 A program is cut at `;`; line ends and blanks between blocks are passed over. The first characters
 choose the pattern that the whole block must match (`patterns`); only a block that does
-not is walked word by word, to say where it goes wrong.
+not is walked word by word, to find where it goes wrong.
 """
 
 from __future__ import annotations
@@ -213,7 +213,7 @@ class _Reader:
         return feed
 
     def _event(self, code: str, letters: str, match: re.Match[str], index: int) -> None:
-        """All other codes. G90 says what always holds here and gives no row."""
+        """All other codes. G90 is always in force here and gives no row."""
         x, y, z = self.path.position
         zero_x, zero_y, zero_z = self._zero
         if code == "G90":
@@ -270,9 +270,9 @@ def fault_of(text: str, form: str) -> Fault:
             small.start() + 1, "this controller takes no small letters", "write capital letters"
         )
     if text[0] not in "GM":
-        return Fault(1, f"{_shown(text)} is no block: it begins with neither G nor M")
+        return Fault(1, f"{_quoted(text)} is no block: it begins with neither G nor M")
     if not re.match(r"\d\d", text[1:3]):
-        return Fault(2, f"{_shown(text)}: wanted two digits after {text[0]}")
+        return Fault(2, f"{_quoted(text)}: wanted two digits after {text[0]}")
     shapes = SHAPES.get(text[:3])
     if shapes is None:
         known = " ".join(SHAPES)
@@ -295,10 +295,10 @@ def _walk(text: str, shape: Shape, form: str) -> Fault:
         if match is None:
             at += text.startswith(letter, at)
             words = _COORDINATE_WORDS[form] if kind == "c" else _VALUE_WORDS[kind]
-            return Fault(at + 1, f"{_shown(text)}: wanted {letter} with {words}")
+            return Fault(at + 1, f"{_quoted(text)}: wanted {letter} with {words}")
         at = match.end()
-    return Fault(at + 1, f"{_shown(text)}: wanted ; after the last word of {text[:3]}")
+    return Fault(at + 1, f"{_quoted(text)}: wanted ; after the last word of {text[:3]}")
 
 
-def _shown(text: str) -> str:
+def _quoted(text: str) -> str:
     return repr(text if len(text) <= SHOWN_CHARS else f"{text[:SHOWN_CHARS]}…")

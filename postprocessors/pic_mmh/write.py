@@ -44,7 +44,7 @@ from .findings import (
     MOVE_SPLIT,
     VALUE_ROUNDED,
 )
-from .numbers import SAY, Grid, check_motion, event_words, far_arcs, numbers_of
+from .numbers import FORMATS, Grid, check_motion, event_words, far_arcs, numbers_of
 
 WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
 
@@ -55,14 +55,14 @@ XY = tuple[int, int]
 
 
 def write_program(toolpath: Toolpath, machine: PicMmhMachine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    """The program of a toolpath; PostError names the move that cannot be written or done."""
     writer = _Writer(toolpath, machine)
     writer.run()
     return Program.of_lines(writer.blocks, machine, writer.rows, writer.findings())
 
 
 def _refuse_chords(where: str) -> NoReturn:
-    """PostError for an arc that passes where no coordinate can be said."""
+    """PostError for an arc that passes where no coordinate can be written."""
     raise PostError(
         "an arc that has to be written as lines leaves the five digits of a coordinate",
         where=where,
@@ -79,9 +79,9 @@ class _Writer:
         self.rows: list[int] = []
         self._machine = machine
         self._dialect = dialect
-        self._say = SAY[dialect.form]
+        self._format = FORMATS[dialect.form]
         self._wanted = toolpath
-        self._notes = Notes()
+        self._changes = Changes()
         check_motion(toolpath, machine)
         # Refuses by the numbers of the rows that were given, before these are lowered.
         given = numbers_of(toolpath, machine, dialect)
@@ -95,18 +95,18 @@ class _Writer:
         self._starts = lowered.toolpath.starts[:, :2]
 
     def _lowered(self, grid: Grid) -> Lowered:
-        """Arcs whose centre cannot be said as lines, slopes as steps; the notes tell of both."""
-        toolpath, notes = self._wanted, self._notes
+        """Arcs whose centre cannot be written as lines, slopes as steps; `Changes` counts both."""
+        toolpath, changes = self._wanted, self._changes
         far = far_arcs(toolpath, self._machine, self._dialect)
-        notes.far = int(far.sum())
-        notes.far_place = toolpath.place(int(far.argmax())) if notes.far else ""
+        changes.far = int(far.sum())
+        changes.far_place = toolpath.place(int(far.argmax())) if changes.far else ""
         straight = arcs_to_lines(toolpath, far, LINE_SAGITTA * grid.resolution_mm)
-        notes.split_step_mm = slope_step_mm(self._machine)
-        stepped = helices_to_steps(straight.toolpath, notes.split_step_mm)
+        changes.split_step_mm = slope_step_mm(self._machine)
+        stepped = helices_to_steps(straight.toolpath, changes.split_step_mm)
         steps = np.bincount(stepped.row, minlength=len(straight.toolpath)) > 1
         slopes = np.unique(straight.row[steps & straight.toolpath.is_feed])
-        notes.split = len(slopes)
-        notes.split_place = toolpath.place(int(slopes[0])) if notes.split else ""
+        changes.split = len(slopes)
+        changes.split_place = toolpath.place(int(slopes[0])) if changes.split else ""
         lowered = stepped.after(straight)
         beyond = ~grid.fits(lowered.toolpath.end[:, :2]).all(axis=1)
         if beyond.any():
@@ -138,7 +138,7 @@ class _Writer:
         """What was changed, one finding for each kind."""
         if self._feed_finding:
             yield self._feed_finding
-        yield from self._notes.findings(self._grid.step_mm * 1000.0)
+        yield from self._changes.findings(self._grid.step_mm * 1000.0)
         yield from too_long(self.blocks, self._dialect.buffer_chars)
 
     def _place(self, row: int) -> str:
@@ -159,16 +159,16 @@ class _Writer:
         elif [x, y] != self._steps[:2]:
             self._send_xy(row, WORD[kind], self._numbers.end_units[row], (x, y))
         elif not self._split[self._row[row]]:  # parts of slopes and of far arcs may be small
-            self._notes.dropped += 1
+            self._changes.dropped += 1
 
     def _send_z(self, row: int, kind: Kind) -> None:
         word = "G00" if kind == Kind.RAPID else "G01"
         self._units[2] = self._numbers.end_units[row][2]
         self._steps[2] = self._numbers.end_steps[row][2]
-        self._send(f"{word}Z{self._say(self._units[2])}{self._numbers.feed_words[row]};", row)
+        self._send(f"{word}Z{self._format(self._units[2])}{self._numbers.feed_words[row]};", row)
 
     def _send_xy(self, row: int, word: str, units: list[int], steps: XY, centre: str = "") -> None:
-        say = self._say
+        say = self._format
         feed = self._numbers.feed_words[row]
         self._units[:2] = units[:2]
         self._steps[:2] = steps
@@ -179,16 +179,16 @@ class _Writer:
         arc = self._in_steps(row, kind)
         sweep = self._numbers.sweeps[row]
         if arc.start == arc.end and arc.sweep_rad <= math.pi:
-            self._notes.dropped += 1  # as an arc it would become a full circle
+            self._changes.dropped += 1  # as an arc it would become a full circle
             return
         landing = land(arc, self._grid) if arc.radius >= LEAST_RADIUS_STEPS else None
-        units = self._said_end(row, arc, landing) if landing else None
+        units = self._end_units(row, arc, landing) if landing else None
         if landing is None or units is None:
-            self._notes.arcs_as_lines += 1
+            self._changes.arcs_as_lines += 1
             self._lines(row, self._starts[row], sweep)
             return
         i, j = self._numbers.centre_units[row]
-        centre = f"I{self._say(i)}J{self._say(j)}"
+        centre = f"I{self._format(i)}J{self._format(j)}"
         steps = (landing.at[0] + arc.centre[0], landing.at[1] + arc.centre[1])
         self._send_xy(row, WORD[kind], units, steps, centre)
         self._check_end(row, arc, landing)
@@ -208,8 +208,8 @@ class _Writer:
             sweep_rad=abs(self._numbers.sweeps[row]),
         )
 
-    def _said_end(self, row: int, arc: Arc, landing: Landing) -> list[int] | None:
-        """The units that say the landing; None when a reader would take the block for another
+    def _end_units(self, row: int, arc: Arc, landing: Landing) -> list[int] | None:
+        """The units of the landing; None when a reader would take the block for another
         arc: short arcs can turn into almost full circles by the rounding of their numbers."""
         if landing.at == arc.start:
             units = self._units[:2]  # the very numbers of the start, so that it reads as full
@@ -243,10 +243,10 @@ class _Writer:
         turn = unwrapped_rad(turn, expected_turn_rad(landing, arc.radius))
         left = max(0.0, arc.sweep_rad - turn)
         rest = math.dist(landing.at, arc.end) * self._grid.step_mm * 1000.0
-        self._notes.mended += 1
-        if rest > self._notes.remainder_um:
-            self._notes.remainder_um = rest
-            self._notes.remainder_place = self._place(row)
+        self._changes.mended += 1
+        if rest > self._changes.remainder_um:
+            self._changes.remainder_um = rest
+            self._changes.remainder_place = self._place(row)
         self._lines(row, at, -left if arc.clockwise else left)
 
     def _lines(self, row: int, start: Floats, sweep_rad: float) -> None:
@@ -285,8 +285,8 @@ class _Writer:
             for block in blocks:
                 self._send(block, row)
             if rounded:
-                self._notes.rounded += 1
-                self._notes.rounded_place = self._notes.rounded_place or self._place(row)
+                self._changes.rounded += 1
+                self._changes.rounded_place = self._changes.rounded_place or self._place(row)
         if self._numbers.end_steps[row] != self._steps:
             raise PostError(
                 f"a {kind.name} cannot end at another place than where the controller stands then",
@@ -304,7 +304,7 @@ class _Writer:
 
 
 @dataclass
-class Notes:
+class Changes:
     """What one run of the writer changed, counted; places name the first of each kind."""
 
     dropped: int = 0
@@ -314,7 +314,7 @@ class Notes:
     split_place: str = ""
     split_step_mm: float = 0.0
     far: int = 0
-    """Arcs whose centre the dialect cannot say."""
+    """Arcs whose centre the dialect cannot represent."""
     far_place: str = ""
     mended: int = 0
     remainder_um: float = 0.0

@@ -1,9 +1,9 @@
 """Reading valcnc as its firmware takes a block: blanks dropped, then the first X, Y, Z, I and J of
 the block, wherever they stand (L1179, L1222-1226).
 
-What the firmware would meet and the thesis does not tell (a missing word, Z along with X, a full
+What the thesis does not describe (a missing word, Z along with X, a full
 circle, an arc whose chord exceeds its diameter) is an error with block, line and column, unless an
-option of `[dialect]` says what happens.
+option of `[dialect]` defines what happens.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ class _Reader:
                 self.path.line(x, y, z, feed=self._feed)
 
     def _in_order(self, block: Block, end: Point) -> Point | None:
-        """The point on the way where Z and XY change turns, if they do."""
+        """The corner between the parts along Z and in XY, if they are apart."""
         old, order = self._at, self._dialect.z_order
         if end[:2] == old[:2] or end[2] == old[2] or order == "together":
             return None
@@ -175,7 +175,7 @@ class _Reader:
         return (*old[:2], end[2]) if order == "before" else (*end[:2], old[2])
 
     def _arc(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
-        """An arc; Z in a block of its own before or after it where the option says so."""
+        """An arc; Z in a block of its own before or after it where the option asks for it."""
         if "I" not in values or "J" not in values:
             missing = "J" if "I" in values else "I"
             block.fail(f"an arc without {missing}", mend="give I and J from the start")

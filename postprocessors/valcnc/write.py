@@ -1,4 +1,4 @@
-"""Writing valcnc: each block says its code and all of X, Y and Z; arcs say I and J too.
+"""Writing valcnc: each block has its code and all of X, Y and Z; arcs have I and J too.
 
     rows ──checked──▶ XY and Z apart ──arcs cut short──▶ scaled ──units──▶ blocks
 
@@ -24,7 +24,7 @@ from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
 
-from ..gcode.format import CODE, NumberStyle, first_too_long, say_units
+from ..gcode.format import CODE, NumberStyle, first_too_long, format_units
 from ..gcode.plain import (
     ArcRules,
     PlainRows,
@@ -52,7 +52,7 @@ MOST_UNITS: Final = 99_999.0
 
 
 def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be said or done."""
+    """The program of a toolpath; PostError names the move that cannot be written or done."""
     dialect = machine.dialect
     check_plain(toolpath, machine)
     _check_tools(toolpath)
@@ -123,11 +123,11 @@ def _scaled(toolpath: Toolpath, scales: Floats) -> Toolpath:
 def _blocks(rows: PlainRows, dialect: Dialect) -> list[str]:
     """The block of each row, without a code for events."""
     style = NumberStyle(dialect.decimals)
-    x, y, z = (say_units(rows.end[:, axis], style) for axis in range(3))
+    x, y, z = (format_units(rows.end[:, axis], style) for axis in range(3))
     words = [CODE.get(kind, "") for kind in rows.kind.tolist()]
     blocks = [f"{w} X{a} Y{b} Z{c}" for w, a, b, c in zip(words, x, y, z, strict=True)]
     arcs = np.flatnonzero(rows.is_arc)
-    i, j = (say_units(rows.offset[arcs, axis], style) for axis in range(2))
+    i, j = (format_units(rows.offset[arcs, axis], style) for axis in range(2))
     for row, a, b in zip(arcs.tolist(), i, j, strict=True):
         blocks[row] += f" I{a} J{b}"
     return blocks

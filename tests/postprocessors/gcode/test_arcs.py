@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors.gcode.arcs import arcs_hold, arcs_of
+from camtool_postprocessors.gcode.arcs import arcs_accepted, arcs_of
 from camtool_postprocessors.grbl.dialect import Dialect
 from hypothesis import given
 from hypothesis import strategies as st
@@ -162,7 +162,7 @@ def test_a_turn_that_the_controller_takes_for_a_circle_does_not_hold() -> None:
     for units, holds in ((1, False), (10, True)):
         end = np.array([[2_000_000, units]])
         sweep = np.array([units / 2_000_000])
-        assert arcs_hold(sweep, (start, end, centre), kinds, options)[0] == holds
+        assert arcs_accepted(sweep, (start, end, centre), kinds, options)[0] == holds
 
 
 def test_linuxcnc_gets_no_arc_of_a_radius_that_it_calls_zero() -> None:

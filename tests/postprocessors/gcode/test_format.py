@@ -7,8 +7,8 @@ from camtool_postprocessors.gcode.format import (
     NumberStyle,
     comment,
     first_too_long,
-    say_column,
-    say_number,
+    format_column,
+    format_number,
     units_of,
     values_of,
 )
@@ -34,13 +34,13 @@ numbers = st.floats(-1e5, 1e5)
     ],
 )
 def test_a_number(value: float, style: NumberStyle, text: str) -> None:
-    assert say_number(value, style) == text
+    assert format_number(value, style) == text
 
 
 @given(st.lists(numbers, max_size=20), st.integers(0, 6), st.booleans())
 def test_a_column_says_what_units_mean(values: list[float], decimals: int, strip: bool) -> None:
     column = np.array(values, dtype=np.float64)
-    texts = say_column(column, NumberStyle(decimals, strip=strip))
+    texts = format_column(column, NumberStyle(decimals, strip=strip))
     units = units_of(column, decimals)
     assert [float(text) for text in texts] == values_of(units, decimals).tolist()
     assert np.abs(np.array(units) - column * 10.0**decimals).max(initial=0.0) <= 0.5 + 1e-6
@@ -54,11 +54,11 @@ def test_a_column_says_what_units_mean(values: list[float], decimals: int, strip
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 1e300])
 def test_no_text_for_what_is_no_number(value: float) -> None:
     with pytest.raises(ValueError, match="not finite, or too large"):
-        say_column(np.array([1.0, value]), NumberStyle(3))
+        format_column(np.array([1.0, value]), NumberStyle(3))
 
 
 def test_an_empty_column_is_no_text() -> None:
-    assert say_column(np.empty(0), NumberStyle(3)) == []
+    assert format_column(np.empty(0), NumberStyle(3)) == []
 
 
 @pytest.mark.parametrize(
