@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job
     from camtool.simulation.motion import Effects
     from camtool.targets.registry import LoadedTarget
-    from camtool.toolpath.moves import Bent, Toolpath
+    from camtool.toolpath.moves import Compensated, Toolpath
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import Kept
     from camtool.verification.conformance import Asked
@@ -57,7 +57,7 @@ class _Goal:
 
     wanted: Toolpath | None = None
     drawing: Drawing | None = None
-    sent: Bent | None = None
+    sent: Compensated | None = None
     asked: Asked | None = None
     said: Toolpath | None = None
 
@@ -295,7 +295,7 @@ def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, .
     return tuple(gate_findings(verification.report, gates))
 
 
-def _bent(wanted: Toolpath, machine: Machine) -> Bent:
+def _bent(wanted: Toolpath, machine: Machine) -> Compensated:
     """What the controller must be told for its slides to come out on `wanted`."""
     from camtool.planning.compensating import compensated
 
@@ -347,7 +347,9 @@ def _judged(
     )
 
 
-def _asked(job: Job, target: LoadedTarget, planned: Toolpath, sent: Bent | None) -> Asked | None:
+def _asked(
+    job: Job, target: LoadedTarget, planned: Toolpath, sent: Compensated | None
+) -> Asked | None:
     """What the job asks for, in moves as the dialect would say them; None where it asks for what
     cannot be made, which is said already. `sent` is `planned` bent against the mechanics."""
     from camtool.planning.settings import safe_z_of

@@ -23,7 +23,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.planning.reversing import Residual, residual
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Bent, Kind, Move, Toolpath
+from camtool.toolpath.moves import Compensated, Kind, Move, Toolpath
 
 OVERSHOOT = 0.5
 """The share of what the controller compensates too much that an axis overshoots at a reversal."""
@@ -46,7 +46,7 @@ TURN_EPS_RAD = 1e-9
 Point = tuple[float, float, float]
 
 
-def compensated(toolpath: Toolpath, machine: Machine) -> Bent:
+def compensated(toolpath: Toolpath, machine: Machine) -> Compensated:
     """`toolpath` bent against the scale, squareness and play of the machine, so that its slides
     come out where `toolpath` says. Sources of the rows are kept; blocks are not.
 
@@ -55,10 +55,10 @@ def compensated(toolpath: Toolpath, machine: Machine) -> Bent:
     """
     motors = motor_path(toolpath, machine)
     bent = _taken_up(motors.toolpath, machine)
-    return Bent(bent.toolpath, motors.row[bent.row])
+    return Compensated(bent.toolpath, motors.row[bent.row])
 
 
-def motor_path(toolpath: Toolpath, machine: Machine) -> Bent:
+def motor_path(toolpath: Toolpath, machine: Machine) -> Compensated:
     """Scale and squareness undone: the path of the motors for slides on `toolpath`; itself where
     both are as they should.
 
@@ -77,7 +77,7 @@ def motor_path(toolpath: Toolpath, machine: Machine) -> Bent:
     scale = np.diag([axis.coded_step_mm / axis.real_step_mm for axis in machine.axes])
     matrix = scale @ square
     if np.array_equal(matrix, np.eye(3)):
-        return Bent(toolpath, np.arange(len(toolpath)))
+        return Compensated(toolpath, np.arange(len(toolpath)))
     return _Mapped(toolpath, matrix, machine.defaults.fit_tolerance_mm).bent()
 
 
@@ -92,7 +92,7 @@ class _Mapped:
         self._scale = float(sizes.mean())
         self._b = ToolpathBuilder(self._to(tuple(toolpath.start.tolist())))
 
-    def bent(self) -> Bent:
+    def bent(self) -> Compensated:
         sweeps = self._toolpath.sweeps()
         rows: list[int] = []
         for move in self._toolpath:
@@ -108,7 +108,7 @@ class _Mapped:
                 _add_event(self._b, move, self._toolpath)
                 self._b.moved_to(*end)
             rows += [move.index] * (len(self._b) - len(rows))
-        return Bent(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
+        return Compensated(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
 
     def _to(self, point: tuple[float, ...]) -> Point:
         x, y, z = (self._matrix @ np.array(point)).tolist()
@@ -195,12 +195,12 @@ class _Drive:
                 return
 
 
-def _taken_up(toolpath: Toolpath, machine: Machine) -> Bent:
+def _taken_up(toolpath: Toolpath, machine: Machine) -> Compensated:
     """The positions that a controller must be given for slides on `toolpath` (in motor mm); the
     same toolpath where there is neither play nor compensation."""
     regions = _Regions(machine)
     if not regions.matter:
-        return Bent(toolpath, np.arange(len(toolpath)))
+        return Compensated(toolpath, np.arange(len(toolpath)))
     return _TakenUp(toolpath, machine, regions).bent()
 
 
@@ -243,7 +243,7 @@ class _TakenUp:
         ]
         self._b = ToolpathBuilder(self._place())
 
-    def bent(self) -> Bent:
+    def bent(self) -> Compensated:
         rows: list[int] = []
         sweeps = self._toolpath.sweeps()
         for move in self._toolpath:
@@ -261,7 +261,7 @@ class _TakenUp:
             else:
                 self._event(move)
             rows += [move.index] * (len(self._b) - len(rows))
-        return Bent(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
+        return Compensated(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
 
     def _enter(self, point: Point) -> None:
         """From here on the play is that of the region around a point."""

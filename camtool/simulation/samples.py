@@ -20,7 +20,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
-from camtool.toolpath.moves import Arms, Toolpath
+from camtool.toolpath.moves import PolarArcs, Toolpath
 
 MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or wider when a program would have more of them than this."""
@@ -103,7 +103,7 @@ def move_lengths(toolpath: Toolpath) -> Floats:
     if len(toolpath) == 0:
         return np.zeros(0)
     length = np.linalg.norm(toolpath.end - toolpath.starts, axis=1)
-    arms = Arms(toolpath, toolpath.is_arc)
+    arms = PolarArcs(toolpath, toolpath.is_arc)
     rise = arms.end[:, 2] - arms.begin[:, 2]
     radius = 0.5 * (arms.radius + arms.end_radius)
     length[arms.row] = np.hypot(radius * arms.sweep, rise)
@@ -127,7 +127,7 @@ class PathSamples:
         self._toolpath = toolpath
         self._starts = toolpath.starts
         self._way = toolpath.end - self._starts
-        self._arms = Arms(toolpath, toolpath.is_arc)
+        self._arms = PolarArcs(toolpath, toolpath.is_arc)
         self._arm_of_row = np.full(len(toolpath), -1, dtype=np.int64)
         self._arm_of_row[self._arms.row] = np.arange(len(self._arms.row))
         length = move_lengths(toolpath)
@@ -192,7 +192,7 @@ class CountedSamples(PathSamples):
         return np.column_stack(columns)
 
 
-def _pieces(length: Floats, arms: Arms) -> _Pieces:
+def _pieces(length: Floats, arms: PolarArcs) -> _Pieces:
     """All pieces in order: rows without arcs that move are one, arcs as many as they need."""
     straight = length > 0.0
     straight[arms.row] = False
@@ -208,7 +208,7 @@ def _pieces(length: Floats, arms: Arms) -> _Pieces:
     )
 
 
-def _arc_pieces(arms: Arms) -> _Pieces:
+def _arc_pieces(arms: PolarArcs) -> _Pieces:
     """Arcs cut at their turning points.
 
     These lie at angles k·π/2. Seen in the direction of the arc (σ = ±1) from its start at σ·a,

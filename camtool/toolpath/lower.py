@@ -8,7 +8,7 @@
 Each of them gives a new Toolpath and, for each of its rows, the row that it came from. All new
 points lie on the true arc, and the last one is the old end itself. Feed, provenance, block and
 value of a row go on in all the rows that it becomes; events stay as they are. Arcs whose ends lie
-at two radii are spirals (`Arms`).
+at two radii are spirals (`PolarArcs`).
 
     carried_over        the program of one machine as what another one shall do
     at_feed             all cuts at one feed
@@ -26,7 +26,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError, PostError
 from camtool.findings import FEED_ABOVE_LIMIT_LOWERED
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Arms, Kind, Toolpath
+from camtool.toolpath.moves import Kind, PolarArcs, Toolpath
 
 MAX_CHORD_SWEEP_RAD = 0.5 * math.pi
 """No chord stands for more of an arc than this, however wide the tolerance: a circle has four."""
@@ -97,7 +97,7 @@ def helices_to_steps(toolpath: Toolpath, max_dz_mm: float) -> Lowered:
     flat = toolpath.end[:, :2] != toolpath.starts[:, :2]
     sloping = toolpath.is_feed & (rise > 0.0) & (toolpath.is_arc | flat.any(axis=1))
     parts = np.where(sloping, np.maximum(np.ceil(rise / max_dz_mm - STEP_EPS), 1.0), 1.0)
-    arms = Arms(toolpath, toolpath.is_arc & sloping)
+    arms = PolarArcs(toolpath, toolpath.is_arc & sloping)
     cut = _split(toolpath, arms, _Parts(parts, "use a larger step"))
     return xy_then_z(cut.toolpath).after(cut)
 
@@ -114,7 +114,7 @@ def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lower
     if not (math.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise OptionError(f"tolerance {tolerance_mm:g} mm is not above 0")
     chosen = toolpath.is_arc & rows
-    arms = Arms(toolpath, chosen)
+    arms = PolarArcs(toolpath, chosen)
     largest = np.maximum(arms.radius, arms.end_radius)
     with np.errstate(divide="ignore"):
         half_sine = np.sqrt(np.minimum(tolerance_mm / (2.0 * largest), 1.0))
@@ -131,7 +131,7 @@ def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> Lowered:
     """
     if not (math.isfinite(max_sweep_rad) and max_sweep_rad > 0.0):
         raise OptionError(f"sweep {max_sweep_rad:g} rad is not above 0")
-    arms = Arms(toolpath, toolpath.is_arc)
+    arms = PolarArcs(toolpath, toolpath.is_arc)
     excess = np.maximum(np.abs(arms.sweep) - SWEEP_EPS_RAD, 0.0)
     return _split(toolpath, arms, _of_rows(toolpath, arms, np.ceil(excess / max_sweep_rad)))
 
@@ -144,14 +144,14 @@ class _Parts:
     mend: str = "use a wider tolerance"
 
 
-def _of_rows(toolpath: Toolpath, arms: Arms, parts: Floats) -> _Parts:
+def _of_rows(toolpath: Toolpath, arms: PolarArcs, parts: Floats) -> _Parts:
     """`parts` (J,) of the arcs, at least one; all other rows stay whole."""
     count = np.ones(len(toolpath))
     count[arms.row] = np.maximum(parts, 1.0)
     return _Parts(count)
 
 
-def _split(toolpath: Toolpath, arms: Arms, parts: _Parts, *, lines: bool = False) -> Lowered:
+def _split(toolpath: Toolpath, arms: PolarArcs, parts: _Parts, *, lines: bool = False) -> Lowered:
     """Each row in so many parts of equal length, arcs of `arms` in equal sweeps; `lines`: chords
     of these."""
     if float(parts.count.sum()) > MAX_PARTS:

@@ -228,7 +228,7 @@ def _or_none(number: np.float64) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Bent:
+class Compensated:
     """A toolpath compensated beforehand, so that the slides come out on the wanted one: `toolpath`
     is what the controller is sent, `row` (N,) the row of the wanted toolpath for each of its
     rows."""
@@ -237,8 +237,8 @@ class Bent:
     row: Ints
 
 
-class Arms:
-    """The chosen arcs seen from their centres: radius at start and end mm, angle at the start and
+class PolarArcs:
+    """The chosen arcs in polar coordinates: radius at start and end mm, angle at the start and
     signed sweep rad, each (J,), for the rows `row` (J,).
 
     An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the

@@ -10,7 +10,7 @@ from camtool.machine.model import Machine
 from camtool.planning.job import Job
 from camtool.simulation.motion import ALL, Effects, Options
 from camtool.targets.registry import LoadedTarget
-from camtool.toolpath.moves import Bent, Toolpath
+from camtool.toolpath.moves import Compensated, Toolpath
 from camtool.toolpath.wanted import Kept
 from camtool.verification.conformance import Asked
 
@@ -106,7 +106,7 @@ class Case:
     wanted: Toolpath | None
     drawing: Drawing | None
     options: VerifyOptions
-    sent: Bent | None = None
+    sent: Compensated | None = None
     asked: Asked | None = None
     said: Toolpath | None = None
 

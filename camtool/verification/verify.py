@@ -27,7 +27,7 @@ from camtool.simulation.controller import FusedRun
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk
 from camtool.targets.registry import LoadedTarget
-from camtool.toolpath.moves import Bent, Toolpath, toolpath_extents
+from camtool.toolpath.moves import Compensated, Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import Case, VerifyOptions
@@ -101,7 +101,7 @@ def verify(
     wanted: Toolpath | None = None,
     drawing: Drawing | None = None,
     options: VerifyOptions | None = None,
-    sent: Bent | None = None,
+    sent: Compensated | None = None,
     asked: Asked | None = None,
     said: Toolpath | None = None,
 ) -> Verification:

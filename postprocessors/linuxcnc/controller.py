@@ -40,7 +40,7 @@ from camtool.simulation.samples import (
     sample_spacing_mm,
 )
 from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
-from camtool.toolpath.moves import Arms, Kind, PathMode, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath
 
 from .dialect import Dialect, LinuxcncController
 
@@ -340,7 +340,7 @@ def moves_of(path: Toolpath, chain: Ints, machine: _Machine, period_s: float) ->
     lengths = length[lasting]
     begin, end = _tangents(path, lead)
     highest, along = allowed_along(rate, begin), allowed_along(acceleration, begin)
-    arms = Arms(path, path.is_arc)
+    arms = PolarArcs(path, path.is_arc)
     arm_of_row = np.full(len(path), -1, dtype=np.int64)
     arm_of_row[arms.row] = np.arange(len(arms.row))
     arm = arm_of_row[lead]
@@ -359,7 +359,7 @@ def _tangents(path: Toolpath, lead: Ints) -> tuple[Floats, Floats]:
     """(M, 3) unit tangents at the start and end of the rows `lead`; merged rows are straight."""
     way = (path.end - path.starts)[lead]
     begin, end = way.copy(), way.copy()
-    arms = Arms(path, path.is_arc)
+    arms = PolarArcs(path, path.is_arc)
     at = np.searchsorted(arms.row, lead)
     on = np.flatnonzero(path.is_arc[lead])
     for tangent, radius, share in ((begin, arms.radius, 0.0), (end, arms.end_radius, 1.0)):
@@ -375,7 +375,7 @@ def _tangents(path: Toolpath, lead: Ints) -> tuple[Floats, Floats]:
 
 
 def _arc_limits(
-    arms: Arms, arm: Ints, length: Floats, limits: tuple[Floats, Floats]
+    arms: PolarArcs, arm: Ints, length: Floats, limits: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats]:
     """Highest speed and acceleration along the way of arcs."""
     rate, acceleration = limits

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Arms, Kind, Toolpath, mounted_before, toolpath_extents
+from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, mounted_before, toolpath_extents
 
 
 def test_left_out_coordinates_stay() -> None:
@@ -41,7 +41,9 @@ def test_an_arc_with_z_is_a_helix() -> None:
     assert (quarter.start, quarter.end) == ((1.0, 0.0, 0.0), (0.0, 1.0, -2.0))
     assert turn.end == (0.0, 1.0, -3.0)
     assert path.finish().sweeps() == pytest.approx([math.pi / 2, -2 * math.pi])
-    points = Arms(path.finish(), path.finish().is_arc).points(np.array([0, 1]), np.full(2, 0.5))
+    points = PolarArcs(path.finish(), path.finish().is_arc).points(
+        np.array([0, 1]), np.full(2, 0.5)
+    )
     assert points == pytest.approx(
         np.array([[math.sqrt(0.5), math.sqrt(0.5), -1.0], [0.0, -1.0, -2.5]])
     )
