@@ -2,7 +2,7 @@
 
 Field names carry their units. `msgspec` checks types and ranges and refuses unknown keys;
 `camtool.tables` turns its complaints into errors that name file, table and key. What
-`[controller]` and `[dialect]` may say is the target's to tell: `Machine` is generic over both.
+`[controller]` and `[dialect]` may say its target says: `Machine` is generic over both.
 """
 
 from __future__ import annotations

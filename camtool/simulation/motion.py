@@ -116,7 +116,7 @@ IDEAL = Effects(False, False, False, False, False)
 """Slides that are where they are commanded."""
 
 CHUNK_STEPS = 1 << 16
-"""Samples of a chunk, unless told: a few MB."""
+"""Samples of a chunk by default: a few MB."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ SPREAD_STEPS = 2.0
 """Ends of an arc at two radii that differ by so many steps or fewer were made so by rounding."""
 
 LEAST_CHORD_STEPS = 2.0
-"""An arc with its ends nearer than this keeps its centre: no direction can be told from them."""
+"""An arc with its ends nearer than this keeps its centre: they give no direction."""
 
 
 _Machine = Machine[PathController, Any]

@@ -220,7 +220,7 @@ def _load(point: EntryPoint) -> tuple[Target, Path]:
 
 
 class Guarded:
-    """A third party's target, or its model: what it raises and should not is told as its own
+    """A third party's target, or its model: what it raises and should not is reported as its own
     fault."""
 
     def __init__(self, guarded: Any, value: str) -> None:

@@ -212,7 +212,7 @@ def _rounded(mm: Singles, steps_per_mm: Singles) -> Ints:
 def speeds_of(blocks: Blocks, path: Toolpath, machine: _Machine) -> SpeedPlan:
     """How fast each block may go, and each corner be passed.
 
-    Along a unit vector u no axis exceeds its own limit, so a block is held to min(limit / |u|).
+    Along a unit vector u no axis exceeds its own limit, so a block is limited to min(limit / |u|).
     At a corner between u1 and u2, with θ the angle between −u1 and u2, a circle touches both at
     `junction_deviation_mm` δ from the corner, and is followed (for its speed alone) at the
     acceleration a that u2 − u1 allows:  v² = a δ sin(θ/2) / (1 − sin(θ/2)).

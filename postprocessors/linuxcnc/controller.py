@@ -255,8 +255,8 @@ def _machine_mode(machine: _Machine) -> PathMode:
 
 # The moves of LinuxCNC's planner: rows merged into lines, and what bounds each of them.
 #
-# From `emccanon.cc`. Along a unit vector u a line is held to min(limit / |u|) of the axes. An arc
-# of radius r and sweep φ turns in XY, at no more than the slower axis v_xy, a_xy:
+# From `emccanon.cc`. Along a unit vector u a line is limited to min(limit / |u|) of the axes.
+# An arc of radius r and sweep φ turns in XY, at no more than the slower axis v_xy, a_xy:
 #
 #     v² ≤ a_xy · √¾ · r_e,   r_e² = (least r)² + (dr/dφ)²       (`arc`, ARC_FEED)
 #
@@ -507,7 +507,7 @@ def _blend(corners: Corners, moves: Moves, on: Ints, rules: CornerRules) -> None
     """Fill in speed, reach and acceleration of the blends at the corners `on`.
 
     In the plane of both tangents, with unit normal m, no axis exceeds its limit when the whole is
-    held to min(limit / √(1 − m²)).
+    limited to min(limit / √(1 − m²)).
     """
     theta = corners.theta[on]
     normal = _unit(np.cross(moves.end[on - 1], moves.begin[on]))

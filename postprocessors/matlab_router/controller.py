@@ -231,7 +231,7 @@ class Lines:
 
 
 def lines_of(path: Toolpath, rows: int, machine: _Machine) -> Lines:
-    """The orders for the first `rows` rows of a held toolpath.
+    """The orders for the first `rows` rows of a quantised toolpath.
 
     Raises ProgramError for a line without a feed above 0, a dwell without its seconds, and part
     zero set anew away from part zero.
@@ -318,14 +318,14 @@ def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> I
     way = np.abs(way_mm[first])
     feed = path.feed[first] / (60.0 * TICKS_PER_S)
     along = feed[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
-    # No axis can be told more than an int16, and none of the listing's programs tells as much.
+    # No axis takes more than an int16, and none of the listing's programs sends as much.
     wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
-    told = to_steps(wanted, 1.0)
+    sent = to_steps(wanted, 1.0)
     slanted = np.flatnonzero((wanted[:, 0] > 0.0) & (wanted[:, 1] > 0.0) & (wanted[:, 2] == 0.0))
-    told[slanted, :2] = _pairs(wanted[slanted, :2])
+    sent[slanted, :2] = _pairs(wanted[slanted, :2])
     rapid_mm = machine.rapid_mm_min / (60.0 * TICKS_PER_S)
     rapid = to_steps(min(rapid_mm, INT16 * coded[0]), float(coded[0]))
-    return np.where((path.kind[first] == Kind.LINE)[:, None], told, rapid)
+    return np.where((path.kind[first] == Kind.LINE)[:, None], sent, rapid)
 
 
 def _pairs(wanted: Floats) -> Ints:

@@ -49,7 +49,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect, PicMmhController
 from .findings import ARC_END_UNSURE
-from .legs import METHODS, JudgedSteps, legs_of, positions
+from .legs import METHODS, FusedLegs, legs_of, positions
 
 _Machine = Machine[PicMmhController, Dialect]
 
@@ -59,7 +59,7 @@ class PicMmhModel(ControllerModel[PicMmhController, Dialect]):
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
-        return PicMmh(toolpath, machine, options).run()
+        return PicMmhRun(toolpath, machine, options).run()
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with start, ends and arc centres at their nearest steps."""
@@ -94,15 +94,15 @@ class PicMmhModel(ControllerModel[PicMmhController, Dialect]):
             return ()
 
         return arc_end_findings(
-            toolpath, machine, PicMmh(toolpath, machine, options).legs_as_said()
+            toolpath, machine, PicMmhRun(toolpath, machine, options).legs_as_said()
         )
 
     def fused_run(
         self, toolpath: Toolpath, machine: _Machine, options: Options
-    ) -> JudgedSteps | None:
+    ) -> FusedLegs | None:
         """The same motion as that of `run`, judged as it is made, without chunks; None where the
         mechanics needs these. Raises as `run` does, all at once."""
-        return PicMmh(toolpath, machine, options).judged_steps()
+        return PicMmhRun(toolpath, machine, options).fused_run()
 
 
 def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:
@@ -141,7 +141,7 @@ def _counted(fill: Filler) -> Filler:
     return on
 
 
-class PicMmh:
+class PicMmhRun:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
     def __init__(self, toolpath: Toolpath, machine: _Machine, options: Options) -> None:
@@ -187,7 +187,7 @@ class PicMmh:
             if kind == Kind.END:
                 return
 
-    def judged_steps(self) -> JudgedSteps | None:
+    def fused_run(self) -> FusedLegs | None:
         """All rows up to the end of the program as legs."""
         if not self._mechanics.plain:
             return None
@@ -202,7 +202,7 @@ class PicMmh:
             feed_s = np.maximum(feed_s, self._least_period_s)
         waits = toolpath.kind[:rows] == Kind.DWELL
         legs = legs_of(toolpath, places, self._centres, self._stops)
-        return JudgedSteps(
+        return FusedLegs(
             legs=legs,
             periods_s=np.where(feeds, feed_s, self._rapid_period_s),
             still_s=np.where(waits, toolpath.value[:rows], 0.0),

@@ -69,8 +69,8 @@ def legs_of(toolpath: Toolpath, places: Ints, centres: Ints, stops: Ints) -> Int
     return np.ascontiguousarray(both[moves])
 
 
-class JudgedSteps:
-    """Runs the rows of a program in order, some at a time, and judges them on the way."""
+class FusedLegs:
+    """Runs the rows of a program in order, some at a time, and judges them as they are made."""
 
     def __init__(
         self,
