@@ -94,9 +94,9 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import camtool.api
 
-    value = getattr(camtool.api, name)
-    globals()[name] = value
-    return value
+    # All at once: what the api loads has bound the package `camtool.targets` to a name of these.
+    globals().update({each: getattr(camtool.api, each) for each in __all__})
+    return globals()[name]
 
 
 def __dir__() -> list[str]:

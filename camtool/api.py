@@ -14,14 +14,16 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
-from camtool.calibration.calibrate import Calibration
-from camtool.comparison import Comparison
+from camtool.calibration.calibrate import Calibration, to_text
+from camtool.calibration.calibrate import calibrate as calibrated
+from camtool.comparison import Comparison, Way, compare_program, ways_of
 from camtool.errors import CamtoolError, MachineError, OptionError, ProgramError
 from camtool.geometry.drawing import Drawing
 from camtool.jobs.keys import field_value
+from camtool.pictures.options import Options
 from camtool.pictures.picture import Picture
 from camtool.pictures.scene import Scene
-from camtool.pipeline import Judging
+from camtool.pipeline import Judging, convert_program, post_drawing, verify_program
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.job import job_of as made
 from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
@@ -304,8 +306,6 @@ def post(
     squareness; `gates` are limits whose excess is a finding. Raises OptionError, and PostError
     for what the machine or its dialect cannot do. Source: docs/verifying.md.
     """
-    from camtool.pipeline import post_drawing
-
     loaded, wanted = as_target(target), job or Job()
     read = as_drawing(drawing, loaded, wanted)
     return post_drawing(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
@@ -327,8 +327,6 @@ def convert(
     ProgramError with block and column, and PostError for what the second machine cannot do.
     Source: docs/verifying.md, docs/dialects.
     """
-    from camtool.pipeline import convert_program
-
     before, after = as_target(from_), as_target(to)
     data, source = as_bytes(program)
     return convert_program(data, before, after, file=source, feed_mm_min=feed_mm_min, check=check)
@@ -353,8 +351,6 @@ def verify(
     times in s. Raises ProgramError with block and column, and OptionError. Source:
     docs/verifying.md.
     """
-    from camtool.pipeline import verify_program
-
     loaded, wanted = as_target(target), job or Job()
     data, source = as_bytes(program)
     read = None if against is None else as_drawing(against, loaded, wanted)
@@ -377,8 +373,6 @@ def compare(
     verdict on each way. Raises ProgramError with block and column, OptionError for ways that are
     none, and MachineError for values that the machine cannot have. Source: docs/verifying.md.
     """
-    from camtool.comparison import Way, compare_program, ways_of
-
     loaded, wanted, how = as_target(target), job or Job(), judging or Judging()
     data, source = as_bytes(program)
     read = None if against is None else as_drawing(against, loaded, wanted)
@@ -410,8 +404,6 @@ class Calibrated(Calibration):
         return machine_file(self, self.measurements, self.machine, dict(self.extends))
 
     def __str__(self) -> str:
-        from camtool.calibration.calibrate import to_text
-
         return to_text(self, self.machine)
 
     def __repr__(self) -> str:
@@ -433,10 +425,8 @@ def calibrate(
     `machine_file` of the result is the text of a new one. Raises InputError, which names file,
     table and key, OptionError and MachineError. Source: docs/calibration.md.
     """
-    from camtool.calibration.calibrate import calibrate as calibrated
     from camtool.calibration.measurements import Measurements, read_measurements
     from camtool.tables import read_table
-    from camtool.targets.loader import extended_by
 
     own = None if machine is None else Path(machine)
     said = measurements
@@ -484,8 +474,6 @@ def preview(
     place of their own, in order. Raises OptionError for looks that make no picture. Source:
     docs/pictures.md, docs/viewer.md.
     """
-    from camtool.pictures.options import Options
-
     scenes = [_shown(each).scene() for each in (what, *beside)]
     if len(titles) > len(scenes):
         raise TypeError(f"{len(titles)} titles for {len(scenes)} values")

@@ -6,16 +6,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camtool.pictures.beside import draw_beside, render_beside
+from camtool.pictures.draw import draw, render
 from camtool.pictures.options import AS_USUAL, Options
+from camtool.pictures.overlay import Overlay, draw_overlay, render_overlay
 from camtool.pictures.scene import Scene
 from camtool.units import UM_PER_MM
-
-if TYPE_CHECKING:
-    from camtool.pictures.overlay import Overlay
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,10 +28,6 @@ class Picture:
     @property
     def svg(self) -> str:
         """The picture as SVG text; OptionError for options that make no picture."""
-        from camtool.pictures.beside import draw_beside
-        from camtool.pictures.draw import draw
-        from camtool.pictures.overlay import Overlay, draw_overlay
-
         if isinstance(self.scene, tuple):
             return draw_beside(self.scene, self.options)
         if isinstance(self.scene, Overlay):
@@ -42,10 +37,6 @@ class Picture:
     def render(self, name: str) -> bytes:
         """The bytes of a file of this name: .svg, .png, or .html, which is the viewer (it has no
         options, and shows one value alone). OutputError or OptionError for any other."""
-        from camtool.pictures.beside import render_beside
-        from camtool.pictures.draw import render
-        from camtool.pictures.overlay import Overlay, render_overlay
-
         if isinstance(self.scene, tuple):
             return render_beside(self.scene, name, self.options)
         if isinstance(self.scene, Overlay):

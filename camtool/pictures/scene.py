@@ -17,7 +17,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import Segments
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
@@ -269,8 +269,6 @@ def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, 
     only then is there a place where the frame can honestly be drawn."""
     if toolpath is None or machine is None:
         return None
-    from camtool.toolpath.moves import toolpath_extents
-
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
     (left, right), (low, high), _ = toolpath_extents(toolpath).tolist()
     if x is None or y is None or left < 0.0 or low < 0.0 or right > x or high > y:

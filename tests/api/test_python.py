@@ -60,9 +60,14 @@ def test_calls_are_functions_whoever_comes_first(first: str) -> None:
     """A room is named by a noun and a call by a verb: neither takes the other's place."""
     code = f"""
 import {first}, camtool.pictures.draw, camtool.pipeline, inspect
-assert inspect.isfunction(camtool.verify) and inspect.isfunction(camtool.preview)
+assert camtool.Job and inspect.isfunction(camtool.verify) and inspect.isfunction(camtool.preview)
 assert inspect.ismodule(camtool.pictures.draw) and not callable(camtool.pipeline)
 """
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_every_name_holds_after_any_other() -> None:
+    code = "import camtool; camtool.load_target('grbl'); assert camtool.targets()"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
