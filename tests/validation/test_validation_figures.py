@@ -59,7 +59,7 @@ def table_3_8() -> Iterator[Figure]:
             "L1208-1214",
             f"5263 × {printed}",
             f"{steps[0]} × {steps[1]}",
-            "simulation/test_flashcut_thesis.py::test_the_shorter_axis_of_table_3_8",
+            "postprocessors/flashcut/test_thesis.py::test_the_shorter_axis_of_table_3_8",
         )
 
 
@@ -91,7 +91,7 @@ def the_star() -> Iterator[Figure]:
     for name, printed, found in zip(names, STAR, arrays, strict=True):
         yield Figure(
             "Matlab router", f"the star's {name}", "L3196-3228", printed, found,
-            "simulation/test_matlab_router.py::test_the_star_s_arrays_are_what_the_slaves_get",
+            "postprocessors/matlab_router/test_controller.py::test_the_star_s_arrays_are_what_the_slaves_get",
         )  # fmt: skip
     assert posted.decoded is not None
     cut = posted.decoded.is_feed & (posted.decoded.end[:, 2] < 0.0)
@@ -102,7 +102,8 @@ def the_star() -> Iterator[Figure]:
         found = ", ".join(signed(value, 0).replace("+", "") for value in drift[:, axis])
         yield Figure(
             "Matlab router", f"its drift in {'XY'[axis]}, 0.1 mm (derived)", "L5589-5600", printed,
-            found, "simulation/test_matlab_router.py::test_the_star_s_drift_by_odd_distances",
+            found,
+            "postprocessors/matlab_router/test_controller.py::test_the_star_s_drift_by_odd_distances",
         )  # fmt: skip
 
 
@@ -114,7 +115,8 @@ def table_8() -> Iterator[Figure]:
     yield Figure(
         "ValCNC", "Tabla 8: places of 7 × 3 steps", "L1239-1250",
         "(1, 0) (2, 0) (3, 1) (4, 1) (5, 2) (6, 2) (7, 3)",
-        " ".join(f"({x}, {y})" for x, y in places), "simulation/test_valcnc.py::test_table_8",
+        " ".join(f"({x}, {y})" for x, y in places),
+        "postprocessors/valcnc/test_controller.py::test_table_8",
     )  # fmt: skip
 
 
@@ -133,7 +135,7 @@ def leads() -> Iterator[Figure]:
         yield Figure(
             "ValCNC", f"Tabla {table}: lead of {axis.upper()} over ten turns, mm", lines,
             f"{printed:.3f}", f"{end['xyz'.index(axis)] / 10.0:.3f}",
-            "simulation/test_valcnc.py::test_the_effective_leads_of_tables_14_to_16",
+            "postprocessors/valcnc/test_controller.py::test_the_effective_leads_of_tables_14_to_16",
         )  # fmt: skip
 
 
@@ -151,14 +153,14 @@ def dog_legs() -> Iterator[Figure]:
         yield Figure(
             "8751", f"dog-leg of {dx} × {dy}: error, steps (derived)", "L416-426",
             f"{dy * (dx - dy) / math.hypot(dx, dy):.2f}", f"{off:.2f}",
-            "simulation/test_i8751.py::test_the_error_of_the_dog_leg",
+            "postprocessors/i8751/test_controller.py::test_the_error_of_the_dog_leg",
         )  # fmt: skip
 
 
 def ramps() -> Iterator[Figure]:
     """Delays of the pulses of a run of 200, as the motion takes them."""
     times = {steps: ramp_s(steps) for steps in (1, 89, 90, 91, 200, 201)}
-    test = "machine/test_i8751_pulses.py::test_the_ramp_of_the_thesis"
+    test = "postprocessors/i8751/test_pulses.py::test_the_ramp_of_the_thesis"
     for what, lines, printed, found in (
         ("start, Hz", "L3150-3183", "8.0", f"{1.0 / times[1]:.1f}"),
         ("run of 89 pulses, s: no ramp", "L3095-3111", f"{89 / 8:.3f}", f"{times[89]:.3f}"),

@@ -20,7 +20,7 @@ from tests.oracles.flashcut_run import Pc, half_period, run_rows
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.targets import build_machine, simulate
 
-TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
+TARGET = Path(__file__).parents[3] / "postprocessors" / "flashcut" / "machine.toml"
 STEP = 0.0019
 
 

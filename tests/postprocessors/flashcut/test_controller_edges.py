@@ -17,7 +17,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.targets import build_machine, model_of, simulate
 
-TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
+TARGET = Path(__file__).parents[3] / "postprocessors" / "flashcut" / "machine.toml"
 STEP = 0.0019
 
 

@@ -18,7 +18,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.targets import build_machine, simulate
 
-TARGET = Path(__file__).parents[2] / "postprocessors" / "flashcut" / "machine.toml"
+TARGET = Path(__file__).parents[3] / "postprocessors" / "flashcut" / "machine.toml"
 F3, F6, F10, F20, F40 = 14.25, 8.14, 5.18, 2.714, 1.39
 """Feeds, mm/min, of half periods of 3, 6, 10, 20 and 40 ms."""
 CLOCKS = ["whole-ms", "late-longer"]

@@ -9,7 +9,7 @@ from camtool.machine.model import Machine
 from camtool.tables import read_table
 from tests.targets import build_machine
 
-TARGET = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"
+TARGET = Path(__file__).parents[3] / "postprocessors" / "pic_mmh" / "machine.toml"
 
 
 @pytest.fixture(scope="session")
