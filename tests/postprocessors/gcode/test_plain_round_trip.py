@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 
 from camtool.findings import Code
-from camtool.targets.registry import load_target
+from camtool.targets.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.gcode.plain_parts import KINDS, anywhere, judge, on_grid, part
@@ -68,6 +69,12 @@ def test_anything_comes_back_within_a_unit_thoroughly(name: str, data: st.DataOb
     judge(LOADED[name], data.draw(anywhere(KINDS[name])), KINDS[name].unit_mm)
 
 
+def unit_of(target: LoadedTarget) -> float:
+    """The last decimal of a coordinate, mm."""
+    options = structs.asdict(target.machine.dialect)
+    return float(10.0 ** -options["decimals"] / options.get("coord_scale", 1.0))
+
+
 @pytest.mark.parametrize(
     ("name", "setting"),
     [
@@ -85,9 +92,7 @@ def test_anything_comes_back_within_a_unit_thoroughly(name: str, data: st.DataOb
 )
 def test_every_option_is_understood_by_both(name: str, setting: str) -> None:
     target = load_target(name, settings=[setting])
-    dialect = target.machine.dialect
-    unit = 10.0 ** -float(dialect["decimals"]) / float(dialect.get("coord_scale", 1.0))
-    program = judge(target, part(3.0, 8.0), unit)
+    program = judge(target, part(3.0, 8.0), unit_of(target))
     default = LOADED[name].post.write(part(3.0, 8.0), LOADED[name].machine)
     assert program.data != default.data
 
@@ -184,7 +189,5 @@ def test_an_empty_toolpath(name: str) -> None:
 
 def test_kinds_are_those_of_the_targets() -> None:
     for name, kinds in KINDS.items():
-        dialect = LOADED[name].machine.dialect
-        scale = float(dialect.get("coord_scale", 1.0))
-        assert kinds.unit_mm == pytest.approx(10.0 ** -float(dialect["decimals"]) / scale)
+        assert kinds.unit_mm == pytest.approx(unit_of(LOADED[name]))
     assert Kind.END not in LOADED["valcnc"].post.read(b"G00X0Y0Z1", LOADED["valcnc"].machine).kind
