@@ -75,13 +75,13 @@ def post_drawing(
     """Plan, write, read back, simulate and judge; `check=False` leaves out the last two;
     `compensate` bends what is written against the machine's mechanics; `trace_points` of the
     slides' path are kept at most (None: as usual)."""
-    from camtool.planning.checks import doubts
+    from camtool.planning.checks import doubtful_settings
     from camtool.planning.plan import planned
 
     plan = planned(drawing, job, target.machine)
     wanted = plan.toolpath
     run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
-    doubtful = doubts(plan.steps, starts_spindle=target.post.starts_spindle)
+    doubtful = doubtful_settings(plan.steps, starts_spindle=target.post.starts_spindle)
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)

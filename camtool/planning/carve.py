@@ -13,14 +13,14 @@ tip stops where it no longer fits). Where the depth of the operation or the widt
 not allow more, walls are cut at that depth, and the floor between them is left and reported: a
 pocket with a flat tool clears it.
 
-A disc of radius ρ in the region is what the bit cuts at the surface. `grooves` are stretches of
+A disc of radius ρ in the region is what the bit cuts at the surface. `grooves` are pieces of
 the medial axis with low ≤ ρ ≤ high; where discs are larger than `high`, the `walls` run beside the
-boundary at that distance. Together they are where the middle of the largest disc allowed runs when
+boundary at that distance. Together they are where the centre of the largest disc allowed runs when
 it rolls along the boundary.
 
 What is cut is right to `CARVE_TOLERANCE_MM`: all vertices lie on the medial axis or on the
 parallel curve, exact to rounding; lines and arcs between them leave the axis, sideways and in
-radius together, by no more than the tolerance; twigs that would reach no farther are left out.
+radius together, by no more than the tolerance; side branches that reach no farther go.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class _Region:
 def vcarve(chosen: Chosen, setting: Setting) -> Work:
     """One Fixed item for each region: what an even-odd reading of the closed paths fills.
 
-    Where paths cross nobody knows what is filled: a finding of severity error, and no items.
+    Where paths cross it is not defined what is filled: a finding of severity error, and no items.
     OptionError for an open path and for a tool that is no V bit.
     """
     cone = Cone.of(setting.operation)
@@ -146,11 +146,11 @@ def vcarve(chosen: Chosen, setting: Setting) -> Work:
     findings: list[Finding] = []
     for region in _regions(chosen):
         try:
-            item, noticed = _carved(region, setting, cone)
+            item, found = _carved(region, setting, cone)
         except GeometryError as error:
             return Work((), (_no_region(region, error),))
         items.extend(item)
-        findings.extend(noticed)
+        findings.extend(found)
     return Work(tuple(items), tuple(findings))
 
 
@@ -195,7 +195,7 @@ def _regions(chosen: Chosen) -> Iterator[_Region]:
 
 
 def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed], list[Finding]]:
-    """The item of one region, none if the tip fits nowhere, and what was noticed."""
+    """The item of one region, none if the tip fits nowhere, and its findings."""
     boundary, trace = medial_trace(region.lines, CARVE_TOLERANCE_MM)
     limits = [cone.tip_mm, *(cone.radius_at(-level) for level in setting.levels_mm)]
     for limit in sorted(set(limits)):
@@ -217,12 +217,12 @@ def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed],
 
 
 def _walks(trace: Trace, floor: list[Floats], band: Band, again_mm: float) -> list[Floats]:
-    """What is walked in one band: the grooves, the walls, and the middle of a round region."""
-    graph = without_twigs(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
-    middle = trace.discs[int(np.argmax(trace.rho))]
-    is_cut = band.low_mm < middle[2] <= band.high_mm
-    lonely = is_cut and _passed_by(graph.pieces, middle[:2]) > band.tolerance_mm
-    return [*walks(graph, again_mm), *([np.append(middle, 0.0)[None, :]] if lonely else [])]
+    """The walks of one band: the grooves, the walls, and the centre of a round region."""
+    graph = pruned(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
+    largest = trace.discs[int(np.argmax(trace.rho))]
+    is_cut = band.low_mm < largest[2] <= band.high_mm
+    is_missed = is_cut and _passed_by(graph.pieces, largest[:2]) > band.tolerance_mm
+    return [*walks(graph, again_mm), *([np.append(largest, 0.0)[None, :]] if is_missed else [])]
 
 
 def _passed_by(pieces: list[Floats], point: Floats) -> float:
@@ -310,7 +310,7 @@ def _with_radius(trace: Trace, rho: Floats) -> Trace:
 
 
 def grooves(trace: Trace, band: Band) -> list[Floats]:
-    """Pieces (n, 4) of x, y, rho, bulge: the axis within the band, each stretch once; an arc
+    """Pieces (n, 4) of x, y, rho, bulge: the axis within the band, each piece once; an arc
     whose radius changes changes it evenly along its sweep.
 
     `trace` has rows at both limits of the band.
@@ -318,11 +318,11 @@ def grooves(trace: Trace, band: Band) -> list[Floats]:
     rho = trace.rho
     least, most = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
     same = (trace.element[1:] == trace.element[:-1]) & (trace.partner[1:] == trace.partner[:-1])
-    # Every stretch is seen from both its sides: from the first one it is taken.
+    # Every piece is traced from both its sides: it is taken from the first one.
     own = trace.element[1:] < trace.partner[1:]
     wanted = same & own & (least >= band.low_mm) & (most <= band.high_mm) & (most > band.low_mm)
     tolerance = FIT_SHARE * band.tolerance_mm
-    return [_fitted(trace.discs[i : j + 1], tolerance) for i, j in _stretches(trace, wanted)]
+    return [_fitted(trace.discs[i : j + 1], tolerance) for i, j in _index_runs(trace, wanted)]
 
 
 def walls(boundary: Boundary, trace: Trace, high_mm: float) -> list[Floats]:
@@ -333,7 +333,7 @@ def walls(boundary: Boundary, trace: Trace, high_mm: float) -> list[Floats]:
     wanted = same & (least >= high_mm) & (most > high_mm)
     return [
         _wall(boundary, int(trace.element[i]), (float(trace.t[i]), float(trace.t[j])), high_mm)
-        for i, j in _stretches(trace, wanted, partners=False)
+        for i, j in _index_runs(trace, wanted, partners=False)
     ]
 
 
@@ -349,7 +349,7 @@ def floor_area(pieces: list[Floats]) -> float:
     return total
 
 
-def _stretches(trace: Trace, wanted: Bools, partners: bool = True) -> list[tuple[int, int]]:
+def _index_runs(trace: Trace, wanted: Bools, partners: bool = True) -> list[tuple[int, int]]:
     """First and last rows of the runs of wanted gaps, within an element (and one partner)."""
     joined = wanted[1:] & wanted[:-1] & (trace.element[2:] == trace.element[:-2])
     if partners:
@@ -444,11 +444,11 @@ def _extent(piece: Floats) -> float:
     return float(np.hypot(*(piece[1:, :2] - piece[0, :2]).T).max())
 
 
-def without_twigs(graph: Graph, tolerance_mm: float) -> Graph:
-    """The graph without its twigs whose discs reach no farther than the tolerance out of the disc
-    at the other end of the twig.
+def pruned(graph: Graph, tolerance_mm: float) -> Graph:
+    """The graph without the side branches whose discs reach no farther than the tolerance out of
+    the disc at the other end of the branch.
 
-    A disc (m, ρ) reaches |m − m'| + ρ − ρ' out of another one (m', ρ'); along a twig of several
+    A disc (m, ρ) reaches |m − m'| + ρ − ρ' out of another one (m', ρ'); along a branch of several
     pieces these add up at most.
     """
     degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
@@ -526,8 +526,8 @@ def lengths_of(path: Floats) -> Floats:
     chord = np.hypot(*np.diff(path[:, :2], axis=0).T)
     bulge = path[:-1, 3]
     safe = np.where(bulge != 0.0, bulge, 1.0)
-    stretch = np.where(bulge != 0.0, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
-    return np.asarray(chord * stretch)
+    factor = np.where(bulge != 0.0, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
+    return np.asarray(chord * factor)
 
 
 def _jumps(graph: Graph) -> Ints:

@@ -226,12 +226,12 @@ def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
 def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
     """The fastest move along X and Y, and along Z, where the machine is not so fast.
 
-    Of a feed the part |dz| / way goes along Z, and the rest of the triangle across.
+    Of a feed the part |dz| / length goes along Z, and the rest of the triangle across.
     """
-    across, along = _ways(toolpath)
-    way = np.hypot(across, along)
-    moves = toolpath.is_feed & (way > 0.0)
-    feed = np.where(moves, toolpath.feed, 0.0) / np.where(moves, way, 1.0)
+    across, along = _lengths(toolpath)
+    length = np.hypot(across, along)
+    moves = toolpath.is_feed & (length > 0.0)
+    feed = np.where(moves, toolpath.feed, 0.0) / np.where(moves, length, 1.0)
     for what, part, limit in (
         ("in X and Y", across, machine.max_feed_mm_min),
         ("along Z", along, machine.max_plunge_mm_min),
@@ -249,7 +249,7 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
         )
 
 
-def _ways(toolpath: Toolpath) -> tuple[Floats, Floats]:
+def _lengths(toolpath: Toolpath) -> tuple[Floats, Floats]:
     """(N,), (N,) mm: how far each row goes in XY, along its arc, and in Z."""
     step = toolpath.end - toolpath.starts if len(toolpath) else np.zeros((0, 3))
     spoke = toolpath.starts[:, :2] - toolpath.centre
@@ -264,7 +264,7 @@ def _place(toolpath: Toolpath, row: int) -> str:
     return f"move {row} ({source})" if source else f"move {row}"
 
 
-def doubts(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
+def doubtful_settings(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
     """One finding for all that looks forgotten or too bold in the operations that cut something;
     none when all is well.
 
@@ -275,7 +275,7 @@ def doubts(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
     cutting = [step for step in steps if step.runs]
     said: dict[str, list[Step]] = defaultdict(list)
     for step in cutting:
-        for doubt in _doubts_of(step, starts_spindle):
+        for doubt in _doubts(step, starts_spindle):
             said[doubt].append(step)
     if not said:
         return []
@@ -286,7 +286,7 @@ def doubts(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
     return [CUT_DOUBTFUL(doubts="; ".join(parts))]
 
 
-def _doubts_of(step: Step, starts_spindle: bool) -> Iterator[str]:
+def _doubts(step: Step, starts_spindle: bool) -> Iterator[str]:
     """What is doubtful about an operation, each with the flag that mends it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = tool.radius_mm + operation.allowance_mm > 0.0

@@ -1,10 +1,10 @@
-"""Ways that clear a region in the plane: rings or a zigzag, slots, and the links between strokes.
+"""Paths that clear a pocket: rings or a zigzag, slots, and the links between strokes.
 
-    region of the tool's middle ──rings from the middle outwards──▶ strokes ┐
-                                ──straight lines at an angle──────▶ strokes ┴──linked──▶ way
+    tool centre region ──rings from the inside outwards──▶ strokes ┐
+                       ──straight lines at an angle──────▶ strokes ┴──linked──▶ path
 
-The region of the tool's middle is the pocket shrunk by the tool's radius. Nothing of the pocket is
-left over: `ring_cells` and `zigzag_ways` say why. Links (`route`) never leave the region.
+The tool centre region is the pocket shrunk by the tool's radius. Nothing of the pocket is
+left over: `ring_cells` and `zigzag_paths` say why. Links (`route`) never leave the region.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ from camtool.geometry.polylines import (
     reverse,
     rotated,
 )
-from camtool.planning.paths import Along, joined, middles, runs_of_true
+from camtool.planning.paths import MeasuredPath, joined, midpoints, runs_of_true
 
 SHORTER = (0.95, 0.9, 0.85, 0.8)
-"""Parts of the step that are tried where it leaves tips: rings alone make a calmer way."""
+"""Parts of the step that are tried where it leaves tips: rings alone make a smoother path."""
 
 MOST_MARGIN = 0.5
 """The most that is left for the ring round the walls, over the tool's radius."""
@@ -67,15 +67,15 @@ ON_LINE_MM = 5e-6
 """A place this near to the boundary of a region is still in it."""
 
 POLE_SHARE = 0.01
-"""How near to the true middle of a region its middle is looked for, over its extent."""
+"""How near to its true place the pole of a region is looked for, over the extent of the region."""
 
 
 @dataclass(eq=False)
 class Cell:
-    """A connected region of the tool's middle, what it fell into when shrunk by a step, how many
-    times it can be shrunk (`height`), and the tips between the two."""
+    """A connected tool centre region, the regions that it falls into when shrunk by a step, the
+    tips between the two, and how many times it can be shrunk (`height`)."""
 
-    rails: Rails
+    region: ConnectedRegion
     inner: list[Cell] = field(default_factory=list)
     tips: list[Polyline] = field(default_factory=list)
     height: int = 0
@@ -84,32 +84,32 @@ class Cell:
 @dataclass(frozen=True)
 class Steps:
     """Distance of the rings and radius of the tool, mm; whether rings run as they are oriented
-    (the region on their left) or the other way; whether the first one begins as near as can be
-    to the middle of its region, where a helix goes down."""
+    (the region on their left) or reversed; whether the first one begins as near as possible to
+    the pole of its region, where a helix goes down."""
 
     step_mm: float
     radius_mm: float
     forward: bool = True
-    from_middle: bool = False
+    from_pole: bool = False
 
 
 def ring_cells(region: Polylines, steps: Steps) -> Cell:
-    """The tree of regions of one connected region of the tool's middle.
+    """The tree of regions of one connected tool centre region.
 
-    It is shrunk again and again by the step s, and each boundary is a ring. What lies between two
-    rings is nearer than s to the outer one; so for s up to the tool's radius r nothing is left
-    over, whatever the shape. For a longer step the tool would miss what is farther than r both
-    from the outer ring and from all that lies within the inner one. There it also follows the
+    The region is shrunk again and again by the step s, and each boundary is a ring. What lies
+    between two rings is nearer than s to the outer one; so for s up to the tool's radius r nothing
+    is left over, whatever the shape. For a longer step the tool would miss what is farther than r
+    both from the outer ring and from all that lies within the inner one. There it also follows the
     boundary of the region shrunk by r, as far as that is farther than r from the inner ring: the
     *tips*. They reach into corners and cores. Regions fall apart as they shrink: they form a tree.
     """
-    root = Cell(Rails(region))
+    root = Cell(ConnectedRegion(region))
     waiting, order = [root], []
     while waiting:
         cell = waiting.pop()
         order.append(cell)
-        shrunk, cell.tips = _next_ring(cell.rails.region, steps)
-        cell.inner = [Cell(Rails(part)) for part in parts_of(shrunk)]
+        shrunk, cell.tips = _next_ring(cell.region.boundary, steps)
+        cell.inner = [Cell(ConnectedRegion(part)) for part in parts_of(shrunk)]
         waiting += cell.inner
     for cell in reversed(order):
         cell.height = 1 + max((each.height for each in cell.inner), default=0)
@@ -140,27 +140,27 @@ def _tips(core: Polylines, shrunk: Polylines, steps: Steps) -> list[Polyline]:
     return outside_parts(core, offset_shape(shrunk, -steps.radius_mm))
 
 
-def ring_ways(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
+def ring_paths(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
     """(n, 3) x, y, bulge: an open path over all rings, and the cell that it begins in. A region is
     cut after all that came of it.
 
-    Several paths only where rounding hides the way from one ring to the next (`Way`).
+    Several paths only where rounding hides the link from one ring to the next (`LinkedPath`).
     """
-    way = Way()
+    linked = LinkedPath()
     first = None
-    for cell, around in _inside_out(root, way):
+    for cell, around in _inside_out(root, linked):
         if first is None:
             first = cell
-            way.begin = pole(cell.rails.region) if steps.from_middle else None
-        paths = (*cell.tips, *cell.rails.region)
-        way.cut_all(paths, cell.rails, around.rails, steps.forward)
-    return way.ways(), first or root
+            linked.begin = pole(cell.region.boundary) if steps.from_pole else None
+        paths = (*cell.tips, *cell.region.boundary)
+        linked.cut_all(paths, cell.region, around.region, steps.forward)
+    return linked.paths(), first or root
 
 
-def _inside_out(root: Cell, way: Way) -> Iterator[tuple[Cell, Cell]]:
+def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
     """All cells, each after its inner ones, with the cell in which the tool can come to it.
 
-    The highest first; later the one nearest to the end of the way so far, which grows meanwhile.
+    The highest first; later the one nearest to the end of the path so far, which grows meanwhile.
     """
     stack = [(root, list(root.inner))]
     around: Cell | None = None
@@ -172,7 +172,7 @@ def _inside_out(root: Cell, way: Way) -> Iterator[tuple[Cell, Cell]]:
             around = None
             continue
         around = around or cell
-        chosen = left.pop(_pick(left, way.here))
+        chosen = left.pop(_pick(left, linked.here))
         stack.append((chosen, list(chosen.inner)))
 
 
@@ -180,14 +180,14 @@ def _pick(cells: list[Cell], here: Floats | None) -> int:
     """The cell nearest to a place; the highest when the tool is nowhere yet."""
     if here is None:
         return max(range(len(cells)), key=lambda row: (cells[row].height, -row))
-    apart = [min(closest(along, here)[0] for along in cell.rails.paths) for cell in cells]
+    apart = [min(closest(along, here)[0] for along in cell.region.paths) for cell in cells]
     return int(np.argmin(apart))
 
 
 @dataclass(frozen=True)
 class Scan:
     """Distance of the strokes and radius of the tool, mm, and the angle of the strokes; whether
-    the rings run as they are oriented (the region on their left) or the other way."""
+    the rings run as they are oriented (the region on their left) or reversed."""
 
     step_mm: float
     radius_mm: float
@@ -208,29 +208,29 @@ class Strokes:
         return len(self.row)
 
 
-def zigzag_ways(region: Polylines, scan: Scan) -> list[Floats]:
+def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
     """(n, 3) x, y, bulge: an open path over all strokes and rings of one connected region.
 
     The region is shrunk by a margin m and cut by parallel lines, h apart. Their pieces within it
     are the strokes; then the boundary of the whole region is followed, which takes the margin off
     the walls. Nothing is left over when  h/2 + m ≤ r,  the tool's radius: the line nearest to a
-    place of the shrunk region is no farther than h/2, and if the way straight to it leaves the
+    place of the shrunk region is no farther than h/2, and if the straight line to it leaves the
     shrunk region, that is within h/2, and so the wall's ring within h/2 + m. Every other place is
     within m of that ring.
 
-    Several paths only where rounding hides the way from one stroke to the next (`Way`).
+    Several paths only where rounding hides the link from one stroke to the next (`LinkedPath`).
     """
-    whole, way = Rails(region), Way()
+    whole, linked = ConnectedRegion(region), LinkedPath()
     margin = min(scan.radius_mm - 0.5 * scan.step_mm, MOST_MARGIN * scan.radius_mm)
     for part in parts_of(offset_shape(region, margin)):
-        rails, strokes = Rails(part), strokes_of(part, scan)
+        inner, strokes = ConnectedRegion(part), strokes_of(part, scan)
         around = whole
         for index, turned in _order(strokes):
             ends = strokes.ends[index, ::-1] if turned else strokes.ends[index]
-            way.cut(np.column_stack([ends, np.zeros(2)]), around)
-            around = rails
-    way.cut_all(region, whole, whole, scan.forward)
-    return way.ways()
+            linked.cut(np.column_stack([ends, np.zeros(2)]), around)
+            around = inner
+    linked.cut_all(region, whole, whole, scan.forward)
+    return linked.paths()
 
 
 def strokes_of(region: Polylines, scan: Scan) -> Strokes:
@@ -253,7 +253,7 @@ def _order(strokes: Strokes) -> list[tuple[int, bool]]:
     """Every stroke once, each with whether it is cut from its end.
 
     From a stroke on to one beside it, as long as there is one; else to the nearest end of any
-    that has at most one neighbour left, so that no row of strokes is broken in its middle.
+    that has at most one neighbour left, so that no row of strokes is interrupted.
     """
     beside = _neighbours(strokes)
     left = set(range(len(strokes)))
@@ -302,13 +302,13 @@ def _neighbours(strokes: Strokes) -> list[list[int]]:
     return beside
 
 
-def slot_ways(region: Polylines, tool_radius_mm: float) -> list[Floats]:
-    """(n, 3) x, y, bulge: open paths along the middles of slots as wide as the tool, where the
-    region of its middle is a line and has no area.
+def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
+    """(n, 3) x, y, bulge: open paths along the centre lines of slots as wide as the tool, where
+    the tool centre region is a line and has no area.
 
-    With a tool thinner by a hair the region of the middle is a band as thin as that hair. What of
-    it lies beyond the region of the true tool is a slot. Of the hairs that show all of the slots
-    the thinnest is taken, so that the band is the middle of the slot as near as can be.
+    With a tool thinner by a hair the tool centre region is a band as thin as that hair. What of it
+    lies beyond the region of the true tool is a slot. Of the hairs that show all of the slots the
+    thinnest is taken, so that the band is as near to the centre line of the slot as possible.
     """
     diameter = 2.0 * tool_radius_mm
     widest = _bands(region, tool_radius_mm, SLOT_TOLERANCE * diameter)
@@ -319,11 +319,11 @@ def slot_ways(region: Polylines, tool_radius_mm: float) -> list[Floats]:
         bands = _bands(region, tool_radius_mm, hair * diameter)
         if sum(length(path) for path in bands) >= ALL_OF_IT * whole:
             break
-    ways: list[Polyline] = []
+    paths: list[Polyline] = []
     for band in bands:
-        if not _covered(band, ways, BEYOND * hair * diameter):
-            ways.append(_once(band, BEYOND * hair * diameter))
-    return [_without_specks(way.vertices, BEYOND * hair * diameter) for way in ways]
+        if not _covered(band, paths, BEYOND * hair * diameter):
+            paths.append(_once(band, BEYOND * hair * diameter))
+    return [_without_specks(path.vertices, BEYOND * hair * diameter) for path in paths]
 
 
 def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
@@ -349,7 +349,7 @@ def _once(band: Polyline, near_mm: float) -> Polyline:
     """An open path along a band: one side of it where the other one is beside it; else round."""
     if not band.closed:
         return band
-    along = Along.of(band)
+    along = MeasuredPath.of(band)
     half = 0.5 * along.total_mm
     at = np.arange(BAND_PLACES) / BAND_PLACES * half
     begin = float(at[np.hypot(*(along.at(at) - along.at(at + half)).T).argmax()])
@@ -366,7 +366,7 @@ def _without_specks(vertices: Floats, speck_mm: float) -> Floats:
     return np.asarray(vertices[np.concatenate([step > speck_mm, [True]])])
 
 
-class Way:
+class LinkedPath:
     """Collects strokes (k, 3) of x, y, bulge; each is linked to the one before it, at depth."""
 
     def __init__(self) -> None:
@@ -380,13 +380,13 @@ class Way:
         """Where the tool is (2,); None before the first stroke."""
         return self._parts[-1][-1, :2] if self._parts else None
 
-    def cut(self, stroke: Floats, rails: Rails) -> None:
+    def cut(self, stroke: Floats, region: ConnectedRegion) -> None:
         """A stroke, after a link that stays in a region which holds both places.
 
-        Where rounding hides the link (`route`) the tool comes up: another way begins.
+        Where rounding hides the link (`route`) the tool comes up: another path begins.
         """
         if self.here is not None:
-            link = route(self.here, stroke[0, :2], rails)
+            link = route(self.here, stroke[0, :2], region)
             if link is None:
                 self._done.append(_chained(self._parts))
                 self._parts = []
@@ -394,25 +394,31 @@ class Way:
                 self._parts.append(link)
         self._parts.append(stroke)
 
-    def cut_all(self, paths: Iterable[Polyline], rails: Rails, around: Rails, ahead: bool) -> None:
+    def cut_all(
+        self,
+        paths: Iterable[Polyline],
+        region: ConnectedRegion,
+        around: ConnectedRegion,
+        ahead: bool,
+    ) -> None:
         """All these paths of a region, each time the nearest: closed ones once round from their
-        nearest place, the way they run or (not `ahead`) the other; open ones from either end.
+        nearest place, as they are oriented or (not `ahead`) reversed; open ones from either end.
 
-        The first is come to in `around`, which holds the region.
+        The first is reached through `around`, which contains the region.
         """
-        left = [Along.of(path) for path in paths]
+        left = [MeasuredPath.of(path) for path in paths]
         while left:
             here = self._near(left[0].path)
-            ways = [_from_nearest(along, here) for along in left]
-            pick = min(range(len(left)), key=lambda row: ways[row][0])
-            along, begin = left.pop(pick), ways[pick][1]
+            begins = [_from_nearest(along, here) for along in left]
+            pick = min(range(len(left)), key=lambda row: begins[row][0])
+            along, begin = left.pop(pick), begins[pick][1]
             if along.path.closed:
                 end = begin + (along.total_mm if ahead else -along.total_mm)
                 self.cut(along.piece(begin, end), around)
             else:
                 path = along.path if begin == 0.0 else reverse(along.path)
                 self.cut(path.vertices, around)
-            around = rails
+            around = region
 
     def _near(self, path: Polyline) -> Floats:
         """Where the tool is, or would go down, or else the start of a path."""
@@ -420,12 +426,12 @@ class Way:
             return self.here
         return path.start if self.begin is None else self.begin
 
-    def ways(self) -> list[Floats]:
+    def paths(self) -> list[Floats]:
         """(n, 3) open paths; several only where the tool has to come up."""
         return [*self._done, _chained(self._parts)] if self._parts else self._done
 
 
-def _from_nearest(along: Along, here: Floats) -> tuple[float, float]:
+def _from_nearest(along: MeasuredPath, here: Floats) -> tuple[float, float]:
     """Distance of a place from where a path may begin, and the length along it to there."""
     if along.path.closed:
         return closest(along, here)
@@ -439,20 +445,20 @@ def _chained(parts: list[Floats]) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Rails:
-    """A connected region on the left of its closed paths, made ready for ways in it."""
+class ConnectedRegion:
+    """A connected region on the left of its closed paths, prepared for links within it."""
 
-    region: Polylines
+    boundary: Polylines
 
     @cached_property
     def segments(self) -> Segments:
         """All lines and arcs of the boundary."""
-        return Segments.of(self.region)
+        return Segments.of(self.boundary)
 
     @cached_property
-    def paths(self) -> list[Along]:
+    def paths(self) -> list[MeasuredPath]:
         """The paths of the boundary, measured."""
-        return [Along.of(path) for path in self.region]
+        return [MeasuredPath.of(path) for path in self.boundary]
 
     def holds(self, points: Floats) -> Bools:
         """(P,) true for points (P, 2) in the region or on its boundary."""
@@ -470,7 +476,7 @@ class Rails:
         return path, self.paths[path].reach[row - first] + _length_to(point, self.segments, row)
 
 
-def closest(along: Along, point: Floats) -> tuple[float, float]:
+def closest(along: MeasuredPath, point: Floats) -> tuple[float, float]:
     """Distance of a point (2,) from a path, and the length along it to the nearest place."""
     apart = points_to_segments(point[None, :], along.segments)[0]
     row = int(apart.argmin())
@@ -481,10 +487,10 @@ def _length_to(point: Floats, segments: Segments, row: int) -> float:
     """How far along a segment its place nearest to a point (2,) is."""
     one = segments[np.array([row])]
     if one.is_arc[0]:
-        # Measured from the middle of the arc, no angle is near to half a turn.
+        # Measured from the midpoint of the arc, no angle is near to half a turn.
         arm = point - one.centre[0]
-        middle = one.start_angle[0] + 0.5 * one.sweep[0]
-        turn = np.arctan2(arm[1], arm[0]) - middle
+        midpoint = one.start_angle[0] + 0.5 * one.sweep[0]
+        turn = np.arctan2(arm[1], arm[0]) - midpoint
         turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
         part = 0.5 + turn / one.sweep[0]
         length = one.radius[0] * abs(one.sweep[0])
@@ -495,13 +501,13 @@ def _length_to(point: Floats, segments: Segments, row: int) -> float:
     return float(np.clip(part, 0.0, 1.0) * length)
 
 
-def route(start: Floats, end: Floats, rails: Rails) -> Floats | None:
+def route(start: Floats, end: Floats, region: ConnectedRegion) -> Floats | None:
     """(k, 3) x, y, bulge from one place (2,) of a connected region to another, staying in it.
 
     A straight line leaves a region through one of its paths and comes back through the same one:
     each path has the region on its left and one connected piece of what is not the region on its
-    right. So the way goes straight, and where the line is outside it follows that path, the
-    shorter way round.
+    right. So the link goes straight, and where the line is outside it follows that path, in the
+    shorter direction.
 
     None when rounding hides where the straight line goes out or in, or the two places are not in
     one connected region.
@@ -509,32 +515,32 @@ def route(start: Floats, end: Floats, rails: Rails) -> Floats | None:
     if np.hypot(*(end - start)) <= POSITION_EPS_MM:
         return np.array([[*start, 0.0]])
     rows = [np.array([[*start, 0.0]])]
-    for out, back in _outside(start, end, rails):
-        path, begin = rails.place(start + out * (end - start))
-        other, stop = rails.place(start + back * (end - start))
+    for out, back in _outside(start, end, region):
+        path, begin = region.place(start + out * (end - start))
+        other, stop = region.place(start + back * (end - start))
         if path != other:
             return None
-        rows.append(_along(rails.paths[path], begin, stop))
+        rows.append(_along(region.paths[path], begin, stop))
     rows.append(np.array([[*end, 0.0]]))
     return tidy(np.concatenate(rows))
 
 
-def _outside(start: Floats, end: Floats, rails: Rails) -> list[tuple[float, float]]:
+def _outside(start: Floats, end: Floats, region: ConnectedRegion) -> list[tuple[float, float]]:
     """The parts (from, to) of the straight line that are outside of the region, in order."""
-    room = points_to_segments(start[None, :], rails.segments).min()
+    room = points_to_segments(start[None, :], region.segments).min()
     if np.hypot(*(end - start)) <= room + ON_LINE_MM:
         return []
     line = Segments.between(start[None, :], end[None, :], np.zeros(1))
-    found = crossings(line, rails.segments, position_eps_mm=ON_LINE_MM)
+    found = crossings(line, region.segments, position_eps_mm=ON_LINE_MM)
     marks = np.unique(np.concatenate([[0.0, 1.0], found.ta]))
-    middles = 0.5 * (marks[1:] + marks[:-1])
-    points = point_at(line, np.zeros(len(middles), dtype=np.int64), middles)
-    first, last = runs_of_true(~rails.holds(points))
+    parts = 0.5 * (marks[1:] + marks[:-1])
+    points = point_at(line, np.zeros(len(parts), dtype=np.int64), parts)
+    first, last = runs_of_true(~region.holds(points))
     return list(zip(marks[first].tolist(), marks[last].tolist(), strict=True))
 
 
-def _along(along: Along, begin: float, end: float) -> Floats:
-    """The piece of a closed path between two lengths, the shorter way round."""
+def _along(along: MeasuredPath, begin: float, end: float) -> Floats:
+    """The piece of a closed path between two lengths, in the shorter direction."""
     forth = (end - begin) % along.total_mm
     back = along.total_mm - forth
     return along.piece(begin, begin + forth) if forth <= back else along.piece(begin, begin - back)
@@ -562,7 +568,7 @@ def parts_of(lines: Polylines) -> list[Polylines]:
     owner = np.full(len(lines), -1, dtype=np.int64)
     for hole in holes.tolist():
         ring = Segments.of(lines[hole])
-        points = middles(ring)
+        points = midpoints(ring)
         for row in order.tolist():
             # Most of them, as a hole may touch its outer path.
             if 2 * np.count_nonzero(inside(points, Segments.of(lines[row]))) > len(points):
@@ -588,18 +594,18 @@ def pole(region: Polylines) -> Floats:
 
 
 def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:
-    """What of the paths lies outside of a region (even-odd): open stretches, or whole paths."""
+    """What of the paths lies outside of a region (even-odd): open pieces, or whole paths."""
     border = Segments.of(region)
     found: list[Polyline] = []
     for path in lines:
-        along = Along.of(path)
+        along = MeasuredPath.of(path)
         marks = _marks(along, border)
         outside = ~inside(along.at(0.5 * (marks[1:] + marks[:-1])), border)
         found += _runs(along, marks, outside)
     return found
 
 
-def _marks(along: Along, border: Segments) -> Floats:
+def _marks(along: MeasuredPath, border: Segments) -> Floats:
     """The lengths along a path, ascending, where it meets the border, and both its ends."""
     met = crossings(along.segments, border)
     lengths = segment_lengths(along.segments)
@@ -611,8 +617,8 @@ def _marks(along: Along, border: Segments) -> Floats:
     return marks
 
 
-def _runs(along: Along, marks: Floats, wanted: Bools) -> list[Polyline]:
-    """The stretches between marks that are wanted, neighbours as one."""
+def _runs(along: MeasuredPath, marks: Floats, wanted: Bools) -> list[Polyline]:
+    """The pieces between marks that are wanted, neighbours as one."""
     if wanted.all():
         return [along.path]
     begin, end = marks[:-1], marks[1:]

@@ -1,7 +1,7 @@
 """A toolpath bent beforehand, so that the slides come out where it was wanted (`compensated`).
 
 wanted ─linear─▶ as the motors must go: scale and squareness undone, arcs stay arcs
-       ─take up─▶ play taken up at reversals, and what the controller compensates wrongly
+       ─take up─▶ backlash taken up at reversals, and what the controller compensates wrongly
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ AHEAD_MM = 1e-9
 """Positions nearer than this are one."""
 
 LEAST_SHARE = 1e-9
-"""An edge nearer than this share of a stretch to its end is that end."""
+"""An edge nearer than this share of a segment to its end is that end."""
 
 TURN_EPS_RAD = 1e-9
 """A turning point nearer than this to an end of its arc is that end."""
@@ -47,8 +47,8 @@ Point = tuple[float, float, float]
 
 
 def compensated(toolpath: Toolpath, machine: Machine) -> Compensated:
-    """`toolpath` bent against the scale, squareness and play of the machine, so that its slides
-    come out where `toolpath` says. Sources of the rows are kept; blocks are not.
+    """`toolpath` bent against the scale, squareness and backlash of the machine, so that its
+    slides come out where `toolpath` says. Sources of the rows are kept; blocks are not.
 
     What remains: at a reversal that the controller compensates by too much, half of the excess
     (see `_TakenUp`), and the random part of the mechanics.
@@ -82,7 +82,7 @@ def motor_path(toolpath: Toolpath, machine: Machine) -> Compensated:
 
 
 class _Mapped:
-    """One toolpath on its way through the matrix."""
+    """One toolpath mapped by the matrix."""
 
     def __init__(self, toolpath: Toolpath, matrix: Floats, tolerance_mm: float) -> None:
         self._toolpath, self._matrix, self._tolerance_mm = toolpath, matrix, tolerance_mm
@@ -121,16 +121,16 @@ class _Mapped:
         spoke = np.array(move.start[:2]) - centre
         radius = float(np.hypot(*spoke))
         plane = self._matrix[:2, :2]
-        middle = plane @ centre
+        new_centre = plane @ centre
         level = move.start[2] == move.end[2]
         if radius * self._unround <= self._tolerance_mm or not level:
-            x, y = middle.tolist()
+            x, y = new_centre.tolist()
             ccw = move.kind == Kind.ARC_CCW
             self._b.arc(*end, centre=(x, y), ccw=ccw, feed=_feed(move))
             return
         angle = float(np.arctan2(spoke[1], spoke[0]))
         axes = plane * radius
-        ellipse = EllipseCurve(middle, axes[:, 0], axes[:, 1], angle, angle + sweep)
+        ellipse = EllipseCurve(new_centre, axes[:, 0], axes[:, 1], angle, angle + sweep)
         vertices = fit_curve(ellipse, self._tolerance_mm).vertices
         _add_vertices(self._b, vertices, end, _feed(move))
 
@@ -143,7 +143,7 @@ def _add_vertices(builder: ToolpathBuilder, vertices: Floats, end: Point, feed: 
         if bulge == 0.0:
             builder.line(x1, y1, feed=feed)
             continue
-        # Centre: off the middle of the chord by (1 − b²)/(4b) of it, to the left for b > 0.
+        # Centre: off the midpoint of the chord by (1 − b²)/(4b) of it, to the left for b > 0.
         share = (1.0 - bulge * bulge) / (4.0 * bulge)
         centre = (
             0.5 * (x0 + x1) - share * (y1 - y0),
@@ -166,7 +166,7 @@ def _add_event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None
 
 @dataclass
 class _Drive:
-    """An axis on its way: where the controller stands, and in which direction ±1 it went last;
+    """An axis in motion: where the controller stands, and in which direction ±1 it went last;
     `residual` is that of the region that the tool is in."""
 
     axis: Axis
@@ -181,10 +181,10 @@ class _Drive:
 
     def sense_of(self, begin: float, end: float) -> int:
         """The direction of a move; the last one where it does not move."""
-        way = end - begin
-        if abs(way) < STILL_STEPS * self.axis.coded_step_mm:
+        step = end - begin
+        if abs(step) < STILL_STEPS * self.axis.coded_step_mm:
             return self.sense
-        return 1 if way > 0.0 else -1
+        return 1 if step > 0.0 else -1
 
     def free(self, begin: float, end: float) -> None:
         """A move in the air to `end`: whatever direction takes the axis to where it is asked."""
@@ -197,7 +197,7 @@ class _Drive:
 
 def _taken_up(toolpath: Toolpath, machine: Machine) -> Compensated:
     """The positions that a controller must be given for slides on `toolpath` (in motor mm); the
-    same toolpath where there is neither play nor compensation."""
+    same toolpath where there is neither backlash nor compensation."""
     regions = _Regions(machine)
     if not regions.matter:
         return Compensated(toolpath, np.arange(len(toolpath)))
@@ -205,7 +205,7 @@ def _taken_up(toolpath: Toolpath, machine: Machine) -> Compensated:
 
 
 class _TakenUp:
-    """Play taken up at reversals, and what a controller compensates wrongly.
+    """Backlash taken up at reversals, and what a controller compensates wrongly.
 
     Driven in the direction d = ±1 and engaged, a slide stands at an offset from where the
     controller believes it to be (`camtool.planning.reversing.Residual`):
@@ -214,20 +214,20 @@ class _TakenUp:
 
     When an axis reverses, that position jumps by e(−d) − e(d) =: J in the new direction d:
 
-    - J > 0, less is compensated than the play: the axis goes on by J alone, a line on which the
-      slide does not move, and then along the path. Nothing is left over.
+    - J > 0, less is compensated than the backlash: the axis goes on by J alone, a line on which
+      the slide does not move, and then along the path. Nothing is left over.
     - J < 0, the controller compensates by r = −J too much: its first step back throws the slide r
       ahead. So the axis first overshoots by `OVERSHOOT` · r, then makes one step back, which
       leaves the slide (1 − `OVERSHOOT`) · r ahead, and holds until the path has come as far. With
-      one half the largest error is r/2, at the reversal only; without any of this it is r all the
-      way back. An axis that still waits from the reversal before stands out already, and
+      one half the largest error is r/2, at the reversal only; without any of this it is r on the
+      whole path back. An axis that still waits from the reversal before stands out already, and
       overshoots by the rest. In the cut nothing does better: the step throws the slide from one
       end of a length r to the other, wherever it is made, and one of the two ends is r/2 or more
       off the place of the reversal.
 
-    Where the play changes with the region of the table, e does too: a step towards d is taken
-    alone, one against it is waited for. Rapids and other moves in the air take up the play on
-    their way. An axis that does not move keeps what it has.
+    Where the backlash changes with the region of the table, e does too: a step towards d is taken
+    alone, one against it is waited for. Rapids and other moves in the air take up the backlash
+    as they go. An axis that does not move keeps what it has.
     """
 
     def __init__(self, toolpath: Toolpath, machine: Machine, regions: _Regions) -> None:
@@ -254,8 +254,8 @@ class _TakenUp:
                     drive.free(begin, end)
                 self._b.rapid(*self._place())
             elif move.kind in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
-                for stretch in stretches(move, float(sweeps[move.index])):
-                    for part in self._regions.parts(stretch):
+                for segment in monotone_segments(move, float(sweeps[move.index])):
+                    for part in self._regions.parts(segment):
                         self._enter(part.at(0.5))
                         self._cut(part, move)
             else:
@@ -264,7 +264,7 @@ class _TakenUp:
         return Compensated(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
 
     def _enter(self, point: Point) -> None:
-        """From here on the play is that of the region around a point."""
+        """From here on the backlash is that of the region around a point."""
         for drive, found in zip(self._drives, self._regions.residuals(point), strict=True):
             drive.residual = found
 
@@ -277,25 +277,25 @@ class _TakenUp:
         if math.dist(self._b.position, self._place()) > AHEAD_MM:
             self._b.line(*self._place(), feed=_feed(move))
 
-    def _cut(self, stretch: Stretch, move: Move) -> None:
-        """A stretch at a feed: take up, overshoot, hold, and follow."""
-        self._overshoot(stretch, move)
-        for drive, begin, end in zip(self._drives, stretch.begin, stretch.end, strict=True):
+    def _cut(self, segment: MonotoneSegment, move: Move) -> None:
+        """A segment at a feed: take up, overshoot, hold, and follow."""
+        self._overshoot(segment, move)
+        for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             drive.sense = drive.sense_of(begin, end)
             ask = drive.asked(begin, drive.sense)
             if (ask - drive.at) * drive.sense > AHEAD_MM:
                 drive.at = ask
         self._line(move)
-        shares = [self._joins(index, stretch) for index in range(3)]
+        shares = [self._joins(index, segment) for index in range(3)]
         low = 0.0
         for high in sorted({share for share in shares if 0.0 < share < 1.0} | {1.0}):
-            self._follow(stretch.part(low, high), [share <= low for share in shares], move)
+            self._follow(segment.part(low, high), [share <= low for share in shares], move)
             low = high
 
-    def _overshoot(self, stretch: Stretch, move: Move) -> None:
+    def _overshoot(self, segment: MonotoneSegment, move: Move) -> None:
         """Before a reversal that the controller compensates too much: out, and one step back."""
         back = []
-        for drive, begin, end in zip(self._drives, stretch.begin, stretch.end, strict=True):
+        for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             sense = drive.sense_of(begin, end)
             excess = (drive.at - drive.asked(begin, sense)) * sense
             if sense != drive.sense and excess > AHEAD_MM:
@@ -309,19 +309,19 @@ class _TakenUp:
                 drive.sense = sense
             self._line(move)
 
-    def _joins(self, index: int, stretch: Stretch) -> float:
-        """The share of the stretch from which on an axis follows it: 0 unless it stands ahead."""
+    def _joins(self, index: int, segment: MonotoneSegment) -> float:
+        """The share of the segment from which on an axis follows it: 0 unless it stands ahead."""
         drive = self._drives[index]
-        begin, end = stretch.begin[index], stretch.end[index]
+        begin, end = segment.begin[index], segment.end[index]
         ahead = (drive.at - drive.asked(begin, drive.sense)) * drive.sense
         if ahead <= AHEAD_MM:
             return 0.0
         if ahead >= abs(end - begin):
             return 1.0
-        return stretch.where(index, drive.at + drive.residual.error_mm(drive.sense))
+        return segment.where(index, drive.at + drive.residual.error_mm(drive.sense))
 
-    def _follow(self, part: Stretch, follows: list[bool], move: Move) -> None:
-        """One part of a stretch, on which each axis either follows or holds."""
+    def _follow(self, part: MonotoneSegment, follows: list[bool], move: Move) -> None:
+        """One part of a segment, on which each axis either follows or holds."""
         offsets = []
         for drive, begin, end, moves in zip(
             self._drives, part.begin, part.end, follows, strict=True
@@ -354,11 +354,11 @@ def _step_mm(axis: Axis) -> float:
 
 
 class _Regions:
-    """What play and compensation leave over in each region of the table; play is divided by the
+    """What backlash and compensation leave over in each region of the table; it is divided by the
     scale, since the path is that of the motors.
 
     A wanted path is cut at the edges of the regions. They belong to positions of the controller,
-    which are the wanted ones but for the play: near an edge the play of the neighbour may be
+    which are the wanted ones but for the backlash: near an edge that of the neighbour may be
     taken.
     """
 
@@ -375,7 +375,7 @@ class _Regions:
 
     @property
     def matter(self) -> bool:
-        """Whether there is play or compensation anywhere."""
+        """Whether there is backlash or compensation anywhere."""
         cells = [one for table in self._by_cell for row in table for one in row]
         return any(one.matters for one in (*self._plain, *cells))
 
@@ -391,29 +391,29 @@ class _Regions:
             found.append(self._by_cell[axis][row][column])
         return tuple(found)
 
-    def parts(self, stretch: Stretch) -> Iterator[Stretch]:
-        """The stretch cut at the edges of all regions."""
+    def parts(self, segment: MonotoneSegment) -> Iterator[MonotoneSegment]:
+        """The segment cut at the edges of all regions."""
         shares = {0.0, 1.0}
         for cells in self._cells:
             if cells is None:
                 continue
             for axis, edges in ((0, cells.x_mm), (1, cells.y_mm)):
-                low, high = sorted((stretch.begin[axis], stretch.end[axis]))
+                low, high = sorted((segment.begin[axis], segment.end[axis]))
                 for edge in edges[1:-1]:
                     value = edge + self._zero[axis]
                     if low < value < high:
-                        share = stretch.where(axis, value)
+                        share = segment.where(axis, value)
                         if LEAST_SHARE < share < 1.0 - LEAST_SHARE:
                             shares.add(share)
         if len(shares) == 2:
-            yield stretch
+            yield segment
             return
         for begin, end in pairwise(sorted(shares)):
-            yield stretch.part(begin, end)
+            yield segment.part(begin, end)
 
 
 def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
-    """Of an axis with this play, None: its own; compensation is whole steps."""
+    """Of an axis with this backlash, None: its own; compensation is whole steps."""
     play = axis.backlash_mm if play_mm is None else play_mm
     whole = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
     at_motor = msgspec.structs.replace(
@@ -425,10 +425,10 @@ def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A part of a line or arc on which no axis turns back: from `begin` to `end` mm, straight, or
+class MonotoneSegment:
+    """A part of a line or arc on which no axis reverses: from `begin` to `end` mm, straight, or
     about `centre` (x, y) with `sweep_rad`, CCW positive and at most a quarter turn; Z in
-    proportion to the way."""
+    proportion to the length."""
 
     begin: Point
     end: Point
@@ -436,7 +436,7 @@ class Stretch:
     sweep_rad: float = 0.0
 
     def at(self, share: float) -> Point:
-        """The point at this share (0 … 1) of the way; exact at the ends."""
+        """The point at this share (0 … 1) of the length; exact at the ends."""
         if share <= 0.0:
             return self.begin
         if share >= 1.0:
@@ -451,7 +451,7 @@ class Stretch:
         return cx + radius * math.cos(angle), cy + radius * math.sin(angle), line[2]
 
     def where(self, axis: int, value: float) -> float:
-        """The share of the way at which an axis that moves has this value; 0 or 1 beyond it.
+        """The share of the length at which an axis that moves has this value; 0 or 1 beyond it.
 
         On an arc the angle θ with c + r cos θ (sin θ for Y) = value; of its two solutions the one
         within the sweep.
@@ -460,7 +460,7 @@ class Stretch:
         share = min(max((value - first) / (last - first), 0.0), 1.0)
         if self.centre is None or axis == 2 or share in (0.0, 1.0):
             return share
-        low, high = 0.0, 1.0  # the axis runs one way along the stretch: bisection cannot fail
+        low, high = 0.0, 1.0  # the axis runs in one direction: bisection cannot fail
         rising = last > first
         while high - low > np.finfo(np.float64).eps:
             share = 0.5 * (low + high)
@@ -472,20 +472,22 @@ class Stretch:
                 high = share
         return high
 
-    def part(self, low: float, high: float) -> Stretch:
-        """The part between two shares of the way."""
-        return Stretch(self.at(low), self.at(high), self.centre, (high - low) * self.sweep_rad)
+    def part(self, low: float, high: float) -> MonotoneSegment:
+        """The part between two shares of the length."""
+        return MonotoneSegment(
+            self.at(low), self.at(high), self.centre, (high - low) * self.sweep_rad
+        )
 
 
-def stretches(move: Move, sweep_rad: float) -> Iterator[Stretch]:
-    """A line as one stretch; an arc of this signed sweep cut where X or Y turns."""
+def monotone_segments(move: Move, sweep_rad: float) -> Iterator[MonotoneSegment]:
+    """A line as one segment; an arc of this signed sweep cut where X or Y reverses."""
     if move.kind not in (Kind.ARC_CW, Kind.ARC_CCW) or move.centre is None:
-        yield Stretch(move.start, move.end)
+        yield MonotoneSegment(move.start, move.end)
         return
-    whole = Stretch(move.start, move.end, move.centre, sweep_rad)
+    whole = MonotoneSegment(move.start, move.end, move.centre, sweep_rad)
     cx, cy = move.centre
     sign = math.copysign(1.0, sweep_rad)
-    # Seen along the way the turning points are the next multiples of a quarter turn.
+    # Seen along the arc the turning points are the next multiples of a quarter turn.
     quarter = 0.5 * math.pi
     ahead = sign * math.atan2(move.start[1] - cy, move.start[0] - cx)
     turn = (math.floor(ahead / quarter) + 1.0) * quarter - ahead

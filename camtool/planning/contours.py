@@ -3,9 +3,9 @@
     path ──Along──▶ lengths ──ramps: profile of z──▶ ──tabs: raised──▶ lifted ──leads──▶ Run
 
 A closed contour is one run: down, round and round, the overlap. With leads it is one run for each
-pass, from the way to it to the way out; where it ramps down, it stays one run, and goes out and
+pass, from the lead-in to the lead-out; where it ramps down, it stays one run, and goes out and
 back at each level. An open one is one run, to and fro, when it is reversible, and else one run for
-each pass. So the ways to a contour and out of it are cut step by step, as the contour itself.
+each pass. So the leads of a contour are cut step by step, as the contour itself.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
 from camtool.planning.items import Bridge, Contour, Run
 from camtool.planning.leads import KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place
-from camtool.planning.paths import Along
+from camtool.planning.paths import MeasuredPath
 from camtool.planning.ramps import (
     MOST_LAPS,
-    Knots,
+    ZProfile,
     apart,
     feeds_along,
     laps,
@@ -58,19 +58,19 @@ class CutContour:
 def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut | None = None) -> CutContour:
     """How a contour is cut.
 
-    `path` is the contour's path from the chosen start in the chosen direction. On the ways to it
-    and out, the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
+    `path` is the contour's path from the chosen start in the chosen direction. On its leads
+    the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
     OptionError for tabs that cannot be.
     """
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     angle, findings = _slope(contour, along)
     tabs, left_out = tabs_of(contour, along)
     made = _round if path.closed else _along
-    ways, leads = made(contour, along, (angle, tabs), keep_out)
+    paths, leads = made(contour, along, (angle, tabs), keep_out)
     feeds = contour.setting.feeds
     runs = [
         Run(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, contour.name)
-        for vertices in ways
+        for vertices in paths
     ]
     findings += [*left_out, *leads.findings]
     bridges = bridges_of(along, tabs, contour.setting.operation.tool, contour.name)
@@ -78,7 +78,7 @@ def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut | None = None) -
 
 
 def _round(
-    contour: Contour, along: Along, heights: Heights, keep_out: KeepOut | None
+    contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut | None
 ) -> tuple[list[Floats], Leads]:
     """The runs (n, 4) round a closed contour."""
     angle, tabs = heights
@@ -97,28 +97,28 @@ def _round(
         leads = leads_of(contour, along, (profiles[0][0][0], ends[1]), keep_out)
     elif len(leads.away) == len(leads.to) == 0:
         profiles = [laps(total, levels, overlap)]
-    ways = []
+    paths = []
     for profile in profiles:
-        knots = raised(profile, tabs, total)
-        parts = [lifted(along, part) for part in _split(knots, stops)]
-        ways.append(_led(parts, leads))
-    return ways, leads
+        points = raised(profile, tabs, total)
+        parts = [lifted(along, part) for part in _split(points, stops)]
+        paths.append(_with_leads(parts, leads))
+    return paths, leads
 
 
-def _split(knots: Knots, stops: list[float]) -> list[Knots]:
+def _split(points: ZProfile, stops: list[float]) -> list[ZProfile]:
     """The profile in parts that end and begin at these lengths."""
-    parts: list[Knots] = []
+    parts: list[ZProfile] = []
     begin = 0
     for stop in stops:
-        end = next(k for k in range(begin, len(knots)) if knots[k][0] == stop)
-        parts.append(knots[begin : end + 1])
+        end = next(k for k in range(begin, len(points)) if points[k][0] == stop)
+        parts.append(points[begin : end + 1])
         begin = end
-    return [*parts, knots[begin:]]
+    return [*parts, points[begin:]]
 
 
-def _led(parts: list[Floats], leads: Leads) -> Floats:
-    """The run (n, 4) along parts (n, 4) of a contour: the way to it before the first of them, the
-    way out behind the last, and out and back between two."""
+def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
+    """The run (n, 4) along parts (n, 4) of a contour: the lead-in before the first of them, the
+    lead-out behind the last, and out and back between two."""
     rows = [np.insert(leads.to[:-1], 2, parts[0][0, 2], axis=1)]
     for part in parts[:-1]:
         out = np.insert(leads.away[1:], 2, part[-1, 2], axis=1)
@@ -131,7 +131,7 @@ def _led(parts: list[Floats], leads: Leads) -> Floats:
 
 
 def _along(
-    contour: Contour, along: Along, heights: Heights, keep_out: KeepOut | None
+    contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut | None
 ) -> tuple[list[Floats], Leads]:
     """The runs (n, 4) along an open contour."""
     angle, tabs = heights
@@ -139,7 +139,7 @@ def _along(
     leads = leads_of(contour, along, (0.0, along.total_mm), keep_out)
     vertices = along.path.vertices.copy()
     vertices[-1, 2] = leads.away[0, 2] if len(leads.away) else 0.0
-    track = Along.of(Polyline(np.concatenate([leads.to[:-1], vertices, leads.away[1:]])))
+    track = MeasuredPath.of(Polyline(np.concatenate([leads.to[:-1], vertices, leads.away[1:]])))
     before = float(track.reach[len(leads.to[:-1])])
     stand = [tab.moved(before) for tab in tabs]
     above = (0.0, *levels)
@@ -150,7 +150,7 @@ def _along(
     return [lifted(track, raised(profile, stand, None)) for profile in profiles], leads
 
 
-def _slope(contour: Contour, along: Along) -> tuple[float | None, list[Finding]]:
+def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Finding]]:
     """The angle of the ramp, None for a plunge; and when a plunge stands for a ramp."""
     operation = contour.setting.operation
     angle = operation.entry.angle_rad
@@ -183,27 +183,27 @@ def with_starts(
     any_vertex = np.empty(0, dtype=np.int64)
     if not path.closed or rule == "nearest":
         return path, any_vertex
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     if rule == "corner":
         # Where it turns back at once is the tip of a relief.
         bend = np.abs(along.turns)
         turns = (bend > START_CORNER_RAD) & (bend < math.pi - START_CORNER_RAD)
         around = np.abs(along.segments.radius - tool_radius_mm) <= POSITION_EPS_MM
         return path, np.flatnonzero(turns | around)
-    length = _middle(along) if isinstance(rule, str) else along.nearest_to(rule)
+    length = _midpoint(along) if isinstance(rule, str) else along.nearest_to(rule)
     begun, start = _with_vertex(along, length)
     return begun, np.array([start], dtype=np.int64)
 
 
-def _middle(along: Along) -> float:
-    """The length along the path of the middle of its longest line, or else arc."""
+def _midpoint(along: MeasuredPath) -> float:
+    """The length along the path of the midpoint of its longest line, or else arc."""
     size = np.diff(along.reach)
     lines = np.where(along.segments.is_arc, 0.0, size)
     row = int((lines if lines.any() else size).argmax())
     return float(0.5 * (along.reach[row] + along.reach[row + 1]))
 
 
-def _with_vertex(along: Along, length: float) -> tuple[Polyline, int]:
+def _with_vertex(along: MeasuredPath, length: float) -> tuple[Polyline, int]:
     """The path with a vertex at this length, and its index."""
     off = np.abs(along.reach - length)
     vertex = int(off.argmin())

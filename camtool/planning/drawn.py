@@ -182,7 +182,7 @@ def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:
 
     A profile leaves the part, a pocket and a carving what is outside of their region; engraving
     and drilling leave nothing in particular. Where reliefs go into the corners of the part, they
-    are meant to, and nothing is said of that operation.
+    are meant to, and such an operation leaves nothing in particular.
     """
     return tuple(each for step in steps for each in _kept(step))
 

@@ -1,4 +1,4 @@
-"""Engraving: the middle of the tool runs on the line itself.
+"""Engraving: the tool centre runs on the line itself.
 
 Open paths stay open and may be cut from either end; closed ones keep the direction in which they
 are drawn and may begin anywhere. The material stays on both sides.

@@ -1,8 +1,8 @@
-"""Cuts that run into what is to stay, and sides that follow from what nobody cuts.
+"""Cuts that run into what is to stay, and sides that follow from uncut contours.
 
 A profile keeps what is on the other side of its contour. Where the sweep of another cut comes over
 that contour, it takes some of what was to stay: an error, because a strip that stays can be filed
-off, and a gouge cannot be put back. It is a warning only where nobody cuts the other contour, for
+off, and a gouge cannot be put back. It is a warning only where the other contour is not cut, for
 that may be of the drawing alone; and where the job itself names the side, for contours of the same
 operation, and for those that cross: whoever draws a notch beyond an edge wants it open.
 """
@@ -32,8 +32,8 @@ from camtool.geometry.nesting import inside, nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Chosen, Contour, Work
 from camtool.planning.job import Operation
-from camtool.planning.naming import at_place, operation_name, told_together, tool_name
-from camtool.planning.paths import middles
+from camtool.planning.naming import at_place, operation_name, shortened_list, tool_name
+from camtool.planning.paths import midpoints
 from camtool.planning.sides import Sides, runs_beside
 
 GOUGE_TOLERANCE_MM = 1e-4
@@ -44,13 +44,13 @@ SAMPLES_ROUND = 500
 
 
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
-    """What is said of the sides of an operation: gouges, and sides that nobody's cut decides."""
+    """Findings on the sides of an operation: gouges, and sides that follow from uncut contours."""
     if operation.kind == "pocket":
-        return told_together(list(_cleared_away(chosen, sides, operation)), GOUGE_BY_POCKET_MORE)
+        return shortened_list(list(_cleared_away(chosen, sides, operation)), GOUGE_BY_POCKET_MORE)
     if not runs_beside(operation):
         return []
     gouges = list(_gouges(work, chosen, sides, operation))
-    found = told_together(gouges, GOUGE_MORE)
+    found = shortened_list(gouges, GOUGE_MORE)
     if operation.side == "auto":
         found += by_uncut(sides, operation, chosen.source[chosen.lines.closed])
     return found
@@ -95,8 +95,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         drawn = sides.lines[item.source]
         kept = bool(sided[other])
         if not kept and _lies_in(drawn, wall):
-            continue  # the edge of the stock, or of a sheet: nobody says that it stays
-        told = operation.side != "auto" and (other in own or _cross(drawn, wall))
+            continue  # the edge of the stock, or of a sheet: nothing says that it stays
+        is_asked = operation.side != "auto" and (other in own or _cross(drawn, wall))
         amount = radius - near.distance
         if near.distance <= POSITION_EPS_MM:
             amount = radius + _beyond(item.path, wall, drawn)
@@ -104,7 +104,7 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
             where=at_place(item.name, near.point),
             measured=near.distance,
             limit=radius,
-            severity=Severity.ERROR if kept and not told else Severity.WARNING,
+            severity=Severity.ERROR if kept and not is_asked else Severity.WARNING,
             tool=tool_name(operation.tool),
             contour=item.name,
             amount=amount,
@@ -113,8 +113,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
 
 
 def _witnesses(path: Polyline) -> Floats:
-    """(P, 2) the vertices of a path and the middles of its segments."""
-    return np.concatenate([path.vertices[:, :2], middles(Segments.of(path))])
+    """(P, 2) the vertices of a path and the midpoints of its segments."""
+    return np.concatenate([path.vertices[:, :2], midpoints(Segments.of(path))])
 
 
 def _parts(path: Polyline, wall: Polyline) -> tuple[Bools, Floats]:
@@ -177,7 +177,7 @@ def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[F
 
 
 def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding]:
-    """What follows from closed contours that nobody cuts, for those of the operation (`rows`):
+    """What follows from uncut closed contours, for those of the operation (`rows`):
     some have their side because of them, others in spite of those on the layers of frames."""
     seen = sides.seen_by(operation)
     for sentence, turned, around in (

@@ -67,7 +67,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Contour:
-    """One line of the tool's middle, to be cut at all levels of its setting.
+    """One path of the tool centre, to be cut at all levels of its setting.
 
     `path` runs as it is to be cut unless `reversible`. `starts`: the vertices of a closed path at
     which it may begin; empty: any that is no joint within an arc. `source`: the index of its path
@@ -105,7 +105,7 @@ Item = Contour | Fixed
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What an operation made of its paths, and what it noticed."""
+    """What an operation made of its paths, and its findings."""
 
     items: tuple[Item, ...]
     findings: tuple[Finding, ...] = ()
@@ -128,11 +128,11 @@ class Chosen:
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """What a tab leaves: `middle` (2,), `ahead` (2,) the direction of its contour there, half its
+    """What a tab leaves: `centre` (2,), `ahead` (2,) the direction of its contour there, half its
     width, half the width of the slot that it spans, mm; its top; `fall` as of its tab; the name of
     its contour."""
 
-    middle: Floats
+    centre: Floats
     ahead: Floats
     half_width_mm: float
     half_span_mm: float

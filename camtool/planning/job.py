@@ -23,13 +23,13 @@ SIDES = ("on", "outside", "inside", "auto")
 """Where the tool of a profile runs: on the line, around it, within it, or as the nesting says."""
 
 DIRECTIONS = ("drawn", "climb", "conventional")
-"""Which way round: as drawn, or with the tool's teeth going with or against the feed."""
+"""The direction of the cut: as drawn, or with the tool's teeth going with or against the feed."""
 
 PATTERNS = ("contour", "zigzag")
 """How a pocket is cleared: parallel to its contours from inside out, or in straight lines."""
 
 JOINS = ("round", "mitre", "sharp")
-"""What the tool's middle does about an outer corner: an arc, a corner up to the mitre limit
+"""What the tool centre does about an outer corner: an arc, a corner up to the mitre limit
 (else cut off), or a corner however long."""
 
 CORNERS = ("none", "dogbone", "overcut")
@@ -55,7 +55,7 @@ FRAMES = ("*border*", "*frame*", "*title*")
 """Layers, by patterns of their names, of what belongs to the sheet of paper."""
 
 THROUGH_MM = 1.0
-"""How far cuts may go below a stock, into the spoilboard, where nobody says how far."""
+"""How far cuts may go below a stock, into the spoilboard, where the job does not say how far."""
 
 THROUGH_SHARE = 0.5
 """And no farther than this part of its thickness: thin stock has a thin board under it."""
@@ -121,7 +121,7 @@ def finite(name: str, value: float, unit: str, most: float | None = None) -> Non
 
 
 def refuse_endless(moves: float, where: str, asked: str, mend: str) -> None:
-    """OptionError when so many moves are estimated to come of what was `asked`, such as
+    """OptionError when so many moves are estimated to result from what was `asked`, such as
     "10000 passes"."""
     if moves > MOST_MOVES:
         raise OptionError(
@@ -261,12 +261,12 @@ class Tabs:
 
 @dataclass(frozen=True)
 class Operation:
-    """One way to cut some of the paths.
+    """How some of the paths are cut.
 
     `layers`, `colours`: patterns of the paths that it takes, empty for all. `allowance_mm` is
     left on the wall of a profile or pocket. `depth_mm` is cut below the stock top in passes of
     `step_down_mm` at most (None: one pass), the last of `last_pass_mm` (None: like the others).
-    `step_over` is the distance of neighbouring ways of a pocket over the tool's diameter.
+    `step_over` is the distance of neighbouring passes of a pocket over the tool's diameter.
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
     `max_hole_mm`: circles up to this diameter are drilled (None: as wide as the drill, or any
@@ -443,7 +443,7 @@ class Stock:
 
     @property
     def box_mm(self) -> tuple[float, float, float, float] | None:
-        """Its left, lower, right and upper edge; None where nobody said them."""
+        """Its left, lower, right and upper edge; None where the job does not give them."""
         if self.corner_mm is None or self.size_mm is None:
             return None
         (x, y), (width, height) = self.corner_mm, self.size_mm
@@ -459,9 +459,9 @@ class Stock:
 
 @dataclass(frozen=True)
 class Job:
-    """How a drawing is cut. `approach`: every cut starts after a move that takes up the play of
-    both axes. `minimise`: one of GOALS. `frames`: patterns of the layers whose contours, where
-    nobody cuts them, are no edges of parts. Raises OptionError for what no job can be."""
+    """How a drawing is cut. `approach`: every cut starts after a move that takes up the backlash
+    of both axes. `minimise`: one of GOALS. `frames`: patterns of the layers whose contours, where
+    they are not cut, are no edges of parts. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = (Operation(),)
     placement: Placement = Placement()

@@ -9,7 +9,7 @@ A lead may lie where the tool does no harm: nowhere on the other side of the con
 material is that is to stay, and nowhere nearer to other wanted lines than the tool's radius (and
 the allowance, where the operation leaves one on them). Both
 are decided exactly: cut where it meets the contour, each of its pieces lies on one side, and so
-its middle tells which. A lead that does no good is halved, and at last left out.
+its midpoint shows which. A lead that does not fit is halved, and at last left out.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
 from camtool.planning.naming import at_place
-from camtool.planning.paths import QUARTER, Along, backwards
+from camtool.planning.paths import QUARTER, MeasuredPath, backwards
 
 LEAD_SLACK_MM = 1e-5
 """A lead may come nearer to wanted material than the tool's radius by this much."""
@@ -110,7 +110,7 @@ class Border:
 
 @dataclass(frozen=True, eq=False)
 class Leads:
-    """The way to a contour and away from it, (k, 3) x, y, bulge, k = 0 or 2, both with the place
+    """The lead-in and lead-out of a contour, (k, 3) x, y, bulge, k = 0 or 2, both with the place
     at the contour; and what did not fit."""
 
     to: Floats
@@ -119,7 +119,7 @@ class Leads:
 
 
 def leads_of(
-    contour: Contour, along: Along, ends: tuple[float, float], keep_out: KeepOut | None
+    contour: Contour, along: MeasuredPath, ends: tuple[float, float], keep_out: KeepOut | None
 ) -> Leads:
     """The leads of a contour that is cut as `along` from one length to another, its `ends`."""
     operation = contour.setting.operation
@@ -148,8 +148,8 @@ def leads_of(
 def _bend(sign: float, material_left: bool | None) -> float:
     """Bulge of a lead that goes away from the contour: a quarter arc to the free side.
 
-    Seen along the way out, what is free on the right of the travel is so of a lead-out too, and
-    on the left of a lead-in, which is seen backwards.
+    Seen away from the contour, what is free on the right of the travel is on the right of a
+    lead-out too, and on the left of a lead-in, which is seen backwards.
     """
     if material_left is None:
         return 0.0
@@ -159,7 +159,7 @@ def _bend(sign: float, material_left: bool | None) -> float:
 def _longest(
     lead: Lead, at: tuple[Floats, Floats], bulge: float, border: Border
 ) -> tuple[Floats, float]:
-    """The lead as a way out from its place at the contour, as long as does no harm; its size."""
+    """The lead as it leaves its place at the contour, as long as does no harm; its size."""
     place, ahead = at
     near = border.near(place, lead.length_mm)
     size = lead.length_mm
@@ -176,8 +176,8 @@ def _longest(
 
 
 def runs_back(path: Polyline, other: Polyline) -> bool:
-    """Whether `other`, a part of the path or all of it, is travelled the other way."""
-    there = Along.of(other)
+    """Whether `other`, a part of the path or all of it, is travelled in the other direction."""
+    there = MeasuredPath.of(other)
     middle = 0.5 * there.reach[1:2]
     point, ahead = there.at(middle), there.directions(middle)
     segments = Segments.of(path)
@@ -209,7 +209,7 @@ def left_of(path: Polyline, points: Floats) -> Floats:
     """(J,) distances of points (J, 2) from a path, positive to its left, negative to its right.
 
     Left of a closed path is its inside when it runs CCW. Beside an open path the nearest point
-    tells: within a line or arc by its side of it, at a vertex by the middle of the directions
+    tells: within a line or arc by its side of it, at a vertex by the bisector of the directions
     there; and beyond its ends, the tangents go on.
     """
     segments = Segments.of(path)

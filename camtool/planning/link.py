@@ -14,7 +14,7 @@ from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-SETTLED_DECIMALS = 10
+ROUNDED_DECIMALS = 10
 """Places are rounded to so many decimals of a mm: far above the noise of doubles, and far below
 what any machine or tolerance knows."""
 
@@ -30,7 +30,7 @@ class Worked:
     runs: Sequence[Run]
 
 
-def settled(toolpath: Toolpath) -> Toolpath:
+def rounded(toolpath: Toolpath) -> Toolpath:
     """The same moves with their places rounded to SETTLED_DECIMALS.
 
     The ends of a straight wall differ by some 1e-15 of their size, as offsets, tabs and ramps come
@@ -39,7 +39,7 @@ def settled(toolpath: Toolpath) -> Toolpath:
     """
     # Adding 0 makes −0 and 0 one.
     end, centre = (
-        np.round(each, SETTLED_DECIMALS) + 0.0 for each in (toolpath.end, toolpath.centre)
+        np.round(each, ROUNDED_DECIMALS) + 0.0 for each in (toolpath.end, toolpath.centre)
     )
     return replace(toolpath, end=end, centre=centre)
 
@@ -79,7 +79,7 @@ def link(
 
 
 def _changes(before: Tool | None, tool: Tool) -> bool:
-    """Whether the machine must be told of this tool: it has a number, and another was in."""
+    """Whether the program must ask for this tool: it has a number, and another was in."""
     return tool.number is not None and (before is None or before.number != tool.number)
 
 

@@ -1,4 +1,4 @@
-"""Places and tools as messages of planning name them."""
+"""How messages of planning name places, tools, operations and keys."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from camtool.machine.model import Machine
 from camtool.planning.job import Operation, Tool
 
 MOST_PLACES = 12
-"""So many places of a kind are told one by one, the others together."""
+"""So many findings of a kind are listed one by one, the others are counted."""
 
 
 def at_place(name: str, point: Sequence[float]) -> str:
@@ -42,9 +42,9 @@ def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
     )
 
 
-def told_together(findings: Sequence[Finding], more: Sentence) -> list[Finding]:
+def shortened_list(findings: Sequence[Finding], more: Sentence) -> list[Finding]:
     """The first `MOST_PLACES` of findings of one kind, and one more that counts the others."""
-    told, rest = list(findings[:MOST_PLACES]), findings[MOST_PLACES:]
+    listed, rest = list(findings[:MOST_PLACES]), findings[MOST_PLACES:]
     if rest:
-        told.append(more(where=rest[0].where, measured=len(rest), severity=rest[0].severity))
-    return told
+        listed.append(more(where=rest[0].where, measured=len(rest), severity=rest[0].severity))
+    return listed

@@ -1,11 +1,11 @@
 """In which order items are cut, and where each begins: short rapids, nothing before its time.
 
-An item may be cut in several ways (`Choices`): a closed contour from each of its vertices, an
-open one from either end. The order and the ways are searched together: nearest neighbours first,
-then reversals and moves of parts of the order as long as they make it shorter, and the best ways
-for that order, exactly, layer by layer (`camtool.kernels.tour`). What must be cut before what is
-kept by every step of the search (`must_precede`: a part comes loose after everything within it
-has been cut). The same input always gives the same order.
+An item may be cut in several variants (`Choices`): a closed contour from each of its vertices, an
+open one from either end. The order and the variants are searched together: nearest neighbours
+first, then reversals and moves of parts of the order as long as they make it shorter, and the best
+variants for that order, exactly, layer by layer (`camtool.kernels.tour`). What must be cut before
+what is kept by every step of the search (`must_precede`: a part comes loose after everything
+within it has been cut). The same input always gives the same order.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SEED = 20_011
 """Where the pseudo-random places of the kicks begin."""
 
 MOST_PLACES = 8
-"""So many of its ways, evenly spread, say where an item of more lies for its neighbours."""
+"""So many of its variants, evenly spread, show where an item of more lies for its neighbours."""
 
 SHOWN_ITEMS = 5
 """An error message names no more items than this."""
@@ -55,9 +55,9 @@ long enough to be a line, far shorter than any tool is wide."""
 
 @dataclass(frozen=True, eq=False)
 class Choices:
-    """The ways in which M items may be cut, one row each: `owner` (S,), the item, ascending from
-    0, none left out; `entry`, `exit` (S, 2) mm, where the tool goes down and where it comes up.
-    The first row of an item is as it is drawn. ValueError for other arrays."""
+    """The variants in which M items may be cut, one row each: `owner` (S,), the item, ascending
+    from 0, none left out; `entry`, `exit` (S, 2) mm, where the tool goes down and where it comes
+    up. The first row of an item is as it is drawn. ValueError for other arrays."""
 
     owner: Ints
     entry: Floats
@@ -82,7 +82,7 @@ class Choices:
 
 
 def choices_of(items: Sequence[Item]) -> Choices:
-    """The ways in which the items may be cut, by where the tool goes down and comes up.
+    """The variants in which the items may be cut, by where the tool goes down and comes up.
 
     A closed contour may begin at its `starts` or at any joint, and ends there; its direction
     changes nothing. An open one runs as drawn, or from its end too when reversible.
@@ -108,7 +108,7 @@ def chosen_path(items: Sequence[Item], choices: Choices, row: int) -> Polyline:
 
 
 def drawn(choices: Choices) -> Ints:
-    """Rows (M,): all items in the order in which they come, each in its first way."""
+    """Rows (M,): all items in the order in which they come, each in its first variant."""
     return choices.first[:-1]
 
 
@@ -160,7 +160,7 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
     from camtool.kernels.tour_start import neighbours
     from camtool.kernels.tour_tree import tree_of
 
-    count, ways = len(choices), len(choices.owner)
+    count, variants = len(choices), len(choices.owner)
     turned = _turned(choices)
     stays = bool(np.isnan(goal).any())
     goal = start if stays else goal
@@ -172,11 +172,11 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
     earlier_first, earlier = _followers(np.asarray(before).reshape(-1, 2)[:, ::-1], count)
     item = np.concatenate([[count], choices.owner[rows], [count + 1]])
     row = np.empty(count + 2, dtype=np.int64)
-    row[item] = np.concatenate([[ways], rows, [ways + 1]])
-    one_way = (turned == np.arange(ways)) & (choices.entry != choices.exit).any(axis=1)
+    row[item] = np.concatenate([[variants], rows, [variants + 1]])
+    one_way = (turned == np.arange(variants)) & (choices.entry != choices.exit).any(axis=1)
     return Tour(
         ends,
-        np.concatenate([turned, [ways, ways + 1]]),
+        np.concatenate([turned, [variants, variants + 1]]),
         choices.first,
         near,
         near_first,
@@ -184,7 +184,7 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
         after_first,
         earlier,
         earlier_first,
-        ways + 1 if stays else -1,
+        variants + 1 if stays else -1,
         bool(one_way.any()),
         item,
         np.argsort(item),
@@ -208,8 +208,8 @@ def _turned(choices: Choices) -> Ints:
 
 def _places(choices: Choices) -> tuple[Floats, Ints]:
     """Places (N, 2) that stand for the items when neighbours are sought, and their owners (N,)."""
-    first, ways = choices.first, np.diff(choices.first)
-    step = -(-ways // MOST_PLACES)
+    first, variants = choices.first, np.diff(choices.first)
+    step = -(-variants // MOST_PLACES)
     rank = np.arange(len(choices.owner)) - first[choices.owner]
     rows = np.flatnonzero(rank % step[choices.owner] == 0)
     alone = rows[(choices.entry[rows] != choices.exit[rows]).any(axis=1)]
@@ -253,19 +253,19 @@ def _circle(left: set[int]) -> OptionError:
 
 
 def _ends(item: Item) -> Floats:
-    """(R, 4): x and y where the tool goes down and where it comes up, way by way."""
+    """(R, 4): x and y where the tool goes down and where it comes up, variant by variant."""
     if not isinstance(item, Contour):
         start, end = item.runs[0].vertices[0, :2], item.runs[-1].vertices[-1, :2]
         return np.concatenate([start, end])[None]
     if item.path.closed:
         places = item.path.vertices[_begins(item), :2]
         return np.column_stack([places, places])
-    way = np.concatenate([item.path.start, item.path.end])
+    ends = np.concatenate([item.path.start, item.path.end])
     # Passes to and fro leave the tool where it went down when their number is even.
     back = item.reversible and len(item.setting.levels_mm) % 2 == 0
-    way = np.tile(way[:2], 2) if back else way
-    turned = np.tile(item.path.end, 2) if back else np.roll(way, 2)
-    return np.stack([way, turned] if item.reversible else [way])
+    ends = np.tile(ends[:2], 2) if back else ends
+    turned = np.tile(item.path.end, 2) if back else np.roll(ends, 2)
+    return np.stack([ends, turned] if item.reversible else [ends])
 
 
 def _begins(item: Contour) -> Ints:

@@ -35,7 +35,7 @@ SLOPE_EPS = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Along:
+class MeasuredPath:
     """A path with the length `reach` (n+1,) mm from its start to the start of each segment, and
     to its end: `total_mm`."""
 
@@ -44,7 +44,7 @@ class Along:
     reach: Floats
 
     @classmethod
-    def of(cls, path: Polyline) -> Along:
+    def of(cls, path: Polyline) -> MeasuredPath:
         """The path, measured."""
         segments = Segments.of(path)
         reach = np.concatenate([[0.0], np.cumsum(segment_lengths(segments))])
@@ -85,7 +85,7 @@ class Along:
     def nearest_to(self, point: tuple[float, float]) -> float:
         """The length at which the path is nearest to a point (x, y) mm.
 
-        Told from the start of an arc of the curvature k, with the point at x along the tangent
+        Measured from the start of an arc of the curvature k, with the point at x along the tangent
         and y along the left normal, the foot of the point is  atan2(k x, 1 − k y) / k  along.
         """
         where = np.array([point])
@@ -148,7 +148,8 @@ class Along:
 
 
 def backwards(vertices: Floats) -> Floats:
-    """Vertices (k, n) of an open path, the bulge in the last column, travelled the other way."""
+    """Vertices (k, n) of an open path, the bulge in the last column, travelled in the other
+    direction."""
     back = vertices[::-1].copy()
     back[:-1, -1] = 0.0 - vertices[-2::-1, -1]
     back[-1:, -1] = 0.0
@@ -160,8 +161,8 @@ def joined(paths: Sequence[Floats]) -> Floats:
     return np.concatenate([*(path[:-1] for path in paths[:-1]), paths[-1]])
 
 
-def middles(segments: Segments) -> Floats:
-    """(K, 2) the middles of lines and arcs."""
+def midpoints(segments: Segments) -> Floats:
+    """(K, 2) the midpoints of lines and arcs."""
     return point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
 
 

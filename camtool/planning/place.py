@@ -99,7 +99,7 @@ def part_scale(drawing: Drawing, job: Job) -> float:
 
 
 def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
-    """What the scale made too small for a shape, told once: points that became one, and paths
+    """One finding for what the scale made too small for a shape: points that became one, and paths
     that became a point and are left out (a warning: something drawn is not cut)."""
     columns, rows = job.placement.copies
     paths = columns * rows * len(drawing.paths) - len(placed.paths)

@@ -37,7 +37,7 @@ from camtool.planning.gouges import side_findings
 from camtool.planning.items import Bridge, Chosen, Contour, Item, Run, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
 from camtool.planning.leads import KeepOut
-from camtool.planning.link import Worked, link, settled
+from camtool.planning.link import Worked, link, rounded
 from camtool.planning.naming import key_of
 from camtool.planning.order import (
     Point,
@@ -52,7 +52,7 @@ from camtool.planning.place import SCALE_SHARE, collapsed, place
 from camtool.planning.profile import profile
 from camtool.planning.settings import safe_z_of, setting_of
 from camtool.planning.sides import Sides, choose
-from camtool.planning.tabs import spared, with_tabs
+from camtool.planning.tabs import raised_over_bridges, with_tabs
 from camtool.toolpath.moves import Toolpath
 
 HOME: Point = (0.0, 0.0)
@@ -107,7 +107,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
 
         approaches = partial(Approaches, machine)
     builder = link(worked, safe_z_of(job, machine), approaches)
-    toolpath = settled(builder.finish())
+    toolpath = rounded(builder.finish())
     findings = collapsed(drawing, placed, job)
     findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, job, any(step.runs for step in steps))
@@ -156,26 +156,26 @@ def _step(
     job: Job,
     setting: Setting,
     machine: Machine,
-    way: tuple[Point, Point | None],
+    ends: tuple[Point, Point | None],
     sides: Sides,
 ) -> Step:
     """One operation from what it takes to its runs, for a tool that comes from the first point
-    of its `way` and goes to the second (None: stays)."""
+    of its `ends` and goes to the second (None: stays)."""
     chosen = choose(placed, setting.operation, sides)
     work = _kind(setting.operation.kind)(chosen, setting)
     items: tuple[Item, ...] = tuple(_with_starts(item) for item in work.items)
     items, bare = with_tabs(items)
     findings = [*work.findings, *side_findings(work, chosen, sides, setting.operation), *bare]
     choices = choices_of(items)
-    before = travel_mm(choices, drawn(choices), *way)
+    before = travel_mm(choices, drawn(choices), *ends)
     if job.minimise == "reversals":
         from camtool.planning.reversing import fewer_reversals
 
-        items, noticed = fewer_reversals(items, machine)
-        findings += noticed
+        items, found = fewer_reversals(items, machine)
+        findings += found
         choices = choices_of(items)
     _refuse_endless(items, setting)
-    rows = best_order(choices, must_precede(items), *way)
+    rows = best_order(choices, must_precede(items), *ends)
     keep_out = _walls(placed, job, setting.operation)
     runs: list[Run] = []
     bridges: list[Bridge] = []
@@ -198,7 +198,7 @@ def _step(
         owners=tuple(owners),
         findings=tuple(findings),
         rapid_drawn_mm=before,
-        rapid_mm=travel_mm(choices, rows, *way),
+        rapid_mm=travel_mm(choices, rows, *ends),
         bridges=tuple(bridges),
     )
 
@@ -219,7 +219,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
         return steps
     made = []
     for step in steps:
-        kept = spared(step.runs, step.operation, step.setting.feeds, bridges)
+        kept = raised_over_bridges(step.runs, step.operation, step.setting.feeds, bridges)
         findings = (*step.findings, *kept.findings)
         made.append(replace(step, runs=kept.runs, findings=findings))
     return made
@@ -250,8 +250,8 @@ def _refuse_endless(items: tuple[Item, ...], setting: Setting) -> None:
 
 
 def _walls(placed: Drawing, job: Job, operation: Operation) -> KeepOut:
-    """The closed lines that ways to and from a contour must leave alone: those of the operation
-    itself, and those that any operation makes walls of."""
+    """The closed lines that leads of a contour must keep away from: those of the operation itself,
+    and those that any operation makes walls of."""
     makers = [each for each in job.operations if each.kind in ("profile", "pocket")]
     names = list(zip(placed.layers, placed.colours, strict=True))
     own = np.array([operation.takes(*name) for name in names], dtype=np.bool_)
@@ -280,7 +280,7 @@ def _end(runs: tuple[Run, ...], here: Point) -> Point:
 
 
 def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
-    """What is drawn and not cut: points that nobody drills, or all of it."""
+    """What is drawn and not cut: points that are not drilled, or all of it."""
     found: list[Finding] = []
     drills = [operation for operation in job.operations if operation.kind == "drill"]
     left = [

@@ -1,16 +1,16 @@
 """Pockets: all within closed contours is cleared, except islands, which stay.
 
-    closed paths ─nesting─▶ regions ─shrunk by tool and allowance─▶ regions of the tool's middle
-    ─contour or zigzag─▶ ways in the plane ─levels, entry─▶ runs
+    closed paths ─nesting─▶ regions ─shrunk by tool and allowance─▶ tool centre regions
+    ─contour or zigzag─▶ paths in the plane ─levels, entry─▶ runs
 
 Closed contours count by nesting: what an odd number of them hold is cleared. Rings run so that
 the teeth go with the feed (climb): round walls CCW and round islands CW, as a spindle turning CW
-wants it. "conventional" is the other way; "drawn" is climb too, because no ring is drawn.
+wants it. "conventional" is the opposite; "drawn" is climb too, because no ring is drawn.
 
-The tool goes down once for each connected region of its middle, and stays at depth between rings:
+The tool goes down once for each connected tool centre region, and stays at depth between rings:
 links run within that region, so they cut nothing that is to stay. At each level it goes down from
-the floor of the level before (at first from the stock's top), follows the way, and comes back over
-the new floor to where it goes down again.
+the floor of the level before (at first from the stock's top), follows the path, and comes back
+over the new floor to where it goes down again.
 """
 
 from __future__ import annotations
@@ -38,25 +38,25 @@ from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
-    Rails,
+    ConnectedRegion,
     Scan,
     Steps,
     parts_of,
     pole,
     ring_cells,
-    ring_ways,
+    ring_paths,
     route,
-    slot_ways,
-    zigzag_ways,
+    slot_paths,
+    zigzag_paths,
 )
 from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
-from camtool.planning.paths import Along, joined
+from camtool.planning.paths import MeasuredPath, joined
 from camtool.planning.ramps import feeds_along
 from camtool.planning.reach import unreached_findings
 
-MOST_WAYS = 10_000
+MOST_STEPS = 10_000
 """More steps than this across a pocket are taken as a mistake."""
 
 HELIX_MOST = 0.5
@@ -69,10 +69,10 @@ HELIX_MOST_TURNS = 200
 """A helix of more turns than this at one level is not made."""
 
 RAMP_MOST_LAPS = 20
-"""A ramp that would go to and fro on the whole way more often than this becomes a plunge."""
+"""A ramp that would go to and fro on the whole path more often than this becomes a plunge."""
 
 Link = Callable[[Floats, Floats], Floats | None]
-"""From a place (2,) to another: (k, 3) over the floor, or None when there is no way."""
+"""From a place (2,) to another: (k, 3) over the floor, or None when there is no link."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
     for each in pockets(chosen):
         radius = setting.operation.tool.radius_mm
         wanted = offset_shape(each.region, setting.operation.allowance_mm)
-        slots = slot_ways(wanted, radius)
+        slots = slot_paths(wanted, radius)
         cleared = _cleared(wanted, slots, each, setting)
         if not cleared.runs:
             findings.append(_too_small(each, setting.operation))
@@ -133,20 +133,20 @@ def pockets(chosen: Chosen) -> list[Pocket]:
 
 
 def _cleared(wanted: Polylines, slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
-    """The runs of one region: each connected region of the tool's middle, then the slots."""
+    """The runs of one region: each connected tool centre region, then the slots."""
     groups: list[list[Run]] = []
     changed: dict[str, Run] = {}
     tool_region = offset_shape(wanted, setting.operation.tool.radius_mm)
     for part in parts_of(tool_region):
-        whole, runs = Rails(part), list[Run]()
-        for way, middle in _ways(part, setting.operation):
-            down = down_for(way, middle, whole, setting)
-            runs += lowered(way, down, over_floor(whole), setting, each.name)
+        whole, runs = ConnectedRegion(part), list[Run]()
+        for path, around in _paths(part, setting.operation):
+            down = down_for(path, around, whole, setting)
+            runs += lowered(path, down, over_floor(whole), setting, each.name)
             changed.setdefault(down.changed, runs[0])
         groups.append(runs)
-    for way in slots:
-        down = down_for(way, None, None, setting)
-        groups.append(lowered(way, down, back_along(way), setting, each.name))
+    for path in slots:
+        down = down_for(path, None, None, setting)
+        groups.append(lowered(path, down, back_along(path), setting, each.name))
         changed.setdefault(down.changed, groups[-1][0])
     changed.pop("", None)
     return Cleared(_nearest_next(groups), changed)
@@ -163,20 +163,20 @@ def _nearest_next(groups: list[list[Run]]) -> list[Run]:
     return runs
 
 
-def _ways(part: Polylines, operation: Operation) -> Iterator[tuple[Floats, Rails]]:
-    """The ways through one connected region of the tool's middle, each with the region in whose
-    middle there is the most room to go down."""
+def _paths(part: Polylines, operation: Operation) -> Iterator[tuple[Floats, ConnectedRegion]]:
+    """The paths through one connected tool centre region, each with the region at whose pole there
+    is the most room to go down."""
     radius = operation.tool.radius_mm
     step = operation.step_over * operation.tool.diameter_mm
     forward = operation.direction != "conventional"
     if operation.pattern == "zigzag":
-        for way in zigzag_ways(part, Scan(step, radius, operation.angle_rad, forward)):
-            yield way, Rails(part)
+        for path in zigzag_paths(part, Scan(step, radius, operation.angle_rad, forward)):
+            yield path, ConnectedRegion(part)
         return
     steps = Steps(step, radius, forward, operation.entry.kind == "helix")
-    ways, first = ring_ways(ring_cells(part, steps), steps)
-    for way in ways:
-        yield way, first.rails
+    paths, first = ring_paths(ring_cells(part, steps), steps)
+    for path in paths:
+        yield path, first.region
 
 
 def _check(chosen: Chosen, operation: Operation) -> None:
@@ -214,9 +214,9 @@ def _check_step(chosen: Chosen, operation: Operation) -> None:
     """OptionError for a step-over that would take for ever."""
     step = operation.step_over * operation.tool.diameter_mm
     size = float(np.ptp(extents(chosen.lines), axis=1).max()) if len(chosen.lines) else 0.0
-    if size > MOST_WAYS * step:
+    if size > MOST_STEPS * step:
         raise OptionError(
-            f"steps of {step:g} mm go more than {MOST_WAYS} times into {size:g} mm",
+            f"steps of {step:g} mm go more than {MOST_STEPS} times into {size:g} mm",
             where=key_of(operation, "step_over"),
             mend="give a larger step-over, or a larger tool",
         )
@@ -246,7 +246,7 @@ def _slot(each: Pocket, slot: Floats, operation: Operation) -> Finding:
 
 @dataclass(frozen=True, eq=False)
 class Down:
-    """How the tool goes down: the middle (2,) and radius of a helix; or a ramp; or neither (a
+    """How the tool goes down: the centre (2,) and radius of a helix; or a ramp; or neither (a
     plunge). `changed` says what did not fit, "" when all does."""
 
     centre: Floats | None = None
@@ -255,16 +255,18 @@ class Down:
     changed: str = ""
 
 
-def down_for(way: Floats, middle: Rails | None, whole: Rails | None, setting: Setting) -> Down:
-    """What fits of the entry that is asked for: a helix about the middle of a region that keeps
-    to the whole region; else a ramp along the way; else a plunge."""
+def down_for(
+    path: Floats, around: ConnectedRegion | None, whole: ConnectedRegion | None, setting: Setting
+) -> Down:
+    """What fits of the entry that is asked for: a helix about the pole of a region that keeps to
+    the whole region; else a ramp along the path; else a plunge."""
     entry = setting.operation.entry
     if entry.kind == "plunge":
         return Down()
-    if entry.kind == "helix" and middle is not None and whole is not None:
+    if entry.kind == "helix" and around is not None and whole is not None:
         radius = setting.operation.tool.radius_mm
         wanted = HELIX_MOST * radius if entry.radius_mm is None else entry.radius_mm
-        centre = pole(middle.region)
+        centre = pole(around.boundary)
         room = float(points_to_segments(centre[None, :], whole.segments).min())
         fits = min(wanted, room)
         turns = _descent(setting) / (2.0 * math.pi * max(fits, POSITION_EPS_MM))
@@ -273,37 +275,37 @@ def down_for(way: Floats, middle: Rails | None, whole: Rails | None, setting: Se
             changed = f"a helix of {fits:.4g} mm instead of {wanted:g} mm" if smaller else ""
             return Down(centre, fits, changed=changed)
     changed = "a ramp instead of a helix" if entry.kind == "helix" else ""
-    if 0.5 * _descent(setting) <= RAMP_MOST_LAPS * Along.of(Polyline(way)).total_mm:
+    if 0.5 * _descent(setting) <= RAMP_MOST_LAPS * MeasuredPath.of(Polyline(path)).total_mm:
         return Down(ramp=True, changed=changed)
     return Down(changed=f"a plunge instead of a {entry.kind}")
 
 
-def lowered(way: Floats, down: Down, link: Link, setting: Setting, name: str) -> list[Run]:
-    """The runs that follow a way (n, 3) at all levels: one, unless there is no link back."""
+def lowered(path: Floats, down: Down, link: Link, setting: Setting, name: str) -> list[Run]:
+    """The runs that follow a path (n, 3) at all levels: one, unless there is no link back."""
     runs: list[Run] = []
     parts: list[Floats] = []
     for above, level in pairwise((0.0, *setting.levels_mm)):
-        entry = _entry(way, down, link, (above, level), setting)
-        back = link(way[-1, :2], entry[0, :2]) if parts else None
+        entry = _entry(path, down, link, (above, level), setting)
+        back = link(path[-1, :2], entry[0, :2]) if parts else None
         if parts and back is None:
             runs.append(_run(parts, setting, name))
             parts = []
         if back is not None:
             parts.append(_at(back, above))
-        parts += [entry, _at(way, level)]
+        parts += [entry, _at(path, level)]
     return [*runs, _run(parts, setting, name)]
 
 
 def _entry(
-    way: Floats, down: Down, link: Link, heights: tuple[float, float], setting: Setting
+    path: Floats, down: Down, link: Link, heights: tuple[float, float], setting: Setting
 ) -> Floats:
-    """(k, 4) from the floor above down to the beginning of the way."""
+    """(k, 4) from the floor above down to the beginning of the path."""
     above, level = heights
-    begin = way[0, :2]
+    begin = path[0, :2]
     drop = above - level
     slope = math.tan(setting.operation.entry.angle_rad)
     if down.ramp:
-        return _ramp(way, drop / slope, heights)
+        return _ramp(path, drop / slope, heights)
     if down.centre is not None:
         helix = _helix(down.centre, down.radius_mm, begin, drop / slope)
         across = link(helix[-1, :2], begin)
@@ -328,9 +330,9 @@ def _helix(centre: Floats, radius: float, towards: Floats, length: float) -> Flo
     return np.column_stack([points, bulge])
 
 
-def _ramp(way: Floats, length: float, heights: tuple[float, float]) -> Floats:
-    """(k, 4) to and fro along the beginning of the way, down to where it begins."""
-    along = Along.of(Polyline(way))
+def _ramp(path: Floats, length: float, heights: tuple[float, float]) -> Floats:
+    """(k, 4) to and fro along the beginning of the path, down to where it begins."""
+    along = MeasuredPath.of(Polyline(path))
     laps = max(1, math.ceil(0.5 * length / along.total_mm))
     reach = 0.5 * length / laps
     forth = along.piece(0.0, reach)
@@ -346,7 +348,7 @@ def _descent(setting: Setting) -> float:
 
 def _sloping(flat: Floats, heights: tuple[float, float]) -> Floats:
     """(k,) z of an open path (k, 3) that slopes evenly from one height to another."""
-    done = Along.of(Polyline(flat)).reach
+    done = MeasuredPath.of(Polyline(flat)).reach
     above, level = heights
     return np.asarray(above + (level - above) * done / done[-1])
 
@@ -362,14 +364,14 @@ def _run(parts: list[Floats], setting: Setting, name: str) -> Run:
     return Run(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, name)
 
 
-def over_floor(rails: Rails) -> Link:
-    """Links that stay in a region of the tool's middle."""
-    return lambda start, end: route(start, end, rails)
+def over_floor(region: ConnectedRegion) -> Link:
+    """Links that stay in a tool centre region."""
+    return lambda start, end: route(start, end, region)
 
 
-def back_along(way: Floats) -> Link:
-    """Links back along the way itself, from its end to its beginning."""
-    along = Along.of(Polyline(way))
+def back_along(path: Floats) -> Link:
+    """Links back along the path itself, from its end to its beginning."""
+    along = MeasuredPath.of(Polyline(path))
 
     def link(start: Floats, end: Floats) -> Floats | None:
         if np.hypot(*(end - start)) <= POSITION_EPS_MM:

@@ -1,4 +1,4 @@
-"""Profiles: on which lines the middle of the tool runs.
+"""Profiles: the paths of the tool centre beside and on the lines.
 
 `auto` takes all closed paths together: which of them are rims of parts and which of holes, the
 nesting of the whole drawing says (`sides`), and the tool runs a tool's radius (and the allowance)
@@ -33,8 +33,8 @@ from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Chosen, Contour, Setting, Work
-from camtool.planning.naming import at_place, told_together, tool_name
-from camtool.planning.paths import joints, middles
+from camtool.planning.naming import at_place, shortened_list, tool_name
+from camtool.planning.paths import joints, midpoints
 from camtool.planning.sides import runs_beside
 
 ROOM_TOLERANCE_MM = 1e-4
@@ -42,7 +42,7 @@ ROOM_TOLERANCE_MM = 1e-4
 
 FAR_CORNER = 5.0
 """Joins that take the tool farther from a corner than so many times its distance from the wall
-are told: corners sharper than 23 degrees."""
+are reported: corners sharper than 23 degrees."""
 
 SLOT_TOLERANCE_MM = 5e-4
 """A slot or hole narrower than the tool by this much or less counts as wide as the tool."""
@@ -50,7 +50,7 @@ SLOT_TOLERANCE_MM = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class _Line:
-    """A line of the tool's middle; what is to stay lies to its left, or (False) to its right;
+    """A path of the tool centre; what is to stay lies to its left, or (False) to its right;
     `of`: the chosen paths that it belongs to, the one it mostly follows first."""
 
     path: Polyline
@@ -83,7 +83,7 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
             _alone(chosen, k, setting, found)
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if operation.joins != "round":
-        found.findings += told_together(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
+        found.findings += shortened_list(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
     items = [_beside(line, chosen, setting) for line in found.lines]
@@ -123,7 +123,7 @@ def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> No
     _round(chosen, of, shape, setting, found)
     made = found.lines[before:]
     joined = [each for line in made for each in _joined(chosen, line.of, setting)]
-    found.findings += told_together(joined, UNREACHED_BETWEEN_MORE)
+    found.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
     free = Polylines.of(reverse(path) for path in shape)
     as_wide = any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
     hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
@@ -170,7 +170,7 @@ def _offset(shape: Polylines, distance_mm: float, setting: Setting) -> Polylines
 
 
 def _away(setting: Setting) -> float:
-    """How far the tool's middle is from the drawn line, mm."""
+    """How far the tool centre is from the drawn line, mm."""
     return setting.operation.tool.radius_mm + setting.operation.allowance_mm
 
 
@@ -178,7 +178,7 @@ def _sources(path: Polyline, shape: Polylines) -> tuple[int, ...]:
     """The paths of the shape to which the segments of an offset path are nearest, the one that
     is nearest to most of them first."""
     source = Segments.of(shape)
-    of = source.path[nearest(middles(Segments.of(path)), source).segment]
+    of = source.path[nearest(midpoints(Segments.of(path)), source).segment]
     which, count = np.unique(of, return_counts=True)
     return tuple(which[np.argsort(-count, kind="stable")].tolist())
 
@@ -189,29 +189,29 @@ def _is_double(shape: Polylines, place: int) -> bool:
     mine, earlier = segments[segments.path == place], segments[segments.path < place]
     if len(earlier) == 0:
         return False
-    points = np.concatenate([mine.start, middles(mine)])
+    points = np.concatenate([mine.start, midpoints(mine)])
     return bool((nearest(points, earlier).distance <= POSITION_EPS_MM).all())
 
 
 def _as_wide(chosen: Chosen, k: int, setting: Setting) -> Finding:
-    return SLOT_AS_WIDE(where=_middle(chosen, k), tool=tool_name(setting.operation.tool))
+    return SLOT_AS_WIDE(where=_box_centre(chosen, k), tool=tool_name(setting.operation.tool))
 
 
 def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:
     return (CONTOUR_TOO_SMALL_ROUND if outer else CONTOUR_TOO_SMALL)(
-        where=_middle(chosen, k),
+        where=_box_centre(chosen, k),
         measured=abs(float(signed_areas(chosen.lines.select([k]))[0])),
         tool=tool_name(setting.operation.tool),
     )
 
 
-def _middle(chosen: Chosen, k: int) -> str:
-    """A path and the middle of its box."""
+def _box_centre(chosen: Chosen, k: int) -> str:
+    """A path and the centre of its box."""
     return at_place(chosen.names[k], extents(chosen.lines.select([k])).mean(axis=1))
 
 
 def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[Finding]:
-    """Said of a line that runs round several paths at once: between them nothing is cut."""
+    """Findings of a line that runs round several paths at once: between them nothing is cut."""
     room = 2.0 * _away(setting)
     lines = chosen.lines.select(of)
     for one, other in sorted(near_paths(lines, lines, room)):

@@ -1,7 +1,7 @@
 """The height of the tool over the length along a path: passes, plunges and ramps.
 
-A *profile* is a list of knots (length, z) in the order of travel: between two knots the tool
-follows the path, forwards or backwards, and z changes in proportion to the length; two knots of
+A *profile* is a list of points (length, z) in the order of travel: between two points the tool
+follows the path, forwards or backwards, and z changes in proportion to the length; two points of
 the same length are a move straight up or down.
 
 Round a closed path a ramp slopes until it reaches the level, the tool goes on at it, and begins
@@ -34,47 +34,47 @@ from camtool.arrays import Floats
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.planning.items import Feeds
-from camtool.planning.paths import Along
+from camtool.planning.paths import MeasuredPath
 
-Knots = list[tuple[float, float]]
+ZProfile = list[tuple[float, float]]
 
 MOST_LAPS = 200.0
-"""A ramp as long as more laps than this (ways along an open path) is not made."""
+"""A ramp as long as more laps than this (passes along an open path) is not made."""
 
 
-def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> Knots:
+def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZProfile:
     """Round a closed path at each level, straight down from one to the next at the start."""
-    knots: Knots = []
+    points: ZProfile = []
     for turn, z in enumerate(levels_mm):
-        knots += [(turn * total_mm, z), ((turn + 1) * total_mm, z)]
-    knots.append((len(levels_mm) * total_mm + overlap_mm, levels_mm[-1]))
-    return knots
+        points += [(turn * total_mm, z), ((turn + 1) * total_mm, z)]
+    points.append((len(levels_mm) * total_mm + overlap_mm, levels_mm[-1]))
+    return points
 
 
-def apart(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> list[Knots]:
+def apart(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> list[ZProfile]:
     """Round a closed path at each level on its own."""
     return [[(0.0, z), (total_mm + overlap_mm, z)] for z in levels_mm]
 
 
 def spiral(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
-) -> Knots:
+) -> ZProfile:
     """Round a closed path, sloping from the stock top to each level, and once flat at the last."""
-    knots: Knots = [(0.0, 0.0)]
+    points: ZProfile = [(0.0, 0.0)]
     begin = above = 0.0
     for z in levels_mm:
         ramp = (above - z) / math.tan(angle_rad)
-        knots += [(begin, above), (begin + ramp, z)]
+        points += [(begin, above), (begin + ramp, z)]
         begin, above = begin + max(ramp, total_mm), z
-    bottom = knots[-1][0]
-    knots.append((bottom + total_mm + overlap_mm, above))
+    bottom = points[-1][0]
+    points.append((bottom + total_mm + overlap_mm, above))
     before = bottom % total_mm
-    return [(length - before, z) for length, z in knots]
+    return [(length - before, z) for length, z in points]
 
 
 def spiral_with_stops(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
-) -> tuple[Knots, list[float]]:
+) -> tuple[ZProfile, list[float]]:
     """The same, and a length at each level but the last where the tool is down at it, always at
     the place where the last lap ends.
 
@@ -83,34 +83,36 @@ def spiral_with_stops(
     above = (0.0, *levels_mm[:-1])
     ramp = max(a - z for a, z in zip(above, levels_mm, strict=True)) / math.tan(angle_rad)
     laps_each = math.ceil((ramp + overlap_mm) / total_mm)
-    knots: Knots = []
+    points: ZProfile = []
     stops = []
     for turn, z in enumerate(levels_mm):
         bottom = turn * laps_each * total_mm
         stops.append(bottom + overlap_mm)
-        knots += [(bottom - ramp, above[turn]), (bottom, z), (stops[-1], z)]
-    knots[-1] = (bottom + total_mm + overlap_mm, levels_mm[-1])
-    return knots, stops[:-1]
+        points += [(bottom - ramp, above[turn]), (bottom, z), (stops[-1], z)]
+    points[-1] = (bottom + total_mm + overlap_mm, levels_mm[-1])
+    return points, stops[:-1]
 
 
 def to_and_fro(
     total_mm: float, levels_mm: Sequence[float], above_mm: float, angle_rad: float | None
-) -> Knots:
+) -> ZProfile:
     """Along an open path at each level, from the end where the level before ended.
 
     Down from `above_mm` and between the levels straight (None), or sloping by the angle.
     """
-    knots: Knots = []
+    points: ZProfile = []
     for turn, z in enumerate(levels_mm):
-        way: Knots = [(0.0, z), (total_mm, z)]
+        pass_points: ZProfile = [(0.0, z), (total_mm, z)]
         if angle_rad is not None:
-            way = [*_zigzag(total_mm, above_mm, z, angle_rad), (total_mm, z)]
-        knots += [(total_mm - s, height) for s, height in way] if turn % 2 else way
+            pass_points = [*_zigzag(total_mm, above_mm, z, angle_rad), (total_mm, z)]
+        points += (
+            [(total_mm - s, height) for s, height in pass_points] if turn % 2 else pass_points
+        )
         above_mm = z
-    return knots
+    return points
 
 
-def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> Knots:
+def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> ZProfile:
     """Down at the start of an open path, to and fro as often as needed."""
     ramp = (above_mm - z_mm) / math.tan(angle_rad)
     legs = 2 * math.ceil(ramp / (2.0 * total_mm))
@@ -118,11 +120,11 @@ def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> 
     return [(leg % 2 * ramp / legs, above_mm - leg * drop) for leg in range(legs)] + [(0.0, z_mm)]
 
 
-def lifted(along: Along, knots: Knots) -> Floats:
+def lifted(along: MeasuredPath, points: ZProfile) -> Floats:
     """(n, 4) x, y, z, bulge of the path with this profile."""
-    length, z = knots[0]
+    length, z = points[0]
     rows = [np.array([[*along.at(np.array([length]))[0], z, 0.0]])]
-    for (begin, z_begin), (end, z_end) in pairwise(knots):
+    for (begin, z_begin), (end, z_end) in pairwise(points):
         if abs(end - begin) <= POSITION_EPS_MM:
             if abs(z_end - z_begin) > POSITION_EPS_MM:
                 rows.append(np.array([[*rows[-1][-1, :2], z_end, 0.0]]))

@@ -4,8 +4,8 @@ A disc of radius r that stays in a region covers the region shrunk by r and grow
 leaves are the feet of corners and places narrower than the tool. Both boundaries are lines and
 arcs, and the inner one never crosses the outer one: they run together, part, and meet again.
 
-    region  ─ stretches that do not run together with the opened one ──┐
-    opened  ─ stretches that do not run together with the region, back ┴─▶ closed: the pieces
+    region  ─ sections that do not run together with the opened one ──┐
+    opened  ─ sections that do not run together with the region, back ┴─▶ closed: the pieces
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Setting
 from camtool.planning.naming import MOST_PLACES, tool_name
-from camtool.planning.paths import Along, runs_of_true
+from camtool.planning.paths import MeasuredPath, runs_of_true
 
 TOGETHER_MM = 5e-6
 """Two boundaries nearer than this run together: above the error of two offsets in a row."""
 
 SAME_PLACE_MM = 2e-5
-"""Ends of stretches nearer than this are one place."""
+"""Ends of sections nearer than this are one place."""
 
 LEAST_FOOT = 1e-3
 """Pieces smaller than this part of the tool's disc are left out: the foot of a square corner is
 0.068 of it, that of a corner of 156 degrees is just so large."""
 
 PROBES = (0.0, 0.3, 0.5, 0.7, 1.0)
-"""Where a stretch between two vertices is measured; its ends say nothing on whether it runs
+"""Where a part between two vertices is measured; its ends say nothing on whether it runs
 together with something, only on how far it leads."""
 
 PARTING = 4.0
-"""Ends of stretches that meet no other are one place when they are no farther apart than so many
+"""Ends of sections that meet no other are one place when they are no farther apart than so many
 times √(2 r · TOGETHER_MM), on which a disc of radius r comes off a straight wall by TOGETHER_MM:
 where it does is not seen more sharply."""
 
 CORNER_SHARE = 0.25
-"""Pieces up to this part of the tool's disc count as feet of corners, and are told together: that
+"""Pieces up to this part of the tool's disc count as feet of corners, and are one finding: that
 of a corner of 55 degrees is as large."""
 
 
@@ -90,7 +90,7 @@ def unreached(
 
 
 def _far_place(piece: Polylines, reached: Polylines) -> tuple[float, float]:
-    """The vertex of the piece farthest from what is reached; its middle when nothing is."""
+    """The vertex of the piece farthest from what is reached; its centre when nothing is."""
     if len(reached) == 0:
         x, y = extents(piece).mean(axis=1).tolist()
         return x, y
@@ -109,14 +109,14 @@ def _without(
     if len(reached) == 0:
         return region
     inner = _apart(reached, region, least_mm2)
-    stretches = [*_apart(region, reached, least_mm2), *map(reverse, inner)]
-    whole = [path for path in stretches if path.closed]
-    opens = [path for path in stretches if not path.closed]
+    sections = [*_apart(region, reached, least_mm2), *map(reverse, inner)]
+    whole = [path for path in sections if path.closed]
+    opens = [path for path in sections if not path.closed]
     return Polylines.of([*whole, *_closed(opens, parting_mm)])
 
 
 def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
-    """The stretches of closed paths that do not run together with others: closed where whole.
+    """The sections of closed paths that do not run together with others: closed where whole.
 
     They begin and end at vertices, their own and those of the others that are on a path: where
     the one parts from the other, so does the other from the one. One that leads h away, and is l
@@ -136,7 +136,7 @@ def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polylin
     for index in np.unique(segments.path[row[wanted]]).tolist():
         mine = slice(int(first[index]), int(first[index + 1]))
         made = _Parts(lengths[mine], away[mine].max(axis=1), wanted[mine])
-        found += made.stretches(lines[index], least_mm2)
+        found += made.sections(lines[index], least_mm2)
     return found
 
 
@@ -149,7 +149,7 @@ class _Parts:
     away: Floats
     wanted: Bools
 
-    def stretches(self, path: Polyline, least_mm2: float) -> list[Polyline]:
+    def sections(self, path: Polyline, least_mm2: float) -> list[Polyline]:
         """The runs of wanted parts, but those that surely go round less than `least_mm2`."""
         if self.wanted.all():
             return [path]
@@ -157,11 +157,11 @@ class _Parts:
         length, away = np.roll(self.length, -turn), np.roll(self.away, -turn)
         begin = np.concatenate([[0.0], np.cumsum(length)]) + self.length[:turn].sum()
         first, last = runs_of_true(np.roll(self.wanted, -turn))
-        # The path begins with a part that is not wanted, so that every other stretch is wanted.
+        # The path begins with a part that is not wanted, so that every other one is wanted.
         edges = np.column_stack([first, last]).ravel()
         farthest = np.maximum.reduceat(np.append(away, 0.0), edges)[::2]
         large = 2.0 * (begin[last] - begin[first]) * farthest >= least_mm2
-        along = Along.of(path)
+        along = MeasuredPath.of(path)
         found = []
         for low, high in zip(begin[first[large]], begin[last[large]], strict=True):
             vertices = along.piece(float(low), float(high))
@@ -207,11 +207,11 @@ def _at_any(points: Floats, others: Floats) -> Bools:
     return np.isin(node[: len(points)], node[len(points) :])
 
 
-def _closed(stretches: list[Polyline], parting_mm: float) -> list[Polyline]:
-    """Open stretches joined to closed paths; those that lead nowhere are left out."""
-    if not stretches:
+def _closed(sections: list[Polyline], parting_mm: float) -> list[Polyline]:
+    """Open sections joined to closed paths; those that lead nowhere are left out."""
+    if not sections:
         return []
-    ends = np.array([[path.start, path.end] for path in stretches]).reshape(-1, 2)
+    ends = np.array([[path.start, path.end] for path in sections]).reshape(-1, 2)
     node = merge_points(ends, SAME_PLACE_MM)[0].reshape(-1, 2)
     lost = np.flatnonzero(~np.isin(node[:, 0], node[:, 1]))
     for row in np.flatnonzero(~np.isin(node[:, 1], node[:, 0])).tolist():
@@ -221,35 +221,35 @@ def _closed(stretches: list[Polyline], parting_mm: float) -> list[Polyline]:
     leaving: dict[int, list[int]] = defaultdict(list)
     for row, place in enumerate(node[:, 0].tolist()):
         leaving[place].append(row)
-    frames = [Frames.of(Segments.of(path)) for path in stretches]
-    free = np.ones(len(stretches), dtype=np.bool_)
+    frames = [Frames.of(Segments.of(path)) for path in sections]
+    free = np.ones(len(sections), dtype=np.bool_)
     found = []
-    for first in range(len(stretches)):
+    for first in range(len(sections)):
         path = [first] if free[first] else []
         while path and node[path[-1], 1] != node[first, 0]:
             free[path[-1]] = False
-            ways = [row for row in leaving[int(node[path[-1], 1])] if free[row]]
-            if not ways:
+            onward = [row for row in leaving[int(node[path[-1], 1])] if free[row]]
+            if not onward:
                 path = []
                 break
-            turns = [_turn(frames[path[-1]], frames[row]) for row in ways]
-            path.append(ways[int(np.argmax(turns))])
+            turns = [_turn(frames[path[-1]], frames[row]) for row in onward]
+            path.append(onward[int(np.argmax(turns))])
         if path:
             free[path] = False
-            found += _joined([stretches[row] for row in path])
+            found += _joined([sections[row] for row in path])
     return found
 
 
 def _turn(arriving: Frames, leaving: Frames) -> float:
-    """The angle from the end of one stretch to the start of another, left positive."""
+    """The angle from the end of one section to the start of another, left positive."""
     x, y = arriving.tangent_at(np.ones(len(arriving.length)))[-1]
     u, v = leaving.tangent[0]
     return float(np.arctan2(x * v - y * u, x * u + y * v))
 
 
-def _joined(stretches: list[Polyline]) -> list[Polyline]:
-    """Stretches that follow each other as one closed path; none when it is but a speck."""
-    vertices = np.concatenate([path.vertices for path in stretches])
+def _joined(sections: list[Polyline]) -> list[Polyline]:
+    """Sections that follow each other as one closed path; none when it is but a speck."""
+    vertices = np.concatenate([path.vertices for path in sections])
     step = np.roll(vertices[:, :2], -1, axis=0) - vertices[:, :2]
     vertices = vertices[np.hypot(*step.T) > SAME_PLACE_MM]
     if len(vertices) < 2 or (len(vertices) == 2 and not vertices[:, 2].any()):
@@ -262,8 +262,8 @@ def unreached_findings(
 ) -> list[Finding]:
     """What a tool within the region (on the left of its closed paths) cannot touch.
 
-    Feet of corners are not told where the operation makes reliefs. Slots narrower than the tool
-    by `hair_mm` count as reached.
+    Feet of corners are not reported where the operation makes reliefs. Slots narrower than the
+    tool by `hair_mm` count as reached.
     """
     tool = setting.operation.tool
     pieces = unreached(region, tool.radius_mm - 0.5 * hair_mm)

@@ -3,7 +3,7 @@
 A tool of radius r that runs at the distance d from two walls (d = r, and the allowance) stands at
 V when it turns, and leaves what lies between its edge and the corner C of the part:
 
-    dog-bone   from V towards C and back, to where C is at the distance d from the tool's middle;
+    dog-bone   from V towards C and back, to where C is at the distance d from the tool centre;
     overcut    from V along the longer wall and back, to where that is so.
 
     ════════════╗C           |V C| = d / sin(α/2) for straight walls that meet at the angle α:
@@ -26,7 +26,7 @@ from camtool.geometry.distance import paired_distances, points_to_segments
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.job import CORNERS
-from camtool.planning.paths import Along
+from camtool.planning.paths import MeasuredPath
 
 RELIEF_LEAST_MM = 1e-3
 """A corner that the tool's edge misses by no more than this gets no relief."""
@@ -57,7 +57,7 @@ def relieved(
     kind: str,
     keep_out: Polylines | None = None,
 ) -> Relieved:
-    """A contour of the tool's middle with reliefs at the sharp inner corners of the `original`.
+    """A path of the tool centre with reliefs at the sharp inner corners of the `original`.
 
     `kind` is one of CORNERS; without an original nothing is known about its corners, and none is
     relieved. Reliefs come nowhere nearer to the lines of `keep_out`, and to the walls of the
@@ -68,16 +68,16 @@ def relieved(
     nothing = np.empty((0, 2))
     if kind == "none" or original is None or tool_radius_mm == 0.0:
         return Relieved(path, nothing)
-    along, walls = Along.of(path), Along.of(original)
+    along, walls = MeasuredPath.of(path), MeasuredPath.of(original)
     others = (
         walls.segments if keep_out is None else Segments.of(Polylines.of([original, *keep_out]))
     )
     reliefs: dict[int, list[Floats]] = {}
     left: list[Floats] = []
     for corner, vertex in _stands(along, walls, tool_radius_mm).items():
-        way = _way(along, vertex, walls, corner, kind)
-        if _is_clear(way, walls.segments.start[corner], others, tool_radius_mm):
-            reliefs.setdefault(vertex, []).append(way[1])
+        move = _move(along, vertex, walls, corner, kind)
+        if _is_clear(move, walls.segments.start[corner], others, tool_radius_mm):
+            reliefs.setdefault(vertex, []).append(move[1])
         else:
             left.append(walls.segments.start[corner])
     rows: list[Floats] = []
@@ -88,7 +88,7 @@ def relieved(
     return Relieved(Polyline(np.array(rows), path.closed), np.array(left).reshape(-1, 2))
 
 
-def _stands(along: Along, walls: Along, tool_radius_mm: float) -> dict[int, int]:
+def _stands(along: MeasuredPath, walls: MeasuredPath, tool_radius_mm: float) -> dict[int, int]:
     """The corners (vertices of the walls) that the tool misses, and at which vertex of its path it
     stands then: the nearest of those that are equally far from both walls of the corner."""
     found: dict[int, tuple[float, int]] = {}
@@ -107,7 +107,7 @@ def _stands(along: Along, walls: Along, tool_radius_mm: float) -> dict[int, int]
     return {corner: vertex for corner, (_, vertex) in found.items()}
 
 
-def _way(along: Along, vertex: int, walls: Along, corner: int, kind: str) -> Floats:
+def _move(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int, kind: str) -> Floats:
     """(2, 2) from V to where the tool's edge touches the corner."""
     v, c = along.path.vertices[vertex, :2], walls.segments.start[corner]
     away = float(points_to_segments(v[None], walls.segments).min())
@@ -121,11 +121,11 @@ def _way(along: Along, vertex: int, walls: Along, corner: int, kind: str) -> Flo
             bent = beside < away - RELIEF_MATCH_MM
             back = math.sqrt(away * away - beside * beside) if bent else 0.0
             return np.array([v, v + (foot - back) * ahead])
-    # Beside a bent wall the way along it may not come near enough to the corner.
+    # Beside a bent wall the path along it may not come near enough to the corner.
     return np.array([v, c - arm * (away / math.hypot(*arm))])
 
 
-def _along_longer(along: Along, vertex: int, walls: Along, corner: int) -> Floats:
+def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int) -> Floats:
     """The direction (2,) in which the tool goes on beyond V along the longer wall.
 
     Of two as long it is the one nearer to the X axis, so that symmetric parts stay symmetric.
@@ -141,13 +141,13 @@ def _along_longer(along: Along, vertex: int, walls: Along, corner: int) -> Float
     return np.asarray(ahead if coming > going else back)
 
 
-def _is_clear(way: Floats, corner: Floats, others: Segments, tool_radius_mm: float) -> bool:
-    """Whether a tool that goes this way cuts into no wanted line but those at the corner."""
-    low, high = way.min(axis=0) - tool_radius_mm, way.max(axis=0) + tool_radius_mm
+def _is_clear(move: Floats, corner: Floats, others: Segments, tool_radius_mm: float) -> bool:
+    """Whether a tool that makes this move cuts into no wanted line but those at the corner."""
+    low, high = move.min(axis=0) - tool_radius_mm, move.max(axis=0) + tool_radius_mm
     boxes = segment_boxes(others)
     rows = np.flatnonzero(((boxes[:, :2] < high) & (boxes[:, 2:] > low)).all(axis=1))
     at_corner = points_to_segments(corner[None], others[rows])[0] <= RELIEF_MATCH_MM
     rows = rows[~at_corner]
-    move = Segments.between(way[:1], way[1:], np.zeros(1))
-    distance, _ = paired_distances(move[np.zeros_like(rows)], others[rows])
+    line = Segments.between(move[:1], move[1:], np.zeros(1))
+    distance, _ = paired_distances(line[np.zeros_like(rows)], others[rows])
     return bool((distance >= tool_radius_mm - RELIEF_SLACK_MM).all())

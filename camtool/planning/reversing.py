@@ -1,18 +1,18 @@
-"""Fewer reversals while cutting: contours cut as runs in which no axis turns round.
+"""Fewer reversals while cutting: contours cut as runs in which no axis reverses.
 
-Each change of an axis's direction makes its slide cross the play, costs a compensation, and
+Each change of an axis's direction makes its slide cross the backlash, costs a compensation, and
 leaves an error where it happens. The PIC thesis saw parts fail above 16 of them (L3052-3057,
 L3207-3211) and saved them by machining in mirror halves (L2816-2841). So each contour is divided
-where an axis turns (`Division`), the runs are cut in the directions that leave the smaller error,
-and every run is approached so that its axes are engaged (`Approaches`): all reversals happen in
-the air.
+where an axis reverses (`Division`), the runs are cut in the directions that leave the smaller
+error, and every run is approached so that its axes are engaged (`Approaches`): all reversals
+happen in the air.
 
 A contour stays in one piece where the job asks for what only a whole one can have: leads, tabs,
 a ramp, a start by rule or by hand. Of the others of those, only the start is chosen. What cuts
 climb or conventionally keeps its direction, divided or not.
 
-    path ──parts_of──▶ parts, each of one direction in x and one in y ──turns_of──▶ turns
-    parts, turns ──▶ places where it may be divided ──▶ the cheapest division ──▶ pieces
+    path ──parts_of──▶ parts of one direction in x and one in y ──reversals_along──▶ reversals
+    parts, reversals ──▶ places where it may be divided ──▶ the cheapest division ──▶ pieces
 """
 
 from __future__ import annotations
@@ -50,8 +50,9 @@ SAMPLES = 9
 a quarter of a circle the greatest distance is then found within 0.5 %."""
 
 APPROACH_MARGIN_MM = 0.05
-"""An approach is longer by this much than what compensation leaves of the play: the play is not
-the same all over a table (that of the PIC machine by 14 µm in X and 28 µm in Y, L2370-2373)."""
+"""An approach is longer by this much than what compensation leaves of the backlash: the backlash
+is not the same all over a table (that of the PIC machine by 14 µm in X and 28 µm in Y,
+L2370-2373)."""
 
 REVERSAL_STEPS = 0.5
 """An axis has turned round when it came back by this much of a coded step, as the simulation of
@@ -88,13 +89,13 @@ def fewer_reversals(
     """The items with contours replaced by runs that reverse no axis while cutting, in the order
     of the contours, and what that changes; items of `Fixed` runs stay.
 
-    An axis without play and compensation may reverse as it likes. The runs of a contour together
+    An axis without backlash and compensation may reverse anywhere. The runs of a contour together
     are the contour: they meet exactly, keep its name, source and setting, and know the whole path
     as their `outline`. `PLAY_NOT_KNOWN` when neither axis has any: nothing is changed then.
     """
     residual = residuals(machine)
     if not any(each.matters for each in residual):
-        return tuple(items), (_no_play(machine),)
+        return tuple(items), (_no_backlash(machine),)
     counts = _Counts()
     found: list[Item] = []
     for item in items:
@@ -102,18 +103,20 @@ def fewer_reversals(
             found.append(item)
         else:
             found.extend(_runs_of(item, machine, residual, counts))
-    return tuple(found), tuple(_told(counts))
+    return tuple(found), tuple(_findings(counts))
 
 
 def _runs_of(
     contour: Contour, machine: Machine, residual: tuple[Residual, Residual], counts: _Counts
 ) -> list[Item]:
     parts = parts_of(contour.path)
-    turns = _turns(parts, machine, residual)
-    division = Division.of(parts, turns, residual, either_way=not _keeps_direction(contour))
+    reversals = _reversals(parts, machine, residual)
+    division = Division.of(
+        parts, reversals, residual, either_direction=not _keeps_direction(contour)
+    )
     closed, levels = contour.path.closed, len(contour.setting.levels_mm)
-    count, error_mm = len(turns[0]) + len(turns[1]), drawn_error_mm(division)
-    at_start = count - sum(each.within(len(parts)) for each in turns)
+    count, error_mm = len(reversals[0]) + len(reversals[1]), drawn_error_mm(division)
+    at_start = count - sum(each.within(len(parts)) for each in reversals)
     runs = 1 if closed or contour.reversible else levels
     counts.before.add(runs, count * levels - at_start, error_mm)
     reason = _stays_whole(contour.setting.operation)
@@ -124,23 +127,23 @@ def _runs_of(
         pieces = division.pieces()
         counts.after.add(len(pieces) * levels, 0, max(piece.error_mm for piece in pieces))
         return [
-            _part(contour, parts.stretch(piece.first, piece.last), piece.backward)
+            _part(contour, parts.subpath(piece.first, piece.last), piece.backward)
             for piece in pieces
         ]
     counts.whole.setdefault(reason, []).append(contour.name)
     if closed and contour.setting.operation.start == "nearest":
-        contour, at_start = _begun_at_turns(contour, parts, turns)
+        contour, at_start = _begun_at_reversals(contour, parts, reversals)
     counts.after.add(runs, count * levels - at_start, error_mm)
     return [contour]
 
 
-def _turns(
+def _reversals(
     parts: Parts, machine: Machine, residual: tuple[Residual, Residual]
-) -> tuple[Turns, Turns]:
+) -> tuple[AxisReversals, AxisReversals]:
     x, y = (
-        turns_of(parts.places[:, index], parts.path.closed, least_turn_mm(axis))
+        reversals_along(parts.places[:, index], parts.path.closed, least_reversal_mm(axis))
         if residual[index].matters
-        else no_turns(len(parts))
+        else no_reversals(len(parts))
         for index, axis in enumerate((machine.axes.x, machine.axes.y))
     )
     return x, y
@@ -184,22 +187,22 @@ def _part(contour: Contour, path: Polyline, backward: bool) -> Contour:
     )
 
 
-def _begun_at_turns(
-    contour: Contour, parts: Parts, turns: tuple[Turns, Turns]
+def _begun_at_reversals(
+    contour: Contour, parts: Parts, reversals: tuple[AxisReversals, AxisReversals]
 ) -> tuple[Contour, int]:
-    """The closed contour with only those starts at which the most turns happen in the air, and
+    """The closed contour with only those starts at which the most reversals happen in the air, and
     how many do: two at most, one of X and one of Y."""
     count = len(parts)
     if len(contour.starts):
         at = np.flatnonzero(parts.begin == 0.0)[contour.starts]
     else:
-        ends = [np.append(each.first, each.last) for each in turns]
+        ends = [np.append(each.first, each.last) for each in reversals]
         at = np.unique(np.concatenate(ends) % count)
     if len(at) == 0:
         return contour, 0
     held = [
         ((at[:, None] - each.first) % count <= each.last - each.first).any(axis=1)
-        for each in turns
+        for each in reversals
     ]
     saved = held[0].astype(np.int64) + held[1]
     best = saved == saved.max()
@@ -209,7 +212,7 @@ def _begun_at_turns(
     return replace(contour, path=path, starts=starts), int(saved.max())
 
 
-def _told(counts: _Counts) -> Iterator[Finding]:
+def _findings(counts: _Counts) -> Iterator[Finding]:
     before, after = counts.before, counts.after
     if before.reversals:
         yield REVERSALS_IN_AIR(
@@ -224,7 +227,7 @@ def _told(counts: _Counts) -> Iterator[Finding]:
         yield REVERSALS_IN_AIR_NOT(where=names[0], measured=len(names), reason=reason)
 
 
-def _no_play(machine: Machine) -> Finding:
+def _no_backlash(machine: Machine) -> Finding:
     return PLAY_NOT_KNOWN_TO_SAVE(where="axes x, y", machine=machine.target.name)
 
 
@@ -244,17 +247,17 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Division:
-    """A path to be divided into runs in which no axis turns round, each in the direction that errs
-    less: its parts, the turns of both axes along them, the residual errors of both axes;
-    `either_way`: pieces may be cut backward.
+    """A path to be divided into runs in which no axis reverses, each in the direction that errs
+    less: its parts, the reversals of both axes along them, the residual errors of both axes;
+    `either_direction`: pieces may be cut backward.
 
     On the PIC machine a contour cut in one go showed errors that vanished when it was cut as two
     halves, both from one point («maquinado en espejo», L2816-2841, L3200-3202): each half drives
-    each axis in one direction only, so that the play stays taken up. Here every contour becomes
-    such runs.
+    each axis in one direction only, so that the backlash stays taken up. Here every contour
+    becomes such runs.
 
-    Each turn of an axis must be divided somewhere on its stretch; one place may serve both axes
-    (the corner of a square). Only the ends of stretches need to be tried. Of all divisions the one
+    The path must be divided somewhere on the span of each reversal; one place may serve both axes
+    (the corner of a square). Only the ends of spans need to be tried. Of all divisions the one
     with the smallest greatest error is taken; then with the fewest runs; then that which drives
     the axes in one direction throughout, as far as it can, so that the error is the same all over
     the part; then with the smallest error over its length: two passes of dynamic programming along
@@ -262,55 +265,57 @@ class Division:
     """
 
     parts: Parts
-    turns: tuple[Turns, Turns]
+    reversals: tuple[AxisReversals, AxisReversals]
     residual: tuple[Residual, Residual]
     errors: Floats
     lengths: Floats
-    either_way: bool
+    either_direction: bool
 
     @classmethod
     def of(
         cls,
         parts: Parts,
-        turns: tuple[Turns, Turns],
+        reversals: tuple[AxisReversals, AxisReversals],
         residual: tuple[Residual, Residual],
         *,
-        either_way: bool,
+        either_direction: bool,
     ) -> Division:
         """With the predicted errors of all parts."""
         lengths = segment_lengths(parts.segments)
-        return cls(parts, turns, residual, part_errors(parts, residual), lengths, either_way)
+        return cls(
+            parts, reversals, residual, part_errors(parts, residual), lengths, either_direction
+        )
 
     def pieces(self) -> list[Piece]:
         """The runs of the path in its order; together they are the path."""
         if not self.parts.path.closed:
             return _cheapest(self, 0)[1]
-        turns = [(t.first, t.last) for t in self.turns if len(t)]
-        if not turns:
+        reversals = [(t.first, t.last) for t in self.reversals if len(t)]
+        if not reversals:
             return _cheapest(self, 0)[1]
-        first, last = (np.concatenate(column) for column in zip(*turns, strict=True))
+        first, last = (np.concatenate(column) for column in zip(*reversals, strict=True))
         shortest = int((last - first).argmin())
         begins = _places(self, int(first[shortest]), int(last[shortest]))
         return min((_cheapest(self, begin) for begin in begins), key=lambda each: each[0])[1]
 
-    def ways(self, first: int, last: int) -> list[Piece]:
-        """The piece between two places between which no axis turns round, in each way in which
-        it may be cut."""
-        ways = (1, -1) if self.either_way else (1,)
-        return [self._piece(first, last, way) for way in ways]
+    def variants(self, first: int, last: int) -> list[Piece]:
+        """The piece between two places between which no axis reverses, in each direction in
+        which it may be cut."""
+        directions = (1, -1) if self.either_direction else (1,)
+        return [self._piece(first, last, direction) for direction in directions]
 
-    def _piece(self, first: int, last: int, way: int) -> Piece:
+    def _piece(self, first: int, last: int, direction: int) -> Piece:
         index = np.arange(first, last) % len(self.parts)
         columns, spread_mm = [], 0.0
-        for turns, residual in zip(self.turns, self.residual, strict=True):
+        for reversals, residual in zip(self.reversals, self.residual, strict=True):
             # An axis that stands still came in its better direction.
-            sense = way * int(np.sign(turns.sense[index].sum())) or residual.better
+            sense = direction * int(np.sign(reversals.sense[index].sum())) or residual.better
             columns.append(int(sense > 0))
             if sense != residual.better:
                 spread_mm += abs(residual.plus_mm - residual.minus_mm)
         errors = self.errors[index, columns[0], columns[1]]
         weight = float(errors @ self.lengths[index])
-        return Piece(first, last, way < 0, float(errors.max()), spread_mm, weight)
+        return Piece(first, last, direction < 0, float(errors.max()), spread_mm, weight)
 
 
 def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
@@ -336,8 +341,8 @@ def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
 def drawn_error_mm(division: Division) -> float:
     """The greatest predicted error when the path is cut as it is drawn, in one go."""
     columns = []
-    for axis, turns in enumerate(division.turns):
-        sense, better = turns.sense, division.residual[axis].better
+    for axis, reversals in enumerate(division.reversals):
+        sense, better = reversals.sense, division.residual[axis].better
         # An axis that stands still stays where it was driven to last.
         last = np.maximum.accumulate(np.where(sense != 0, np.arange(len(sense)), -1))
         held = np.where(last >= 0, sense[last], better)
@@ -351,7 +356,7 @@ Cost = tuple[int, float, float]
 
 
 def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[Piece]]:
-    """The best division of the way from place `begin` once around, or to the end, with its
+    """The best division of the path from place `begin` once around, or to the end, with its
     greatest error in ALIKE_MM and its cost."""
     places = _places(division, begin, begin + len(division.parts))
     pieces = list(_possible(division, places))
@@ -378,35 +383,35 @@ def _traced(came: Sequence[tuple[int, Piece] | None]) -> list[Piece]:
 
 
 def _possible(division: Division, places: list[int]) -> Iterator[tuple[int, int, Piece]]:
-    """Pieces from place i to place j of `places` in all ways, in the order of i: each ends before,
-    or on, the first turn that lies ahead as a whole."""
+    """Pieces from place i to place j of `places` in all directions, in the order of i: each ends
+    before, or on, the first reversal that lies ahead as a whole."""
     reach = _reaches(division, np.array(places, dtype=np.int64))
     for i, first in enumerate(places):
         for j in range(i + 1, len(places)):
             if places[j] > reach[i]:
                 break
-            for piece in division.ways(first, places[j]):
+            for piece in division.variants(first, places[j]):
                 yield i, j, piece
 
 
 def _reaches(division: Division, places: Ints) -> Floats:
-    """(P,) the farthest place that no turn forbids to a piece from each of the places."""
+    """(P,) the farthest place that no reversal forbids to a piece from each of the places."""
     count = len(division.parts)
     laps = np.arange(3 if division.parts.path.closed else 1) * count
-    first = np.concatenate([(t.first + laps[:, None]).ravel() for t in division.turns])
-    last = np.concatenate([(t.last + laps[:, None]).ravel() for t in division.turns])
+    first = np.concatenate([(t.first + laps[:, None]).ravel() for t in division.reversals])
+    last = np.concatenate([(t.last + laps[:, None]).ravel() for t in division.reversals])
     order = np.argsort(first, kind="stable")
-    # Of all turns that begin after a place, the one that ends first.
+    # Of all reversals that begin after a place, the one that ends first.
     soonest = np.minimum.accumulate(np.append(last[order], np.inf)[::-1])[::-1]
     return np.asarray(soonest[np.searchsorted(first[order], places, side="right")])
 
 
 def _places(division: Division, begin: int, end: int) -> list[int]:
-    """Where a path may be divided between two places, these too: the ends of all stretches, and
+    """Where a path may be divided between two places, these too: the ends of all spans, and
     where an axis of an open path begins or ends to move."""
     count, found = len(division.parts), {begin, end}
-    for turns in division.turns:
-        found.update(turns.first.tolist(), turns.last.tolist(), turns.moves or ())
+    for reversals in division.reversals:
+        found.update(reversals.first.tolist(), reversals.last.tolist(), reversals.moves or ())
     if division.parts.path.closed:
         found |= {place + count for place in found} | {place + 2 * count for place in found}
     return sorted(place for place in found if begin <= place <= end)
@@ -435,7 +440,7 @@ class Parts:
         bulge = np.tan(0.25 * sweep * (self.end - self.begin))
         return Segments.between(self.places[:-1], self.places[1:], bulge)
 
-    def stretch(self, first: int, last: int) -> Polyline:
+    def subpath(self, first: int, last: int) -> Polyline:
         """The open path from place `first` to place `last`; beyond A a closed path goes on.
 
         Parts of one segment are one segment again.
@@ -495,19 +500,19 @@ def parts_of(path: Polyline) -> Parts:
 
 
 @dataclass(frozen=True, eq=False)
-class Turns:
-    """Turns of one axis along A parts.
+class AxisReversals:
+    """Reversals of one axis along A parts.
 
-    The way along the axis is a list of values, and it turns at its highest and lowest ones. What
-    comes back by less than a least way is no turn: the controller may never see it. A turn is not
-    a point but a stretch: a line across the axis lies on the extreme as a whole, and whether it
-    belongs to the way up or to the way down is free.
+    The positions of the axis are a list of values, and it reverses at its highest and lowest ones.
+    What comes back by less than a least distance is no reversal: the controller may never see it.
+    A reversal is not a point but a span: a line across the axis lies on the extreme as a whole,
+    and whether it belongs to the motion before or after is free.
 
-    `sense` (A,): the direction ±1 in which the axis is driven on each part; 0 on the stretches of
-    turns, before the first motion and after the last one. `first`, `last` (T,): the places at the
-    two ends of each turn's stretch; `last` goes on beyond A where the stretch of a closed path
-    holds its first place. `moves`: the places between which the axis of an open path moves at
-    all; None for a closed one, and where it never moves.
+    `sense` (A,): the direction ±1 in which the axis is driven on each part; 0 on the spans of
+    reversals, before the first motion and after the last one. `first`, `last` (T,): the places at
+    the two ends of each span; `last` goes on beyond A where the span of a closed path holds its
+    first place. `moves`: the places between which the axis of an open path moves at all; None for
+    a closed one, and where it never moves.
     """
 
     sense: Ints
@@ -524,84 +529,85 @@ class Turns:
         return int(((self.first > 0) & (self.last < count)).sum())
 
 
-def no_turns(count: int) -> Turns:
-    """The turns of an axis that never moves, or does not matter, along `count` parts."""
+def no_reversals(count: int) -> AxisReversals:
+    """The reversals of an axis that never moves, or does not matter, along `count` parts."""
     none = np.empty(0, dtype=np.int64)
-    return Turns(np.zeros(count, dtype=np.int64), none, none)
+    return AxisReversals(np.zeros(count, dtype=np.int64), none, none)
 
 
-def turns_of(values: Floats, closed: bool, least_mm: float) -> Turns:
-    """Where `values` (A+1,), the way along one axis in mm, come back by `least_mm` or more."""
+def reversals_along(values: Floats, closed: bool, least_mm: float) -> AxisReversals:
+    """Where `values` (A+1,), the positions of one axis in mm, come back by `least_mm` or more."""
     count = len(values) - 1
-    # A closed way is begun at its highest value, which is a turn if there are any.
+    # A closed path is begun at its highest value, which is a reversal if there are any.
     begin = int(values[:-1].argmax()) if closed else 0
-    way = np.append(np.roll(values[:-1], -begin), values[begin]) if closed else values
-    values_mm = way.tolist()
-    knots = _knots(values_mm, least_mm)
-    if not knots:
-        return no_turns(count)
+    path_values = np.append(np.roll(values[:-1], -begin), values[begin]) if closed else values
+    values_mm = path_values.tolist()
+    extremes = _extremes(values_mm, least_mm)
+    if not extremes:
+        return no_reversals(count)
     if closed:
-        knots[0], knots[-1] = 0, count
+        extremes[0], extremes[-1] = 0, count
     sense = np.zeros(count, dtype=np.int64)
-    for one, other in pairwise(knots):
-        sense[one:other] = 1 if way[other] > way[one] else -1
-    flats = [_flat(values_mm, knot, closed, least_mm) for knot in knots]
+    for one, other in pairwise(extremes):
+        sense[one:other] = 1 if path_values[other] > path_values[one] else -1
+    flats = [_flat(values_mm, extreme, closed, least_mm) for extreme in extremes]
     for low, high in flats:
         sense[np.arange(low, high) % count] = 0
     turning = np.array(flats[1:] if closed else flats[1:-1], dtype=np.int64).reshape(-1, 2)
     if not closed:
-        return Turns(sense, turning[:, 0], turning[:, 1], (flats[0][1], flats[-1][0]))
+        return AxisReversals(sense, turning[:, 0], turning[:, 1], (flats[0][1], flats[-1][0]))
     turning += begin
     turning -= np.where(turning[:, :1] >= count, count, 0)
-    return Turns(np.roll(sense, begin), turning[:, 0], turning[:, 1])
+    return AxisReversals(np.roll(sense, begin), turning[:, 0], turning[:, 1])
 
 
-def _knots(values: list[float], least_mm: float) -> list[int]:
-    """The places where the way begins, turns, and is furthest at last; [] when it is shorter than
-    `least_mm` throughout."""
-    low = high = far = way = 0
-    knots: list[int] = []
+def _extremes(values: list[float], least_mm: float) -> list[int]:
+    """The places where the motion begins, reverses, and is furthest at last; [] when it is shorter
+    than `least_mm` throughout."""
+    low = high = far = sense = 0
+    extremes: list[int] = []
     for place, value in enumerate(values):
-        if way == 0:
+        if sense == 0:
             low = place if value < values[low] else low
             high = place if value > values[high] else high
             if values[high] - values[low] >= least_mm:
-                knots, far = [min(low, high)], place
-                way = 1 if place == high else -1
-        elif (value - values[far]) * way > 0.0:
+                extremes, far = [min(low, high)], place
+                sense = 1 if place == high else -1
+        elif (value - values[far]) * sense > 0.0:
             far = place
-        elif (values[far] - value) * way >= least_mm:
-            knots.append(far)
-            far, way = place, -way
-    return [*knots, far] if knots else []
+        elif (values[far] - value) * sense >= least_mm:
+            extremes.append(far)
+            far, sense = place, -sense
+    return [*extremes, far] if extremes else []
 
 
-def _flat(values: list[float], knot: int, closed: bool, least_mm: float) -> tuple[int, int]:
-    """The places before and after `knot` up to which the way stays within `least_mm` of it; those
-    of a closed way go on before 0 and beyond its end."""
+def _flat(values: list[float], extreme: int, closed: bool, least_mm: float) -> tuple[int, int]:
+    """The places before and after `extreme` up to which the values stay within `least_mm`; those
+    of a closed path go on before 0 and beyond its end."""
     count = len(values) - 1
-    low = high = knot
-    while (closed or low > 0) and abs(values[(low - 1) % count] - values[knot]) < least_mm:
+    low = high = extreme
+    while (closed or low > 0) and abs(values[(low - 1) % count] - values[extreme]) < least_mm:
         low -= 1
     while (closed or high < count) and abs(
-        values[(high + 1) % count if closed else high + 1] - values[knot]
+        values[(high + 1) % count if closed else high + 1] - values[extreme]
     ) < least_mm:
         high += 1
     return low, high
 
 
 class Approaches:
-    """Where the tool comes from, so that no axis has play left in front of it when a cut begins.
+    """Where the tool comes from, so that no axis has backlash left to cross when a cut begins.
 
     The tool goes down where it last moved to in XY. If each axis came there in the direction in
-    which the cut first drives it, and over more than its play, its slide is engaged from the first
-    step of the cut on, and the controller has nothing to compensate. An axis that the cut does not
-    drive comes in the direction that leaves the smaller error: always the same one, so that holes
-    and lines along the other axis keep their distances. All of this happens above the stock.
+    which the cut first drives it, and over more than its backlash, its slide is engaged from the
+    first step of the cut on, and the controller has nothing to compensate. An axis that the cut
+    does not drive comes in the direction that leaves the smaller error: always the same one, so
+    that holes and lines along the other axis keep their distances. All of this happens above the
+    stock.
 
-    It is asked run by run, with nothing between them but the way up, across and down (a tool
+    It is asked run by run, with nothing between them but the moves up, across and down (a tool
     change needs a fresh one): an axis that still stands engaged from the run before goes straight
-    to the start. Play is the largest of all regions.
+    to the start. Backlash is the largest of all regions.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -612,11 +618,11 @@ class Approaches:
 
     def __call__(self, run: Run) -> tuple[float, float] | None:
         """Where the tool goes first (x, y) mm, at safe z; None: straight to the first point of the
-        run, as always where neither axis has play or compensation.
+        run, as always where neither axis has backlash or compensation.
 
-        The place lies beside the run, nearer than the play and `APPROACH_MARGIN_MM` on each axis.
-        Nothing keeps it within the travel: a nearer one would not do, and the toolpath that holds
-        it is checked as a whole.
+        The place lies beside the run, nearer than the backlash and `APPROACH_MARGIN_MM` on each
+        axis. Nothing keeps it within the travel: a nearer one would not do, and the toolpath that
+        holds it is checked as a whole.
         """
         path = flat(run.vertices)
         places = run.vertices[:1, :2] if path is None else parts_of(path).places
@@ -627,11 +633,11 @@ class Approaches:
 
 
 class _Drive:
-    """One axis on its way: where it is, in which direction ±1 it moved last, and since where."""
+    """One axis in motion: where it is, in which direction ±1 it moved last, and since where."""
 
     def __init__(self, axis: Axis, residual: Residual) -> None:
         self._residual = residual
-        self._least_mm, self._need_mm = least_turn_mm(axis), approach_mm(axis)
+        self._least_mm, self._need_mm = least_reversal_mm(axis), approach_mm(axis)
         self._at = self._since = math.nan
         self._sense = 0
 
@@ -652,44 +658,45 @@ class _Drive:
         """The direction in which a run first drives the axis; the better one when it does not."""
         if len(values) == 1:
             return self._residual.better
-        sense = turns_of(np.array(values), False, self._least_mm).sense
+        sense = reversals_along(np.array(values), False, self._least_mm).sense
         moving = np.flatnonzero(sense)
         return int(sense[moving[0]]) if len(moving) else self._residual.better
 
     def _go(self, value: float) -> None:
-        way = value - self._at
-        if not way * self._sense >= 0.0:
-            self._since, self._sense = self._at, 1 if way > 0.0 else -1
+        step = value - self._at
+        if not step * self._sense >= 0.0:
+            self._since, self._sense = self._at, 1 if step > 0.0 else -1
         self._at = value
 
 
 def approach_mm(axis: Axis) -> float:
     """How far an axis must be driven in one direction until its slide follows for certain: what
-    the controller's compensation leaves of the play, and the margin."""
+    the controller's compensation leaves of the backlash, and the margin."""
     return max(axis.backlash_mm - axis.compensation_mm, 0.0) + APPROACH_MARGIN_MM
 
 
-def least_turn_mm(axis: Axis) -> float:
-    """How far back an axis must go to turn round."""
+def least_reversal_mm(axis: Axis) -> float:
+    """How far back an axis must go to reverse."""
     return REVERSAL_STEPS * axis.coded_step_mm
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What play and its compensation leave over on one axis: the error of its slide in mm when
-    driven towards − and towards +; `matters`: there is play or compensation; `better`: the
+    """What backlash and its compensation leave over on one axis: the error of its slide in mm when
+    driven towards − and towards +; `matters`: there is backlash or compensation; `better`: the
     direction ±1 of the smaller error (where both are alike, the one in which the axis is engaged
     at first).
 
-    An axis that has been driven in one direction for longer than its play stands at a fixed
-    distance from where the controller believes it to be. With the play operator of
+    An axis that has been driven in one direction for longer than its backlash stands at a fixed
+    distance from where the controller believes it to be. With the backlash operator of
     `camtool.kernels.play`, low ≤ slide − motor ≤ high, and c added at each reversal from the
     direction engaged at first:
 
         in the first direction:   motor = position,       in the other one:   motor = position ∓ c,
         driven towards +:         slide = motor + low,    towards −:          slide = motor + high.
 
-    The difference of the two is |play − c|. Compensation as exact as the play would leave none;
+    The difference of the two is |backlash − c|. Compensation as exact as the backlash would leave
+    none;
     the PIC machine's leaves 11.5 µm in X and 9.5 µm in Y (docs/decisions/0005-play.md).
     """
 
@@ -703,15 +710,15 @@ class Residual:
         return self.plus_mm if sense > 0 else self.minus_mm
 
 
-def plays_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
-    """The play of an axis in every region of the table, mm."""
+def backlashes_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
+    """The backlash of an axis in every region of the table, mm."""
     return (axis.backlash_mm,) if cells is None else tuple(chain.from_iterable(cells.play_mm))
 
 
 def loosest(machine: Machine) -> tuple[Axis, Axis]:
-    """X and Y with the largest play of all regions."""
+    """X and Y with the largest backlash of all regions."""
     x, y, _ = (
-        msgspec.structs.replace(axis, backlash_mm=max(plays_mm(axis, cells)))
+        msgspec.structs.replace(axis, backlash_mm=max(backlashes_mm(axis, cells)))
         for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
     )
     return x, y
@@ -719,13 +726,13 @@ def loosest(machine: Machine) -> tuple[Axis, Axis]:
 
 def residuals(machine: Machine) -> tuple[Residual, Residual]:
     """X and Y of a machine, each in the region where compensation leaves most over: where a
-    contour is divided then hangs on its shape alone, not on where it lies, and what is told to be
-    left over is left nowhere else."""
+    contour is divided then hangs on its shape alone, not on where it lies, and what is reported
+    as left over is left nowhere else."""
     x, y, _ = (
         max(
             (
                 residual(msgspec.structs.replace(axis, backlash_mm=play), machine.controller)
-                for play in plays_mm(axis, cells)
+                for play in backlashes_mm(axis, cells)
             ),
             key=lambda one: abs(one.plus_mm - one.minus_mm),
         )

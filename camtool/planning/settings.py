@@ -1,4 +1,4 @@
-"""An operation's numbers, the machine's where the job is silent: depth, passes, feeds, safe Z."""
+"""An operation's numbers: depth, passes, feeds, safe Z; the machine's where the job gives none."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_PASSES = 10_000
 
 
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
-    """The operation with the machine's numbers where it is silent; OptionError when too fast,
+    """The operation with the machine's numbers where it gives none; OptionError when too fast,
     and for passes that cannot be."""
     depth = depth_of(operation, machine)
     try:
@@ -50,16 +50,16 @@ def depth_of(operation: Operation, machine: Machine) -> float:
 def feeds_of(operation: Operation, machine: Machine) -> Feeds:
     """The operation's feeds, or the machine's, none above the rates of the axes.
 
-    Plunges that nobody speaks of run at the feed of the cut, or at the highest that Z can.
+    A plunge feed that is not given is the feed of the cut, or the highest that Z can.
     OptionError for feeds above what the machine takes at all, naming the highest.
     """
-    said = operation.plunge_feed_mm_min
+    given = operation.plunge_feed_mm_min
     cut = operation.feed_mm_min
     cut = machine.feed.default_mm_min if cut is None else cut
-    plunge = cut if said is None else said
-    if said is None and _above(cut, machine.max_plunge_mm_min):
-        plunge = _sayable(machine.max_plunge_mm_min, machine)
-    held: dict[str, float] = {}
+    plunge = cut if given is None else given
+    if given is None and _above(cut, machine.max_plunge_mm_min):
+        plunge = _programmable(machine.max_plunge_mm_min, machine)
+    lowered: dict[str, float] = {}
     for name, flag, feed, highest in (
         ("feed", "--feed", cut, machine.max_feed_mm_min),
         ("plunge feed", "--plunge-feed", plunge, machine.max_plunge_mm_min),
@@ -69,35 +69,35 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
                 f"{name} {feed:g} mm/min is above {highest:.4g} mm/min, the highest of"
                 f" {machine.target.name}",
                 where=key_of(operation, name.replace(" ", "_")),
-                mend=f"use {flag} {_sayable(highest, machine):g} or less",
+                mend=f"use {flag} {_programmable(highest, machine):g} or less",
             )
         if _above(feed, highest):
-            held[name] = _sayable(highest, machine)
-    return Feeds(held.get("feed", cut), held.get("plunge feed", plunge))
+            lowered[name] = _programmable(highest, machine)
+    return Feeds(lowered.get("feed", cut), lowered.get("plunge feed", plunge))
 
 
 def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
     """Feeds of the job, or of the machine, that the rates of its axes do not allow, each once."""
     axes = machine.axes
-    told: set[tuple[str, float]] = set()
+    reported: set[tuple[str, float]] = set()
     for operation in job.operations:
         cut = operation.feed_mm_min or machine.feed.default_mm_min
-        for name, said, highest, which in (
+        for name, given, highest, which in (
             ("feed", cut, machine.max_feed_mm_min, "xy"),
             ("plunge feed", operation.plunge_feed_mm_min, machine.max_plunge_mm_min, "z"),
         ):
-            if said is None or not _above(said, highest) or (name, said) in told:
+            if given is None or not _above(given, highest) or (name, given) in reported:
                 continue
-            told.add((name, said))
-            slow = [n for n in which if _above(said, getattr(axes, n).max_rate_mm_min or said)]
+            reported.add((name, given))
+            slow = [n for n in which if _above(given, getattr(axes, n).max_rate_mm_min or given)]
             yield FEED_ABOVE_LIMIT_IN_JOB(
                 where=operation_name(operation),
-                measured=said,
+                measured=given,
                 limit=highest,
                 feed=name,
-                lowered=_sayable(highest, machine),
+                lowered=_programmable(highest, machine),
                 machine=machine.target.name,
-                mend=own_numbers(machine, [f"axes.{n}.max_rate_mm_min={said:g}" for n in slow]),
+                mend=own_numbers(machine, [f"axes.{n}.max_rate_mm_min={given:g}" for n in slow]),
             )
 
 
@@ -105,8 +105,8 @@ def _above(feed: float, highest: float) -> bool:
     return feed > highest * (1.0 + FEED_TOLERANCE)
 
 
-def _sayable(highest_mm_min: float, machine: Machine) -> float:
-    """The highest feed not above the highest that the dialect can say."""
+def _programmable(highest_mm_min: float, machine: Machine) -> float:
+    """The highest programmable feed that is not above this one."""
     unit = machine.feed.unit_mm_min
     units = math.floor(highest_mm_min / unit * (1.0 + FEED_TOLERANCE))
     return units * unit or highest_mm_min

@@ -3,13 +3,13 @@
 Sides follow from the nesting of the whole drawing, whatever an operation takes of it.
 A closed contour that an even number of others hold is the rim of a part, which stays; one that an
 odd number hold is the rim of a hole. All closed contours of the file are nested, those of other
-operations and those that nobody cuts too, or a window cut by itself would be taken for a part.
+operations and those that are not cut too, or a window cut by itself would be taken for a part.
 Not every contour bounds material, though. None of these holds anything:
 
 - what is only engraved or carved, for the part goes on beneath it;
 - the pocket of another operation that is less deep than the cut: what is drawn within it goes
   through its floor (a counterbore and its bore);
-- of what nobody cuts: what has a line type of its own, as centre lines, hidden edges and pitch
+- of what is not cut: what has a line type of its own, as centre lines, hidden edges and pitch
   circles have; what is on a layer of `Job.frames`; and what runs along a contour that is cut.
 """
 
@@ -32,10 +32,10 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.patterns import matches
 from camtool.planning.items import Chosen
 from camtool.planning.job import Job, Operation
-from camtool.planning.paths import middles
+from camtool.planning.paths import midpoints
 
 SAME_CONTOUR_MM = 0.01
-"""A contour that nobody cuts, and that runs along one that is cut so near, is that one again."""
+"""An uncut contour that runs this near along one that is cut is the same contour drawn again."""
 
 CONTINUOUS = ("", "continuous", "bylayer", "byblock")
 """Line types of edges that are seen."""
@@ -47,7 +47,7 @@ class Seen:
 
     `rim` (M,): what is within it is part, and stays. `holder` (M,): the smallest contour that
     holds it, −1 if none. `by_uncut` (M,): it would be the other side without the contours that
-    nobody cuts; `by_frames` (M,): with those that count as frames. `bounds` (M,): which contours
+    are not cut; `by_frames` (M,): with those that count as frames. `bounds` (M,): which contours
     bound material.
     """
 
@@ -106,7 +106,7 @@ class Sides:
 
     @cached_property
     def uncut(self) -> Bools:
-        """(M,) the closed contours that bound material though nobody cuts them."""
+        """(M,) the closed contours that bound material though they are not cut."""
         return np.asarray(self._idle & ~self.framed)
 
     @cached_property
@@ -185,7 +185,7 @@ def runs_beside(operation: Operation) -> bool:
 
 
 def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
-    """(M,) those of the closed contours that nobody cuts (`idle`) that run along one that is cut,
+    """(M,) those of the uncut closed contours (`idle`) that run along one that is cut,
     or along one before them."""
     found = np.zeros(len(lines), dtype=np.bool_)
     others = np.flatnonzero((cut & lines.closed) | idle)
@@ -205,7 +205,7 @@ def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
 
 def _runs_along(path: Polyline, other: Polyline) -> bool:
     segments = Segments.of(path)
-    points = np.concatenate([segments.start, middles(segments)])
+    points = np.concatenate([segments.start, midpoints(segments)])
     return bool((nearest(points, Segments.of(other)).distance <= SAME_CONTOUR_MM).all())
 
 

@@ -6,12 +6,12 @@ the path, where it goes up and comes down again, a bridge of the width w is left
     |A B| = w + 2 r,
 
 seen straight across: along a line the raised piece is w + 2 r long, along an arc a bit longer. No
-other part of the path may come as near to the middle of A B as these two: it would cut the bridge
-(as in a slot hardly wider than the tool, where there is nothing to hold on to). The sides of a tab
-are straight up and down, or slope; the bridge is w wide at its top. Slopes keep to the angle of
-the entry when that is a ramp, so that the tool never goes down more steeply.
+other part of the path may come as near to the midpoint of A B as these two: it would cut the
+bridge (as in a slot hardly wider than the tool, where there is nothing to hold on to). The sides
+of a tab are straight up and down, or slope; the bridge is w wide at its top. Slopes keep to the
+angle of the entry when that is a ramp, so that the tool never goes down more steeply.
 
-Tabs stand in the middle of equal shares of the path. One that would stand on a corner moves
+Tabs stand at the centre of equal shares of the path. One that would stand on a corner moves
 within its share to the nearest place where it does not, if there is one. The start of a closed
 path is where two shares meet, so that no tab stands on the seam.
 """
@@ -44,8 +44,8 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.planning.items import Bridge, Contour, Feeds, Item, Run
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name
-from camtool.planning.paths import QUARTER, Along
-from camtool.planning.ramps import Knots, feeds_along, lifted
+from camtool.planning.paths import QUARTER, MeasuredPath
+from camtool.planning.ramps import ZProfile, feeds_along, lifted
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
 """How steep the sides of ramped tabs are when the tool may plunge."""
@@ -57,7 +57,7 @@ TAB_CORNER_RAD = 0.1
 """A path that turns by more than this at a vertex has a corner, where no tab is put."""
 
 PLACES_PER_SIDE = 32
-"""So many places on either side of the middle of its share are tried for a tab on a corner."""
+"""So many places on either side of the centre of its share are tried for a tab on a corner."""
 
 TAB_SLACK_MM = 1e-5
 """A bridge may be narrower than asked by this much."""
@@ -146,7 +146,7 @@ def _is_long_enough(contour: Contour) -> bool:
     return count * (model.end + 2.0 * foot) <= total * (1.0 + COUNT_SLACK)
 
 
-def tabs_of(contour: Contour, along: Along) -> tuple[list[Tab], list[Finding]]:
+def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Finding]]:
     """The tabs of a contour whose path, from its start, is `along`; and those that do not fit.
 
     OptionError for tabs that are higher than the cut is deep or longer than the path together.
@@ -187,13 +187,13 @@ def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
     return model, model.foot(bottom_mm)
 
 
-def raised(knots: Knots, tabs: list[Tab], total_mm: float | None) -> Knots:
+def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfile:
     """The profile, kept above the tabs; `total_mm`: the length of a closed path, round which
     they come again, None for an open one."""
     if not tabs:
-        return knots
-    result: Knots = []
-    for (begin, z_begin), (end, z_end) in pairwise(knots):
+        return points
+    result: ZProfile = []
+    for (begin, z_begin), (end, z_end) in pairwise(points):
         # Only passes below its top know of a tab.
         near = [
             tab
@@ -210,12 +210,13 @@ def raised(knots: Knots, tabs: list[Tab], total_mm: float | None) -> Knots:
             places.update(_breaks(tab, begin, z_begin, slope))
         inside = sorted(p for p in places if min(begin, end) <= p <= max(begin, end))
         for p, q in pairwise(inside if begin < end else inside[::-1]):
-            # The height of a straight tab jumps at its ends: the middle tells which side this is.
+            # The height of a straight tab jumps at its ends: the midpoint shows which side this
+            # is.
             over = [tab for tab in near if tab.height(0.5 * (p + q)) > -math.inf]
             for place in (p, q):
                 line = z_end if place == end else z_begin + slope * (place - begin)
                 result.append((place, max([line, *(tab.height(place) for tab in over)])))
-    return [knot for k, knot in enumerate(result) if k == 0 or knot != result[k - 1]]
+    return [point for k, point in enumerate(result) if k == 0 or point != result[k - 1]]
 
 
 def _between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -> list[Tab]:
@@ -270,13 +271,13 @@ def _wanted(total_mm: float, operation: Operation) -> int:
     return tabs.count
 
 
-def _fitted(along: Along, model: Tab, foot: float, share: tuple[int, int]) -> Tab | None:
+def _fitted(along: MeasuredPath, model: Tab, foot: float, share: tuple[int, int]) -> Tab | None:
     """The tab in this one of so many shares of the path; None when it has no room there."""
     which, count = share
     size = along.total_mm / count
     low, high = which * size, (which + 1) * size
     corners = along.reach[: len(along.turns)][np.abs(along.turns) > TAB_CORNER_RAD]
-    # The middle, then in turn to both sides of it.
+    # The centre, then alternately to both sides of it.
     steps = np.arange(2 * PLACES_PER_SIDE)
     offs = (steps + 1) // 2 * np.where(steps % 2 == 1, 1.0, -1.0) / PLACES_PER_SIDE
     centres = low + size * (0.5 + 0.5 * offs)
@@ -292,7 +293,7 @@ def _fitted(along: Along, model: Tab, foot: float, share: tuple[int, int]) -> Ta
     return None
 
 
-def _half(along: Along, centre: float, chord: float, room: float) -> float | None:
+def _half(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:
     """Half the length about a place whose ends are so far apart; None beyond the room there is."""
 
     def lacks(halves: Floats) -> Floats:
@@ -314,8 +315,8 @@ def _half(along: Along, centre: float, chord: float, room: float) -> float | Non
     return high
 
 
-def _stays(along: Along, tab: Tab) -> bool:
-    """Whether no other part of the path comes nearer to the middle of the bridge than its ends."""
+def _stays(along: MeasuredPath, tab: Tab) -> bool:
+    """Whether no other part of the path comes nearer to the centre of the bridge than its ends."""
     ends = along.at(np.array([tab.begin, tab.end]))
     rest = [(0.0, tab.begin), (tab.end, along.total_mm)]
     if along.path.closed:
@@ -329,36 +330,36 @@ def _stays(along: Along, tab: Tab) -> bool:
     return True
 
 
-def _left_out(contour: Contour, along: Along, length: float) -> Finding:
+def _left_out(contour: Contour, along: MeasuredPath, length: float) -> Finding:
     return TAB_LEFT_OUT(where=at_place(contour.name, along.at(np.array([length]))[0].tolist()))
 
 
-def bridges_of(along: Along, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
+def bridges_of(along: MeasuredPath, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
     """The bridges of the tabs of a contour; none for a tool that cuts no width."""
     found = []
     for tab in tabs if tool.radius_mm > 0.0 else ():
-        a, b, middle = along.at(np.array([tab.begin, tab.end, 0.5 * (tab.begin + tab.end)]))
+        a, b, centre = along.at(np.array([tab.begin, tab.end, 0.5 * (tab.begin + tab.end)]))
         size = math.hypot(*(b - a))
         ahead = (b - a) / size
-        middle = middle + float((0.5 * (a + b) - middle) @ ahead) * ahead
+        centre = centre + float((0.5 * (a + b) - centre) @ ahead) * ahead
         half = 0.5 * size - tool.radius_mm
-        found.append(Bridge(middle, ahead, half, tool.radius_mm, tab.top_mm, tab.fall, name))
+        found.append(Bridge(centre, ahead, half, tool.radius_mm, tab.top_mm, tab.fall, name))
     return found
 
 
 @dataclass(frozen=True, eq=False)
-class Spared:
-    """The runs of an operation, raised where they would have cut bridges, and what is to be said
-    of that."""
+class RaisedRuns:
+    """The runs of an operation, raised where they would have cut bridges, and the
+    findings of that."""
 
     runs: tuple[Run, ...]
     findings: tuple[Finding, ...]
 
 
-def spared(
+def raised_over_bridges(
     runs: Sequence[Run], operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
-) -> Spared:
-    """The runs of an operation, kept above all bridges: whatever else is cut spares them.
+) -> RaisedRuns:
+    """The runs of an operation, kept above all bridges: no cut goes through them.
 
     A tab is made by the contour that it belongs to. The tool comes by again: round a neighbour
     that is nearer than two slots are wide, on the other side of a narrow contour, on a lead, or in
@@ -366,16 +367,16 @@ def spared(
     is wide:
 
         ────────────────────────────  wall      A, B: where the tool goes up and comes down again
-             ╭───╮ ┌─w─┐ ╭───╮                  the rectangle lies on the line through the middle
+             ╭───╮ ┌─w─┐ ╭───╮                  the rectangle lies on the line through the centre
              │ A │ │   │ │ B │                  of the tab, square to the chord A B
              ╰───╯ └───┘ ╰───╯
 
-    A tool of radius r cuts into it where its middle is nearer than r to the rectangle. There its
+    A tool of radius r cuts into it where its centre is nearer than r to the rectangle. There its
     run is raised to the top of the bridge, as by a tab of its own; so the neighbour has a bridge
-    there too, which is said.
+    there too, which is a finding.
     """
     if not bridges or not runs:
-        return Spared(tuple(runs), ())
+        return RaisedRuns(tuple(runs), ())
     reach = operation.tool.radius_mm
     index = BoxIndex(np.array([_box(bridge, reach) for bridge in bridges]))
     made, found = [], _Found()
@@ -383,7 +384,7 @@ def spared(
         _, rows = index.touching(np.concatenate(_extent(run))[None])
         near = [bridges[row] for row in rows.tolist()]
         made.append(_raised(run, near, operation.tool, feeds, found) if near else run)
-    return Spared(tuple(made), tuple(found.told(operation)))
+    return RaisedRuns(tuple(made), tuple(found.findings(operation)))
 
 
 class _Found:
@@ -393,17 +394,17 @@ class _Found:
         self.shared: dict[int, tuple[Bridge, str]] = {}
         self.drilled: dict[int, tuple[Bridge, str]] = {}
 
-    def told(self, operation: Operation) -> Iterator[Finding]:
+    def findings(self, operation: Operation) -> Iterator[Finding]:
         if self.shared:
             bridge, name = next(iter(self.shared.values()))
             yield (TAB_SHARED_WITH_OWN if operation.tabs else TAB_SHARED)(
-                where=at_place(name, bridge.middle.tolist()),
+                where=at_place(name, bridge.centre.tolist()),
                 measured=len(self.shared),
                 contour=bridge.name,
             )
         for bridge, name in self.drilled.values():
             yield TAB_LEFT_OUT_DRILLED(
-                where=at_place(name, bridge.middle.tolist()), contour=bridge.name
+                where=at_place(name, bridge.centre.tolist()), contour=bridge.name
             )
 
 
@@ -420,8 +421,8 @@ def _raised(run: Run, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _
         for bridge in near:
             _drilled(run, bridge, tool, found)
         return run
-    along = Along.of(Polyline(path))
-    knots: Knots = list(zip(along.reach[group].tolist(), vertices[:, 2].tolist(), strict=True))
+    along = MeasuredPath.of(Polyline(path))
+    points: ZProfile = list(zip(along.reach[group].tolist(), vertices[:, 2].tolist(), strict=True))
     low = np.full(len(along.segments), math.inf)
     for end in (0, 1):  # the height at both ends of each move
         z = vertices[np.flatnonzero(moves) + end, 2]
@@ -434,7 +435,7 @@ def _raised(run: Run, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _
         tabs += own
     if not tabs:
         return run
-    made = lifted(along, raised(knots, tabs, None))
+    made = lifted(along, raised(points, tabs, None))
     return replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
 
 
@@ -446,8 +447,8 @@ def _drilled(run: Run, bridge: Bridge, tool: Tool, found: _Found) -> None:
         found.drilled[id(bridge)] = (bridge, run.name)
 
 
-def _over(along: Along, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab]:
-    """The stretches of a path, with the lowest z (n,) of each of its segments, where the tool
+def _over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab]:
+    """The pieces of a path, with the lowest z (n,) of each of its segments, where the tool
     would cut into a bridge."""
     is_low = low < bridge.top_mm - POSITION_EPS_MM
     if not is_low.any():
@@ -465,8 +466,8 @@ def _over(along: Along, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab
     spans: list[tuple[float, float, bool]] = []
     for k, row in enumerate(rows.tolist()):
         parts = np.unique(np.concatenate([[0.0, 1.0], meets.ta[meets.row_a == k]]))
-        middles = 0.5 * (parts[:-1] + parts[1:])
-        within = inside(point_at(along.segments, np.full(len(middles), row), middles), zone)
+        centres = 0.5 * (parts[:-1] + parts[1:])
+        within = inside(point_at(along.segments, np.full(len(centres), row), centres), zone)
         begin, size = along.reach[row], along.reach[row + 1] - along.reach[row]
         for i in np.flatnonzero(within).tolist():
             first, last = float(begin + size * parts[i]), float(begin + size * parts[i + 1])
@@ -475,21 +476,21 @@ def _over(along: Along, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab
                 first, _, was = spans.pop()
                 deep = deep or was
             spans.append((first, last, deep))
-    # What is up already, by a tab of its own, belongs to the stretch: it does not go down between.
+    # What is up already, by a tab of its own, belongs to the piece: it does not go down between.
     for first, last, deep in spans:
         if deep:
             yield Tab(first, last, bridge.top_mm, bridge.fall)
 
 
 def _zone(bridge: Bridge, reach_mm: float) -> Polyline:
-    """Where the middle of a tool of this radius would cut into a bridge."""
+    """Where the centre of a tool of this radius would cut into a bridge."""
     aside = np.array([-bridge.ahead[1], bridge.ahead[0]])
     w, s, r = bridge.half_width_mm, bridge.half_span_mm, reach_mm
     corners = [
         (w + r, -s, 0.0), (w + r, s, QUARTER), (w, s + r, 0.0), (-w, s + r, QUARTER),
         (-w - r, s, 0.0), (-w - r, -s, QUARTER), (-w, -s - r, 0.0), (w, -s - r, QUARTER),
     ]  # fmt: skip
-    rows = [[*(bridge.middle + t * bridge.ahead + n * aside), b] for t, n, b in corners]
+    rows = [[*(bridge.centre + t * bridge.ahead + n * aside), b] for t, n, b in corners]
     return Polyline(np.array(rows), closed=True)
 
 
@@ -503,7 +504,7 @@ def _radius_at(tool: Tool, above_tip_mm: float) -> float:
 
 def _box(bridge: Bridge, reach: float) -> tuple[float, float, float, float]:
     size = math.hypot(bridge.half_width_mm, bridge.half_span_mm) + reach
-    x, y = bridge.middle.tolist()
+    x, y = bridge.centre.tolist()
     return x - size, y - size, x + size, y + size
 
 

@@ -15,7 +15,7 @@ from camtool.planning.items import Contour, Feeds, Item, Run, Setting
 from camtool.planning.job import Operation
 from camtool.planning.link import Worked, link
 from camtool.planning.paths import flat
-from camtool.planning.reversing import Approaches, least_turn_mm, parts_of, turns_of
+from camtool.planning.reversing import Approaches, least_reversal_mm, parts_of, reversals_along
 from camtool.targets.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
@@ -40,8 +40,8 @@ def reversals_of(cut: Polyline | Run, machine: Machine | None = None) -> tuple[i
     parts = parts_of(path)
     least = (LEAST_TURN_MM,) * 2
     if machine is not None:
-        least = least_turn_mm(machine.axes.x), least_turn_mm(machine.axes.y)
-    x, y = (turns_of(parts.places[:, axis], path.closed, least[axis]) for axis in (0, 1))
+        least = least_reversal_mm(machine.axes.x), least_reversal_mm(machine.axes.y)
+    x, y = (reversals_along(parts.places[:, axis], path.closed, least[axis]) for axis in (0, 1))
     return x.within(len(parts)), y.within(len(parts))
 
 

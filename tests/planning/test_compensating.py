@@ -13,7 +13,12 @@ from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
-from camtool.planning.compensating import Stretch, compensated, motor_path, stretches
+from camtool.planning.compensating import (
+    MonotoneSegment,
+    compensated,
+    monotone_segments,
+    motor_path,
+)
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from tests.oracles.path_machine import dense_path, path_machine
@@ -192,7 +197,7 @@ def arc(start_rad: float, sweep_rad: float, radius: float = 2.0) -> Move:
 def test_stretches_of_an_arc_turn_no_axis_and_meet(start: float, sweep: float, ccw: bool) -> None:
     signed = sweep if ccw else -sweep
     move = arc(start, signed)
-    parts = list(stretches(move, signed))
+    parts = list(monotone_segments(move, signed))
     assert parts[0].begin == move.start
     assert parts[-1].end == move.end
     assert sum(part.sweep_rad for part in parts) == pytest.approx(signed)
@@ -207,8 +212,8 @@ def test_stretches_of_an_arc_turn_no_axis_and_meet(start: float, sweep: float, c
 
 @given(st.floats(0.05, 1.5), st.floats(0.0, 1.0), st.booleans())
 def test_where_a_stretch_has_a_value(sweep: float, share: float, straight: bool) -> None:
-    whole = next(stretches(arc(0.01, sweep), sweep))
-    part = Stretch(whole.begin, whole.end) if straight else whole
+    whole = next(monotone_segments(arc(0.01, sweep), sweep))
+    part = MonotoneSegment(whole.begin, whole.end) if straight else whole
     for axis in (0, 1, 2):
         value = part.at(share)[axis]
         if abs(part.end[axis] - part.begin[axis]) > 1e-6:

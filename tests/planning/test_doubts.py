@@ -23,10 +23,10 @@ def _said(target: str, job: Job, *paths: Polyline) -> str:
     found = post_drawing(
         drawing_of(paths or [BOX]), job, load_target(target), check=False
     ).findings
-    doubts = [each for each in found if each.code == Code.CUT_DOUBTFUL]
-    assert len(doubts) <= 1
-    assert all(each.severity == Severity.WARNING for each in doubts)
-    return doubts[0].message if doubts else ""
+    doubtful_settings = [each for each in found if each.code == Code.CUT_DOUBTFUL]
+    assert len(doubtful_settings) <= 1
+    assert all(each.severity == Severity.WARNING for each in doubtful_settings)
+    return doubtful_settings[0].message if doubtful_settings else ""
 
 
 def _flags(text: str) -> set[str]:

@@ -24,7 +24,7 @@ from camtool.planning.leads import (
     runs_back,
     segments_near,
 )
-from camtool.planning.paths import Along
+from camtool.planning.paths import MeasuredPath
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.oracles.runs import runs_of
 from tests.paths import moved
@@ -43,7 +43,7 @@ def contour(path: Polyline, left: bool | None, radius: float = 0.5, **kind: Any)
 
 
 def leads(path: Polyline, left: bool | None, keep_out: list[Polyline] | None = None, **kind: Any):
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     lines = None
     if keep_out is not None:
         lines = KeepOut(Polylines.of(keep_out), np.zeros(len(keep_out), dtype=np.bool_))
@@ -197,14 +197,14 @@ def test_no_point_of_a_lead_does_harm(
 @given(contours(), st.integers(0, 11), st.booleans())
 def test_leads_meet_the_contour_along_its_tangent(path: Polyline, start: int, left: bool) -> None:
     path = rolled(path, start % len(path))
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     made = leads(path, left, lead_in=Lead("arc", 0.2), lead_out=Lead("arc", 0.2))
     for lead, wanted, at in (
         (made.to, along.directions(np.zeros(1))[0], 1.0),
         (made.away, along.arrivals(np.array([along.total_mm]))[0], 0.0),
     ):
         if len(lead):
-            meets = Along.of(Polyline(lead))
+            meets = MeasuredPath.of(Polyline(lead))
             where = np.array([at * meets.total_mm])
             assert meets.at(where)[0] == pytest.approx(path.start, abs=1e-9)
             got = meets.directions(where) if at == 0.0 else meets.arrivals(where)
@@ -226,7 +226,7 @@ def test_left_of_closed_paths(path: Polyline, places: list[tuple[float, float]])
 @given(open_contours(), st.floats(0.0, 1.0), st.sampled_from([-1e-3, 1e-3]))
 def test_left_of_open_paths(path: Polyline, share: float, off: float) -> None:
     """A hair beside the path, and what is so for the way back is the other side."""
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     where = np.array([share * along.total_mm])
     ahead = along.directions(where)[0]
     point = along.at(where) + off * np.array([[-ahead[1], ahead[0]]])
@@ -269,24 +269,25 @@ def test_runs_back(path: Polyline, start: int) -> None:
     other = rolled(path, start % len(path)) if path.closed else path
     assert not runs_back(path, other)
     assert runs_back(path, reverse(other))
-    part = Along.of(path).piece(0.2 * Along.of(path).total_mm, 0.6 * Along.of(path).total_mm)
+    measured = MeasuredPath.of(path)
+    part = measured.piece(0.2 * measured.total_mm, 0.6 * measured.total_mm)
     assert not runs_back(path, Polyline(part))
     assert runs_back(path, reverse(Polyline(part)))
 
 
 def test_a_part_of_a_contour_keeps_to_the_whole_one() -> None:
     """A half of the square, from the middle of a side: the arc of the lead-out would cut it."""
-    half = Polyline(Along.of(MIDDLE).piece(0.0, 15.0))
+    half = Polyline(MeasuredPath.of(MIDDLE).piece(0.0, 15.0))
     alone = contour(half, True, lead_in=Lead(), lead_out=LINE)
     whole = Contour(half, alone.setting, "part", 0, material_left=True, outline=SQUARE)
     drawn = Contour(half, alone.setting, "part", 0, material_left=True, outline=reverse(SQUARE))
     ends = (0.0, 15.0)
-    free = leads_of(alone, Along.of(half), ends, None)
+    free = leads_of(alone, MeasuredPath.of(half), ends, None)
     assert free.away == pytest.approx(np.array([[10, 10, 0], [10, 12, 0.0]]))
     inner = Contour(half, alone.setting, "part", 0, material_left=False, outline=SQUARE)
     for each in (whole, drawn):
-        assert leads_of(each, Along.of(half), ends, None).findings == ()
-    assert len(leads_of(inner, Along.of(half), ends, None).findings) == 1
+        assert leads_of(each, MeasuredPath.of(half), ends, None).findings == ()
+    assert len(leads_of(inner, MeasuredPath.of(half), ends, None).findings) == 1
 
 
 def test_leads_are_flat_and_belong_to_the_run() -> None:

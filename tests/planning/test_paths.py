@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import length
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
-from camtool.planning.paths import Along, backwards
+from camtool.planning.paths import MeasuredPath, backwards
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours, open_contours, polylines
 
@@ -28,7 +28,7 @@ def _closed_rows(path: Polyline) -> np.ndarray:
 def test_a_piece_lies_on_its_path_and_is_as_long(
     path: Polyline, begin: float, size: float
 ) -> None:
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     if not path.closed:
         begin, size = min(max(begin, 0.0), 0.9), min(size, 1.0)
     low = begin * along.total_mm
@@ -46,7 +46,7 @@ def test_a_piece_lies_on_its_path_and_is_as_long(
 
 @given(open_contours(), st.floats(0.1, 0.9))
 def test_pieces_joined_are_the_path(path: Polyline, share: float) -> None:
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     cut = share * along.total_mm
     one, two = along.piece(0.0, cut), along.piece(cut, along.total_mm)
     assert one[-1, :2] == pytest.approx(two[0, :2], abs=2e-6)
@@ -56,7 +56,7 @@ def test_pieces_joined_are_the_path(path: Polyline, share: float) -> None:
 
 
 def test_a_whole_lap_from_anywhere_keeps_every_vertex_exactly() -> None:
-    along = Along.of(MIXED)
+    along = MeasuredPath.of(MIXED)
     lap = along.piece(along.reach[2] + 3 * along.total_mm, along.reach[2] + 4 * along.total_mm)
     wanted = np.roll(MIXED.vertices, -2, axis=0)
     assert (lap[:-1] == wanted).all()
@@ -67,7 +67,7 @@ def test_a_whole_lap_from_anywhere_keeps_every_vertex_exactly() -> None:
 def test_backwards_is_the_same_piece_the_other_way(
     path: Polyline, begin: float, size: float
 ) -> None:
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     low, high = begin * along.total_mm, (begin + size) * along.total_mm
     back = along.piece(high, low)
     assert (backwards(back) == along.piece(low, high)).all()
@@ -75,7 +75,7 @@ def test_backwards_is_the_same_piece_the_other_way(
 
 
 def test_a_piece_too_short_for_a_vertex_is_still_a_piece() -> None:
-    along = Along.of(MIXED)
+    along = MeasuredPath.of(MIXED)
     for middle in (*along.reach.tolist(), 3.3, 8.0):
         piece = along.piece(middle - 2e-7, middle + 2e-7)
         assert piece.shape == (2, 3)
@@ -83,7 +83,7 @@ def test_a_piece_too_short_for_a_vertex_is_still_a_piece() -> None:
 
 
 def test_directions_at_a_vertex_follow_and_arrivals_lead_to_it() -> None:
-    along = Along.of(MIXED)
+    along = MeasuredPath.of(MIXED)
     at = along.reach[1:2]
     for off in (-1e-9, 0.0, 1e-9):
         assert along.directions(at + off)[0] == pytest.approx([0.0, 1.0], abs=1e-8)
@@ -102,14 +102,14 @@ def test_directions_at_a_vertex_follow_and_arrivals_lead_to_it() -> None:
 
 def test_turns_are_signed_angles_between_segments() -> None:
     square = Polyline(np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0.0]]), True)
-    assert Along.of(square).turns == pytest.approx([math.pi / 2] * 4)
+    assert MeasuredPath.of(square).turns == pytest.approx([math.pi / 2] * 4)
     zigzag = Polyline(np.array([[0, 0, 0], [1, 0, 0], [2, -1, 0], [3, 0, 0.0]]))
-    assert Along.of(zigzag).turns == pytest.approx([0.0, -math.pi / 4, math.pi / 2])
+    assert MeasuredPath.of(zigzag).turns == pytest.approx([0.0, -math.pi / 4, math.pi / 2])
 
 
 @given(contours(), st.floats(-15.0, 15.0), st.floats(-15.0, 15.0))
 def test_nearest_to_is_as_near_as_any_sample(path: Polyline, x: float, y: float) -> None:
-    along = Along.of(path)
+    along = MeasuredPath.of(path)
     where = np.array([x, y])
     found = along.at(np.array([along.nearest_to((x, y))]))[0]
     rows = _closed_rows(path)

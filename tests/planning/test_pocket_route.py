@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, point_at, sample
 from camtool.geometry.polylines import Polyline, Segments
-from camtool.planning.clearing import Rails, closest, outside_parts, route, scanned
-from camtool.planning.paths import Along
+from camtool.planning.clearing import ConnectedRegion, closest, outside_parts, route, scanned
+from camtool.planning.paths import MeasuredPath
 from tests.oracles.contours import CIRCLE, DUMBBELL, ELL, SQUARE
 from tests.oracles.contours import opened as open_path
 from tests.oracles.offset import chords, dense, distance, inside
@@ -22,7 +22,7 @@ from tests.strategies import polylines
 
 
 def way(paths: list[Polyline], start: tuple[float, float], end: tuple[float, float]) -> Polyline:
-    found = route(np.array(start), np.array(end), Rails(region_of(paths)))
+    found = route(np.array(start), np.array(end), ConnectedRegion(region_of(paths)))
     assert found is not None
     return Polyline(found)
 
@@ -54,7 +54,7 @@ def test_along_a_corner_of_the_boundary_itself() -> None:
 
 
 def test_no_way_to_another_region() -> None:
-    rails = Rails(region_of([SQUARE, moved(SQUARE, 20.0, 0.0)]))
+    rails = ConnectedRegion(region_of([SQUARE, moved(SQUARE, 20.0, 0.0)]))
     assert route(np.array([5.0, 5.0]), np.array([25.0, 5.0]), rails) is None
 
 
@@ -62,9 +62,9 @@ def test_no_way_to_another_region() -> None:
 @given(paths=shapes(), parts=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)))
 def test_ways_stay_in_the_region(paths: list[Polyline], parts: tuple[float, float]) -> None:
     region = region_of(paths)
-    ends = [Along.of(region[-i]).at(np.array([part * length(region[-i])]))[0]
+    ends = [MeasuredPath.of(region[-i]).at(np.array([part * length(region[-i])]))[0]
             for i, part in enumerate(parts)]  # fmt: skip
-    found = route(ends[0], ends[1], Rails(region))
+    found = route(ends[0], ends[1], ConnectedRegion(region))
     assert found is not None
     if len(found) < 2:
         return
@@ -77,7 +77,7 @@ def test_ways_stay_in_the_region(paths: list[Polyline], parts: tuple[float, floa
 
 @given(path=polylines(), place=st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
 def test_the_closest_place_of_a_path(path: Polyline, place: tuple[float, float]) -> None:
-    along, point = Along.of(path), np.array(place)
+    along, point = MeasuredPath.of(path), np.array(place)
     apart, at = closest(along, point)
     assert apart == pytest.approx(float(distance(point[None, :], path)[0]), abs=1e-9)
     found = along.at(np.array([at]))[0]

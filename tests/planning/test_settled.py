@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Tabs, job_of
-from camtool.planning.link import SETTLED_DECIMALS
+from camtool.planning.link import ROUNDED_DECIMALS
 from camtool.targets.registry import load_target
 from camtool.toolpath.moves import Kind
 from tests.drawings import drawing_of
@@ -59,5 +59,5 @@ def test_places_lie_on_a_grid_far_below_any_tolerance() -> None:
     path = planned(drawing_of([ring]), job_of(tool_diameter_mm=EIGHTH, rotate_rad=0.3), machine)
     for places in (path.toolpath.end, path.toolpath.centre):
         known = places[np.isfinite(places)]
-        assert np.array_equal(known, np.round(known, SETTLED_DECIMALS))
+        assert np.array_equal(known, np.round(known, ROUNDED_DECIMALS))
         assert not np.signbit(known[known == 0.0]).any()

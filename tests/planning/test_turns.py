@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline, Segments
-from camtool.planning.reversing import parts_of, turns_of
+from camtool.planning.reversing import parts_of, reversals_along
 from tests.oracles.reversals import dense, turns
 from tests.planning.reversal_parts import circle, gear, reversals_of, run_of, square
 from tests.strategies import contours, polylines
@@ -24,7 +24,7 @@ LEAST_MM = 7.3e-4
 def test_parts_are_monotone_and_follow_the_path(path: Polyline) -> None:
     parts = parts_of(path)
     for index in range(len(parts)):
-        points = dense(parts.stretch(index, index + 1))
+        points = dense(parts.subpath(index, index + 1))
         step = np.diff(points, axis=0)
         # Rounding, and what an arc strays beyond an extreme that lies at its end.
         forward, backward = step.max(axis=0), step.min(axis=0)
@@ -36,14 +36,14 @@ def test_parts_are_monotone_and_follow_the_path(path: Polyline) -> None:
 def test_stretches_join_to_the_path_again(path: Polyline, data: st.DataObject) -> None:
     parts = parts_of(path)
     cut = data.draw(st.integers(1, len(parts)))
-    pieces = [parts.stretch(0, cut)] + (
-        [parts.stretch(cut, len(parts))] if cut < len(parts) else []
+    pieces = [parts.subpath(0, cut)] + (
+        [parts.subpath(cut, len(parts))] if cut < len(parts) else []
     )
     assert sum(map(length, pieces)) == pytest.approx(length(path), rel=1e-12)
     assert (pieces[0].start == path.start).all()
     assert (pieces[-1].end == path.end).all()
     # A whole segment stays as it was, to the last bit.
-    whole = parts.stretch(0, len(parts))
+    whole = parts.subpath(0, len(parts))
     assert (whole.vertices[: len(path)] == path.vertices[: len(path)]).all()
 
 
@@ -51,7 +51,7 @@ def test_stretches_join_to_the_path_again(path: Polyline, data: st.DataObject) -
 def test_a_stretch_may_go_on_round_a_closed_path(path: Polyline, turn: int) -> None:
     parts = parts_of(path)
     first = turn % len(parts)
-    once = parts.stretch(first, first + len(parts))
+    once = parts.subpath(first, first + len(parts))
     assert (once.start == once.end).all()
     assert length(once) == pytest.approx(length(path), rel=1e-12)
     assert points_to_segments(sample(once, 0.5), Segments.of(path)).min(axis=1).max() < 1e-9
@@ -61,7 +61,7 @@ def test_a_stretch_may_go_on_round_a_closed_path(path: Polyline, turn: int) -> N
 def test_reversals_are_those_of_the_dense_way(path: Polyline) -> None:
     points = dense(path)
     parts = parts_of(path)
-    found = [turns_of(parts.places[:, axis], path.closed, LEAST_MM) for axis in (0, 1)]
+    found = [reversals_along(parts.places[:, axis], path.closed, LEAST_MM) for axis in (0, 1)]
     inner = [((each.first > 0) & (each.last < len(parts))).sum() for each in found]
     assert inner == [turns(points[:, axis].tolist(), LEAST_MM) for axis in (0, 1)]
 
@@ -88,7 +88,7 @@ def test_reversals_of_known_paths(path: Polyline, expected: tuple[int, int], why
 def test_a_closed_path_turns_as_often_there_as_back(path: Polyline) -> None:
     parts = parts_of(path)
     for axis in (0, 1):
-        found = turns_of(parts.places[:, axis], True, LEAST_MM)
+        found = reversals_along(parts.places[:, axis], True, LEAST_MM)
         assert len(found) % 2 == 0
         assert len(found) >= 2
         # Each stretch lies on the extreme, and next to it the axis moves away.
@@ -123,7 +123,7 @@ def test_arcs_are_split_at_their_quadrant_points() -> None:
 
 def test_a_path_that_never_moves_along_an_axis_has_no_turns() -> None:
     line = Polyline(np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
-    assert len(turns_of(parts_of(line).places[:, 0], False, LEAST_MM)) == 0
+    assert len(reversals_along(parts_of(line).places[:, 0], False, LEAST_MM)) == 0
     back = Polyline(line.vertices, True)
-    assert len(turns_of(parts_of(back).places[:, 1], True, LEAST_MM)) == 2
-    assert len(turns_of(parts_of(back).places[:, 0], True, LEAST_MM)) == 0
+    assert len(reversals_along(parts_of(back).places[:, 1], True, LEAST_MM)) == 2
+    assert len(reversals_along(parts_of(back).places[:, 0], True, LEAST_MM)) == 0

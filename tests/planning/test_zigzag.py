@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline
-from camtool.planning.clearing import Scan, strokes_of, zigzag_ways
+from camtool.planning.clearing import Scan, strokes_of, zigzag_paths
 from tests.oracles.contours import CIRCLE, DUMBBELL, SQUARE
 from tests.oracles.swept import at_depth, complaints, gouges
 from tests.planning.pocket_cases import SHAPES, cross, region_of, runs_of, shapes, work_of
@@ -105,7 +105,7 @@ def test_the_walls_come_last_and_whole() -> None:
 
 def test_a_convex_pocket_is_one_way_to_and_fro() -> None:
     region = offset_shape(region_of([SQUARE]), 0.5)
-    (way,) = zigzag_ways(region, Scan(0.5, 0.5, 0.0))
+    (way,) = zigzag_paths(region, Scan(0.5, 0.5, 0.0))
     strokes = 18
     links = strokes - 1
     straight = 17 * (9.0 - 0.5) / 17
