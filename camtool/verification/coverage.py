@@ -74,7 +74,7 @@ class Drilled:
 
 
 @dataclass(frozen=True, eq=False)
-class _Compared:
+class _Sampled:
     """Samples of the cuts of one side with the nearest moves of the other; `drilled` as above."""
 
     cuts: CutMoves
@@ -97,7 +97,7 @@ def cover(decoded: Target, goal: Goal, spacing_mm: float, drilled: Drilled) -> C
     cuts, wanted, limits = decoded.cuts, goal.target, (goal.limit_mm, goal.depth_mm)
     samples = sample_cuts(cuts, spacing_mm)
     found, wrong_depth = nearest_at_height(samples, None, wanted, limits)
-    there = _Compared(cuts, samples, found, wrong_depth, drilled.decoded)
+    there = _Sampled(cuts, samples, found, wrong_depth, drilled.decoded)
     extra = tuple(_extra_cuts(there, goal))
     belongs = match_contours(cuts, samples, found, goal)
     rounding = Figure()
@@ -106,7 +106,7 @@ def cover(decoded: Target, goal: Goal, spacing_mm: float, drilled: Drilled) -> C
     rounding.add(found.distance[real], samples.points[real], rows[real])
     back = sample_cuts(wanted.cuts, spacing_mm)
     found_back, wrong_back = nearest_at_height(back, None, decoded, limits)
-    missing = _missing(_Compared(wanted.cuts, back, found_back, wrong_back, drilled.wanted), goal)
+    missing = _missing(_Sampled(wanted.cuts, back, found_back, wrong_back, drilled.wanted), goal)
     match = match_rows(cuts, samples, belongs, found, goal)
     return Coverage(match, rounding, (*missing, *extra))
 
@@ -115,7 +115,7 @@ _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
 _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
 
 
-def _extra_cuts(there: _Compared, goal: Goal) -> Iterator[Finding]:
+def _extra_cuts(there: _Sampled, goal: Goal) -> Iterator[Finding]:
     cuts, samples, distance = there.cuts, there.samples, there.found.distance
     listed = list(_by_contour(cuts, samples, distance, there.bad(goal)))
     for number, (_, worst, share) in enumerate(listed):
@@ -133,7 +133,7 @@ def _extra_cuts(there: _Compared, goal: Goal) -> Iterator[Finding]:
             return
 
 
-def _missing(back: _Compared, goal: Goal) -> Iterator[Finding]:
+def _missing(back: _Sampled, goal: Goal) -> Iterator[Finding]:
     cuts, samples, distance = back.cuts, back.samples, back.found.distance
     listed = list(_by_contour(cuts, samples, distance, back.bad(goal)))
     for number, (contour, worst, share) in enumerate(listed):

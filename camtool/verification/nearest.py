@@ -347,12 +347,12 @@ class Layers:
         self._count = len(z)
         pieces, whose = boxes_of_pieces(segments, gap)
         level = levels_of(z)[whose]
-        # Layers change between levels only: what lies in one plane is one tree.
+        # Layers change between levels only: what lies in one plane is one index.
         done = np.cumsum(np.bincount(level)) - np.bincount(level)
         layer = done[level] // PIECES_OF_LAYER
         order = np.argsort(layer, kind="stable")
         parts = np.split(order, np.flatnonzero(np.diff(layer[order])) + 1) if len(order) else []
-        self._layers = [
+        self.layers = [
             _Layer(
                 float(z[whose[part], 0].min()),
                 float(z[whose[part], 1].max()),
@@ -368,7 +368,7 @@ class Layers:
         layers within the window (and more, on slopes) of the heights z (B, 2) low, high of the
         box. Moves of other heights may be among them."""
         found = [np.empty(0, dtype=np.int64)]
-        for layer in self._layers:
+        for layer in self.layers:
             window = window_mm * (1.0 + layer.slope)
             rows = np.flatnonzero(
                 (z[:, 0] - window <= layer.high) & (layer.low <= z[:, 1] + window)

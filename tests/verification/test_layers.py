@@ -98,7 +98,7 @@ def test_a_thousand_passes_are_not_all_asked_for_one() -> None:
     assert len(box) <= 512
 
 
-def test_what_lies_in_one_plane_is_one_tree() -> None:
+def test_what_lies_in_one_plane_is_one_layer() -> None:
     moves = crossing(3000, bulges=0.0)
     layers = Layers(moves, np.zeros((3000, 2)), np.zeros(3000), 1.0)
-    assert len(layers._layers) == 1
+    assert len(layers.layers) == 1
