@@ -94,9 +94,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import camtool.api
 
-    # All at once: what the api loads has bound the package `camtool.targets` to a name of these.
-    globals().update({each: getattr(camtool.api, each) for each in __all__})
-    return globals()[name]
+    found = globals()[name] = getattr(camtool.api, name)
+    return found
 
 
 def __dir__() -> list[str]:

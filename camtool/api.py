@@ -28,8 +28,8 @@ from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.job import job_of as made
 from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
 from camtool.simulation.motion import Effects
-from camtool.targets.loader import extended_by
-from camtool.targets.registry import ListedTarget, LoadedTarget, list_target, target_names
+from camtool.target.loader import extended_by
+from camtool.target.registry import ListedTarget, LoadedTarget, list_target, target_names
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 from camtool.units import parse_length
@@ -245,7 +245,7 @@ def load_target(
     `settings`: {"axes.x.backlash_mm": 0.2}, or as `--set` takes them. Units are those that the
     keys end on. Raises UnknownTargetError (with the nearest names) and MachineError.
     """
-    from camtool.targets.registry import load_target as loaded
+    from camtool.target.registry import load_target as loaded
 
     if isinstance(settings, Mapping):
         settings = [f"{key}={_as_toml(value)}" for key, value in settings.items()]

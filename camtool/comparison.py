@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from camtool.pictures.overlay import Overlay
     from camtool.planning.job import Job
     from camtool.simulation.motion import Effects
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import Toolpath
     from camtool.verification.contrast import ContrastRow
     from camtool.verification.verify import Verification

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from camtool.planning.items import Step
     from camtool.planning.job import Job
     from camtool.simulation.motion import Effects
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import Compensated, Toolpath
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import Kept

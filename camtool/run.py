@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from camtool.pictures.overlay import Overlay
     from camtool.pictures.scene import Scene
     from camtool.planning.job import Job
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
     from camtool.toolpath.program import Listing, Program
     from camtool.verification.report import Report
     from camtool.verification.verify import Verification

@@ -11,9 +11,9 @@ from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.motion import Chunk, Options
 from camtool.tables import Table
-from camtool.targets.loader import machine_of, resolved_table
-from camtool.targets.registry import LoadedTarget, find_target, target_names
-from camtool.targets.target import Target
+from camtool.target.contract import Target
+from camtool.target.loader import machine_of, resolved_table
+from camtool.target.registry import LoadedTarget, find_target, target_names
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 

@@ -20,7 +20,7 @@ from camtool.plain import one_line
 if TYPE_CHECKING:
     from camtool.planning.job import Job
     from camtool.run import Run
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
     from camtool.verification.report import Gates
 
 REMARKS = 20

@@ -313,7 +313,7 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """The keys of the machine that the line names before."""
     import msgspec
 
-    from camtool.targets.registry import load_target
+    from camtool.target.registry import load_target
 
     target = ctx.params.get("target")
     if isinstance(target, str):
@@ -325,7 +325,7 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 def _interpolators(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """What the controller of the target that the line names before has to choose from."""
-    from camtool.targets.registry import load_target
+    from camtool.target.registry import load_target
 
     target = ctx.params.get("target")
     if isinstance(target, str):

@@ -39,7 +39,7 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
     one. The target is linuxcnc unless --target or --machine names another one.
     """
     if posting.machine.name() is None:
-        from camtool.targets.registry import filter_target
+        from camtool.target.registry import filter_target
 
         posting = replace(posting, machine=replace(posting.machine, target=filter_target()))
     _progress(BEGUN)

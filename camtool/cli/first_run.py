@@ -73,7 +73,7 @@ def compile_ahead(target: str) -> None:
     from camtool.pipeline import post_drawing
     from camtool.planning.job import job_of
     from camtool.planning.order import Choices, best_order
-    from camtool.targets.registry import load_target
+    from camtool.target.registry import load_target
 
     # Of one item, with no neighbours and nothing before it or after it.
     places, rows, none = np.zeros((3, 4)), np.arange(3), np.empty(0, dtype=np.int64)

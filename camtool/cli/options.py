@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from camtool.importers.options import ReadOptions
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
     from camtool.verification.report import Gates
 
 
@@ -145,7 +145,7 @@ class MachineFlags:
 
     def load(self) -> LoadedTarget:
         """The target with the user's file and settings over it."""
-        from camtool.targets.registry import load_target
+        from camtool.target.registry import load_target
 
         name = self.name()
         if name is None:
@@ -161,7 +161,7 @@ class MachineFlags:
         """The target's name, as given or as the machine file says; None without either."""
         if self.target is not None or self.machine is None:
             return self.target
-        from camtool.targets.loader import extended_by
+        from camtool.target.loader import extended_by
 
         return extended_by(Path(self.machine))
 

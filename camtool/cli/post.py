@@ -52,7 +52,7 @@ from camtool.errors import CamtoolError, OptionError
 if TYPE_CHECKING:
     from camtool.pictures.scene import Scene
     from camtool.run import Run
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
 
 
 def scenes_of(run: Run, *, before: bool) -> list[Scene]:

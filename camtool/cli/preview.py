@@ -36,7 +36,7 @@ from camtool.findings import Finding
 
 if TYPE_CHECKING:
     from camtool.pictures.scene import Scene
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
 
     Findings = tuple[Finding, ...]
 
@@ -181,7 +181,7 @@ class Seen:
 
 def _refuse_program(source: str) -> None:
     """CamtoolError when the file's extension says that it is a program and no target is given."""
-    from camtool.targets.registry import list_target, target_names
+    from camtool.target.registry import list_target, target_names
 
     for name in target_names():
         try:

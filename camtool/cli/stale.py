@@ -18,7 +18,7 @@ from camtool.errors import CamtoolError, InputError
 from camtool.findings import Severity
 
 if TYPE_CHECKING:
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
     from camtool.toolpath.program import Program
 
 

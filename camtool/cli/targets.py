@@ -81,8 +81,8 @@ def show(
 @talk_options
 def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool) -> None:
     """Write a machine file for NAME that extends TARGET, with every value as a comment."""
-    from camtool.targets.registry import list_target
-    from camtool.targets.template import machine_template
+    from camtool.target.registry import list_target
+    from camtool.target.template import machine_template
 
     base = list_target(extends)
     text = machine_template(name, extends, base.file.read_text(encoding="utf-8"), base.needs)
@@ -98,7 +98,7 @@ def target_items(incomplete: str) -> Iterator[CompletionItem]:
     """The machines, each with its title."""
     from click.shell_completion import CompletionItem
 
-    from camtool.targets.registry import list_target, target_names
+    from camtool.target.registry import list_target, target_names
 
     for name in target_names():
         if name.startswith(incomplete):
@@ -110,7 +110,7 @@ def target_items(incomplete: str) -> Iterator[CompletionItem]:
 
 
 def _list(as_json: bool) -> None:
-    from camtool.targets.registry import list_target, target_names
+    from camtool.target.registry import list_target, target_names
 
     rows: list[dict[str, Any]] = []
     for name in target_names():
@@ -153,7 +153,7 @@ def _table(rows: list[dict[str, Any]]) -> None:
 
 
 def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bool) -> None:
-    from camtool.targets.registry import load_target
+    from camtool.target.registry import load_target
 
     loaded = load_target(name, machine_file=Path(machine) if machine else None, settings=settings)
     values = loaded.values()

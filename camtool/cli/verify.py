@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from camtool.pipeline import Judging
     from camtool.planning.job import Job
     from camtool.run import Run
-    from camtool.targets.registry import LoadedTarget
+    from camtool.target.registry import LoadedTarget
 
 
 @click.command(cls=SectionedCommand, short_help="Simulate and judge a program.")

@@ -9,7 +9,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
 from camtool.planning.job import Job
 from camtool.simulation.motion import ALL, Effects, Options
-from camtool.targets.registry import LoadedTarget
+from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Compensated, Toolpath
 from camtool.toolpath.wanted import Kept
 from camtool.verification.conformance import Asked

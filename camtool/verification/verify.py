@@ -26,7 +26,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk
-from camtool.targets.registry import LoadedTarget
+from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Compensated, Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.targets.target import Target
+from camtool.target.contract import Target
 
 from ..gcode.dialect import feed_decimals
 from .dialect import Dialect, LinuxcncController, LinuxcncMachine

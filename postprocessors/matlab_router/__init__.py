@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.targets.target import Target
+from camtool.target.contract import Target
 
 from .dialect import Dialect, MatlabRouterController, MatlabRouterMachine, dialect_of
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, get_args
 
-from camtool.targets.target import Target
+from camtool.target.contract import Target
 
 from .dialect import Dialect, Interpolator, PicMmhController, PicMmhMachine
 

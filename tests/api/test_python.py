@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import pkgutil
 import subprocess
 import sys
 from dataclasses import fields, replace
@@ -66,9 +67,18 @@ assert inspect.ismodule(camtool.pictures.draw) and not callable(camtool.pipeline
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_every_name_holds_after_any_other() -> None:
-    code = "import camtool; camtool.load_target('grbl'); assert camtool.targets()"
+@pytest.mark.parametrize(
+    "first", ["camtool.load_target('grbl')", "import camtool.pipeline", "import camtool.target"]
+)
+def test_every_name_holds_after_any_other(first: str) -> None:
+    """No room has the name of a call, so that none takes its place when it is imported."""
+    code = f"import camtool; {first}; assert camtool.targets()"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_no_room_has_the_name_of_a_call() -> None:
+    rooms = {module.name for module in pkgutil.iter_modules(camtool.__path__)}
+    assert not rooms & set(camtool.__all__)
 
 
 def test_reading_takes_every_field_of_the_options() -> None:

@@ -10,7 +10,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.pipeline import convert_program, post_drawing, read_program, verify_program
 from camtool.planning.job import Job, job_of
 from camtool.run import Run
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from tests.drawings import drawing_of
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0], [0.0, 3.0, 0.0]])

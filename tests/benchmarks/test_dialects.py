@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camtool.targets.registry import load_target, target_names
+from camtool.target.registry import load_target, target_names
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.i8751.machines import SAMPLE

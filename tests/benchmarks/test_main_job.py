@@ -16,7 +16,7 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import job_of
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 pytestmark = pytest.mark.benchmark
 ROOT = Path(__file__).parents[2]

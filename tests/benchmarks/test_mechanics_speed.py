@@ -8,7 +8,7 @@ import pytest
 
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL, CHUNK_STEPS
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 pytestmark = pytest.mark.benchmark
 

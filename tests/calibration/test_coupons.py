@@ -19,7 +19,7 @@ from camtool.calibration.measurements import read_measurements
 from camtool.errors import InputError, OptionError
 from camtool.geometry.measure import extents, path_lengths
 from camtool.importers.read import read_drawing
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 SIDES = st.floats(2.0, 2000.0)
 

@@ -14,7 +14,7 @@ from camtool.calibration.measurements import Added, Lines, Measurements, Regions
 from camtool.importers.read import read_drawing
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from tests.targets import simulate
 
 NEAR_MM = 1e-6

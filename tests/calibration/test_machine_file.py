@@ -12,7 +12,7 @@ from camtool.calibration.machine_file import machine_file
 from camtool.calibration.measurements import read_measurements
 from camtool.machine.model import Machine
 from camtool.tables import read_table
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 MEASURED = Path(__file__).parents[2] / "samples" / "measured"
 

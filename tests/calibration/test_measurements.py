@@ -9,7 +9,7 @@ import pytest
 from camtool.calibration.calibrate import calibrate
 from camtool.calibration.measurements import read_measurements
 from camtool.errors import InputError
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 LINES = '[[lines]]\naxis = "x"\nnominal_mm = 2.5\n'
 SQUARE = "[[squares]]\nnominal_mm = [2.5, 2.5]\n"

@@ -23,7 +23,7 @@ from camtool.calibration.measurements import (
     Steps,
 )
 from camtool.machine.model import Machine
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.oracles import measured
 
 RECORDS: dict[str, type[Coupon]] = {

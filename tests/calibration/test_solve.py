@@ -9,7 +9,7 @@ import pytest
 
 from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.measurements import read_measurements
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 
 def calibrated(tmp_path: Path, text: str, *settings: str) -> Calibration:

@@ -10,7 +10,7 @@ import pytest
 
 from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.measurements import read_measurements
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 MEASURED = Path(__file__).parents[2] / "samples" / "measured"
 

@@ -18,7 +18,7 @@ from camtool.cli.batch import stoppable
 from camtool.cli.options import DrawingFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.errors import CamtoolError
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.verification.report import Gates
 from tests.cli.conftest import Run
 from tests.oracles.batch_works import HerePool

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camtool.calibration.coupons import KINDS
-from camtool.targets.registry import load_target, target_names
+from camtool.target.registry import load_target, target_names
 from tests.cli.conftest import Run
 
 ENGRAVE = ("--kind", "engrave", "--start", "longest-line", "--gap", "0")

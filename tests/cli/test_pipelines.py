@@ -206,7 +206,7 @@ def test_hooks_take_the_files_that_they_are_for(said: dict[str, str]) -> None:
     drawings = ("parts/a.dxf", "parts/b/c.svg", "parts/d.STEP")
     assert all(taken("camtool-check", name, **said) for name in drawings)
     assert not any(taken("camtool-check", f"parts/a{e}", **said) for e in (".nc", ".toml", ""))
-    from camtool.targets.registry import list_target, target_names
+    from camtool.target.registry import list_target, target_names
 
     endings = {list_target(name).target.extension for name in target_names()} | {".toml", ".dxf"}
     assert [e for e in endings if not taken("camtool-stale", f"parts/a{e}", **said)] == []

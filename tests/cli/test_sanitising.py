@@ -9,7 +9,7 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
-from camtool.targets.registry import load_target, target_names
+from camtool.target.registry import load_target, target_names
 from camtool.toolpath.moves import Toolpath
 
 NASTY = (

@@ -6,7 +6,7 @@ import pytest
 
 from camtool.errors import CamtoolError
 from camtool.patterns import guess
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 LOGO = "samples/logo.dxf"
 PIC = ("-t", "pic-mmh")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from camtool.targets.registry import target_names
+from camtool.target.registry import target_names
 from tests.cli.conftest import Run
 
 

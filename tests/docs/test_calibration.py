@@ -13,7 +13,7 @@ from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.measurements import read_measurements
 from camtool.cli.main import cli
 from camtool.errors import InputError
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "calibration.md").read_text(encoding="utf-8")

@@ -18,7 +18,7 @@ import click
 import pytest
 
 from camtool.cli.main import cli
-from camtool.targets.registry import target_names
+from camtool.target.registry import target_names
 from tests.docs.test_examples import ROOT, shell
 
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]

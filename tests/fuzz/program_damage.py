@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from camtool.targets.registry import LoadedTarget
+from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Kind, Toolpath
 
 Block = TypeVar("Block")

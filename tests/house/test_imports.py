@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 BASE = {"arrays", "plain", "errors", "units", "findings", "patterns", "tables"}
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
-TARGETS = SHARED | {"simulation", "targets"}
+TARGETS = SHARED | {"simulation", "target"}
 JUDGE = TARGETS | {"importers", "planning"}
 MADE = JUDGE | {"verification", "pictures", "run", "pipeline", "comparison"}
 
@@ -32,7 +32,7 @@ ALLOWED = {
     "importers": SHARED,
     "planning": SHARED,
     "simulation": SHARED,
-    "targets": SHARED | {"simulation"},
+    "target": SHARED | {"simulation"},
     "postprocessors": TARGETS,
     "verification": JUDGE,
     "pictures": JUDGE | {"verification"},

@@ -8,7 +8,7 @@ from msgspec import inspect as known
 
 from camtool.calibration.measurements import KINDS, _Head
 from camtool.machine.model import Machine
-from camtool.targets.registry import find_target, load_target, target_names
+from camtool.target.registry import find_target, load_target, target_names
 
 DIALECTS: dict[str, type] = {name: find_target(name)[0].dialect for name in target_names()}
 

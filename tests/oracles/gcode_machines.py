@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from camtool.machine.model import Machine
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 
 
 def grbl_machine(*settings: str) -> Machine:

@@ -9,7 +9,7 @@ import pytest
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.scene import Scene
 from camtool.pipeline import verify_program
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.pictures.conftest import SCENES, circle

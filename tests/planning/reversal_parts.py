@@ -16,7 +16,7 @@ from camtool.planning.job import Operation
 from camtool.planning.link import Worked, link
 from camtool.planning.paths import flat
 from camtool.planning.reversing import Approaches, least_reversal_mm, parts_of, reversals_along
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
 from tests.targets import verify

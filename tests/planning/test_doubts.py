@@ -9,7 +9,7 @@ from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool, job_of
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 
 BOX = Polyline(np.array([[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0.0]]), True)

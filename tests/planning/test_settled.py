@@ -11,7 +11,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Tabs, job_of
 from camtool.planning.link import ROUNDED_DECIMALS
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind
 from tests.drawings import drawing_of
 

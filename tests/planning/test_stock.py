@@ -17,7 +17,7 @@ from camtool.findings import Code, Finding, Severity
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool
 from camtool.planning.plan import plan
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from tests.drawings import drawing_of
 from tests.oracles.contours import closed
 from tests.oracles.stock import Cutter, Path, moves_of

@@ -10,7 +10,7 @@ from camtool.findings import Code, Finding
 from camtool.geometry.polylines import Polyline
 from camtool.planning.job import Job, Tabs, job_of
 from camtool.planning.plan import planned
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 
 

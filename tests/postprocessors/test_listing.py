@@ -9,7 +9,7 @@ import pytest
 from camtool_postprocessors.gcode.blocks import Lexing, blocks_of
 from camtool_postprocessors.gcode.blocks import listing as lines_of
 
-from camtool.targets.registry import LoadedTarget, load_target, target_names
+from camtool.target.registry import LoadedTarget, load_target, target_names
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Listing

@@ -13,7 +13,7 @@ from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 
 # A wave of half circles, which chains their ends; a lens; a nearly straight arc; a speck; a line.

@@ -12,7 +12,7 @@ import numpy as np
 
 from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.measurements import Measurements, read_measurements
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.validation.pieces import ROOT, UM, Piece, piece
 
 UNCOMPENSATED = ("axes.x.compensation_mm=0", "axes.y.compensation_mm=0")

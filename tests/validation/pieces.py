@@ -15,7 +15,7 @@ from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, job_of
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
 from tests.oracles.motion_rows import RowMotion, rows_of

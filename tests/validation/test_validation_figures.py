@@ -18,7 +18,7 @@ from camtool.importers.read import read_drawing
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
 from camtool.simulation.motion import IDEAL, Options
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of

@@ -14,7 +14,7 @@ from camtool_postprocessors.pic_mmh.dialect import Interpolator
 
 from camtool.pipeline import Judging, verify_program
 from camtool.simulation.motion import IDEAL, Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.report import Report
 from tests.oracles.motion_rows import rows_of

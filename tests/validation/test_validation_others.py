@@ -13,7 +13,7 @@ from camtool.calibration.measurements import Measurements, Steps, read_measureme
 from camtool.importers.read import read_drawing
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.motion_rows import rows_of
 from tests.targets import simulate

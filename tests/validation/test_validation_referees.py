@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.simulation.motion import IDEAL, Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.targets import simulate
 from tests.validation.page import check, mm, signed

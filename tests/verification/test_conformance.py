@@ -11,7 +11,7 @@ from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Operation, Tool, job_of
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from camtool.verification.verify import Verification
 from tests.drawings import drawing_of
 

@@ -20,7 +20,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, job_of
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from tests.drawings import drawing_of
 from tests.fuzz.program_damage import KINDS, Whole, damaged
 from tests.oracles.changed import makes_a_difference

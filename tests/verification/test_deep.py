@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from camtool.findings import Code, Severity
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.coverage import holes_of

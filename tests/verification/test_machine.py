@@ -7,7 +7,7 @@ import pytest
 
 from camtool.findings import Code, Severity
 from camtool.simulation.motion import Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.verify import VerifyOptions

@@ -11,7 +11,7 @@ from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drawn import kept_of
 from camtool.planning.job import job_of
 from camtool.planning.plan import planned
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.wanted import Kept

@@ -12,7 +12,7 @@ import pytest
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool, job_of
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.verification.report import Dimension
 from tests.drawings import drawing_of
 

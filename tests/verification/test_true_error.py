@@ -18,7 +18,7 @@ from camtool.jobs.drawing import read_to_scale
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Tool, job_of
 from camtool.run import Run
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.oracles.true_curves import distances, drawn, slides_cutting
 
 ROOT = Path(__file__).parents[2]

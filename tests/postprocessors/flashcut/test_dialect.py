@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 from camtool.errors import MachineError, PostError, ProgramError
 from camtool.findings import Code, Finding, Severity
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274

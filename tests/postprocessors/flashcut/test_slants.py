@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import PostError
 from camtool.findings import Code
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.targets import simulate

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from tests.postprocessors.gcode.parts import part
 
 ROOT = Path(__file__).parents[3]

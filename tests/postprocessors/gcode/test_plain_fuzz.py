@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from tests.postprocessors.gcode.plain_parts import KINDS, part
 from tests.waiting import no_chewing

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from camtool.findings import Code
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.gcode.plain_parts import KINDS, anywhere, judge, on_grid, part

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.lower import carried_over
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from tests.postprocessors.gcode.parts import part

@@ -10,7 +10,7 @@ from camtool.errors import ProgramError
 from camtool.importers.read import read_drawing
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, interpreted, motions, needs_rs274, run_rs274

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import MachineError, PostError
 from camtool.findings import Code
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program

@@ -9,7 +9,7 @@ from camtool.errors import MachineError, ProgramError
 from camtool.findings import Code, Severity
 from camtool.machine.model import Machine
 from camtool.simulation.motion import CHUNK_STEPS, Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.gcode_machines import grbl_machine

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 
 ROOT = Path(__file__).parents[3]
 SAMPLE = ROOT / "samples" / "i8751-sample.toml"

@@ -11,7 +11,7 @@ from camtool_postprocessors.i8751.pulses import Firmware
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
 from camtool.simulation.motion import IDEAL, Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.corte_recto import walk

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
-from camtool.targets.registry import LoadedTarget
+from camtool.target.registry import LoadedTarget
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.i8751.machines import OPTIONS, STEP_MM, loaded

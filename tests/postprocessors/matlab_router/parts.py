@@ -9,7 +9,7 @@ import numpy as np
 from camtool.importers.read import read_drawing
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 

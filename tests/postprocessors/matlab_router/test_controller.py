@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine, controller_of
 from camtool.simulation.motion import IDEAL, Chunk, Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.matlab_router.parts import ROOT, STAR, STAR_LXY, STAR_VELXY

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from camtool.findings import Severity, worst
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
-from camtool.targets.registry import LoadedTarget
+from camtool.target.registry import LoadedTarget
 from tests.postprocessors.matlab_router.parts import (
     ROOT,
     Point,

@@ -10,7 +10,7 @@ from camtool.errors import PostError
 from camtool.findings import Code, Severity
 from camtool.kernels.lattice import to_steps
 from camtool.simulation.motion import IDEAL, Options
-from camtool.targets.registry import LoadedTarget, load_target
+from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from camtool.toolpath.program import Program

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Move, Toolpath
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camtool.simulation.motion import Effects, Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.motion_rows import rows_of
 from tests.targets import simulate

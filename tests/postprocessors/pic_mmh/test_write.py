@@ -8,7 +8,7 @@ from camtool_postprocessors.pic_mmh.numbers import FORMATS
 
 from camtool.errors import MachineError, PostError
 from camtool.findings import Code, Severity
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 

@@ -11,7 +11,7 @@ from camtool_postprocessors.valcnc.dialect import ValcncController
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine, SlideStart
 from camtool.simulation.motion import IDEAL, Effects, Options
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of

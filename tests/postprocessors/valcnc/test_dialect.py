@@ -9,7 +9,7 @@ import pytest
 
 from camtool.errors import MachineError, PostError, ProgramError
 from camtool.findings import Code, Severity
-from camtool.targets.registry import load_target
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274

@@ -8,8 +8,8 @@ from click.testing import CliRunner
 
 from camtool.cli.targets import targets
 from camtool.errors import MachineError, PostError, UnknownTargetError
-from camtool.targets import registry
-from camtool.targets.registry import list_target, load_target, target_names
+from camtool.target import registry
+from camtool.target.registry import list_target, load_target, target_names
 
 
 def test_pic_mmh_is_installed() -> None:

@@ -2,8 +2,8 @@
 
 A third party adds a target as camtool's own are added: an entry point of the group
 `camtool.postprocessors`, named like the target, that points at a `Target` (see
-`camtool.targets.target`) in a package that has `machine.toml` beside its `__init__.py`. Nothing is
-imported but the target that is asked for, and a broken one is named and harms nothing else.
+`camtool.target.contract`) in a package that has `machine.toml` beside its `__init__.py`. Nothing
+is imported but the target that is asked for, and a broken one is named and harms nothing else.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import msgspec
 from camtool.errors import CamtoolError, MachineError, OptionError, PostError, UnknownTargetError
 from camtool.machine.model import Machine, PathController, TargetNames
 from camtool.tables import Table, read_table
-from camtool.targets.loader import machine_of, missing_keys, names_of, resolved_table
-from camtool.targets.target import Target
+from camtool.target.contract import Target
+from camtool.target.loader import machine_of, missing_keys, names_of, resolved_table
 
 if TYPE_CHECKING:
     from camtool.simulation.controller import ControllerModel
@@ -203,7 +203,7 @@ def _load(point: EntryPoint) -> tuple[Target, Path]:
     try:
         post = point.load()
         if not isinstance(post, Target):
-            raise TypeError(f"{point.attr} is no camtool.targets.target.Target")
+            raise TypeError(f"{point.attr} is no camtool.target.contract.Target")
         for code in post.codes:
             if not code.name.startswith(f"{post.name}."):
                 raise ValueError(f"the code {code.name} does not begin with {post.name}.")

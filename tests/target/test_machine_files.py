@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from camtool.errors import MachineError
 from camtool.machine.model import Machine, PathController, controller_of
 from camtool.tables import read_table
-from camtool.targets.loader import missing_keys, names_of
-from camtool.targets.registry import load_target
+from camtool.target.loader import missing_keys, names_of
+from camtool.target.registry import load_target
 from tests.targets import build_machine
 
 FILE = Path(__file__).parents[2] / "postprocessors" / "pic_mmh" / "machine.toml"

@@ -25,7 +25,7 @@ import msgspec
 from camtool.errors import MachineError
 from camtool.machine.model import Machine, PathController, SlideStart, TargetNames
 from camtool.tables import DEEPEST, Table, convert, parsed_table, read_table
-from camtool.targets.target import Target
+from camtool.target.contract import Target
 
 NEEDS = "needs"
 """Key at the top of a target's file: the keys that only the user's machine file can give."""
