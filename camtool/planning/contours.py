@@ -1,6 +1,6 @@
 """A contour, its start and direction chosen, as runs of the tool: how it goes in, down and out.
 
-    path ──Along──▶ lengths ──ramps: profile of z──▶ ──tabs: raised──▶ lifted ──leads──▶ Run
+    path ──MeasuredPath──▶ lengths ──ramps: profile of z──▶ ──tabs: raised──▶ lifted ──leads──▶ Run
 
 A closed contour is one run: down, round and round, the overlap. With leads it is one run for each
 pass, from the lead-in to the lead-out; where it ramps down, it stays one run, and goes out and

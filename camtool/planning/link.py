@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,16 +22,8 @@ Approach = Callable[[Run], tuple[float, float] | None]
 """Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
 
 
-@dataclass(frozen=True, eq=False)
-class Worked:
-    """The runs of one operation, in order of cutting."""
-
-    operation: Operation
-    runs: Sequence[Run]
-
-
 def rounded(toolpath: Toolpath) -> Toolpath:
-    """The same moves with their places rounded to SETTLED_DECIMALS.
+    """The same moves with their places rounded to ROUNDED_DECIMALS.
 
     The ends of a straight wall differ by some 1e-15 of their size, as offsets, tabs and ramps come
     to them. Where a dialect's last decimal is a tie (a cutter of 1/8 inch has a radius of 1.5875)
@@ -45,30 +37,32 @@ def rounded(toolpath: Toolpath) -> Toolpath:
 
 
 def link(
-    worked: Sequence[Worked],
+    worked: Sequence[tuple[Operation, Sequence[Run]]],
     safe_z_mm: float,
     approaches: Callable[[], Approach] | None = None,
 ) -> ToolpathBuilder:
     """All moves of a program: the tool starts at part zero on the stock and ends above it.
 
-    Rows know their run, counted through all of `worked`. `approaches` gives what tells where runs
-    are come to from, a new one after a tool change."""
+    `worked`: operations, each with its runs in order of cutting. Rows know their run, counted
+    through all of them. `approaches` makes what gives the place from which a run is approached, a
+    new one after each tool change.
+    """
     builder = ToolpathBuilder().rapid(z=safe_z_mm)
     approach = approaches() if approaches is not None else None
     tool: Tool | None = None
     speed: float | None = None
     done = 0
-    for each in worked:
-        if not each.runs:
+    for operation, runs in worked:
+        if not runs:
             continue
         builder.source = ""
-        if _changes(tool, each.operation.tool):
+        if _changes(tool, operation.tool):
             speed = _spin(builder, speed, None)
-            builder.event(Kind.TOOL_CHANGE, float(each.operation.tool.number or 0))
+            builder.event(Kind.TOOL_CHANGE, float(operation.tool.number or 0))
             approach = approaches() if approaches is not None else None
-        tool = each.operation.tool
-        speed = _spin(builder, speed, each.operation.spindle_rpm)
-        for run in each.runs:
+        tool = operation.tool
+        speed = _spin(builder, speed, operation.spindle_rpm)
+        for run in runs:
             builder.run = done
             _cut_one(builder, run, safe_z_mm, approach)
             done += 1

@@ -37,7 +37,7 @@ from camtool.planning.gouges import side_findings
 from camtool.planning.items import Bridge, Chosen, Contour, Item, Run, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
 from camtool.planning.leads import KeepOut
-from camtool.planning.link import Worked, link, rounded
+from camtool.planning.link import link, rounded
 from camtool.planning.naming import key_of
 from camtool.planning.order import (
     Point,
@@ -100,7 +100,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
         here = end
         steps.append(step)
     steps = _sparing(steps)
-    worked = [Worked(step.operation, step.runs) for step in steps]
+    worked = [(step.operation, step.runs) for step in steps]
     approaches = None
     if not undivided and (job.approach or job.minimise == "reversals"):
         from camtool.planning.reversing import Approaches

@@ -55,7 +55,7 @@ class Asked:
 
     @property
     def away(self) -> float:
-        """From the wall to the tool's middle."""
+        """From the wall to the tool centre."""
         return self.cutter.radius + self.allowance
 
 

@@ -13,7 +13,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.planning.items import Contour, Feeds, Item, Run, Setting
 from camtool.planning.job import Operation
-from camtool.planning.link import Worked, link
+from camtool.planning.link import link
 from camtool.planning.paths import flat
 from camtool.planning.reversing import Approaches, least_reversal_mm, parts_of, reversals_along
 from camtool.target.registry import load_target
@@ -76,7 +76,7 @@ def toolpath(paths: Sequence[Polyline], machine: Machine, *, approach: bool) -> 
     """The paths cut one after the other, each from its first point."""
     runs = [run_of(path) for path in paths]
     come = Approaches(machine) if approach else None
-    return link([Worked(Operation(), runs)], 0.2, lambda: come).finish()
+    return link([(Operation(), runs)], 0.2, lambda: come).finish()
 
 
 def judged(

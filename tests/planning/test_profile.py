@@ -1,4 +1,4 @@
-"""On which lines the middle of the tool runs, and what is noticed on the way."""
+"""The paths of the tool centre beside and on the lines, and the findings of profiles."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def test_parts_nearer_than_the_tool_is_wide_are_gouged_when_cut_one_by_one() -> 
     assert _codes(found) == [Code.GOUGE, Code.GOUGE]
     first = found.findings[0]
     assert first.severity == Severity.WARNING
-    # Round the left circle the tool's middle reaches x = 1.25; the other begins at 1.3.
+    # Round the left circle the tool centre reaches x = 1.25; the other begins at 1.3.
     assert first.measured == pytest.approx(0.05)
     assert first.limit == 0.25
     assert "cuts 0.2 mm into" in first.message
