@@ -695,7 +695,7 @@ def worst(findings: tuple[Finding, ...] | list[Finding]) -> Severity:
 
 def _and_more(noun: str) -> str:
     """The end of a sentence of which only the first are listed; `more` is how many are not."""
-    return f"{{more:|; and # more {noun}|; and # more {noun}}}"
+    return f"{{more:|; and # more {noun.removesuffix('s')}|; and # more {noun}}}"
 
 
 # What is said of drawings.
@@ -718,7 +718,9 @@ IMPLAUSIBLE_SIZE = Sentence(
 ENTITY_SKIPPED = Sentence(Code.ENTITY_SKIPPED, "{measured} {kind} left out: {reason}")
 GAP_OPEN = Sentence(Code.GAP_OPEN, "two open ends are {size_um:.4g} µm apart and stay open", "mm")
 GAP_OPEN_MORE = Sentence(
-    Code.GAP_OPEN, "{count} more gaps stay open, of {least_um:.4g} to {most_um:.4g} µm", "mm"
+    Code.GAP_OPEN,
+    "{count:# more gap stays|# more gaps stay} open, of {least_um:.4g} to {most_um:.4g} µm",
+    "mm",
 )
 FILE_REPAIRED = Sentence(
     Code.FILE_REPAIRED,
@@ -726,14 +728,17 @@ FILE_REPAIRED = Sentence(
 )
 FILE_REPAIRED_BODIES = Sentence(
     Code.FILE_REPAIRED,
-    "{measured} of {bodies} bodies have faces or edges that do not fit together",
+    "{measured} of {bodies:# body|# bodies} {measured:has|have} faces or edges that do not fit "
+    "together",
 )
 FILE_REPAIRED_IN_PART = Sentence(
     Code.FILE_REPAIRED, "the file is damaged, something may be missing: {complaint}"
 )
 GAP_CLOSED = Sentence(Code.GAP_CLOSED, "a gap of {size_um:.4g} µm was closed", "mm")
 GAP_CLOSED_MORE = Sentence(
-    Code.GAP_CLOSED, "{count} more gaps were closed, of {least_um:.4g} to {most_um:.4g} µm", "mm"
+    Code.GAP_CLOSED,
+    "{count:# more gap was|# more gaps were} closed, of {least_um:.4g} to {most_um:.4g} µm",
+    "mm",
 )
 NOTHING_DRAWN = Sentence(Code.NOTHING_DRAWN, "no contour is left to cut")
 NOTHING_DRAWN_BUT_PATHS = Sentence(
@@ -749,7 +754,9 @@ SELF_CROSSING = Sentence(
     severity=WARNING,
 )
 SELF_CROSSING_MORE = Sentence(
-    Code.SELF_CROSSING, "{measured} more closed contours cross themselves", severity=WARNING
+    Code.SELF_CROSSING,
+    "{measured:# more closed contour crosses itself|# more closed contours cross themselves}",
+    severity=WARNING,
 )
 SELF_CROSSING_CARVED = Sentence(
     Code.SELF_CROSSING,
@@ -761,16 +768,21 @@ SELF_CROSSING_NO_REGION = Sentence(
     Code.SELF_CROSSING, "{fault}: what is inside cannot be carved; {mend}", severity=ERROR
 )
 BRANCHED = Sentence(Code.BRANCHED, "{measured} ends meet; the straightest were joined")
-BRANCHED_MORE = Sentence(Code.BRANCHED, "more than two ends meet at {measured} more places")
+BRANCHED_MORE = Sentence(
+    Code.BRANCHED, "more than two ends meet at {measured:# more place|# more places}"
+)
 DRAWN_TWICE = Sentence(
     Code.DRAWN_TWICE,
     "{doubles} drawn twice and {overlaps} lying on others in whole or in part: {measured:.6g} mm "
     "left out",
     "mm",
 )
-TINY_MERGED = Sentence(Code.TINY_MERGED, "{measured} segments too short to matter were merged")
-ARCS_RECOGNISED = Sentence(Code.ARCS_RECOGNISED, "chords became {measured} arcs")
-FONT_SUBSTITUTED = Sentence(Code.FONT_SUBSTITUTED, "{measured} texts: {what}")
+TINY_MERGED = Sentence(
+    Code.TINY_MERGED,
+    "{measured:# segment|# segments} too short to matter {measured:was|were} merged",
+)
+ARCS_RECOGNISED = Sentence(Code.ARCS_RECOGNISED, "chords became {measured:# arc|# arcs}")
+FONT_SUBSTITUTED = Sentence(Code.FONT_SUBSTITUTED, "{measured:# text|# texts}: {what}")
 SECTION_CHOSEN = Sentence(
     Code.SECTION_CHOSEN,
     "the section at z = {heights} mm is drawn; the model spans z = {bottom:.6g} to {top:.6g} mm; "
@@ -798,9 +810,9 @@ UNIT_GUESSED_BY_PROGRAM = Sentence(
 )
 POINTS_MERGED = Sentence(
     Code.POINTS_MERGED,
-    "at this scale {measured} points lie within {near_nm:g} nm of the one before them and were "
-    "merged{paths:|; # paths are no longer than that and are left out|; # paths are no longer "
-    "than that and are left out}",
+    "at this scale {measured:# point lies|# points lie} within {near_nm:g} nm of the one before "
+    "and {measured:was|were} merged{paths:|; # path is no longer than that and is left out|; # "
+    "paths are no longer than that and are left out}",
 )
 
 # What planning says.
@@ -840,7 +852,7 @@ GOUGE_OF_ALLOWANCE = Sentence(
     "{tool} beside {contour} cuts {amount:.4g} mm into the allowance on {other}",
     "mm",
 )
-GOUGE_MORE = Sentence(Code.GOUGE, "{measured} more places like this")
+GOUGE_MORE = Sentence(Code.GOUGE, "{measured:# more place|# more places} like this")
 GOUGE_BY_POCKET = Sentence(
     Code.GOUGE,
     "the pocket {pocket} clears away {contour}, {measured:.4g} mm wide, which another operation "
@@ -848,7 +860,7 @@ GOUGE_BY_POCKET = Sentence(
     "mm",
     ERROR,
 )
-GOUGE_BY_POCKET_MORE = Sentence(Code.GOUGE, "{measured} more contours like this")
+GOUGE_BY_POCKET_MORE = Sentence(Code.GOUGE, "{measured:# more contour|# more contours} like this")
 OUT_OF_TRAVEL = Sentence(
     Code.OUT_OF_TRAVEL,
     "{axis} spans {measured:.4f} mm with part zero, more than its travel of {limit:g} mm: {mend}",
@@ -867,7 +879,7 @@ UNREACHED = Sentence(
 )
 UNREACHED_MORE = Sentence(
     Code.UNREACHED,
-    "{tool} is too wide for {places} more places: {measured:.4g} mm² stay uncut",
+    "{tool} is too wide for {places:# more place|# more places}: {measured:.4g} mm² stay uncut",
     "mm2",
     WARNING,
 )
@@ -880,8 +892,8 @@ UNREACHED_CORNERS = Sentence(
 )
 UNREACHED_BY_TIP = Sentence(
     Code.UNREACHED,
-    "a flat tip of {tip:g} mm leaves {places} corners or narrow places uncut, {measured:.4g} mm² "
-    "in all: use a bit with a smaller tip",
+    "a flat tip of {tip:g} mm leaves {places:# corner or narrow place|# corners or narrow "
+    "places} uncut, {measured:.4g} mm² in all: use a bit with a smaller tip",
     "mm2",
     WARNING,
 )
@@ -892,7 +904,9 @@ UNREACHED_BETWEEN = Sentence(
     WARNING,
 )
 UNREACHED_BETWEEN_MORE = Sentence(
-    Code.UNREACHED, "{measured} more pairs of contours that stay joined", severity=WARNING
+    Code.UNREACHED,
+    "{measured:# more pair|# more pairs} of contours that {measured:stays|stay} joined",
+    severity=WARNING,
 )
 OUT_OF_STOCK = Sentence(
     Code.OUT_OF_STOCK,
@@ -911,7 +925,8 @@ OUT_OF_STOCK_AS_ALLOWED = Sentence(
 )
 OUT_OF_STOCK_BESIDE = Sentence(
     Code.OUT_OF_STOCK,
-    "{measured} cuts lie wholly beside the stock: check its corner, its size and the origin",
+    "{measured:# cut lies|# cuts lie} wholly beside the stock: check its corner, its size and "
+    "the origin",
     "cuts",
     WARNING,
 )
@@ -939,7 +954,8 @@ TAB_LEFT_OUT_DRILLED = Sentence(
 )
 TAB_LEFT_OUT_OF_ALL = Sentence(
     Code.TAB_LEFT_OUT,
-    "{measured} contours go without tabs: {kinds}; an operation of their own may give them some",
+    "{measured:# contour goes|# contours go} without tabs: {kinds}; an operation of their own "
+    "may give them some",
     "contours",
 )
 LEAD_LEFT_OUT = Sentence(
@@ -970,20 +986,24 @@ DEPTH_LIMITED = Sentence(
 )
 REVERSALS_IN_AIR = Sentence(
     Code.REVERSALS_IN_AIR,
-    "{limit} reversals while cutting become {measured}: {runs_before} runs are cut as "
-    "{runs_after}; what play leaves over is at most {after_um:.3g} µm, not {before_um:.3g} µm",
+    "{limit:# reversal|# reversals} while cutting {limit:becomes|become} {measured}: "
+    "{runs_before:# run is|# runs are} cut as {runs_after}; what backlash leaves over is at most "
+    "{after_um:.3g} µm, not {before_um:.3g} µm",
 )
 REVERSALS_IN_AIR_NOT = Sentence(
     Code.REVERSALS_IN_AIR,
-    "{measured} contours that turn back are cut in one piece: {reason}",
+    "{measured:# contour that turns back is|# contours that turn back are} cut in one piece: "
+    "{reason}",
 )
 NOT_RELIEVED = Sentence(Code.NOT_RELIEVED, "{tool} finds no room for a relief at this corner")
 MARKS_NOT_CUT = Sentence(
-    Code.MARKS_NOT_CUT, "{measured} single points are not cut: a profile follows lines"
+    Code.MARKS_NOT_CUT,
+    "{measured:# single point is|# single points are} not cut: a profile follows lines",
 )
 NOT_DRILLED = Sentence(
     Code.NOT_DRILLED,
-    "only full circles and single points are drilled: {measured} other paths are not",
+    "only full circles and single points are drilled: {measured:# other path is|# other paths "
+    "are} not",
 )
 NOT_DRILLED_TOO_LARGE = Sentence(
     Code.NOT_DRILLED,
@@ -992,7 +1012,8 @@ NOT_DRILLED_TOO_LARGE = Sentence(
 )
 HOLE_SIZE = Sentence(
     Code.HOLE_SIZE,
-    "{count} circles of {limit:g} mm are drilled with a drill of {measured:g} mm",
+    "{count:# circle|# circles} of {limit:g} mm {count:is|are} drilled with a drill of "
+    "{measured:g} mm",
     "mm",
 )
 TOOL_NOT_SAID = Sentence(
@@ -1022,7 +1043,7 @@ SIDE_BY_UNCUT_FRAME = Sentence(
 )
 CUT_DOUBTFUL = Sentence(Code.CUT_DOUBTFUL, "{doubts}")
 CUT_DOUBTFUL_SPEED = Sentence(
-    Code.CUT_DOUBTFUL, "nobody says how fast the spindle turns, so it stays off (--spindle)"
+    Code.CUT_DOUBTFUL, "no spindle speed is given, so the spindle stays off (--spindle)"
 )
 CUT_DOUBTFUL_WIDTH = Sentence(
     Code.CUT_DOUBTFUL,
@@ -1039,15 +1060,15 @@ CUT_DOUBTFUL_PLUNGE = Sentence(
 )
 TAB_SHARED = Sentence(
     Code.TAB_SHARED,
-    "cuts are raised over {measured} tabs, which they would have cut away: the first over one of "
-    "{contour}",
+    "cuts are raised over {measured:# tab|# tabs}, which they would have cut away: the first "
+    "over one of {contour}",
     "tabs",
     WARNING,
 )
 TAB_SHARED_WITH_OWN = Sentence(
     Code.TAB_SHARED,
-    "cuts are raised over {measured} its own and its neighbours' tabs, which they would have cut "
-    "away: the first over one of {contour}",
+    "cuts are raised over {measured:# tab|# tabs} of its own and its neighbours, which they "
+    "would have cut away: the first over one of {contour}",
     "tabs",
     INFO,
 )
@@ -1057,7 +1078,7 @@ CORNER_FAR = Sentence(
     '"round", or "mitre" with a low limit',
     "mm",
 )
-CORNER_FAR_MORE = Sentence(Code.CORNER_FAR, "{measured} more corners")
+CORNER_FAR_MORE = Sentence(Code.CORNER_FAR, "{measured:# more corner|# more corners}")
 
 # What is said of programs.
 
@@ -1084,8 +1105,8 @@ FEED_ABOVE_LIMIT_IN_JOB = Sentence(
 )
 FEED_ABOVE_LIMIT_LOWERED = Sentence(
     Code.FEED_ABOVE_LIMIT,
-    "{cuts} cuts of up to {measured:g} mm/min are written at {limit:g}, the highest feed of "
-    "{machine}",
+    "{cuts:# cut|# cuts} of up to {measured:g} mm/min {cuts:is|are} written at {limit:g}, the "
+    "highest feed of {machine}",
     "mm_min",
     WARNING,
 )
@@ -1189,7 +1210,7 @@ EXTRA_CUT_PLUNGE = Sentence(
 )
 EXTRA_CUT_AGAIN = Sentence(
     Code.EXTRA_CUT,
-    "a move is cut {measured} times, asked for {limit} times" + _and_more("moves"),
+    "a move is cut {measured} times, asked for {limit:once|# times}" + _and_more("moves"),
     "times",
 )
 EXTRA_CUT_HOLE = Sentence(
@@ -1205,19 +1226,19 @@ EXTRA_CUT_HOLE_DEPTH = Sentence(
 )
 MANY_REVERSALS = Sentence(
     Code.MANY_REVERSALS,
-    "X and Y reverse {measured} times while cutting a part of {size:.3g} mm; small parts were "
-    "seen to fail above {limit}",
+    "X and Y reverse {measured:once|# times} while cutting a part of {size:.3g} mm; small parts "
+    "were seen to fail above {limit}",
     "reversals",
 )
 PLAY_NOT_KNOWN = Sentence(
     Code.PLAY_NOT_KNOWN,
-    "the machine file gives {axis} no play: its error is predicted as if it had none",
+    "the machine file gives no backlash for {axis}: its error is predicted as if there were none",
     severity=INFO,
 )
 PLAY_NOT_KNOWN_TO_SAVE = Sentence(
     Code.PLAY_NOT_KNOWN,
-    "{machine} has no play in X and Y, so that fewer reversals would gain nothing: give it with "
-    "--set axes.x.backlash_mm=...",
+    "no backlash is known of X and Y of {machine}, so that fewer reversals would gain nothing: "
+    "give it with --set axes.x.backlash_mm=...",
     severity=WARNING,
 )
 NO_MOTION = Sentence(Code.NO_MOTION, "the program moves nothing")
@@ -1241,13 +1262,14 @@ ABOVE_GATE_UNKNOWN = Sentence(
 )
 ABOVE_GATE_REVERSALS = Sentence(
     Code.ABOVE_GATE,
-    "X and Y reverse {measured} times while cutting; {limit} are allowed",
+    "X and Y reverse {measured:once|# times} while cutting; {limit} are allowed",
     "reversals",
 )
 ABOVE_GATE_TIME = Sentence(Code.ABOVE_GATE, "the program takes {takes}; {allowed} is allowed", "s")
 END_NOT_REACHED = Sentence(
     Code.END_NOT_REACHED,
-    "the controller leaves {count} moves beside their ends, up to {measured:.2f} µm",
+    "the controller leaves {count:# move beside its end|# moves beside their ends}, up to "
+    "{measured:.2f} µm",
     "um",
 )
 FIT_COARSE = Sentence(
@@ -1281,7 +1303,7 @@ SPINDLE_DIFFERS = Sentence(
 )
 SPINDLE_DIFFERS_UNASKED = Sentence(
     Code.SPINDLE_DIFFERS,
-    "{moves:# move runs|# moves run} with {turning}, where {wanted} is nobody asked for it",
+    "{moves:# move runs|# moves run} with {turning}, where nobody asked for {wanted}",
     "rev_min",
     INFO,
 )
@@ -1291,12 +1313,14 @@ CUT_OTHER_WAY = Sentence(
 )
 CLEARANCE_LOW = Sentence(
     Code.CLEARANCE_LOW,
-    "{rapids} rapids run lower than Z {limit:g} mm, asked for: down to Z {measured:g} mm",
+    "{rapids:# rapid runs|# rapids run} lower than Z {limit:g} mm, asked for: down to Z "
+    "{measured:g} mm",
     "mm",
 )
 CLEARANCE_LOW_OWN = Sentence(
     Code.CLEARANCE_LOW,
-    "{rapids} rapids run lower than Z {limit:g} mm, the machine's own: down to Z {measured:g} mm",
+    "{rapids:# rapid runs|# rapids run} lower than Z {limit:g} mm, the machine's own: down to Z "
+    "{measured:g} mm",
     "mm",
 )
 END_DIFFERS = Sentence(
@@ -1334,7 +1358,7 @@ SETTING_DIFFERS_NO_CORNERS = Sentence(
 )
 SETTING_DIFFERS_DWELL = Sentence(
     Code.SETTING_DIFFERS,
-    "the tool waits {measured:g} s, where {limit:g} s are asked for; at {places} places",
+    "the tool waits {measured:g} s, where {limit:g} s are asked for; at {places:# place|# places}",
     "s",
     ERROR,
 )

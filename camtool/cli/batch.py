@@ -63,9 +63,9 @@ _RUN = "How the batch runs"
 @click.option(
     "--compensate",
     is_flag=True,
-    help="Bend the path against the machine's play, scale and squareness.",
+    help="Compensate the path for the machine's backlash, scale and squareness.",
 )
-@click.option("--no-own-jobs", is_flag=True, help="Pay no heed to part.toml beside part.dxf.")
+@click.option("--no-own-jobs", is_flag=True, help="Ignore part.toml beside part.dxf.")
 @option(_RUN, "--jobs", "-j", type=click.IntRange(min=1), help="Processes.  [one for each core]")
 @option(_RUN, "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, tcp://host:8786.")
 @option(_RUN, "--timeout", callback=duration, metavar="TIME", help="Longest for one drawing, 60s.")
@@ -100,9 +100,9 @@ def batch(
 ) -> int:
     """Turn DRAWINGS (files, folders, quoted patterns such as 'parts/**/*.dxf') into programs.
 
-    Folders are kept below --out. What is up to date by content is passed over. A drawing that
-    fails stops no other one; exit code 1 when any did. A job file beside a drawing, part.toml for
-    part.dxf, is its job; --job is for those without one.
+    Folders are kept below --out. Drawings that are up to date by content are skipped. A drawing
+    that fails does not stop the others; exit code 1 when any failed. A job file beside a drawing,
+    part.toml for part.dxf, is its job; --job is for those without one.
     """
     if no_verify and (gates.given or reports):
         raise click.UsageError("--no-verify leaves nothing to report or to hold against limits")
@@ -191,7 +191,7 @@ class BatchRun:
         except KeyboardInterrupt:  # before the first drawing, or for the second time
             ended, number = Ended((), None), int(signal.SIGINT)
         if number is not None:
-            text = "interrupted; what is written is whole, and the same command goes on"
+            text = "interrupted; written files are complete, and the same command continues"
             say(f"camtool: {text}", quiet=False)
             return EXIT_SIGNAL + number
         if ended.error is not None:

@@ -31,7 +31,7 @@ def calibrate(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Estimate steps, play and squareness from MEASUREMENTS, a TOML file of measured coupons.
+    """Estimate steps, backlash and squareness from MEASUREMENTS, a TOML file of measured coupons.
 
     `camtool coupon` draws them and begins that file. With -o, a machine file for --machine is
     written, with the uncertainty and the source of each number behind it.

@@ -54,7 +54,7 @@ def _regions(ctx: click.Context, param: click.Parameter, value: str) -> tuple[in
 @click.argument("kind", type=click.Choice(KINDS), metavar="KIND")
 @click.option("-o", "--output", metavar="FILE", help="The drawing, .dxf or .svg.  [coupon.dxf]")
 @click.option(
-    "--measurements", metavar="FILE", help="Also a file to fill in, for camtool calibrate."
+    "--measurements", metavar="FILE", help="Also a file to fill in for camtool calibrate."
 )
 @click.option(
     "--size", metavar="WxH", callback=_size, help="Of the sheet; the machine's travel, or 50x50mm."
@@ -64,7 +64,7 @@ def _regions(ctx: click.Context, param: click.Parameter, value: str) -> tuple[in
     metavar="NxM",
     default="1x1",
     callback=_regions,
-    help="Columns and rows of the table in which lines measure the play.  [1x1]",
+    help="Columns and rows of the table in which lines measure the backlash.  [1x1]",
 )
 @machine_options
 @talk_options
@@ -81,10 +81,10 @@ def coupon(
     """Draw coupons of a KIND: what `camtool calibrate` wants to have cut and measured.
 
     \b
-    lines    two lines along each axis, joined at one end: play, and play by --regions
-    squares  three of them: step scale, play, squareness
+    lines    two lines along each axis, joined at one end: backlash, also by --regions
+    squares  three of them: step scale, backlash, squareness
     circles  three of them: the same, from eight diameters each
-    steps    a ruler along each axis, forwards and backwards: step scale and play
+    steps    a ruler along each axis, forwards and backwards: step scale and backlash
 
     Cut them: camtool post coupon.dxf --kind engrave --start longest-line --gap 0.
     """
@@ -115,6 +115,7 @@ def _travel(machine: Machine | None) -> tuple[float, float]:
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
     if x is None or y is None:
         raise OptionError(
-            f"the travel of {machine.target.name} is not said", mend="give --size, such as 40x30mm"
+            f"the travel of {machine.target.name} is not known",
+            mend="give --size, such as 40x30mm",
         )
     return x, y

@@ -113,7 +113,7 @@ def _code(*, debug: bool) -> int:
             say(line, quiet=False)
         return EXIT_BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
-        say("camtool: interrupted; what is written is whole", quiet=False)
+        say("camtool: interrupted; written files are complete", quiet=False)
         return EXIT_INTERRUPTED
     except CamtoolError as error:
         _trace(debug)

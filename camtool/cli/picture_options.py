@@ -168,7 +168,7 @@ def check_beside(flag: str, pictures: Sequence[str | None]) -> None:
     if not names:
         raise click.UsageError(f"{flag}: there is no picture to make; add --preview")
     if any(map(is_viewer, names)):
-        raise click.UsageError(f"{flag}: an .html viewer shows one alone; name a .svg or .png")
+        raise click.UsageError(f"{flag}: an .html viewer shows a single one; name a .svg or .png")
 
 
 def picture_options(command: Command) -> Command:

@@ -62,7 +62,7 @@ def scenes_of(run: Run, *, before: bool) -> list[Scene]:
         return [run.scene()]
     if run.before is None:
         raise OptionError(
-            "the job does nothing against reversals or play",
+            "the job does nothing against reversals or backlash",
             where="--before-after",
             mend="add --compensate, --minimise reversals or --approach, or drop it",
         )
@@ -142,7 +142,7 @@ def posting_options(command: Command) -> Command:
             click.option(
                 "--compensate",
                 is_flag=True,
-                help="Bend the path against the machine's play, scale and squareness.",
+                help="Compensate the path for the machine's backlash, scale and squareness.",
             ),
         ],
     )

@@ -190,5 +190,5 @@ def _refuse_program(source: str) -> None:
             continue
         if Path(source).suffix.lower() == extension:
             raise CamtoolError(
-                "is a program", file=source, mend=f"say whose, such as --target {name}"
+                "is a program", file=source, mend=f"name its machine, such as --target {name}"
             )

@@ -181,7 +181,7 @@ def _backlash_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[s
     """The cells as they lie on the table: +X to the right, +Y up."""
     mean_um = getattr(machine.axes, name).backlash_mm * 1000.0
     instead = "" if machine.play_map.use else f", not used: play_map.use; {mean_um:g} everywhere"
-    yield f"play of {name.upper()} by region of the table, µm{instead}"
+    yield f"backlash of {name.upper()} by region of the table, µm{instead}"
     rows = [("y \\ x mm", *_spans(cells.x_mm))]
     for span, plays in zip(_spans(cells.y_mm), cells.play_mm, strict=True):
         rows.insert(1, (span, *(f"{play * 1000.0:g}" for play in plays)))
@@ -195,7 +195,7 @@ def _spans(edges_mm: tuple[float, ...]) -> list[str]:
 
 
 def _speed(mm_min: float) -> str:
-    return f"{mm_min:.4g} mm/min" if math.isfinite(mm_min) else "not said"
+    return f"{mm_min:.4g} mm/min" if math.isfinite(mm_min) else "not known"
 
 
 def flat(prefix: str, table: dict[str, Any]) -> list[tuple[str, Any]]:

@@ -82,14 +82,14 @@ if TYPE_CHECKING:
 @click.option(
     "--compare",
     metavar="WHAT",
-    help="Judge it several ways: interpolators, mechanics, backlash=0,0.1,0.2 or any "
+    help="Judge several variants: interpolators, mechanics, backlash=0,0.1,0.2 or any "
     "KEY=VALUE,VALUE of the machine.",
 )
 @click.option(
     "--preview",
     metavar="FILE",
     callback=picture_name,
-    help="Picture of the predicted result (with --compare: of all ways), .svg or .png; "
+    help="Picture of the predicted result (with --compare: of all variants), .svg or .png; "
     ".html to pan, zoom and play.",
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
@@ -189,13 +189,13 @@ class Wishes:
                 check_beside("--beside", outputs.pictures)
             return
         if outputs.page is not None:
-            raise click.UsageError("--report is of one way to run a program; drop --compare")
+            raise click.UsageError("--report is for a single variant; drop --compare")
         if gated:
-            raise click.UsageError("limits hold for one way to run a program; drop --compare")
+            raise click.UsageError("limits are for a single variant; drop --compare")
         if self.beside is not None:
-            raise click.UsageError("--beside is for one way to run a program; drop --compare")
+            raise click.UsageError("--beside is for a single variant; drop --compare")
         if outputs.preview is not None and is_viewer(outputs.preview):
-            raise click.UsageError("--compare draws .svg and .png alone")
+            raise click.UsageError("--compare draws only .svg and .png")
         self.looks.check(outputs.pictures, OVERLAY)
 
 

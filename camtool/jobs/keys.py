@@ -473,7 +473,9 @@ WHOLE = {
         "Order and starts for short rapids, or few reversals while cutting.",
         '"reversals"',
     ),
-    "approach": Key("approach", SWITCH, "Take up the play of X and Y before every cut.", "true"),
+    "approach": Key(
+        "approach", SWITCH, "Take up the backlash of X and Y before every cut.", "true"
+    ),
     "frames": Key(
         "frames",
         Value(plain(layers), "PATTERNS"),
@@ -603,7 +605,7 @@ OPERATION = {
     ),
     "corners": Key("corners", one_of(CORNERS), "Relief of inner corners.", '"dogbone"', _PROFILE),
     "joins": Key(
-        "joins", one_of(JOINS), "The tool's way round outer corners.", '"mitre"', _PROFILE
+        "joins", one_of(JOINS), "The tool's path around outer corners.", '"mitre"', _PROFILE
     ),
     "mitre_limit": Key(
         "mitre_limit",

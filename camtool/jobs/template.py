@@ -91,7 +91,7 @@ def _head(drawing: Drawing, size: tuple[float, float], machine: Machine | None) 
         yield (
             f"# {target}: feed {machine.feed.default_mm_min:g} mm/min,"
             f" depth {machine.defaults.cut_depth_mm:g} mm,"
-            f" safe_z {machine.defaults.safe_z_mm:g} mm where nothing is said"
+            f" safe_z {machine.defaults.safe_z_mm:g} mm by default"
         )
         if travel[0] is not None and travel[1] is not None:
             yield f"# {target}: travel {travel[0]:g} by {travel[1]:g} mm"

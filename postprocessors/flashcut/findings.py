@@ -6,47 +6,49 @@ from camtool.findings import WARNING, Code, Sentence
 
 FEED_ABOVE_LIMIT = Sentence(
     Code.FEED_ABOVE_LIMIT,
-    "{count} blocks have a feed above what the machine's shortest half period gives, up to "
-    "{measured:g} mm/min where {limit:.4g} is the limit: that half period holds them, and so "
-    "does the simulation",
+    "{count:# block has|# blocks have} a feed above what the machine's shortest half period "
+    "gives, up to {measured:g} mm/min where {limit:.4g} is the limit: that half period holds "
+    "them, and so does the simulation",
     "mm_min",
     WARNING,
 )
 VALUE_ROUNDED = Sentence(
     Code.VALUE_ROUNDED,
-    "{speeds} spindle speeds and {tools} tool numbers have no word: the spindle turns with the "
-    "feed, and M00 waits for the tool",
+    "{speeds:# spindle speed|# spindle speeds} and {tools:# tool number|# tool numbers} have no "
+    "word: the spindle turns with the feed, and M00 waits for the tool",
 )
 EVENT_LEFT_OUT_DWELL = Sentence(
     Code.EVENT_LEFT_OUT,
-    "{count} events were left out ({kinds}): this controller has no dwell",
+    "{count:# event was|# events were} left out ({kinds}): this controller has no dwell",
     severity=WARNING,
 )
 EVENT_LEFT_OUT_STOP = Sentence(
     Code.EVENT_LEFT_OUT,
-    "{count} events were left out ({kinds}): M05 is written, but this machine's spindle turns "
-    "with every move",
+    "{count:# event was|# events were} left out ({kinds}): M05 is written, but this machine's "
+    "spindle turns with every move",
     severity=WARNING,
 )
 EXECUTED_OTHERWISE = Sentence(
     Code.EXECUTED_OTHERWISE,
-    "{count} straight moves of both axes make their shorter one too long, by up to {steps} steps "
-    "({measured:.1f} µm), because each axis has a timer of its own{stays:|; it stays in all that "
-    "follows|}. What lowers it: longer half periods (controller.half_period_ms), lines in pieces "
-    "(dialect.slants=split){rapids:|, rapids along one axis at a time (dialect.rapids=one-axis)|}",
+    "{count:# straight move|# straight moves} of both axes {count:makes its|make their} shorter "
+    "one too long, by up to {steps:# step|# steps} ({measured:.1f} µm), because each axis has a "
+    "timer of its own{stays:|; it stays in all that follows|}. What lowers it: longer half "
+    "periods (controller.half_period_ms), lines in pieces (dialect.slants=split){rapids:|, "
+    "rapids along one axis at a time (dialect.rapids=one-axis)|}",
     "um",
 )
 FEED_HELD = Sentence(
     Code.FEED_HELD,
-    "{count} cuts are slower than their F: F{limit:g} becomes {measured:.3g} mm/min of both "
-    "axes, by the shortest half period (controller.half_period_ms, "
+    "{count:# cut is slower than its F|# cuts are slower than their F}: F{limit:g} becomes "
+    "{measured:.3g} mm/min of both axes, by the shortest half period (controller.half_period_ms, "
     "controller.single_axis_half_period_ms); a shorter one makes slanted lines less exact",
     "mm_min",
 )
 FEED_HELD_ALONE = Sentence(
     Code.FEED_HELD,
-    "{count} cuts are slower than their F: F{limit:g} becomes {measured:.3g} mm/min along one "
-    "axis, by the shortest half period (controller.half_period_ms, "
-    "controller.single_axis_half_period_ms); a shorter one makes slanted lines less exact",
+    "{count:# cut is slower than its F|# cuts are slower than their F}: F{limit:g} becomes "
+    "{measured:.3g} mm/min along one axis, by the shortest half period "
+    "(controller.half_period_ms, controller.single_axis_half_period_ms); a shorter one makes "
+    "slanted lines less exact",
     "mm_min",
 )

@@ -6,12 +6,12 @@ from camtool.findings import INFO, Code, Sentence
 
 EVENT_LEFT_OUT = Sentence(
     Code.EVENT_LEFT_OUT,
-    "the tool is not said, since grbl knows no tool change: mount it before the program",
+    "the program names no tool, since grbl knows no tool change: mount it before the program",
     severity=INFO,
 )
 FEED_TOO_SLOW = Sentence(
     Code.FEED_TOO_SLOW,
-    "{count} cuts are slower than the controller can step (it makes no less than {least_hz:g} "
-    "steps a second): F{measured:g} runs at {limit:.3g} mm/min, and is simulated so",
+    "{count:# cut is|# cuts are} slower than the controller can step (it makes no less than "
+    "{least_hz:g} steps a second): F{measured:g} runs at {limit:.3g} mm/min, and is simulated so",
     "mm_min",
 )

@@ -17,7 +17,7 @@ FEED_ROUNDED = Sentence(
 )
 FEED_ROUNDED_TO_LIMIT = Sentence(
     Code.FEED_ROUNDED,
-    "{measured} lines run at the highest speed of an axis, less than wanted",
+    "{measured:# line runs|# lines run} at the highest speed of an axis, less than wanted",
     "moves",
     WARNING,
 )
@@ -30,36 +30,36 @@ FEED_ROUNDED_UP = Sentence(
 )
 MOVE_COLLAPSED = Sentence(
     Code.MOVE_COLLAPSED,
-    "{measured} lines shorter than the grid of {grid:g} mm were left out",
+    "{measured:# line|# lines} shorter than the grid of {grid:g} mm {measured:was|were} left out",
     "moves",
     INFO,
 )
 MOVE_COLLAPSED_STROKES = Sentence(
     Code.MOVE_COLLAPSED,
-    "{measured} strokes are smaller than the grid of {grid:g} mm and are not cut at all; scale "
-    "the drawing up",
+    "{measured:# stroke is|# strokes are} smaller than the grid of {grid:g} mm and not cut at "
+    "all; scale the drawing up",
     "strokes",
     WARNING,
 )
 MOVE_COLLAPSED_READ = Sentence(Code.MOVE_COLLAPSED, "lines of no length: {count}", "mm", INFO)
 MOVE_SPLIT = Sentence(
     Code.MOVE_SPLIT,
-    "{measured} moves in XY and Z were split: up first, down last, because Z only goes from home "
-    "to its one depth",
+    "{measured:# move|# moves} in XY and Z {measured:was|were} split: up first, down last, "
+    "because Z only goes from home to its one depth",
     "moves",
     WARNING,
 )
 MOVE_SPLIT_BENT = Sentence(
     Code.MOVE_SPLIT,
-    "{measured} lines nearly along an axis became several, because whole speeds would bend them "
-    "by more than {tolerance:g} mm",
+    "{measured:# line|# lines} nearly along an axis became several, because whole speeds would "
+    "bend {measured:it|them} by more than {tolerance:g} mm",
     "moves",
     INFO,
 )
 MOVE_SPLIT_INTO_JOBS = Sentence(
     Code.MOVE_SPLIT,
-    "strokes of more than {most} lines became {measured} more jobs: between two jobs the machine "
-    "goes home, and begins where it ended",
+    "strokes of more than {most} lines became {measured:# more job|# more jobs}: between two "
+    "jobs the machine goes home, and begins where it ended",
     "jobs",
     WARNING,
 )
@@ -71,17 +71,19 @@ FEED_ABOVE_LIMIT = Sentence(
 )
 EVENT_LEFT_OUT_DWELL = Sentence(
     Code.EVENT_LEFT_OUT,
-    "{measured} dwells are not sent: the arrays have no place for them",
+    "{measured:# dwell is|# dwells are} not sent: the arrays have no place for {measured:it|them}",
     severity=WARNING,
 )
 EVENT_LEFT_OUT_TOOL = Sentence(
     Code.EVENT_LEFT_OUT,
-    "{measured} tool numbers are not sent: the arrays have no place for them",
+    "{measured:# tool number is|# tool numbers are} not sent: the arrays have no place for "
+    "{measured:it|them}",
     severity=INFO,
 )
 EVENT_LEFT_OUT_SPEED = Sentence(
     Code.EVENT_LEFT_OUT,
-    "{measured} spindle speeds are not sent: the arrays have no place for them",
+    "{measured:# spindle speed is|# spindle speeds are} not sent: the arrays have no place for "
+    "{measured:it|them}",
     severity=INFO,
 )
 PLACES_SNAPPED = Sentence(
@@ -91,14 +93,15 @@ PLACES_SNAPPED = Sentence(
 )
 PLACES_SNAPPED_AND_STARTS = Sentence(
     Code.PLACES_SNAPPED,
-    "vertices were moved to the grid of {limit:g} mm, by {moved_um:.0f} µm at most; {starts} "
-    "strokes begin at least {limit:g} mm from home, because the way to a first point of 0 would "
-    "never end",
+    "vertices were moved to the grid of {limit:g} mm, by {moved_um:.0f} µm at most; {starts:# "
+    "stroke begins|# strokes begin} at least {limit:g} mm from home, because the way to a first "
+    "point of 0 would never end",
     "mm",
 )
 PLACES_SNAPPED_FROM_ONE = Sentence(
     Code.PLACES_SNAPPED,
-    "{measured} vertices were moved by 0.1 mm, because a distance of 0.1 mm would never end",
+    "{measured:# vertex was|# vertices were} moved by 0.1 mm, because a distance of 0.1 mm would "
+    "never end",
 )
 EXECUTED_OTHERWISE_ODD = Sentence(
     Code.EXECUTED_OTHERWISE,

@@ -6,20 +6,21 @@ from camtool.findings import WARNING, Code, Sentence
 
 FEED_ROUNDED = Sentence(
     Code.FEED_ROUNDED,
-    "the feeds of {count} moves are not said: the machine has one speed, {limit:g} mm/min",
+    "the feed of {count:# move|# moves} is not written: the machine has one speed, {limit:g} "
+    "mm/min",
     "mm_min",
     WARNING,
 )
 ARC_MENDED = Sentence(
     Code.ARC_MENDED,
-    "{measured} arcs were written as lines within {tolerance:g} mm: on axes of unequal steps the "
-    "controller would make ellipses of them",
+    "{measured:# arc was|# arcs were} written as lines within {tolerance:g} mm: on axes of "
+    "unequal steps the controller would make ellipses of them",
     "moves",
 )
 EVENT_LEFT_OUT = Sentence(
     Code.EVENT_LEFT_OUT,
-    "{count} events were left out ({kinds}): this machine has no codes but G00 to G03; do it by "
-    "hand",
+    "{count:# event was|# events were} left out ({kinds}): this machine has no codes but G00 to "
+    "G03; do it by hand",
     severity=WARNING,
 )
 COORDINATES_SCALED = Sentence(
@@ -34,8 +35,8 @@ COORDINATES_SCALED_READ = Sentence(
 )
 ARC_MISSES_END = Sentence(
     Code.ARC_MISSES_END,
-    "{count} arcs of about 180°: the controller takes their angle from an arcsine and ends up to "
-    "{measured:.3g} mm off",
+    "{count:# arc|# arcs} of about 180°: the controller takes the angle from an arcsine and ends "
+    "up to {measured:.3g} mm off",
     "mm",
     WARNING,
 )

@@ -147,7 +147,7 @@ def test_what_is_left_halfway_is_whole_and_can_be_gone_on_with(tmp_path: Path, l
         subprocess.run(here, cwd=tmp_path, check=True, timeout=HANG_S)
     else:
         assert run.returncode == 128 + signal.SIGINT, said
-        assert "interrupted; what is written is whole" in said
+        assert "interrupted; written files are complete" in said
         assert re.search(r"40 drawings: \d+ made, \d+ not run", said)
     assert_same_as_here(tmp_path, 40)
 

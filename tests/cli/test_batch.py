@@ -317,7 +317,7 @@ def test_a_run_that_is_interrupted_at_once_says_so(
     monkeypatch.setattr(batch, "own_job", interrupted)
     done = camtool("batch", "drawings/in", *PIC, *QUICK)
     assert done.returncode == 128 + signal.SIGINT
-    assert b"interrupted; what is written is whole" in done.stderr
+    assert b"interrupted; written files are complete" in done.stderr
     assert files_in(tmp_path / "build") == set()
 
 

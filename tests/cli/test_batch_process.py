@@ -64,7 +64,7 @@ def test_an_interrupted_run_leaves_whole_files_and_goes_on(
             running.send_signal(number)
         said += running.communicate(timeout=HANG_S)[1]
     assert running.returncode == 128 + number, said
-    assert "interrupted; what is written is whole" in said
+    assert "interrupted; written files are complete" in said
     assert "Traceback" not in said
     assert 1 <= assert_whole(tmp_path / "build") < 12
     done = camtool_process(*COMMAND[3:], "--jobs", "2")

@@ -247,5 +247,5 @@ click.echo = slow
         [sys.executable, "-c", LATE.format(early)], capture_output=True, check=False
     )
     assert done.returncode == 128 + signal.SIGINT
-    assert done.stderr.strip() == b"camtool: interrupted; what is written is whole"
+    assert done.stderr.strip() == b"camtool: interrupted; written files are complete"
     assert b"went on" not in done.stdout

@@ -110,7 +110,7 @@ def test_a_machine_file_that_extends_nothing_is_refused(
 def test_play_by_region_is_shown_as_it_lies_on_the_table(camtool: Run) -> None:
     shown = camtool("targets", "pic-mmh").stderr.decode()
     assert (
-        "play of X by region of the table, µm, not used: play_map.use; 192.5 everywhere" in shown
+        "backlash of X by region of the table, µm, not used: play_map.use; 192.5 everywhere" in shown
     )
     lines = [line.split() for line in shown.splitlines()]
     assert ["y", "\\", "x", "mm", "0…3.333", "3.333…6.667", "6.667…10"] in lines
@@ -118,6 +118,6 @@ def test_play_by_region_is_shown_as_it_lies_on_the_table(camtool: Run) -> None:
     at = lines.index(["4.667…7", "173"])
     assert lines[at + 1 : at + 3] == [["2.333…4.667", "180"], ["0…2.333", "152"]]
     used = camtool("targets", "pic-mmh", "--set", "play_map.use=true").stderr.decode()
-    assert "play of Y by region of the table, µm\n" in used
+    assert "backlash of Y by region of the table, µm\n" in used
     assert "not used" not in used
     assert "play of" not in camtool("targets", "grbl").stderr.decode()

@@ -65,5 +65,5 @@ def test_the_report_names_the_moves_that_it_speaks_of(drawing: str) -> None:
 def test_several_ways_make_no_page(drawing: str) -> None:
     head("post", drawing, "--target", "pic-mmh", "-o", "a.pic", "--preview", "a.html")
     compared = ["verify", "a.pic", "--target", "pic-mmh", "--compare", "mechanics"]
-    with pytest.raises(click.UsageError, match=r"\.svg and \.png alone"):
+    with pytest.raises(click.UsageError, match=r"draws only \.svg and \.png"):
         head(*compared, "--preview", "b.html")

@@ -155,7 +155,7 @@ def test_findings_count_what_was_lost() -> None:
         Code.EVENT_LEFT_OUT,
         Code.VALUE_ROUNDED,
     }
-    assert "1 feed moves" in found[Code.MOVE_SPLIT].message
+    assert "1 feed move in" in found[Code.MOVE_SPLIT].message
     assert "DWELL" in found[Code.EVENT_LEFT_OUT].message
     valcnc = LOADED["valcnc"]
     found = {f.code: f for f in valcnc.post.write(wanted, valcnc.machine).findings}

@@ -55,7 +55,7 @@ def test_a_high_byte_is_told_where_nobody_knows_its_worth() -> None:
     (found,) = read(ONE).findings
     assert (found.code, found.severity) == (Code.READ_TWO_WAYS, Severity.WARNING)
     assert (found.where, found.measured) == ("record 1", 1.0)
-    assert "up to 1 steps elsewhere" in found.message
+    assert "up to 1 step elsewhere" in found.message
     assert read(ONE, "long_runs=true").findings == ()
     short = b"\x13" + RECORD.replace(b"\x01\x2c", b"\x00\xff") + b"\x45\x54"
     assert read(short).findings == ()

@@ -185,7 +185,7 @@ def test_what_cannot_be_said_is_told() -> None:
     assert by_code[Code.EVENT_LEFT_OUT].severity == Severity.WARNING
     assert by_code[Code.MOVE_COLLAPSED].measured == 1
     assert by_code[Code.FEED_ROUNDED].severity == Severity.INFO
-    assert by_code[Code.MOVE_SPLIT].message.startswith("1 feed moves in XY and Z became steps")
+    assert by_code[Code.MOVE_SPLIT].message.startswith("1 feed move in XY and Z became steps")
     assert by_code[Code.MOVE_SPLIT].severity == Severity.WARNING
 
 

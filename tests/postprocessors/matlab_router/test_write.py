@@ -119,7 +119,7 @@ def test_a_start_at_home_moves_to_the_first_chunk() -> None:
     (snapped,) = [f for f in written.findings if f.code == Code.PLACES_SNAPPED]
     assert snapped.severity == Severity.WARNING
     assert snapped.measured == pytest.approx(0.2 * math.sqrt(2.0))
-    assert "1 strokes begin at least 0.2 mm from home" in snapped.message
+    assert "1 stroke begins at least 0.2 mm from home" in snapped.message
 
 
 def test_part_zero_may_lie_anywhere() -> None:

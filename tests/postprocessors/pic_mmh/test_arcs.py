@@ -333,7 +333,7 @@ def test_an_arc_about_its_own_start_is_written_as_lines() -> None:
     blocks, found = mend_of(path)
     assert all(block.startswith("G01") for block in blocks)
     assert blocks[-1] == "G01X00000.20Y00000.00F10;"
-    assert "1 arcs too small" in found[Code.MOVE_COLLAPSED]
+    assert "1 arc too small" in found[Code.MOVE_COLLAPSED]
 
 
 def test_mends_are_counted_once_and_go_on_the_same_way() -> None:

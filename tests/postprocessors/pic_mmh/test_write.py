@@ -104,7 +104,7 @@ def test_up_comes_first_and_down_last() -> None:
     assert findings(path) == {}
     path.line(3, 0, -1, feed=1).arc(3, 2, centre=(3, 1), ccw=True, feed=1)
     assert (
-        "1 feed moves in XY and Z became steps of at most 0.0005 mm"
+        "1 feed move in XY and Z became steps of at most 0.0005 mm"
         in (findings(path)[Code.MOVE_SPLIT])
     )
 
