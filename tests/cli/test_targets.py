@@ -109,9 +109,8 @@ def test_a_machine_file_that_extends_nothing_is_refused(
 
 def test_play_by_region_is_shown_as_it_lies_on_the_table(camtool: Run) -> None:
     shown = camtool("targets", "pic-mmh").stderr.decode()
-    assert (
-        "backlash of X by region of the table, µm, not used: play_map.use; 192.5 everywhere" in shown
-    )
+    head = "backlash of X by region of the table, µm, not used: play_map.use; 192.5 everywhere"
+    assert head in shown
     lines = [line.split() for line in shown.splitlines()]
     assert ["y", "\\", "x", "mm", "0…3.333", "3.333…6.667", "6.667…10"] in lines
     assert ["0…7", "190", "201", "187"] in lines
