@@ -367,7 +367,7 @@ def test_what_is_told_counts_passes(machine: Machine) -> None:
     # Three rounds in one go turn 4 times each; at the start nothing has turned yet.
     assert told.limit == 3 * 4 - 2
     assert told.measured == 0.0
-    assert "1 runs are cut as 6" in told.message
+    assert "1 run is cut as 6" in told.message
     assert told.severity == Severity.INFO
     assert math.isclose(float(told.message.split(" µm, not ")[1].split()[0]), 14.9, abs_tol=0.05)
 
