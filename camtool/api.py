@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from camtool.calibration.calibrate import Calibration, to_text
 from camtool.calibration.calibrate import calibrate as calibrated
 from camtool.comparison import Comparison, Way, compare_program, ways_of
-from camtool.errors import CamtoolError, MachineError, OptionError, ProgramError
+from camtool.errors import CamtoolError, OptionError, ProgramError
 from camtool.geometry.drawing import Drawing
 from camtool.jobs.keys import field_value
 from camtool.pictures.options import Options
@@ -29,7 +29,7 @@ from camtool.planning.job import job_of as made
 from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
 from camtool.simulation.motion import Effects
 from camtool.target.loader import extended_by
-from camtool.target.registry import ListedTarget, LoadedTarget, list_target, target_names
+from camtool.target.registry import ListedTarget, LoadedTarget, each_target, list_target
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 from camtool.units import parse_length
@@ -224,12 +224,10 @@ def job_of(**settings: Any) -> Job:
 def targets() -> list[ListedTarget]:
     """The machines that camtool knows, by name: title, extension, and what a machine file must
     still say of them. A plug-in that cannot be loaded is left out with a warning."""
-    found = []
-    for name in target_names():
-        try:
-            found.append(list_target(name))
-        except MachineError as error:
-            warnings.warn(str(error), stacklevel=2)
+    broken: list[CamtoolError] = []
+    found = [listed for _, listed in each_target(list_target, broken=broken)]
+    for error in broken:
+        warnings.warn(str(error), stacklevel=2)
     return found
 
 

@@ -81,14 +81,14 @@ def post_drawing(
     plan = planned(drawing, job, target.machine)
     wanted = plan.toolpath
     run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
-    doubtful = doubtful_settings(plan.steps, starts_spindle=target.post.starts_spindle)
+    doubtful = doubtful_settings(plan.steps, starts_spindle=target.target.starts_spindle)
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
     sent = _bent(wanted, target.machine) if compensate else None
     written = wanted if sent is None else sent.toolpath
-    program = target.post.write(written, target.machine)
-    decoded = target.post.read(program.data, target.machine)
+    program = target.target.write(written, target.machine)
+    decoded = target.target.read(program.data, target.machine)
     # What the writer said of its blocks, the reader need not say again in other words.
     said = {finding.code for finding in program.findings}
     repeated = {finding for finding in decoded.findings if finding.code in said}
@@ -224,8 +224,8 @@ def convert_program(
     run = Run(source=file, target=target, wanted=wanted)
     if worst(wanted.findings) >= Severity.ERROR:
         return replace(run, findings=wanted.findings)
-    program = target.post.write(wanted, target.machine)
-    again = target.post.read(program.data, target.machine)
+    program = target.target.write(wanted, target.machine)
+    again = target.target.read(program.data, target.machine)
     said = {finding.code for finding in program.findings}
     repeated = {finding for finding in again.findings if finding.code in said}
     findings = _merged(wanted.findings, program.findings, again.findings, without=repeated)
@@ -259,7 +259,7 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
 
 def _decoded(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     try:
-        toolpath = target.post.read(data, target.machine)
+        toolpath = target.target.read(data, target.machine)
     except ProgramError as error:
         error.file = error.file or file
         raise
@@ -332,8 +332,8 @@ def _judged(
     """Simulated, and compared with what was wanted and drawn."""
     from camtool.verification.verify import verify
 
-    sent = target.post.line_bytes(data, target.machine)
-    stray = target.post.stray_mm(target.machine)
+    sent = target.target.line_bytes(data, target.machine)
+    stray = target.target.stray_mm(target.machine)
     sized = replace(options, size_bytes=len(data), line_bytes=sent, stray_mm=stray)
     return verify(
         decoded,
@@ -359,9 +359,9 @@ def _asked(
         return None
     machine = target.machine
     wanted = planned if sent is None else sent.toolpath
-    program = target.post.write(wanted, machine)
-    units = [target.post.unit_mm(machine, axis) for axis in machine.axes]
-    written, blocks = target.post.read(program.data, machine), len(program.row_of_block)
+    program = target.target.write(wanted, machine)
+    units = [target.target.unit_mm(machine, axis) for axis in machine.axes]
+    written, blocks = target.target.read(program.data, machine), len(program.row_of_block)
     return Asked(
         written=written,
         wanted=wanted,

@@ -93,12 +93,9 @@ class Run(Shown):
             return None
 
         def listing() -> Listing | None:
-            make = getattr(target.post, "listing", None)
-            if make is None:
-                return None
-            made: Listing = make(program.data, target.machine)
-            last = int(decoded.block.max()) if len(decoded) else -1
-            return made if last < len(made.blocks) else None
+            made = target.target.listing(program.data, target.machine)
+            last = int(decoded.block.max(initial=-1))
+            return made if made is not None and last < len(made.blocks) else None
 
         return listing
 

@@ -181,14 +181,10 @@ class Seen:
 
 def _refuse_program(source: str) -> None:
     """CamtoolError when the file's extension says that it is a program and no target is given."""
-    from camtool.target.registry import list_target, target_names
+    from camtool.target.registry import each_target, list_target
 
-    for name in target_names():
-        try:
-            extension = list_target(name).target.extension
-        except CamtoolError:  # a broken plug-in harms nothing else
-            continue
-        if Path(source).suffix.lower() == extension:
+    for name, listed in each_target(list_target):
+        if Path(source).suffix.lower() == listed.target.extension:
             raise CamtoolError(
                 "is a program", file=source, mend=f"name its machine, such as --target {name}"
             )

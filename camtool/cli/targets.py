@@ -14,7 +14,7 @@ import click
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.messages import in_colour, say, show_text
 from camtool.cli.options import talk_options
-from camtool.errors import CamtoolError, MachineError
+from camtool.errors import CamtoolError
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
@@ -98,30 +98,23 @@ def target_items(incomplete: str) -> Iterator[CompletionItem]:
     """The machines, each with its title."""
     from click.shell_completion import CompletionItem
 
-    from camtool.target.registry import list_target, target_names
+    from camtool.target.registry import each_target, list_target
 
-    for name in target_names():
-        if name.startswith(incomplete):
-            try:
-                title = list_target(name).target.title
-            except CamtoolError:  # a broken plug-in harms nothing else
-                continue
-            yield CompletionItem(name, help=title)
+    for name, listed in each_target(list_target, prefix=incomplete):
+        yield CompletionItem(name, help=listed.target.title)
 
 
 def _list(as_json: bool) -> None:
-    from camtool.target.registry import list_target, target_names
+    from camtool.target.registry import each_target, list_target
 
     rows: list[dict[str, Any]] = []
-    for name in target_names():
-        try:
-            listed = list_target(name)
-        except MachineError as error:  # a broken plug-in is named and harms nothing else
-            say(f"camtool: warning: {error}", quiet=False)
-            continue
+    broken: list[CamtoolError] = []
+    for name, listed in each_target(list_target, broken=broken):
         target = listed.target
         row = {"name": name, "title": target.title, "extension": target.extension}
         rows.append({**row, "needs": list(listed.needs)})
+    for error in broken:
+        say(f"camtool: warning: {error}", quiet=False)
     if as_json:
         write_all({STDOUT: to_json({"targets": rows}).encode()})
         return
@@ -165,7 +158,7 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
         if cells is not None:
             show_text("\n" + "\n".join(_backlash_table(name, cells, loaded.machine)), err=True)
-    for code in loaded.post.codes:
+    for code in loaded.target.codes:
         grave = " or ".join(severity.name.lower() for severity in code.severities)
         show_text(f"\n{code.name} ({grave}): {code.means}; mend: {code.mend}", err=True)
     show_text(

@@ -32,7 +32,7 @@ NEEDS = "needs"
 
 
 def resolved_table(
-    post: Target,
+    target: Target,
     base: Table,
     base_name: str,
     user_file: Path | None = None,
@@ -52,28 +52,28 @@ def resolved_table(
                 where="key extends",
                 mend=f'write extends = "{base["target"]["name"]}" or change --target',
             )
-        table, name = _overlaid(post, table, extra), str(user_file)
+        table, name = _overlaid(target, table, extra), str(user_file)
     for setting in settings:
-        table, name = _overlaid(post, table, _setting(setting)), f"--set {setting}"
+        table, name = _overlaid(target, table, _setting(setting)), f"--set {setting}"
     _refuse_incomplete(table, str(user_file or base_name))
     return {key: table[key] for key in table if key != NEEDS}, name
 
 
-def machine_of(post: Target, table: Table, name: str) -> Machine:
+def machine_of(target: Target, table: Table, name: str) -> Machine:
     """A resolved table as the machine of this target, checked; MachineError names the key that
     does not fit, and `name`."""
-    records: Any = reduce(or_, _records(post))
+    records: Any = reduce(or_, _records(target))
     generic: Any = Machine
-    kind: type[Machine] = generic[records, post.dialect]
+    kind: type[Machine] = generic[records, target.dialect]
     whole = table if "dialect" in table else table | {"dialect": {}}
     machine: Machine = convert(whole, kind, name)
-    post.check(machine)
+    target.check(machine)
     return machine
 
 
-def _records(post: Target) -> tuple[type[SlideStart], ...]:
+def _records(target: Target) -> tuple[type[SlideStart], ...]:
     """What `[controller]` may be."""
-    return (*post.controllers, PathController)
+    return (*target.controllers, PathController)
 
 
 def extended_by(user_file: Path) -> str:
@@ -124,22 +124,22 @@ def _refuse_incomplete(table: Table, name: str) -> None:
     )
 
 
-def _overlaid(post: Target, below: Table, above: Table) -> Table:
+def _overlaid(target: Target, below: Table, above: Table) -> Table:
     """`_laid_over`; where `above` names another controller model, the options of the model below
     go with it, but for those that all controllers have."""
     old, new = below.get("controller"), above.get("controller")
     if isinstance(old, dict) and isinstance(new, dict) and "model" in new:
-        own = _own_options(post, old.get("model")) if new["model"] != old.get("model") else set()
+        own = _own_options(target, old.get("model")) if new["model"] != old.get("model") else set()
         below = below | {"controller": {key: old[key] for key in old.keys() - own}}
     return _laid_over(below, above)
 
 
-def _own_options(post: Target, model: object) -> set[str]:
+def _own_options(target: Target, model: object) -> set[str]:
     """The options that only this model of a controller has."""
     shared = {field.name for field in msgspec.structs.fields(SlideStart)}
     return {
         field.name
-        for record in _records(post)
+        for record in _records(target)
         if record.__struct_config__.tag == model
         for field in msgspec.structs.fields(record)
     } - shared

@@ -11,11 +11,11 @@ from __future__ import annotations
 import difflib
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import msgspec
 
@@ -47,7 +47,7 @@ class LoadedTarget:
     machine, and nobody has said others."""
 
     machine: Machine
-    post: Target
+    target: Target
     file: Path
     table: Table
     any_machine: bool = False
@@ -59,13 +59,13 @@ class LoadedTarget:
             from camtool.simulation.path import PathModel
 
             return PathModel()
-        return self.post.model()
+        return self.target.model()
 
     @property
     def interpolators(self) -> tuple[str, ...]:
         """What the machine's controller has to choose from."""
         exact = isinstance(self.machine.controller, PathController)
-        return () if exact else self.post.interpolators
+        return () if exact else self.target.interpolators
 
     def simulate(self, toolpath: Toolpath, options: Options | None = None) -> Iterator[Chunk]:
         """The motion that the machine's controller and mechanics make of a toolpath, chunk by
@@ -104,8 +104,8 @@ class LoadedTarget:
         one."""
         if not settings:
             return self
-        table, name = resolved_table(self.post, self.table, str(self.file), None, settings)
-        return replace(self, machine=machine_of(self.post, table, name), table=table)
+        table, name = resolved_table(self.target, self.table, str(self.file), None, settings)
+        return replace(self, machine=machine_of(self.target, table, name), table=table)
 
     def values(self) -> dict[str, Any]:
         """All values of the machine as `--set` takes them; of its dialect those that are said."""
@@ -121,8 +121,8 @@ class LoadedTarget:
         base = read_table(self.file)
         needs = missing_keys(base, str(self.file))
         given = [f"{key}={json.dumps(now[key])}" for key in needs if key in now]
-        table, name = resolved_table(self.post, base, str(self.file), None, given)
-        plain = replace(self, machine=machine_of(self.post, table, name), table=table)
+        table, name = resolved_table(self.target, base, str(self.file), None, given)
+        plain = replace(self, machine=machine_of(self.target, table, name), table=table)
         own = dict(_flat("", plain.values()))
         return [
             (key, _shown(now.get(key)), _shown(None if key in needs else own.get(key)))
@@ -153,33 +153,48 @@ def load_target(
 
     Raises UnknownTargetError (with the nearest names) and MachineError.
     """
-    post, file = find_target(name)
-    table, last = resolved_table(post, read_table(file), str(file), machine_file, settings)
-    machine = machine_of(post, table, last)
+    target, file = find_target(name)
+    table, last = resolved_table(target, read_table(file), str(file), machine_file, settings)
+    machine = machine_of(target, table, last)
     said = machine_file is not None or any(each.startswith("axes.") for each in settings)
-    return LoadedTarget(machine, post, file, table, post.any_machine and not said)
+    return LoadedTarget(machine, target, file, table, target.any_machine and not said)
 
 
 def list_target(name: str) -> ListedTarget:
     """What a list says of the target `name`, complete or not; raises as `load_target` does."""
-    post, file = find_target(name)
+    target, file = find_target(name)
     table = read_table(file)
     needs = missing_keys(table, str(file))
     if not needs:
-        machine_of(post, *resolved_table(post, table, str(file)))
+        machine_of(target, *resolved_table(target, table, str(file)))
     return ListedTarget(names_of(table, str(file)), needs, file)
+
+
+Taken = TypeVar("Taken")
+
+
+def each_target(
+    take: Callable[[str], Taken], *, prefix: str = "", broken: list[CamtoolError] | None = None
+) -> Iterator[tuple[str, Taken]]:
+    """(name, what `take` returns for it) of the targets whose names start with `prefix`.
+
+    A plug-in that is broken harms no other: it is left out, and its error is appended to `broken`.
+    """
+    for name in target_names():
+        if name.startswith(prefix):
+            try:
+                taken = take(name)
+            except CamtoolError as error:
+                if broken is not None:
+                    broken.append(error)
+                continue
+            yield name, taken
 
 
 def filter_target() -> str | None:
     """The target that `camtool filter` takes where none is named."""
-    for name in target_names():
-        try:
-            post, _ = find_target(name)
-        except MachineError:  # a broken one is named where it is asked for
-            continue
-        if post.filter_default:
-            return name
-    return None
+    found = each_target(find_target)
+    return next((name for name, (target, _) in found if target.filter_default), None)
 
 
 def find_target(name: str) -> tuple[Target, Path]:
@@ -201,12 +216,12 @@ def _found(name: str) -> EntryPoint:
 def _load(point: EntryPoint) -> tuple[Target, Path]:
     """The target and its machine file; a broken plug-in is named, nothing else."""
     try:
-        post = point.load()
-        if not isinstance(post, Target):
+        target = point.load()
+        if not isinstance(target, Target):
             raise TypeError(f"{point.attr} is no camtool.target.contract.Target")
-        for code in post.codes:
-            if not code.name.startswith(f"{post.name}."):
-                raise ValueError(f"the code {code.name} does not begin with {post.name}.")
+        for code in target.codes:
+            if not code.name.startswith(f"{target.name}."):
+                raise ValueError(f"the code {code.name} does not begin with {target.name}.")
         file = Path(str(sys.modules[point.module].__file__)).with_name(MACHINE_FILE)
     except Exception as error:  # whatever a third party's module raises belongs to it
         raise MachineError(
@@ -215,8 +230,8 @@ def _load(point: EntryPoint) -> tuple[Target, Path]:
             mend="reinstall or remove the package that brings it",
         ) from error
     if point.module.startswith(OURS):
-        return post, file
-    return cast(Target, Guarded(post, point.value)), file
+        return target, file
+    return cast(Target, Guarded(target, point.value)), file
 
 
 class Guarded:

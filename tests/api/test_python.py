@@ -1,7 +1,6 @@
 """camtool from Python: the names, what they give, and that it is what the commands do."""
 
 import ast
-import importlib
 import inspect
 import pkgutil
 import subprocess
@@ -17,6 +16,7 @@ from camtool.cli.main import cli
 from camtool.importers.options import ReadOptions, Selection
 from camtool.pictures.options import Options
 from camtool.run import Run
+from camtool.target import registry
 
 LOGO = Path("samples/logo.dxf")
 SQUARE = "0,0\n4,0\n4,4\n0,4\n0,0\n"
@@ -215,7 +215,6 @@ def test_targets_are_listed_and_a_broken_one_is_said(monkeypatch: pytest.MonkeyP
     names = [each.target.name for each in camtool.targets()]
     assert "pic-mmh" in names
     assert names == sorted(names)
-    module = importlib.import_module("camtool.api")
-    monkeypatch.setattr(module, "target_names", lambda: ["grbl", "broken"])
+    monkeypatch.setattr(registry, "target_names", lambda: ["grbl", "broken"])
     with pytest.warns(UserWarning, match="broken"):
         assert [each.target.name for each in camtool.targets()] == ["grbl"]

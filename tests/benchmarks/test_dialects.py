@@ -59,7 +59,7 @@ def test_writing(benchmark: Any, what: str) -> None:
     target = load_target(what)
     path = many_moves(target.machine.feed.default_mm_min)
     program = benchmark.pedantic(
-        lambda: target.post.write(path, target.machine), rounds=5, warmup_rounds=1
+        lambda: target.target.write(path, target.machine), rounds=5, warmup_rounds=1
     )
     assert program.data.count(b"\n") >= MOVES
     benchmark.extra_info["bytes"] = len(program.data)
@@ -74,8 +74,8 @@ def test_reading(benchmark: Any, what: str) -> None:
         return
     target = load_target(what)
     path = many_moves(target.machine.feed.default_mm_min)
-    data = target.post.write(path, target.machine).data
+    data = target.target.write(path, target.machine).data
     decoded = benchmark.pedantic(
-        lambda: target.post.read(data, target.machine), rounds=5, warmup_rounds=1
+        lambda: target.target.read(data, target.machine), rounds=5, warmup_rounds=1
     )
     assert len(decoded) >= MOVES

@@ -30,7 +30,7 @@ def many_lines() -> Toolpath:
 def test_writing(benchmark: Any, form: str) -> None:
     target = load_target("matlab-router", settings=[f"dialect.format={form}"])
     path = many_lines()
-    program = benchmark.pedantic(lambda: target.post.write(path, target.machine), rounds=5)
+    program = benchmark.pedantic(lambda: target.target.write(path, target.machine), rounds=5)
     assert len(program.row_of_block) > LINES
 
 
@@ -38,6 +38,6 @@ def test_writing(benchmark: Any, form: str) -> None:
 @pytest.mark.parametrize("form", ["m", "stream"])
 def test_reading(benchmark: Any, form: str) -> None:
     target = load_target("matlab-router", settings=[f"dialect.format={form}"])
-    data = target.post.write(many_lines(), target.machine).data
-    decoded = benchmark.pedantic(lambda: target.post.read(data, target.machine), rounds=5)
+    data = target.target.write(many_lines(), target.machine).data
+    decoded = benchmark.pedantic(lambda: target.target.read(data, target.machine), rounds=5)
     assert len(decoded) > LINES

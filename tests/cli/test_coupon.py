@@ -41,7 +41,7 @@ def test_lines_are_cut_as_they_are_drawn(camtool: Run, tmp_path: Path, target: s
     done = camtool("post", "coupon.dxf", "-t", target, *ENGRAVE, "--no-verify", "-o", "p")
     assert done.returncode == 0, done.stderr
     loaded = load_target(target)
-    path = loaded.post.read((tmp_path / "p").read_bytes(), loaded.machine)
+    path = loaded.target.read((tmp_path / "p").read_bytes(), loaded.machine)
     for table in tomllib.loads(file.read_text())["lines"]:
         axis = "xy".index(table["axis"])
         other = path.end[:, 1 - axis]

@@ -77,7 +77,7 @@ def _rewritten(whole: Whole, random: Random, *, circles: bool) -> bytes | None:
     turned = replace(
         path, kind=kinds, end=places, centre=path.centre[order], feed=path.feed[order]
     )
-    return bytes(whole.target.post.write(turned, whole.target.machine).data)
+    return bytes(whole.target.target.write(turned, whole.target.machine).data)
 
 
 def _text(whole: Whole, kind: str, random: Random) -> bytes | None:
@@ -188,7 +188,7 @@ MOTOR, FORWARD, BACKWARD, END_PACKET = 4, 0x03, 0x04, 0x45
 
 def _records(whole: Whole, kind: str, random: Random) -> bytes | None:
     """The 8751's bytes: record by record, a motor as `01 03 00 64`."""
-    listing = whole.target.post.listing(whole.data, whole.target.machine)  # type: ignore[attr-defined]
+    listing = whole.target.target.listing(whole.data, whole.target.machine)  # type: ignore[attr-defined]
     blocks = [bytes.fromhex(block) for block in listing.blocks]
     assert b"".join(blocks) == whole.data
     moves = [at for at, block in enumerate(blocks) if len(block) > 6]

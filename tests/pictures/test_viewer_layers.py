@@ -149,7 +149,7 @@ def test_at_the_end_stands_the_last_block(shown: Any) -> None:
 
 def test_bytes_under_the_cursor_and_the_largest_error_of_the_report(shown: Any) -> None:
     target = load_target("i8751", machine_file=SAMPLE, settings=["axes.x.backlash_mm=0.05"])
-    program = target.post.write(_square(), target.machine).data
+    program = target.target.write(_square(), target.machine).data
     run = verify_program(program, target, source="a.bin")
     listing, scene = run.listing, run.scene("a")
     view = shown(scene)

@@ -83,8 +83,8 @@ def judged(
     paths: Sequence[Polyline], wanted: Sequence[Polyline], machine: Machine, *, approach: bool
 ) -> Report:
     """The paths as the PIC machine cuts them, compared with the wanted ones."""
-    program = PIC.post.write(toolpath(paths, machine, approach=approach), machine)
-    decoded = PIC.post.read(program.data, machine)
+    program = PIC.target.write(toolpath(paths, machine, approach=approach), machine)
+    decoded = PIC.target.read(program.data, machine)
     whole = toolpath(wanted, machine, approach=False)
     return verify(decoded, machine, wanted=whole).report
 

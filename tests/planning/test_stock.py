@@ -69,7 +69,7 @@ def program_of(asked: Asked) -> tuple[str, tuple[Finding, ...]]:
     toolpath = plan(drawing, Job((operation_of(asked),)), target.machine)
     if any(finding.severity is Severity.ERROR for finding in toolpath.findings):
         return "", toolpath.findings
-    return target.post.write(toolpath, target.machine).data.decode(), toolpath.findings
+    return target.target.write(toolpath, target.machine).data.decode(), toolpath.findings
 
 
 def judged(asked: Asked) -> list[str]:

@@ -102,8 +102,8 @@ def test_nearly_straight_arcs_are_cut_as_they_are(
     x, y = 6.0 + 3.0 * math.cos(angle + math.pi), 6.0 + 3.0 * math.sin(angle + math.pi)
     heights = loaded.machine.defaults.safe_z_mm, -loaded.machine.defaults.cut_depth_mm
     wanted = arc(heights, x, y, angle, chord, radius, ccw)
-    program = loaded.post.write(wanted, loaded.machine)
-    points = cut_points(loaded.post.read(program.data, loaded.machine))
+    program = loaded.target.write(wanted, loaded.machine)
+    points = cut_points(loaded.target.read(program.data, loaded.machine))
     away = points - np.array([x, y])
     across = away @ np.array([math.cos(angle), math.sin(angle)])
     beside = away @ np.array([-math.sin(angle), math.cos(angle)]) * (-1.0 if ccw else 1.0)

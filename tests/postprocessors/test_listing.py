@@ -37,7 +37,7 @@ TEXTS = {
 
 
 def listed(data: bytes, target: LoadedTarget) -> tuple[Toolpath, Listing]:
-    return target.post.read(data, target.machine), target.post.listing(data, target.machine)
+    return target.target.read(data, target.machine), target.target.listing(data, target.machine)
 
 
 @pytest.mark.parametrize("name", list(TEXTS))
@@ -124,7 +124,7 @@ def test_all_targets_are_here() -> None:
 def test_the_text_of_each_block_says_where_its_moves_end(name: str) -> None:
     place, heights = ALL[name]
     target = loaded() if name == "i8751" else load_target(name)
-    data = target.post.write(small(*heights), target.machine).data
+    data = target.target.write(small(*heights), target.machine).data
     toolpath, listing = listed(data, target)
     at, seen = np.zeros(3), 0
     for block, text in enumerate(listing.blocks):
@@ -155,7 +155,9 @@ def test_a_column_is_what_stands_in_the_arrays() -> None:
 @pytest.mark.parametrize("settings", [("format=stream",), ("format=stream", "profile=listing")])
 def test_a_stream_is_listed_as_it_is_sent(settings: tuple[str, ...]) -> None:
     target = router(*settings)
-    data = target.post.write(strokes([(5.0, 20.0), (9.0, 20.0), (9.0, 24.0)]), target.machine).data
+    data = target.target.write(
+        strokes([(5.0, 20.0), (9.0, 20.0), (9.0, 24.0)]), target.machine
+    ).data
     toolpath, listing = listed(data, target)
     assert len(listing.blocks) == int(toolpath.block.max()) + 1 == 3
     words = [word.decode("latin-1") for word in data.split(b"\r")[:-1]]

@@ -7,16 +7,16 @@ import pytest
 from click.testing import CliRunner
 
 from camtool.cli.targets import targets
-from camtool.errors import MachineError, PostError, UnknownTargetError
+from camtool.errors import CamtoolError, MachineError, PostError, UnknownTargetError
 from camtool.target import registry
-from camtool.target.registry import list_target, load_target, target_names
+from camtool.target.registry import each_target, list_target, load_target, target_names
 
 
 def test_pic_mmh_is_installed() -> None:
     assert "pic-mmh" in target_names()
     target = load_target("pic-mmh")
     assert target.machine.target.name == "pic-mmh"
-    assert target.post.name == "pic-mmh"
+    assert target.target.name == "pic-mmh"
 
 
 @pytest.mark.parametrize("name", ["pic-mhm", "picmmh", "", "nothing like it"])
@@ -36,6 +36,10 @@ def test_a_broken_plug_in_is_named_and_harms_nothing_else(
     with pytest.raises(MachineError, match="'broken' cannot be loaded") as caught:
         load_target("broken")
     assert "no_such_module" in str(caught.value)
+    errors: list[CamtoolError] = []
+    assert [name for name, _ in each_target(list_target, broken=errors)] == ["pic-mmh"]
+    assert [str(error) for error in errors] == [str(caught.value)]
+    assert not list(each_target(list_target, prefix="grbl"))
 
 
 def test_a_dialect_checks_its_own_table() -> None:

@@ -30,12 +30,12 @@ from tests.validation.pieces import ROOT
 
 
 def program_of(path: Toolpath, target: LoadedTarget) -> bytes:
-    return bytes(target.post.write(path, target.machine).data)
+    return bytes(target.target.write(path, target.machine).data)
 
 
 def run(path: Toolpath, target: LoadedTarget) -> list[RowMotion]:
     """What each row does that the machine reads out of the program of a toolpath."""
-    decoded = target.post.read(program_of(path, target), target.machine)
+    decoded = target.target.read(program_of(path, target), target.machine)
     return rows_of(simulate(decoded, target.machine))
 
 
@@ -146,7 +146,7 @@ def dog_legs() -> Iterator[Figure]:
     for dx, dy in ((100, 50), (100, 41), (300, 100)):
         path = ToolpathBuilder().line(z=-STEP_8751_MM, feed=9.0)
         path.line(dx * STEP_8751_MM, dy * STEP_8751_MM, feed=9.0)
-        program = target.post.write(path.finish(), target.machine)
+        program = target.target.write(path.finish(), target.machine)
         longest = max(run_bytes(program.data, target), key=lambda each: len(each.commanded))
         row = longest.commanded[:, :2] / STEP_8751_MM
         off = np.abs(row[:, 0] * dy - row[:, 1] * dx).max() / math.hypot(dx, dy)
@@ -189,7 +189,7 @@ def ramp_s(steps: int, *settings: str) -> float:
 
 
 def run_bytes(data: bytes, target: LoadedTarget) -> list[RowMotion]:
-    decoded = target.post.read(data, target.machine)
+    decoded = target.target.read(data, target.machine)
     return rows_of(simulate(decoded, target.machine, Options(effects=IDEAL)))
 
 

@@ -47,7 +47,7 @@ def circle_of_30(method: Interpolator) -> Report:
     at, radius = 100 * STEP_MM, 30 * STEP_MM
     path = ToolpathBuilder().rapid(at, at + radius).line(z=-0.0014, feed=0.8)
     path.arc(at, at + radius, centre=(at, at), ccw=False, feed=0.8)
-    data = target.post.write(path.rapid(z=0.0014).finish(), target.machine).data
+    data = target.target.write(path.rapid(z=0.0014).finish(), target.machine).data
     judging = Judging(interpolator=method, effects=IDEAL)
     return verify_program(data, target, source="circle.pic", judging=judging).report
 

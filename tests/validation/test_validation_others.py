@@ -36,8 +36,8 @@ def ten_turns(axis: str, *settings: str) -> np.ndarray:
     path = ToolpathBuilder()
     for place in TURNS:
         path.rapid(**{axis: float(place)})
-    program = target.post.write(path.finish(), target.machine)
-    decoded = target.post.read(program.data, target.machine)
+    program = target.target.write(path.finish(), target.machine)
+    decoded = target.target.read(program.data, target.machine)
     rows = rows_of(simulate(decoded, target.machine))
     return np.array([row.slide[-1, "xyz".index(axis)] for row in rows if len(row.slide)])
 

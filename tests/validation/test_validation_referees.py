@@ -41,7 +41,7 @@ NEAR_PART = 0.01
 def run(name: str, data: bytes, *settings: str) -> tuple[list[RowMotion], float]:
     """The motion of each row of a program, and the time of all, s."""
     target = load_target(name, settings=settings)
-    path = target.post.read(data, target.machine)
+    path = target.target.read(data, target.machine)
     rows = rows_of(simulate(path, target.machine, Options(effects=IDEAL)))
     return rows, sum(row.duration_s for row in rows)
 

@@ -144,7 +144,7 @@ def check_rearranged(name: str, data: st.DataObject) -> None:
     made = post(name, drawing, job, compensate=False)
     target = sound(name)[0].target
     other = rearranged(made.wanted, data.draw(st.randoms(use_true_random=False)))
-    program = target.post.write(other, target.machine)
+    program = target.target.write(other, target.machine)
     told = against(judged(name, program.data, drawing, job))
     assert [each for each in told if not _speeds_of_the_grid(name, each)] == []
 

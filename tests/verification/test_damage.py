@@ -94,7 +94,7 @@ def sound(name: str) -> tuple[Whole, Drawing, Job]:
 def throw(name: str, kind: str, random: Random) -> bytes | None:
     """One damaged program that can be read and differs; None when the target knows no such."""
     whole = sound(name)[0]
-    read, machine = whole.target.post.read, whole.target.machine
+    read, machine = whole.target.target.read, whole.target.machine
     before = read(whole.data, machine)
     for _ in range(40):
         try:

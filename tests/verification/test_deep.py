@@ -49,8 +49,8 @@ def test_each_dialect_cuts_all_of_it(name: str) -> None:
     size, deep, feed, settings = SHOPS[name]
     target = load_target(name, settings=settings)
     wanted = everything(size, deep, feed)
-    program = target.post.write(wanted, target.machine)
-    decoded = target.post.read(program.data, target.machine)
+    program = target.target.write(wanted, target.machine)
+    decoded = target.target.read(program.data, target.machine)
     options = VerifyOptions(tool_diameter_mm=0.3 * size)
     found = verify(decoded, target.machine, wanted=wanted, options=options)
     assert errors(found) == []
@@ -76,7 +76,9 @@ def test_helices_and_slopes_come_back_as_they_are_where_they_can_be_said() -> No
         size, deep, feed, _ = SHOPS[name]
         target = load_target(name)
         wanted = everything(size, deep, feed)
-        decoded = target.post.read(target.post.write(wanted, target.machine).data, target.machine)
+        decoded = target.target.read(
+            target.target.write(wanted, target.machine).data, target.machine
+        )
         moves = wanted.is_feed & (wanted.end != wanted.starts).any(axis=1) | wanted.is_arc
         assert decoded.kind[decoded.is_feed].tolist() == wanted.kind[moves].tolist()
         assert np.abs(decoded.end[decoded.is_feed] - wanted.end[moves]).max() < 0.00051

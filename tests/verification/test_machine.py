@@ -161,8 +161,8 @@ def test_a_program_of_our_own_post_is_within_the_steps_of_its_machine(form: str)
         b.line(*rng.uniform(1.0, 4.0, 2), feed=0.8)
         circle(b, x, y, radius, ccw=number % 2 == 0)
     wanted = b.finish()
-    data = target.post.write(wanted, target.machine).data
-    decoded = target.post.read(data, target.machine)
+    data = target.target.write(wanted, target.machine).data
+    decoded = target.target.read(data, target.machine)
     found = verify(decoded, target.machine, wanted=wanted)
     assert [f for f in found.findings if f.severity == Severity.ERROR] == []
     error = found.report.error_um
@@ -182,7 +182,7 @@ def test_the_string_of_the_thesis_alone_is_judged() -> None:
     ):
         target = load_target("pic-mmh", settings=[f"controller.arc_end={reading}"])
         data = b"G02X02969.00Y03400.00I03012.00J03040.00F08;"
-        decoded = target.post.read(data, target.machine)
+        decoded = target.target.read(data, target.machine)
         found = verify(decoded, target.machine)
         assert {code, Code.ARC_END_UNSURE} <= {f.code for f in found.findings}
         assert found.report.contours == 1

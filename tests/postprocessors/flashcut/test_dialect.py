@@ -25,13 +25,13 @@ EXAMPLES = {
 
 def read(data: bytes, *settings: str) -> Toolpath:
     target = load_target("flashcut", settings=settings)
-    path: Toolpath = target.post.read(data, target.machine)
+    path: Toolpath = target.target.read(data, target.machine)
     return path
 
 
 def write(path: Toolpath, *settings: str) -> list[str]:
     target = load_target("flashcut", settings=settings)
-    lines: list[str] = target.post.write(path, target.machine).data.decode("ascii").splitlines()
+    lines: list[str] = target.target.write(path, target.machine).data.decode("ascii").splitlines()
     return lines
 
 
@@ -188,7 +188,7 @@ def test_what_a_feed_becomes_is_said() -> None:
 def test_the_spindle_may_not_stop() -> None:
     target = load_target("flashcut", settings=["dialect.spindle_stops=false"])
     path = ToolpathBuilder().event(Kind.SPINDLE_CW).event(Kind.SPINDLE_OFF).finish()
-    program = target.post.write(path, target.machine)
+    program = target.target.write(path, target.machine)
     assert program.data == b"M03\nM05\nM30\n"
     (finding,) = program.findings
     assert (finding.code, finding.severity) == (Code.EVENT_LEFT_OUT, Severity.WARNING)

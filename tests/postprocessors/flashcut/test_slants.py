@@ -20,8 +20,8 @@ def target(*settings: str) -> LoadedTarget:
 
 
 def decoded(path: Toolpath, machine: LoadedTarget) -> Toolpath:
-    program = machine.post.write(path, machine.machine)
-    back: Toolpath = machine.post.read(program.data, machine.machine)
+    program = machine.target.write(path, machine.machine)
+    back: Toolpath = machine.target.read(program.data, machine.machine)
     assert (program.row_of_block[back.block] >= 0).all() or back.kind[-1] == Kind.END
     return back
 
@@ -89,8 +89,8 @@ def test_other_rows_stay() -> None:
     path.arc(2.0, 1.0, centre=(1.0, 1.0), ccw=True, feed=3.0).line(z=-0.1, feed=3.0)
     wanted = path.event(Kind.END).finish()
     machine, plain = target(SPLIT), target()
-    assert machine.post.write(wanted, machine.machine).data == (
-        plain.post.write(wanted, plain.machine).data
+    assert machine.target.write(wanted, machine.machine).data == (
+        plain.target.write(wanted, plain.machine).data
     )
 
 
@@ -100,7 +100,7 @@ def test_too_many_pieces_are_refused() -> None:
         path.line(9999.0, 9000.0, feed=14.1).line(-9999.0, -9000.0, feed=14.1)
     machine = target(SPLIT, "controller.half_period_ms=1")
     with pytest.raises(PostError, match="more than 10000000 blocks"):
-        machine.post.write(path.finish(), machine.machine)
+        machine.target.write(path.finish(), machine.machine)
 
 
 def test_without_its_timers_nothing_is_split() -> None:

@@ -143,11 +143,11 @@ def any_arc(
 def judge(target: LoadedTarget, wanted: Toolpath, unit_mm: float) -> Program:
     """Write and read back; every row must end where it was wanted to and every arc must be one,
     near the wanted circle and of the wanted sweep, by the numbers of the program alone."""
-    program: Program = target.post.write(wanted, target.machine)
+    program: Program = target.target.write(wanted, target.machine)
     if not program.data:
         assert not len(wanted) or np.abs(wanted.end).max() <= unit_mm
         return program
-    decoded: Toolpath = target.post.read(program.data, target.machine)
+    decoded: Toolpath = target.target.read(program.data, target.machine)
     row_of = program.row_of_block[decoded.block]
     starts = decoded.starts
     swept = np.zeros(len(wanted))

@@ -119,8 +119,8 @@ def test_absurd_radii_become_lines() -> None:
     first = math.pi / 2.0 - sweep / 2.0
     path = one_arc(radius, first, sweep, at=(0.0, -radius))
     target = load_target("grbl")
-    program = target.post.write(path, target.machine)
-    decoded = target.post.read(program.data, target.machine)
+    program = target.target.write(path, target.machine)
+    decoded = target.target.read(program.data, target.machine)
     assert b"I" not in program.data.replace(b"IN", b"").split(b"G54")[1]
     (finding,) = [note for note in program.findings if note.code == Code.ARC_MENDED]
     assert "1 written as lines" in finding.message
@@ -135,9 +135,9 @@ def test_a_crooked_arc_is_mended_and_told() -> None:
     """Radii that differ by 7 µm: grbl would stop with its error 33."""
     path = ToolpathBuilder().rapid(1.0, 0.0).arc(-1.007, 0.0, centre=(0.0, 0.0), ccw=True, feed=9)
     target = load_target("grbl")
-    program = target.post.write(path.finish(), target.machine)
+    program = target.target.write(path.finish(), target.machine)
     assert any(note.code == Code.ARC_MENDED for note in program.findings)
-    decoded = target.post.read(program.data, target.machine)
+    decoded = target.target.read(program.data, target.machine)
     assert decoded.end[-2].tolist() == [-1.007, 0.0, 0.0]
     assert decoded.is_arc.any()
 
@@ -171,5 +171,5 @@ def test_linuxcnc_gets_no_arc_of_a_radius_that_it_calls_zero() -> None:
         path = one_arc(radius, 0.0, 2.0 * math.pi, at=(1.0, 1.0))
         full = ToolpathBuilder().rapid(*path.end[0, :2].tolist())
         full.arc(*path.end[0, :2].tolist(), centre=(1.0, 1.0), ccw=True, feed=9.0)
-        program = target.post.write(full.finish(), target.machine)
-        target.post.read(program.data, target.machine)
+        program = target.target.write(full.finish(), target.machine)
+        target.target.read(program.data, target.machine)

@@ -36,7 +36,7 @@ CASES = {
 def program_of(case: str) -> bytes:
     name, settings = CASES[case]
     target = load_target(name, settings=settings)
-    data: bytes = target.post.write(part(tools=case != "grbl.nc"), target.machine).data
+    data: bytes = target.target.write(part(tools=case != "grbl.nc"), target.machine).data
     return data
 
 

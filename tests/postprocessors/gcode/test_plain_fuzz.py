@@ -14,7 +14,8 @@ from tests.waiting import no_chewing
 
 LOADED = {name: load_target(name) for name in sorted(KINDS)}
 PROGRAMS = {
-    name: target.post.write(part(3.0, 8.0), target.machine).data for name, target in LOADED.items()
+    name: target.target.write(part(3.0, 8.0), target.machine).data
+    for name, target in LOADED.items()
 }
 """Far more than any of these takes, and far less than a reader that hangs."""
 
@@ -23,7 +24,7 @@ def tried(name: str, data: bytes) -> Toolpath | None:
     """The toolpath, or None after a clean error with a place."""
     target = LOADED[name]
     try:
-        path: Toolpath = target.post.read(data, target.machine)
+        path: Toolpath = target.target.read(data, target.machine)
     except ProgramError as error:
         text = str(error)
         assert "\n" not in text
@@ -79,7 +80,7 @@ def test_ten_megabytes_on_one_line(name: str, piece: bytes) -> None:
 @pytest.mark.parametrize("name", LOADED)
 def test_decimal_commas(name: str) -> None:
     with pytest.raises(ProgramError, match="decimal comma"):
-        LOADED[name].post.read(PROGRAMS[name].replace(b".", b","), LOADED[name].machine)
+        LOADED[name].target.read(PROGRAMS[name].replace(b".", b","), LOADED[name].machine)
 
 
 @pytest.mark.parametrize("name", LOADED)

@@ -26,16 +26,16 @@ ROW_BY_ROW = LOADED | {"flashcut": load_target("flashcut", settings=["dialect.ra
 
 def check_same(name: str, wanted: Toolpath) -> None:
     target = ROW_BY_ROW[name]
-    program = target.post.write(wanted, target.machine)
+    program = target.target.write(wanted, target.machine)
     assert {finding.code for finding in program.findings} <= {Code.COORDINATES_SCALED}
-    read = target.post.read(program.data, target.machine)
+    read = target.target.read(program.data, target.machine)
     assert read.kind.tolist() == wanted.kind.tolist()
     np.testing.assert_allclose(read.end, wanted.end, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(read.centre, wanted.centre, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(read.feed, wanted.feed, rtol=1e-12)
     rows = program.row_of_block[read.block]
     assert rows.tolist() == list(range(len(wanted)))
-    again = target.post.write(read, target.machine)
+    again = target.target.write(read, target.machine)
     assert again.data == program.data
 
 
@@ -93,7 +93,7 @@ def unit_of(target: LoadedTarget) -> float:
 def test_every_option_is_understood_by_both(name: str, setting: str) -> None:
     target = load_target(name, settings=[setting])
     program = judge(target, part(3.0, 8.0), unit_of(target))
-    default = LOADED[name].post.write(part(3.0, 8.0), LOADED[name].machine)
+    default = LOADED[name].target.write(part(3.0, 8.0), LOADED[name].machine)
     assert program.data != default.data
 
 
@@ -117,8 +117,8 @@ def test_random_arcs_stay_arcs(name: str) -> None:
         )
     target = LOADED[name]
     wanted = path.finish()
-    program = target.post.write(wanted, target.machine)
-    read = target.post.read(program.data, target.machine)
+    program = target.target.write(wanted, target.machine)
+    read = target.target.read(program.data, target.machine)
     assert (read.is_arc == read.is_feed).all()
     (mended,) = (f for f in program.findings if f.code == Code.ARC_MENDED)
     assert mended.measured is not None
@@ -130,8 +130,8 @@ def test_random_arcs_stay_arcs(name: str) -> None:
 def test_full_circles_are_written_in_parts(name: str) -> None:
     target = LOADED[name]
     circle = ToolpathBuilder().rapid(2.0, 0.0).arc(2.0, 0.0, centre=(0, 0), ccw=True, feed=3.0)
-    program = target.post.write(circle.finish(), target.machine)
-    read = target.post.read(program.data, target.machine)
+    program = target.target.write(circle.finish(), target.machine)
+    read = target.target.read(program.data, target.machine)
     arcs = read.sweeps()[read.is_arc]
     assert len(arcs) == (2 if name == "flashcut" else 4)
     assert arcs.sum() == pytest.approx(2.0 * math.pi)
@@ -149,7 +149,7 @@ def test_a_speck_of_an_arc_behind_a_nearly_full_circle(name: str) -> None:
 def test_findings_count_what_was_lost() -> None:
     target = LOADED["flashcut"]
     wanted = part(3.0, 8.0)
-    found = {f.code: f for f in target.post.write(wanted, target.machine).findings}
+    found = {f.code: f for f in target.target.write(wanted, target.machine).findings}
     assert set(found) == {
         Code.MOVE_SPLIT,
         Code.EVENT_LEFT_OUT,
@@ -158,7 +158,7 @@ def test_findings_count_what_was_lost() -> None:
     assert "1 feed move in" in found[Code.MOVE_SPLIT].message
     assert "DWELL" in found[Code.EVENT_LEFT_OUT].message
     valcnc = LOADED["valcnc"]
-    found = {f.code: f for f in valcnc.post.write(wanted, valcnc.machine).findings}
+    found = {f.code: f for f in valcnc.target.write(wanted, valcnc.machine).findings}
     assert set(found) >= {
         Code.COORDINATES_SCALED,
         Code.MOVE_SPLIT,
@@ -173,7 +173,7 @@ def test_specks_are_counted() -> None:
     path = ToolpathBuilder().line(1.0, 0.0, feed=3.0).line(1.0002, 0.0, feed=3.0)
     path.arc(1.0002, 0.004, centre=(1.0002, 0.002), ccw=True, feed=3.0)
     path.arc(1.5, 0.004, centre=(1.25, 200.0), ccw=True, feed=3.0)
-    found = {f.code: f for f in target.post.write(path.finish(), target.machine).findings}
+    found = {f.code: f for f in target.target.write(path.finish(), target.machine).findings}
     assert found[Code.MOVE_COLLAPSED].measured == 2.0
     assert found[Code.ARC_MENDED].message.startswith("0 arcs got another centre")
     assert found[Code.ARC_MENDED].where == "move 2"
@@ -182,7 +182,7 @@ def test_specks_are_counted() -> None:
 @pytest.mark.parametrize("name", TARGETS)
 def test_an_empty_toolpath(name: str) -> None:
     target = LOADED[name]
-    program = target.post.write(ToolpathBuilder().finish(), target.machine)
+    program = target.target.write(ToolpathBuilder().finish(), target.machine)
     assert program.data == (b"M30\n" if name == "flashcut" else b"")
     assert len(program.row_of_block) == program.data.count(b"\n")
 
@@ -190,4 +190,6 @@ def test_an_empty_toolpath(name: str) -> None:
 def test_kinds_are_those_of_the_targets() -> None:
     for name, kinds in KINDS.items():
         assert kinds.unit_mm == pytest.approx(unit_of(LOADED[name]))
-    assert Kind.END not in LOADED["valcnc"].post.read(b"G00X0Y0Z1", LOADED["valcnc"].machine).kind
+    assert (
+        Kind.END not in LOADED["valcnc"].target.read(b"G00X0Y0Z1", LOADED["valcnc"].machine).kind
+    )

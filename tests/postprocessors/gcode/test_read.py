@@ -25,7 +25,7 @@ loaded = functools.cache(lambda name, settings: load_target(name, settings=setti
 def read(data: bytes | str, name: str = "grbl", *settings: str) -> Toolpath:
     target = loaded(name, settings)
     text = data.encode() if isinstance(data, str) else data
-    path: Toolpath = target.post.read(text, target.machine)
+    path: Toolpath = target.target.read(text, target.machine)
     return path
 
 
@@ -317,7 +317,7 @@ def test_line_ends_of_any_system(name: str, end: str) -> None:
 
 def program(name: str) -> bytes:
     target = load_target(name)
-    data: bytes = target.post.write(part(tools=name == "linuxcnc"), target.machine).data
+    data: bytes = target.target.write(part(tools=name == "linuxcnc"), target.machine).data
     return data
 
 
@@ -387,27 +387,27 @@ def test_ten_megabytes_on_one_line_are_refused(name: str) -> None:
 def test_foreign_signs_stand_in_comments_of_linuxcnc_alone() -> None:
     text = "G21 G0 X1 (größer)\nM2\n".encode()
     linuxcnc, grbl = load_target("linuxcnc"), load_target("grbl")
-    assert linuxcnc.post.read(text, linuxcnc.machine).end[0, 0] == 1.0
+    assert linuxcnc.target.read(text, linuxcnc.machine).end[0, 0] == 1.0
     # grbl takes bytes above 7F for commands wherever they stand.
     with pytest.raises(ProgramError, match="0xc3 belongs to no program"):
-        grbl.post.read(text, grbl.machine)
+        grbl.target.read(text, grbl.machine)
     for outside in ("G0 Xß1\n", "G0 X1ß\n", "Gß0\n", "µ\n", "\x85G0 X1\n"):
         with pytest.raises(ProgramError) as caught:
-            linuxcnc.post.read(outside.encode(), linuxcnc.machine)
+            linuxcnc.target.read(outside.encode(), linuxcnc.machine)
         assert "line 1, column" in str(caught.value.where)
 
 
 def test_a_circle_may_say_its_centre_alone_in_linuxcnc() -> None:
     text = b"G21 F100 G0 X1\nG3 I2\nM2\n"
     linuxcnc, grbl = load_target("linuxcnc"), load_target("grbl")
-    path = linuxcnc.post.read(text, linuxcnc.machine)
+    path = linuxcnc.target.read(text, linuxcnc.machine)
     assert path.centre[1].tolist() == [3.0, 0.0]
     assert path.sweeps()[1] == pytest.approx(6.283185307)
     with pytest.raises(ProgramError, match="an arc without X or Y"):
-        grbl.post.read(text, grbl.machine)
+        grbl.target.read(text, grbl.machine)
     for bad in (b"G21 F100 G3 R2\nM2\n", b"G21 F100 G3\nM2\n", b"G21 F100 G1 I2\nM2\n"):
         with pytest.raises(ProgramError):
-            linuxcnc.post.read(bad, linuxcnc.machine)
+            linuxcnc.target.read(bad, linuxcnc.machine)
 
 
 @pytest.mark.parametrize(
@@ -439,8 +439,8 @@ def test_path_modes_are_written_where_they_change() -> None:
     )
     path = read(text, "linuxcnc")
     target = loaded("linuxcnc", ())
-    program = target.post.write(carried_over(path), target.machine)
-    again = target.post.read(program.data, target.machine)
+    program = target.target.write(carried_over(path), target.machine)
+    again = target.target.read(program.data, target.machine)
     moves, wanted = again.is_motion, path.is_motion
     assert [again.modes[k] for k in again.mode[moves][1:]] == [
         path.modes[k] for k in path.mode[wanted][1:]
@@ -449,7 +449,7 @@ def test_path_modes_are_written_where_they_change() -> None:
     said = [line for line in program.data.decode().splitlines() if line.startswith("G6")]
     assert said == ["G64 P0.01", "G61", "G64 P0.25 Q0.5", "G64 P0.25", "G64", "G61.1"]
     grbl = loaded("grbl", ())
-    assert b"G6" not in grbl.post.write(carried_over(path), grbl.machine).data
+    assert b"G6" not in grbl.target.write(carried_over(path), grbl.machine).data
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -467,7 +467,7 @@ def test_a_spindle_may_start_before_its_speed_is_said(name: str) -> None:
     assert found == [(Code.SPINDLE_SPEED_NOT_SAID, Severity.WARNING, "block 1")]
     for other in (*TARGETS, "valcnc"):
         target = loaded(other, ())
-        text = target.post.write(carried_over(path), target.machine).data.decode()
+        text = target.target.write(carried_over(path), target.machine).data.decode()
         assert ("M3\n" in text) == (other != "valcnc")
         assert "nan" not in text
 

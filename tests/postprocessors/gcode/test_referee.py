@@ -25,15 +25,15 @@ TARGETS = ("grbl", "linuxcnc")
 def test_our_programs_are_what_was_wanted(name: str, tmp_path: Path) -> None:
     target = load_target(name)
     wanted = part(tools=name == "linuxcnc")
-    program = target.post.write(wanted, target.machine)
-    decoded = target.post.read(program.data, target.machine)
+    program = target.target.write(wanted, target.machine)
+    decoded = target.target.read(program.data, target.machine)
     compare(wanted, program.data, tmp_path)
     compare(decoded, program.data, tmp_path)
 
 
 def test_events_are_canonical_calls_too(tmp_path: Path) -> None:
     target = load_target("linuxcnc")
-    program = target.post.write(part(tools=True), target.machine)
+    program = target.target.write(part(tools=True), target.machine)
     calls = interpreted(program.data, tmp_path)
     names = [name for name, _, _ in calls]
     said = {(name, *values) for name, _, values in calls}
@@ -47,7 +47,7 @@ def test_events_are_canonical_calls_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", ["blend", "exact-path", "exact-stop"])
 def test_the_path_mode_is_the_one_asked_for(path: str, tmp_path: Path) -> None:
     target = load_target("linuxcnc", settings=[f"dialect.path={path}", "dialect.percent=true"])
-    program = target.post.write(part(), target.machine)
+    program = target.target.write(part(), target.machine)
     run = run_rs274("-g", "/dev/stdin", input=program.data.decode(), cwd=tmp_path)
     mode = {
         "blend": "CONTINUOUS, 0.010000",
@@ -61,8 +61,8 @@ def test_the_path_mode_is_the_one_asked_for(path: str, tmp_path: Path) -> None:
 def test_the_logo(name: str, tmp_path: Path) -> None:
     target = load_target(name)
     drawing = read_drawing(Path(__file__).parents[3] / "samples" / "logo.dxf")
-    program = target.post.write(plan(drawing, job_of(), target.machine), target.machine)
-    compare(target.post.read(program.data, target.machine), program.data, tmp_path)
+    program = target.target.write(plan(drawing, job_of(), target.machine), target.machine)
+    compare(target.target.read(program.data, target.machine), program.data, tmp_path)
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -70,8 +70,8 @@ def test_the_logo(name: str, tmp_path: Path) -> None:
 @given(path=toolpaths())
 def test_random_programs(name: str, path: Toolpath, tmp_path: Path) -> None:
     target = load_target(name)
-    program = target.post.write(path, target.machine)
-    compare(target.post.read(program.data, target.machine), program.data, tmp_path)
+    program = target.target.write(path, target.machine)
+    compare(target.target.read(program.data, target.machine), program.data, tmp_path)
 
 
 FOREIGN = [
@@ -107,20 +107,20 @@ def test_programs_of_other_hands(name: str, text: str, tmp_path: Path) -> None:
     target = load_target(name)
     # LinuxCNC knows no motion before a motion word, grbl no %.
     program = text.replace("%\n", "") if name == "grbl" else text
-    compare(target.post.read(program.encode(), target.machine), program.encode(), tmp_path)
+    compare(target.target.read(program.encode(), target.machine), program.encode(), tmp_path)
 
 
 @pytest.mark.parametrize("text", ONLY_LINUXCNC)
 def test_programs_that_grbl_has_no_words_for(text: str, tmp_path: Path) -> None:
     target = load_target("linuxcnc")
-    compare(target.post.read(text.encode(), target.machine), text.encode(), tmp_path)
+    compare(target.target.read(text.encode(), target.machine), text.encode(), tmp_path)
 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_helices_are_theirs(name: str, tmp_path: Path) -> None:
     text = b"G0 X10 Z2\nG3 X0 Y10 Z0 I-10 J0 F100\nG2 X0 Y10 Z-1 I0 J-5\nG2 X5 Y5 R5 Z1\nM2"
     target = load_target(name)
-    compare(target.post.read(text, target.machine), text, tmp_path)
+    compare(target.target.read(text, target.machine), text, tmp_path)
     assert motions(interpreted(text, tmp_path))[1:4, 3].tolist() == [0.0, -1.0, 1.0]
 
 
@@ -139,7 +139,7 @@ def judged(text: str, folder: Path) -> tuple[bool, bool]:
     target = load_target("linuxcnc")
     verdicts = []
     for judge in (
-        lambda: target.post.read(text.encode(), target.machine),
+        lambda: target.target.read(text.encode(), target.machine),
         lambda: interpreted(text.encode(), folder),
     ):
         try:

@@ -23,8 +23,8 @@ arc by as much, twice (its radius follows the start), and the end by √2/2 once
 
 def there_and_back(path: Toolpath, name: str, *settings: str) -> tuple[Program, Toolpath]:
     target = load_target(name, settings=settings)
-    program = target.post.write(path, target.machine)
-    decoded: Toolpath = target.post.read(program.data, target.machine)
+    program = target.target.write(path, target.machine)
+    decoded: Toolpath = target.target.read(program.data, target.machine)
     return program, decoded
 
 

@@ -22,7 +22,7 @@ MODES = {
 
 def write(path: Toolpath, name: str = "grbl", *settings: str) -> Program:
     target = load_target(name, settings=settings)
-    program: Program = target.post.write(path, target.machine)
+    program: Program = target.target.write(path, target.machine)
     return program
 
 

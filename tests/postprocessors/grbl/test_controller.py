@@ -303,7 +303,7 @@ def test_no_step_takes_longer_than_the_timer_s_longest_tick(feed: float) -> None
 def test_a_feed_that_is_too_slow_is_found() -> None:
     """7.32 mm/min are 30.518 steps of 0.004 mm a second; √2 of it at 45°."""
     target = load_target("grbl")
-    read = target.post.read
+    read = target.target.read
     (found,) = read(b"G1 X1 F5\nX2 Y1 F9\nM2\n", target.machine).findings
     assert (found.code, found.severity) == (Code.FEED_TOO_SLOW, Severity.WARNING)
     assert found.message.startswith("2 cuts are slower")

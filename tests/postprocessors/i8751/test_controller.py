@@ -182,8 +182,8 @@ def test_an_elbow_ramps_anew_or_flows() -> None:
 
 def test_feeds_that_are_read_are_those_of_the_motion() -> None:
     target = loaded("first_pulse=repeats", "high_byte='255'")
-    program = target.post.write(in_steps((0, 0, -130), (700, 200, -130)), target.machine)
-    decoded = target.post.read(program.data, target.machine)
+    program = target.target.write(in_steps((0, 0, -130), (700, 200, -130)), target.machine)
+    decoded = target.target.read(program.data, target.machine)
     assert decoded.is_feed.sum() > 5
     for move, row in zip(decoded, run(decoded, target.machine), strict=True):
         if move.feed is not None:

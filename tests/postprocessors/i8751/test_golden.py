@@ -40,7 +40,7 @@ def compare(file: Path, data: bytes, *, bless: bool) -> None:
 @pytest.mark.parametrize("form", FILES)
 def test_program(form: str, bless: bool) -> None:
     target = loaded(f"format={form}", "arc_tolerance_mm=0.05")
-    compare(GOLDEN / FILES[form], target.post.write(part(), target.machine).data, bless=bless)
+    compare(GOLDEN / FILES[form], target.target.write(part(), target.machine).data, bless=bless)
 
 
 def test_the_dump_is_that_of_the_packets() -> None:
@@ -71,13 +71,13 @@ def test_the_worked_examples_of_the_page() -> None:
     assert len(dumps) == 2
     target = loaded("format=hex")
     for dump in dumps:
-        target.post.read(dump.encode("ascii"), target.machine)
+        target.target.read(dump.encode("ascii"), target.machine)
     path = ToolpathBuilder().line(z=-0.5, feed=30).line(100 * STEP_MM, 25 * STEP_MM, feed=30)
-    written = target.post.write(path.finish(), target.machine).data.decode("ascii")
+    written = target.target.write(path.finish(), target.machine).data.decode("ascii")
     assert written == dumps[1]
     (listing,) = re.findall(r"```listing\n(.+?)```", page, re.DOTALL)
     target = loaded("format=listing")
-    assert target.post.write(path.finish(), target.machine).data.decode("ascii") == listing
+    assert target.target.write(path.finish(), target.machine).data.decode("ascii") == listing
 
 
 def test_every_option_has_its_line_on_the_page() -> None:

@@ -19,8 +19,8 @@ def test_every_step_stays_near_what_was_wanted() -> None:
     """Within the tolerance of lines, that of arcs, and half a step in X and in Y."""
     target = loaded()
     wanted = plan(read_drawing(LOGO), job_of(), target.machine)
-    program = target.post.write(wanted, target.machine)
-    read = target.post.read(program.data, target.machine)
+    program = target.target.write(wanted, target.machine)
+    read = target.target.read(program.data, target.machine)
     moves = list(wanted)
     limit = 0.05 + 0.01 + math.sqrt(0.5) * STEP_MM
     worst = 0.0

@@ -34,7 +34,7 @@ EXAMPLES = {"packets": ONE, "listing": LISTING, "hex": DUMP}
 
 def read(data: bytes, *settings: str) -> Toolpath:
     target = loaded(*settings)
-    path: Toolpath = target.post.read(data, target.machine)
+    path: Toolpath = target.target.read(data, target.machine)
     return path
 
 
@@ -326,7 +326,7 @@ def test_noise(form: str, data: bytes) -> None:
 def read_or_refused(target: LoadedTarget, data: bytes) -> Toolpath | None:
     """The moves, or None after a ProgramError of one printable line."""
     try:
-        path: Toolpath = target.post.read(data, target.machine)
+        path: Toolpath = target.target.read(data, target.machine)
     except ProgramError as error:
         message = str(error)
     else:
@@ -375,7 +375,7 @@ def test_noise_under_every_option(option: str) -> None:
     target = loaded(option)
     for length in range(len(ONE)):
         with pytest.raises(ProgramError):
-            target.post.read(ONE[:length], target.machine)
+            target.target.read(ONE[:length], target.machine)
 
 
 def test_the_reader_starts_at_part_zero() -> None:

@@ -86,12 +86,12 @@ def steps_of(path: Toolpath) -> np.ndarray:
 
 def write_and_read(target: LoadedTarget, path: Toolpath) -> tuple[Program, Toolpath] | None:
     try:
-        program = target.post.write(path, target.machine)
+        program = target.target.write(path, target.machine)
     except PostError as error:
         if "nothing moves" not in str(error):
             raise
         return None
-    return program, target.post.read(program.data, target.machine)
+    return program, target.target.read(program.data, target.machine)
 
 
 def check_places(given_path: Toolpath, program: Program, read: Toolpath, places: list) -> None:
@@ -172,7 +172,9 @@ def test_the_dog_legs_of_a_cut_stay_within_the_tolerance(dx: int, dy: int) -> No
     path = ToolpathBuilder().line(z=-1, feed=30).line(dx * STEP_MM, dy * STEP_MM, feed=30)
     if not (dx or dy):
         return
-    read = target.post.read(target.post.write(path.finish(), target.machine).data, target.machine)
+    read = target.target.read(
+        target.target.write(path.finish(), target.machine).data, target.machine
+    )
     x, y = 0, 0
     places = []
     for end in steps_of(read)[1:-1]:
@@ -189,7 +191,9 @@ def test_arcs_are_followed_to_their_end(radius: float, turn: float, ccw: bool) -
     end = (radius * math.cos(sweep) - radius, radius * math.sin(sweep))
     path = ToolpathBuilder().line(z=-1, feed=30)
     path.arc(*end, centre=(-radius, 0.0), ccw=ccw, feed=30)
-    read = target.post.read(target.post.write(path.finish(), target.machine).data, target.machine)
+    read = target.target.read(
+        target.target.write(path.finish(), target.machine).data, target.machine
+    )
     away = np.hypot(read.end[1:, 0] + radius, read.end[1:, 1]) - radius
     # Chord (0.01), dog-leg, and half a step in X and in Y.
     assert np.abs(away).max() <= 0.01 + TOLERANCE_MM + math.sqrt(0.5) * STEP_MM
@@ -201,7 +205,7 @@ def test_kinds_come_back_from_a_planned_path() -> None:
     path.rapid(z=1).rapid(0, 0).event(Kind.END)
     target = loaded("long_runs=true")
     toolpath = path.finish()
-    read = target.post.read(target.post.write(toolpath, target.machine).data, target.machine)
+    read = target.target.read(target.target.write(toolpath, target.machine).data, target.machine)
     np.testing.assert_array_equal(read.kind, toolpath.kind)
     np.testing.assert_array_equal(read.end, toolpath.end)
 
@@ -209,5 +213,5 @@ def test_kinds_come_back_from_a_planned_path() -> None:
 def test_a_flat_program_is_lines() -> None:
     target = TARGETS["packets", ""]
     path = ToolpathBuilder().rapid(1, 2).line(1, 5, feed=30).finish()
-    read = target.post.read(target.post.write(path, target.machine).data, target.machine)
+    read = target.target.read(target.target.write(path, target.machine).data, target.machine)
     assert read.kind.tolist() == [Kind.LINE, Kind.LINE, Kind.END]

@@ -17,7 +17,7 @@ from tests.postprocessors.i8751.machines import STEP_MM, loaded
 def write(path: ToolpathBuilder | Toolpath, *settings: str) -> Program:
     target = loaded(*settings)
     toolpath = path.finish() if isinstance(path, ToolpathBuilder) else path
-    program: Program = target.post.write(toolpath, target.machine)
+    program: Program = target.target.write(toolpath, target.machine)
     return program
 
 
@@ -86,7 +86,7 @@ def test_no_run_needs_a_high_byte(steps: int, setting: str) -> None:
             loaded(setting.replace("high_byte='256'", "key=once"), f"high_byte='{unit}'")
             for unit in (256, 255)
         )
-        there, here = (made.post.read(program.data, made.machine) for made in (as_256, as_255))
+        there, here = (made.target.read(program.data, made.machine) for made in (as_256, as_255))
         np.testing.assert_array_equal(there.end, here.end)
         np.testing.assert_allclose(there.end[-1], path.finish().end[-1], atol=1e-9)
         assert Code.READ_TWO_WAYS not in {one.code for one in there.findings}
@@ -170,7 +170,7 @@ def test_texts_of_a_drawing_are_comments_only(form: str) -> None:
     (comment,) = [text for text in lines if "X+1.0" in text]
     assert comment.startswith("; END X+1.0 ")
     assert len(comment) <= 62
-    read = [target.post.read(p.data, target.machine).end for p in (program, plain)]
+    read = [target.target.read(p.data, target.machine).end for p in (program, plain)]
     np.testing.assert_array_equal(*read)
 
 
@@ -277,5 +277,5 @@ def test_the_line_carries_packets_whatever_the_file_is(form: str) -> None:
     target = loaded(f"format={form}")
     data = write(line(300, 700, 0), f"format={form}").data
     wanted = len(write(line(300, 700, 0)).data)
-    assert target.post.line_bytes(data, target.machine) == wanted
+    assert target.target.line_bytes(data, target.machine) == wanted
     assert (len(data) == wanted) == (form == "packets")

@@ -35,7 +35,7 @@ def run(path: Toolpath, machine: Machine, chunk_steps: int = CHUNK_STEPS) -> lis
 
 
 def read(program: str, machine: Machine) -> Toolpath:
-    path: Toolpath = load_target("linuxcnc").post.read(program.encode(), machine)
+    path: Toolpath = load_target("linuxcnc").target.read(program.encode(), machine)
     return path
 
 
@@ -60,7 +60,7 @@ def test_linuxcnc_itself(case: Measured) -> None:
     """Times within three periods or 1.1 %, corners of lines within 0.2 µm (the trace was
     sampled)."""
     machine = in_mode(case.mode, case.tolerance_mm)
-    path = load_target("linuxcnc").post.read(
+    path = load_target("linuxcnc").target.read(
         f"G21 G17 G90 G94\n{case.program}M2\n".encode(), machine
     )
     rows = run(path, machine)

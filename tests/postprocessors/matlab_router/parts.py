@@ -62,7 +62,7 @@ def strokes(*paths: Sequence[Point], feed: float = 225.0) -> Toolpath:
 def posted(sample: str, target: LoadedTarget) -> bytes:
     """The program of a sample file."""
     drawing = read_drawing(ROOT / "samples" / sample)
-    return bytes(target.post.write(plan(drawing, job_of(), target.machine), target.machine).data)
+    return bytes(target.target.write(plan(drawing, job_of(), target.machine), target.machine).data)
 
 
 def arrays(program: bytes) -> list[dict[str, list[list[int]]]]:

@@ -46,7 +46,7 @@ def read(name: str, *settings: str) -> tuple[Toolpath, Machine]:
     """A golden program as the dialect reads it."""
     target = load_target("matlab-router", settings=settings)
     data = (ROOT / "tests" / "golden" / f"{name}.m").read_bytes()
-    return target.post.read(data, target.machine), target.machine
+    return target.target.read(data, target.machine), target.machine
 
 
 def line(x: float = 0.0, y: float = 0.0, z: float = 0.0, *, counts: int = 480) -> Toolpath:

@@ -47,7 +47,7 @@ def test_star(name: str, bless: bool) -> None:
 
 def test_part(bless: bool) -> None:
     target = router()
-    compare("matlab-router-part.m", target.post.write(part(), target.machine).data, bless=bless)
+    compare("matlab-router-part.m", target.target.write(part(), target.machine).data, bless=bless)
 
 
 def test_a_changed_byte_fails() -> None:

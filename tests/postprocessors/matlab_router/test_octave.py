@@ -69,13 +69,13 @@ PROGRAMS = {
     "the logo": lambda: posted("logo.dxf", router()),
     "a long stroke": lambda: (
         router()
-        .post.write(
+        .target.write(
             strokes([(1.0 + 0.4 * index, 5.0 + 0.4 * (index % 2)) for index in range(400)]),
             router().machine,
         )
         .data
     ),
-    "the part as it is now": lambda: router().post.write(part(), router().machine).data,
+    "the part as it is now": lambda: router().target.write(part(), router().machine).data,
 }
 
 

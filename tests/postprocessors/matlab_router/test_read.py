@@ -40,7 +40,7 @@ first_pointy = 100;
 
 def read(data: bytes, *settings: str) -> Toolpath:
     target = router(*settings)
-    return target.post.read(data, target.machine)  # type: ignore[no-any-return]
+    return target.target.read(data, target.machine)  # type: ignore[no-any-return]
 
 
 def test_a_job_as_the_machine_runs_it() -> None:
@@ -102,7 +102,7 @@ def test_the_tool_is_switched_where_its_speed_is_known() -> None:
 def test_odd_distances_are_cut_short() -> None:
     """The drift of the star, in 0.1 mm, by which each vertex is off the one that was sent."""
     target = router("grid_mm=0.1", "bend_tolerance_mm=9")
-    path = target.post.read(posted("star.csv", target), target.machine)
+    path = target.target.read(posted("star.csv", target), target.machine)
     (points,) = cut_points(path)
     drift = np.rint(np.array(points) * 10).astype(int) - np.array(STAR)
     assert (drift[:, 0] + 1).tolist() == [0, -1, -1, 0, 0, 0, 1, 1, 1, 1, 2]
@@ -114,7 +114,7 @@ def test_odd_distances_are_cut_short() -> None:
 
 def test_the_listed_master_begins_at_20_mm() -> None:
     target = router("profile=listing", "format=stream")
-    path = target.post.read(posted("star.csv", target), target.machine)
+    path = target.target.read(posted("star.csv", target), target.machine)
     assert cut_points(path)[0][0] == (15.0, 20.0)
     assert any("begin at Y 20 mm" in finding.message for finding in path.findings)
 
@@ -273,7 +273,7 @@ def test_a_character_for_y_is_its_digit_or_nothing() -> None:
 
 PROGRAMS = {
     "m": posted("star.csv", router())
-    + router().post.write(strokes([(5, 5), (9, 7)]), router().machine).data,
+    + router().target.write(strokes([(5, 5), (9, 7)]), router().machine).data,
     "stream": posted("star.csv", router("format=stream")),
 }
 

@@ -36,8 +36,8 @@ def kept(points: list[Point]) -> list[Point]:
 
 def check_exact(target: LoadedTarget, paths: list[list[Point]], feed: float) -> None:
     toolpath = strokes(*paths, feed=feed)
-    program = target.post.write(toolpath, target.machine)
-    read = target.post.read(program.data, target.machine)
+    program = target.target.write(toolpath, target.machine)
+    read = target.target.read(program.data, target.machine)
     back = cut_points(read)
     # Very slow lines need so many pieces that a stroke becomes several jobs.
     longer = sum(finding.measured or 0 for finding in program.findings if finding.unit == "jobs")
@@ -83,8 +83,8 @@ def test_any_stroke_comes_back_to_the_grid(points: list[Point], form: str) -> No
     if np.abs(np.diff(snapped, axis=0)).max() < GRID_MM / 2:
         return
     target = router(f"format={form}")
-    read = target.post.read(
-        target.post.write(strokes(points), target.machine).data, target.machine
+    read = target.target.read(
+        target.target.write(strokes(points), target.machine).data, target.machine
     )
     (found,) = cut_points(read)
     for point in points:
@@ -99,8 +99,8 @@ def test_a_program_written_again_keeps_its_vertices(points: list[Point], counts:
     points = kept(points)
     if len(points) < 2:
         return
-    first = target.post.write(strokes(points, feed=counts * 0.46875), target.machine).data
-    again = target.post.write(target.post.read(first, target.machine), target.machine).data
+    first = target.target.write(strokes(points, feed=counts * 0.46875), target.machine).data
+    again = target.target.write(target.target.read(first, target.machine), target.machine).data
     one, two = (
         {vertex for job in arrays(data) for vertex in zip(*job["xy"], strict=True)}
         for data in (first, again)

@@ -31,12 +31,12 @@ STREAM = (
 
 def program(toolpath: Toolpath, *settings: str) -> bytes:
     target = router(*settings)
-    return bytes(target.post.write(toolpath, target.machine).data)
+    return bytes(target.target.write(toolpath, target.machine).data)
 
 
 def codes(toolpath: Toolpath, *settings: str) -> list[Code]:
     target = router(*settings)
-    return [finding.code for finding in target.post.write(toolpath, target.machine).findings]
+    return [finding.code for finding in target.target.write(toolpath, target.machine).findings]
 
 
 @pytest.mark.parametrize("setting", ["grid_mm=0.1", "profile=text", "profile=listing"])
@@ -76,7 +76,7 @@ def test_the_star_on_the_grid_that_the_slaves_run() -> None:
 def test_blocks_are_mapped_to_moves() -> None:
     target = router()
     toolpath = strokes([(5, 5), (10, 5), (10, 10)], [(20, 20), (30, 20)])
-    written = target.post.write(toolpath, target.machine)
+    written = target.target.write(toolpath, target.machine)
     assert written.row_of_block.tolist() == [-1, 3, 4, -1, 8]
     assert (written.target, written.extension) == ("matlab-router", ".m")
 
@@ -111,7 +111,7 @@ def test_no_job_begins_on_an_axis() -> None:
 
 def test_a_start_at_home_moves_to_the_first_chunk() -> None:
     target = router()
-    written = target.post.write(
+    written = target.target.write(
         strokes([(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)]), target.machine
     )
     (job,) = arrays(written.data)
@@ -131,7 +131,7 @@ def test_a_stroke_below_the_grid_is_told() -> None:
     toolpath = strokes([(5, 5), (5.05, 5)], [(10, 10), (20, 10)])
     (finding,) = [
         finding
-        for finding in router().post.write(toolpath, router().machine).findings
+        for finding in router().target.write(toolpath, router().machine).findings
         if finding.code == Code.MOVE_COLLAPSED and finding.unit == "strokes"
     ]
     assert (finding.severity, finding.measured) == (Severity.WARNING, 1.0)
@@ -162,7 +162,7 @@ def test_feeds_may_be_limited(speed: str) -> None:
     line = strokes([(10, 10), (40, 50)], feed=1e6)
     settings = (f"speed={speed}", "too_fast=limited")
     assert arrays(program(line, *settings))[0]["velxy"] == [[360], [480]]
-    findings = router(*settings).post.write(line, router(*settings).machine).findings
+    findings = router(*settings).target.write(line, router(*settings).machine).findings
     assert (findings[0].code, findings[0].severity) == (Code.FEED_ROUNDED, Severity.WARNING)
 
 
@@ -178,7 +178,7 @@ def test_no_line_runs_away_stops_or_bends(dx: int, dy: int, counts: int, grid: s
     assume(max(dx, dy) > 2)
     target = router(f"grid_mm={grid}", "odd=kept")
     toolpath = strokes([(0.4, 0.4), (0.4 + dx / 10, 0.4 + dy / 10)], feed=counts * 0.46875)
-    data = target.post.write(toolpath, target.machine).data
+    data = target.target.write(toolpath, target.machine).data
     at = np.array([4.0, 4.0])
     end = np.array([4.0 + dx, 4.0 + dy])
     for job in arrays(data):
@@ -204,7 +204,7 @@ def test_speeds_are_those_of_the_listing(half: list[tuple[int, int]]) -> None:
         return
     target = router("bend_tolerance_mm=100")
     toolpath = strokes([(x / 10, y / 10) for x, y in points])
-    (job,) = arrays(target.post.write(toolpath, target.machine).data)
+    (job,) = arrays(target.target.write(toolpath, target.machine).data)
     sent = list(zip(*job["xy"], strict=True))
     lxy, velxy = gui_arrays(sent)
     assert job["lxy"] == lxy

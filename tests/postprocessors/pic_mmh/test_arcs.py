@@ -61,7 +61,7 @@ def random_path(rng: np.random.Generator, count: int, low_mm: float, high_mm: fl
 def last_of_rows(target: LoadedTarget, program: Program) -> Iterator[tuple[int, RowMotion]]:
     """Each block's motion as the simulated controller makes it from the bytes: the row of the
     wanted toolpath, and what it did."""
-    decoded = target.post.read(program.data, target.machine)
+    decoded = target.target.read(program.data, target.machine)
     motion = each_row(simulate(decoded, target.machine, Options(effects=IDEAL)))
     for number, row in enumerate(motion):
         yield int(program.row_of_block[decoded.block[number]]), row
@@ -70,7 +70,7 @@ def last_of_rows(target: LoadedTarget, program: Program) -> Iterator[tuple[int, 
 def check_ends(target: LoadedTarget, wanted: Toolpath, within_steps: float) -> Program:
     """Write, simulate, and compare each row: it ends, on time, where it was meant to, and no
     sample of an arc is farther than `within_steps` from the wanted circle. Gives the program."""
-    program: Program = target.post.write(wanted, target.machine)
+    program: Program = target.target.write(wanted, target.machine)
     unit_mm = 0.000015 if target.machine.dialect.form == "example" else 0.0005
     allowed = unit_mm + 0.5 * STEP_MM + 1e-9
     at = np.zeros((len(wanted) + 1, 3))
@@ -128,7 +128,7 @@ def test_arcs_of_a_few_steps(form: str) -> None:
 def test_the_literal_controller_ends_every_block(form: str) -> None:
     target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
     wanted = random_path(np.random.default_rng(SEED + 1), 250, 0.002, 0.08)
-    program = target.post.write(wanted, target.machine)
+    program = target.target.write(wanted, target.machine)
     ran = oracle.run(program.data, form)
     assert len(ran) > 250
     for motion in ran:
@@ -141,7 +141,7 @@ def check_readings(seed: int, count: int, largest_mm: float, form: str) -> None:
     both starts of D, by the literal controller."""
     target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
     wanted = random_path(np.random.default_rng(seed), count, 0.001, largest_mm)
-    program = target.post.write(wanted, target.machine)
+    program = target.target.write(wanted, target.machine)
     blocks = oracle.arcs(program.data, form)
     assert len(blocks) > 0.4 * count
     for block, start, end in blocks:
@@ -176,13 +176,13 @@ def test_large_arcs_end_by_every_reading(reading: str, error: str) -> None:
     """Written for any machine, simulated on one of these: as on the strictest, step for step."""
     writer = load_target("pic-mmh", settings=EQUAL)
     wanted = random_path(np.random.default_rng(SEED + 4), 300, 0.05, 3.0)
-    program: Program = writer.post.write(wanted, writer.machine)
+    program: Program = writer.target.write(wanted, writer.machine)
     options = [f"controller.arc_end={reading}", f"controller.initial_error={error}"]
     other = load_target("pic-mmh", settings=options)
-    assert other.post.write(wanted, other.machine).data == program.data
+    assert other.target.write(wanted, other.machine).data == program.data
     for now, motion in last_of_rows(other, program):
         assert motion.ended, f"row {now} never ends"
-    decoded = other.post.read(program.data, other.machine)
+    decoded = other.target.read(program.data, other.machine)
     assert not other.model.findings(decoded, other.machine, Options())
 
 
@@ -214,7 +214,7 @@ def foreign(rng: np.random.Generator, count: int) -> bytes:
 def test_a_foreign_program_is_told_what_each_reading_does_to_it() -> None:
     target = load_target("pic-mmh")
     data = foreign(np.random.default_rng(SEED), 40)
-    decoded = target.post.read(data, target.machine)
+    decoded = target.target.read(data, target.machine)
     (told,) = target.model.findings(decoded, target.machine, Options())
     assert (told.code, told.severity) == (Code.ARC_END_UNSURE, Severity.WARNING)
     fates = [
@@ -238,7 +238,7 @@ def test_foreign_arcs_run_as_the_reading_says(reading: str, error: str) -> None:
     settings = [f"controller.arc_end={reading}", f"controller.initial_error={error}"]
     target = load_target("pic-mmh", settings=settings)
     data = foreign(np.random.default_rng(SEED + 5), 25)
-    decoded = target.post.read(data, target.machine)
+    decoded = target.target.read(data, target.machine)
     at, endless = (0, 0), 0
     for row, motion in enumerate(
         each_row(simulate(decoded, target.machine, Options(effects=IDEAL)))
@@ -293,8 +293,8 @@ def test_full_circles_turn_once(ccw: bool, start: tuple[float, float], radius: f
         centre = (start[0] + radius * math.cos(angle), start[1] + radius * math.sin(angle))
         wanted = path.arc(*start, centre=centre, ccw=ccw, feed=1).finish()
         check_ends(target, wanted, within_steps=4.0)
-        program = target.post.write(wanted, target.machine)
-        decoded = target.post.read(program.data, target.machine)
+        program = target.target.write(wanted, target.machine)
+        decoded = target.target.read(program.data, target.machine)
         turned = sum(decoded.sweeps())
         behind = np.arange(len(decoded)) > int(decoded.is_arc.argmax())
         mends = behind & decoded.is_feed & ~decoded.is_arc
@@ -308,7 +308,7 @@ def test_full_circles_turn_once(ccw: bool, start: tuple[float, float], radius: f
 
 def mend_of(path: ToolpathBuilder) -> tuple[list[str], dict[Code, str]]:
     target = load_target("pic-mmh")
-    program = target.post.write(path.finish(), target.machine)
+    program = target.target.write(path.finish(), target.machine)
     blocks = program.data.decode("ascii").splitlines()[2:-1]
     return blocks, {finding.code: finding.message for finding in program.findings}
 
@@ -340,9 +340,9 @@ def test_mends_are_counted_once_and_go_on_the_same_way() -> None:
     rng = np.random.default_rng(SEED)
     wanted = random_path(rng, 600, 0.1, 0.5)
     target = load_target("pic-mmh")
-    program = target.post.write(wanted, target.machine)
+    program = target.target.write(wanted, target.machine)
     (finding,) = [f for f in program.findings if f.code == Code.ARC_MENDED]
-    decoded = target.post.read(program.data, target.machine)
+    decoded = target.target.read(program.data, target.machine)
     rows = program.row_of_block[decoded.block]
     mends = [
         index
@@ -369,7 +369,7 @@ def test_arcs_end_with_another_step() -> None:
     settings = [f"axes.{axis}.coded_step_mm={step}" for axis in "xyz"]
     target = load_target("pic-mmh", settings=[*settings, *EQUAL])
     wanted = random_path(np.random.default_rng(SEED), 500, 0.01, 0.5)
-    program = target.post.write(wanted, target.machine)
+    program = target.target.write(wanted, target.machine)
     assert all(motion.ended for _, motion in last_of_rows(target, program))
 
 
@@ -378,7 +378,7 @@ def test_an_arc_written_as_lines_may_not_leave_the_digits() -> None:
     path = ToolpathBuilder().line(99.999, 0, feed=1)
     path.arc(99.999, 0.0014, centre=(99.999, 0.0007), ccw=True, feed=1)
     with pytest.raises(PostError, match="five digits"):
-        target.post.write(path.finish(), target.machine)
+        target.target.write(path.finish(), target.machine)
 
 
 def test_an_arc_up_or_down_is_split() -> None:

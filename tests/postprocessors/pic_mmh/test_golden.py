@@ -39,7 +39,7 @@ def compare(file: Path, data: bytes, *, bless: bool) -> None:
 @pytest.mark.parametrize("form", ["example", "annex"])
 def test_program(form: str, bless: bool) -> None:
     target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
-    data = target.post.write(part(), target.machine).data
+    data = target.target.write(part(), target.machine).data
     compare(GOLDEN / f"pic-mmh-{form}.pic", data, bless=bless)
 
 

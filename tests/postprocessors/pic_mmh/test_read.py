@@ -19,7 +19,7 @@ ANNEX = b"G02X+02969Y+03400I+03012J+03040F08;"
 
 def read(data: bytes, *settings: str) -> Toolpath:
     target = load_target("pic-mmh", settings=settings)
-    path: Toolpath = target.post.read(data, target.machine)
+    path: Toolpath = target.target.read(data, target.machine)
     return path
 
 
@@ -258,13 +258,13 @@ def test_lines_that_the_dialect_can_say_come_back_equal(
             path.rapid(z=z / 1e5)
     wanted = path.event(Kind.END).finish()
     target = load_target("pic-mmh")
-    program = target.post.write(wanted, target.machine)
-    back = target.post.read(program.data, target.machine)
+    program = target.target.write(wanted, target.machine)
+    back = target.target.read(program.data, target.machine)
     for name in ("kind", "end", "centre", "feed", "value"):
         np.testing.assert_array_equal(getattr(back, name), getattr(wanted, name))
     np.testing.assert_array_equal(program.row_of_block[back.block], np.arange(len(wanted)))
     # and what was read is written as it was
-    assert target.post.write(back, target.machine).data == program.data
+    assert target.target.write(back, target.machine).data == program.data
 
 
 coordinates = st.floats(-4.0, 4.0)
@@ -307,8 +307,8 @@ def test_what_was_written_is_read_to_the_dialects_resolution(
 ) -> None:
     wanted = built(rows, math.exp(log_radius))
     target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
-    program = target.post.write(wanted, target.machine)
-    back = target.post.read(program.data, target.machine)
+    program = target.target.write(wanted, target.machine)
+    back = target.target.read(program.data, target.machine)
     # half a unit of the form, one unit more where that would lie between two steps
     unit_mm, step_mm = (0.000015 if form == "example" else 0.0005), 0.00014
     row_of = program.row_of_block[back.block]

@@ -16,7 +16,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 def written(path: ToolpathBuilder, *settings: str) -> list[str]:
     """The blocks between header and footer."""
     target = load_target("pic-mmh", settings=settings)
-    blocks = target.post.write(path.finish(), target.machine).data.decode("ascii").splitlines()
+    blocks = target.target.write(path.finish(), target.machine).data.decode("ascii").splitlines()
     assert blocks[:2] == ["G54;", "G90;"]
     assert blocks[-1] == "M30;"
     return blocks[2:-1]
@@ -24,7 +24,7 @@ def written(path: ToolpathBuilder, *settings: str) -> list[str]:
 
 def findings(path: ToolpathBuilder, *settings: str) -> dict[Code, str]:
     target = load_target("pic-mmh", settings=settings)
-    found = target.post.write(path.finish(), target.machine).findings
+    found = target.target.write(path.finish(), target.machine).findings
     assert len({finding.code for finding in found}) == len(found)
     return {finding.code: finding.message for finding in found}
 
@@ -89,11 +89,11 @@ def test_rows_of_blocks() -> None:
     target = load_target("pic-mmh")
     path = ToolpathBuilder().event(Kind.SET_ZERO).line(1, 1, feed=1).line(1, 1, feed=1)
     path.line(2, 2, 0.0005, feed=1).event(Kind.END)
-    program = target.post.write(path.finish(), target.machine)
+    program = target.target.write(path.finish(), target.machine)
     assert program.data.decode().splitlines()[0::5] == ["G54;", "M30;"]
     assert program.row_of_block.tolist() == [0, -1, 1, 3, 3, 4]
     assert (program.target, program.extension) == ("pic-mmh", ".pic")
-    bare = target.post.write(ToolpathBuilder().finish(), target.machine)
+    bare = target.target.write(ToolpathBuilder().finish(), target.machine)
     assert bare.data == b"G54;\nG90;\nM30;\n"
     assert bare.row_of_block.tolist() == [-1, -1, -1]
 
@@ -164,7 +164,7 @@ def test_long_blocks_are_one_finding() -> None:
         (["dialect.buffer_chars=35"], Severity.WARNING),
     ):
         target = load_target("pic-mmh", settings=setting)
-        found = target.post.write(path.finish(), target.machine).findings
+        found = target.target.write(path.finish(), target.machine).findings
         (finding,) = [each for each in found if each.code == Code.BLOCK_TOO_LONG]
         assert finding.severity == severity
         assert (finding.measured, finding.limit) == (44.0, 35.0)
@@ -283,6 +283,6 @@ def test_a_toolpath_is_left_as_it_is() -> None:
     path = ToolpathBuilder().line(1, 1, feed=1).finish()
     before = [np.array(getattr(path, name)) for name in ("end", "kind", "feed")]
     assert isinstance(path, Toolpath)
-    target.post.write(path, target.machine)
+    target.target.write(path, target.machine)
     for name, column in zip(("end", "kind", "feed"), before, strict=True):
         np.testing.assert_array_equal(getattr(path, name), column)

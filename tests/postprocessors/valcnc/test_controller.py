@@ -256,7 +256,7 @@ def test_z_alone_before_after_and_together() -> None:
     }
     for order, (first, last) in wanted.items():
         target = load_target("valcnc", settings=[f"dialect.z_order={order}"])
-        decoded = target.post.read(data, target.machine)
+        decoded = target.target.read(data, target.machine)
         rows = run(decoded, target.machine)
         places = [place for row in rows for place in steps_of(row)]
         scale = 25
@@ -319,8 +319,8 @@ def test_a_square_of_50_mm() -> None:
     calibrated = [f"axes.{axis}.coded_step_mm={step}" for axis, step in LEADS.items()]
     for name, settings in (("nominal", []), ("calibrated", calibrated)):
         target = load_target("valcnc", settings=settings)
-        program = target.post.write(wanted, target.machine)
-        decoded = target.post.read(program.data, target.machine)
+        program = target.target.write(wanted, target.machine)
+        decoded = target.target.read(program.data, target.machine)
         report = verify(decoded, target.machine, wanted=wanted).report
         sizes[name] = [one.predicted_mm for one in report.dimensions[:2]]
     assert sizes["nominal"] == pytest.approx([50.475, 50.5375], abs=1e-6)
@@ -424,7 +424,7 @@ def test_the_limits_of_the_format() -> None:
     """99999 units are 800 m: a quarter of that radius, and a line back, 40 million passes."""
     target = load_target("valcnc", settings=["controller.arc_segment_mm=5"])
     data = b"G02X99999Y99999Z0I99999J0\nG00X0Y0Z0"
-    decoded = target.post.read(data, target.machine)
+    decoded = target.target.read(data, target.machine)
     steps, last = np.zeros((2, 3), dtype=np.int64), 0.0
     for chunk in simulate(decoded, target.machine):
         np.add.at(steps, chunk.ledger.row, chunk.ledger.steps)

@@ -26,13 +26,13 @@ CALIBRATED = (
 
 def read(data: bytes, *settings: str) -> Toolpath:
     target = load_target("valcnc", settings=settings)
-    path: Toolpath = target.post.read(data, target.machine)
+    path: Toolpath = target.target.read(data, target.machine)
     return path
 
 
 def write(path: Toolpath, *settings: str) -> list[str]:
     target = load_target("valcnc", settings=settings)
-    lines: list[str] = target.post.write(path, target.machine).data.decode("ascii").splitlines()
+    lines: list[str] = target.target.write(path, target.machine).data.decode("ascii").splitlines()
     return lines
 
 
@@ -81,9 +81,9 @@ def test_the_scale_is_warned_of_until_it_was_measured() -> None:
     path = ToolpathBuilder().rapid(1.0, 2.0).finish()
     for settings, codes in (((), [Code.COORDINATES_SCALED]), (("coord_scale_checked=true",), [])):
         target = load_target("valcnc", settings=[f"dialect.{one}" for one in settings])
-        program = target.post.write(path, target.machine)
+        program = target.target.write(path, target.machine)
         assert [finding.code for finding in program.findings] == codes
-        decoded = target.post.read(program.data, target.machine)
+        decoded = target.target.read(program.data, target.machine)
         assert [finding.code for finding in decoded.findings] == codes
         assert all(finding.severity == Severity.WARNING for finding in program.findings)
 
@@ -99,8 +99,8 @@ def test_calibrated_leads_scale_each_axis() -> None:
 def test_circles_on_axes_of_unequal_steps_become_lines() -> None:
     target = load_target("valcnc", settings=CALIBRATED)
     path = ToolpathBuilder().rapid(10.0, 0.0).arc(0.0, 10.0, centre=(0, 0), ccw=True, feed=14400.0)
-    program = target.post.write(path.finish(), target.machine)
-    decoded = target.post.read(program.data, target.machine)
+    program = target.target.write(path.finish(), target.machine)
+    decoded = target.target.read(program.data, target.machine)
     assert not decoded.is_arc.any()
     radii = np.hypot(*decoded.end[:, :2].T)
     assert np.abs(radii - 10.0).max() < 0.001
@@ -109,7 +109,7 @@ def test_circles_on_axes_of_unequal_steps_become_lines() -> None:
     (mended,) = (f for f in program.findings if f.code == Code.ARC_MENDED)
     assert "ellipses" in mended.message
     with pytest.raises(ProgramError, match="this arc is an ellipse"):
-        target.post.read(b"G00X1Y0Z0\nG03X0Y1Z0I-1J0", target.machine)
+        target.target.read(b"G00X1Y0Z0\nG03X0Y1Z0I-1J0", target.machine)
 
 
 def test_no_arc_is_longer_than_asked_for() -> None:
@@ -125,7 +125,7 @@ def test_no_arc_is_longer_than_asked_for() -> None:
 def test_feeds_and_events_that_have_no_word_are_found() -> None:
     target = load_target("valcnc")
     path = ToolpathBuilder().event(Kind.SPINDLE_CW, 1000).line(1.0, 0.0, feed=100.0).finish()
-    found = {f.code: f for f in target.post.write(path, target.machine).findings}
+    found = {f.code: f for f in target.target.write(path, target.machine).findings}
     assert found[Code.FEED_ROUNDED].severity == Severity.WARNING
     assert found[Code.FEED_ROUNDED].limit == 14400.0
     assert "SPINDLE_CW" in found[Code.EVENT_LEFT_OUT].message
