@@ -466,9 +466,17 @@ def _since(said: Bools, values: Floats) -> Floats:
 
 def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
     """FEED_DIFFERS: an error for feeds that the job names; those that it leaves to the machine
-    are told."""
+    are told.
+
+    A machine that keeps the feed on its faster axis runs as much faster along a line as the line
+    is longer than its run on that axis. Places on a coarse grid turn short lines, so what the
+    directions explain of a difference is left out; both speeds were rounded then, each on its own.
+    """
     is_, wanted = both.decoded.feed[both.pairs[:, 0]], both.written.feed[both.pairs[:, 1]]
-    off = np.abs(is_ - wanted) > FEED_SHARE * asked.feed_unit_mm_min
+    slant, other = _slant(both.decoded)[both.pairs[:, 0]], _slant(both.written)[both.pairs[:, 1]]
+    turned = np.abs(slant / other - 1.0)
+    share = np.where(turned > 0.0, 2.0 * FEED_SHARE, FEED_SHARE)
+    off = np.abs(is_ - wanted) > share * asked.feed_unit_mm_min + wanted * turned
     rows, of = both.unlike(~off)
     said = asked.feed_said[of]
     for is_asked, which in ((True, said), (False, ~said)):
@@ -480,6 +488,14 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
                 limit=both.written.feed[of][which][0],
                 moves=int(which.sum()),
             )
+
+
+def _slant(toolpath: Toolpath) -> Floats:
+    """(N,) length of a line in XY by its run on the faster axis, 1 to √2; 1 for anything else."""
+    run = np.abs(toolpath.end - toolpath.starts)[:, :2]
+    faster = run.max(axis=1)
+    line = ~toolpath.is_arc & (faster > 0.0)
+    return np.asarray(np.where(line, np.hypot(*run.T) / np.where(line, faster, 1.0), 1.0))
 
 
 def _spindle(both: _Both) -> Iterator[Finding]:
