@@ -1,7 +1,7 @@
-"""The same on a Dask cluster: drawings are sent, results come back, files are written here.
+"""The workers of a Dask cluster: drawings are sent, results come back, files are written here.
 
-The workers need just this camtool, and nothing of ours: no shared disk. One that has another one
-ends the run: half of the parts would be made by other rules.
+The workers need the same camtool as the client, but no shared disk. A worker with another version
+ends the run, because its programs would differ.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 CONNECT_S = 10.0
-"""How long the scheduler may take to answer."""
+"""How long the scheduler may take to answer the first time."""
 
 CLOSE_S = 5.0
-"""How long it may take to hear that we leave."""
+"""How long the scheduler may take to close the connection."""
 
 ALONE_S = 5.0
-"""After so long without any worker somebody is told: they may come later, or never."""
+"""After how long without any worker a message says so: they may come later, or never."""
 
 AHEAD = 2
-"""So many drawings for each thread of the cluster are under way: one made, one waiting. More
-would only keep their bytes in memory."""
+"""How many drawings are sent for each thread of the cluster: one is made, one waits. More would
+only take memory."""
 
 _MEND = "what is written is whole; the same command goes on"
 
 
 class OtherCodeError(Exception):
-    """A worker that has another camtool than the client; its text says which one."""
+    """A worker has another camtool than the client; the text says which one."""
 
 
 class ClusterPool:
-    """The workers of the scheduler at `address` for one Work; `note` hears of what is amiss."""
+    """The workers of the scheduler at `address` for one Work; `note` shows a message."""
 
     def __init__(self, work: Work, address: str, note: Callable[[str], None]) -> None:
         self._work = work
@@ -54,10 +54,10 @@ class ClusterPool:
         self._note = note
 
     def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
-        """Every task's result once, None every `TICK_S` without one; closing cancels the rest.
+        """One result for each task, in any order, and None after each `TICK_S` without a result.
 
-        OptionError without `distributed` or a scheduler at the address; CamtoolError when the
-        scheduler is lost, or a worker has another camtool.
+        Closing the generator cancels the rest. OptionError without `distributed` or a scheduler at
+        the address; CamtoolError when the scheduler is lost, or a worker has another camtool.
         """
         with _connected(self._address) as client:
             order = _Order(self._work.digest(), pickle.dumps(self._work))
@@ -73,15 +73,15 @@ class ClusterPool:
 
 @dataclass(frozen=True)
 class _Order:
-    """The work, pickled, and its digest. All goes pickled: a worker that cannot load what comes
-    to it as it is, because it has another camtool, would end without a word."""
+    """The work, pickled, and its digest. Dask gets only bytes: a worker that could not load an
+    object, because it has another camtool, would end without an error."""
 
     digest: str
     work: bytes
 
 
 class _Sent:
-    """The drawings that are to be sent, and those under way."""
+    """The drawings that are still to be sent, and those that the cluster has."""
 
     def __init__(self, client: Client, order: _Order, tasks: Sequence[Task]) -> None:
         self._client = client
@@ -91,11 +91,11 @@ class _Sent:
 
     @property
     def left(self) -> bool:
-        """Whether anything is still to come."""
+        """Whether any result is still missing."""
         return bool(self._queue or self._busy)
 
     def send(self, most: int) -> Iterator[tuple[Task, Made]]:
-        """So many that `most` are under way; those that cannot be read come back at once."""
+        """Send drawings until the cluster has `most`; errors of those that cannot be read."""
         from camtool.importers.read import file_bytes
 
         while self._queue and len(self._busy) < most:
@@ -117,7 +117,7 @@ class _Sent:
             self._busy[future] = task
 
     def done(self) -> Iterator[tuple[Task, Made]]:
-        """Those that are done, waiting a tick for the first."""
+        """The results that are ready; waits for the first one, `TICK_S` at most."""
         from distributed import wait
 
         if not self._busy:
@@ -126,7 +126,7 @@ class _Sent:
         try:
             with self._client.as_current():
                 wait(list(self._busy), timeout=TICK_S, return_when="FIRST_COMPLETED")
-        except (TimeoutError, CancelledError):  # what was cancelled says so itself
+        except (TimeoutError, CancelledError):  # a cancelled future gives its own error below
             pass
         for future in [future for future in self._busy if future.done()]:
             yield self._busy[future], _result(future, self._busy[future])
@@ -134,7 +134,7 @@ class _Sent:
 
 
 class _Workers:
-    """Those who are there; each is asked for its camtool before it gets a drawing."""
+    """The workers of the cluster, each checked for its camtool before it gets a drawing."""
 
     def __init__(self, client: Client, order: _Order, note: Callable[[str], None]) -> None:
         self._client = client
@@ -145,19 +145,19 @@ class _Workers:
         self._said = False
 
     def threads(self) -> int:
-        """How many drawings they make at once; says so when there is nobody for long.
+        """How many drawings they make at once; shows a message when there are none for long.
 
         CamtoolError when the scheduler was lost, or a worker has another camtool.
         """
         there = _threads(self._client)
         if new := sorted(there.keys() - self._known):
-            self._known.update(self._asked(new))
+            self._known.update(self._same_camtool(new))
         threads = sum(there[worker] for worker in there.keys() & self._known)
-        self._hear(threads)
+        self._report(threads)
         return threads
 
-    def _asked(self, workers: list[str]) -> Iterator[str]:
-        """Those that have the same camtool; one that just leaves says nothing."""
+    def _same_camtool(self, workers: list[str]) -> Iterator[str]:
+        """The workers that have the same camtool, without those that have just left."""
         answers = self._client.run(
             asked_there,
             self._order.digest,
@@ -171,7 +171,8 @@ class _Workers:
             elif not isinstance(answer, OSError):
                 raise _refused(worker, answer)
 
-    def _hear(self, threads: int) -> None:
+    def _report(self, threads: int) -> None:
+        """A message when there have been no workers for long, and when they come."""
         if threads:
             if self._said:
                 self._note("the cluster has workers now")
@@ -185,22 +186,22 @@ class _Workers:
 
 
 def asked_there(digest: str, work: bytes) -> None:
-    """OtherCodeError when a worker has not the client's camtool."""
+    """Runs on a worker: OtherCodeError when its camtool is not the client's."""
     _work_of(digest, work)
 
 
 def made_there(digest: str, work: bytes, task: bytes, data: bytes) -> Made:
-    """What a worker of the cluster does with a drawing; OtherCodeError as above."""
+    """Runs on a worker: the outputs of a drawing; OtherCodeError as above."""
     return made_of(_work_of(digest, work), pickle.loads(task), data)
 
 
 @lru_cache(maxsize=1)
 def _work_of(digest: str, work: bytes) -> Work:
-    """The work, once for all drawings of a run."""
+    """The work, loaded once for all drawings of a run."""
     try:
         loaded: Work = pickle.loads(work)
         same = loaded.digest() == digest
-    except Exception:  # whatever comes of loading what was made by other code
+    except Exception:  # anything may go wrong when an object of other code is loaded
         same = False
     if not same:
         raise OtherCodeError(f"it has camtool {__version__}")
@@ -209,7 +210,7 @@ def _work_of(digest: str, work: bytes) -> Work:
 
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
-    """A client; what it has under way at the end is cancelled."""
+    """A client; at the end, unfinished drawings are cancelled."""
     try:
         from distributed import Client
     except ImportError as error:
@@ -234,7 +235,7 @@ def _connected(address: str) -> Iterator[Client]:
 
 
 def _leave(client: Client) -> None:
-    with suppress(OSError, TimeoutError):  # a scheduler that does not answer need not know
+    with suppress(OSError, TimeoutError):  # the scheduler does not answer any more
         if client.status == "running":
             client.cancel(list(client.futures), force=True)
         client.close(CLOSE_S)
@@ -255,7 +256,7 @@ def _lost() -> CamtoolError:
 
 
 def _refused(worker: str, error: Exception) -> CamtoolError:
-    """What is said of a worker that cannot make what is made here."""
+    """The error for a worker whose camtool differs."""
     if isinstance(error, OtherCodeError):
         why = f"{error}, or other code or packages under that number, and this is {__version__}"
     else:
@@ -268,8 +269,7 @@ def _refused(worker: str, error: Exception) -> CamtoolError:
 
 
 def _result(future: Future, task: Task) -> Made:
-    """A result. What befell the worker is the error of this drawing; what concerns them all is
-    raised as CamtoolError."""
+    """The result of a drawing; lost workers are its error. CamtoolError for what ends the run."""
     from distributed import KilledWorker
 
     try:
@@ -286,7 +286,7 @@ def _result(future: Future, task: Task) -> Made:
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Without the log of `distributed`: what it comes to is said by us, in one line."""
+    """Within the block, `distributed` logs nothing: our messages say it in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
     handlers = {handler for name in names for handler in logging.getLogger(name).handlers}
     before = {handler: handler.level for handler in handlers}

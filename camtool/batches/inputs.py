@@ -5,8 +5,8 @@
     one.dxf              this file                   one.dxf          → OUT/one.*
 
 Outputs keep the path below the folder, or below the part of a pattern that has no wildcard. Names
-that differ only in case, or in how accents are coded, are taken for one: they are one file on
-other computers, and programs travel.
+that differ only in case, or in how accents are encoded, count as the same: on other computers they
+are one file, and programs are copied there.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from camtool.batches.run import Task
 from camtool.errors import InputError, OutputError
 
 SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
-"""What a folder is searched for. Lists of points and scripts share their extensions with much
-else: they are taken when they are named or matched by a pattern."""
+"""The extensions that a folder is searched for. Other files too have the extensions of lists of
+points and of scripts: those are taken only by name or by a pattern."""
 
 
 def find_tasks(
     sources: Sequence[str], out: Path, made: Collection[Path] = frozenset()
 ) -> list[Task]:
-    """One task for each drawing, sorted by output; a drawing that is named twice counts once.
+    """One task for each drawing, sorted by output; a drawing that is given twice counts once.
 
-    `made` are outputs of earlier runs (resolved paths): they are no drawings. InputError when a
-    source gives none; OutputError, which names both, when two drawings have one output.
+    `made` are outputs of earlier runs (resolved paths), which are not taken as drawings.
+    InputError when a source has no drawing; OutputError when two drawings have the same output.
     """
     tasks: dict[Path, Task] = {}
     places = RealPaths()
@@ -56,7 +56,7 @@ def find_tasks(
 
 
 def _found(source: str, out: Path) -> Iterator[tuple[Path, str]]:
-    """(drawing, stem) of one argument; `out` is a real path."""
+    """The drawings of one argument, each with its stem; `out` is a real path."""
     path = Path(source)
     if path.is_dir():
         for found in files_below(path, out):
@@ -92,9 +92,7 @@ def _refuse_collisions(tasks: Collection[Task]) -> None:
         if other is not task:
             as_what = f"as {task.stem}.*"
             if other.stem != task.stem:
-                as_what = (
-                    f"to one file where case or the coding of accents does not count, {as_what}"
-                )
+                as_what += " (one file where case and the encoding of accents are ignored)"
             raise OutputError(
                 f"{other.source} and {task.source} would both be written {as_what}",
                 mend="rename one, or make them by two batches with an --out for each",
@@ -102,23 +100,23 @@ def _refuse_collisions(tasks: Collection[Task]) -> None:
 
 
 def _folded(name: str) -> str:
-    """What a name is on a computer that knows no case."""
+    """The name with case and the encoding of accents taken away."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
-# Files below a folder, and files that match a pattern: neither follows links round in circles.
+# Files below a folder, and files that match a pattern.
 #
-# `**` stands for any folders, `*`, `?` and `[...]` for parts of a name, as in a shell; a name that
-# begins with a dot is hidden from them. Links to files are files, links to folders are not entered
-# by a search or by `**`.
+# `**` stands for any folders, `*`, `?` and `[...]` for parts of a name, as in a shell; none
+# matches a name that begins with a dot. Links to files count as files. A search and `**` do not
+# enter links to folders, which could lead in circles.
 
 ANY_FOLDERS = "**"
 
 
 def files_below(folder: Path, apart: Path | None = None) -> Iterator[Path]:
-    """Files in a folder and those below it, sorted; nothing hidden, and nothing in `apart`.
+    """The files in a folder and below it, sorted, without hidden ones and those in `apart`.
 
-    InputError for a folder that cannot be read: what is in it would be missing without a word.
+    InputError for a folder that cannot be read, so that no drawing is left out silently.
     """
     folders = []
     for entry in _entries(folder):
@@ -169,19 +167,19 @@ def _entries(folder: Path) -> list[os.DirEntry[str]]:
         raise InputError(
             f"cannot be searched ({error.strerror})",
             file=str(folder),
-            mend="let it be read, or name the folders that are wanted",
+            mend="make it readable, or name the folders that are wanted",
         ) from error
 
 
 def _is_dir(entry: os.DirEntry[str]) -> bool:
     try:
         return entry.is_dir()
-    except OSError:  # a link that nobody can follow
+    except OSError:  # a link that leads nowhere
         return False
 
 
 def _is_file(entry: os.DirEntry[str]) -> bool:
-    """A file, or a link to nothing (an error by its name later); no pipe and no device."""
+    """Whether it is a file or a broken link (reading that gives an error); no pipe, no device."""
     try:
         return entry.is_file() or (entry.is_symlink() and not Path(entry.path).exists())
     except OSError:
@@ -191,5 +189,5 @@ def _is_file(entry: os.DirEntry[str]) -> bool:
 def _same(entry: os.DirEntry[str], folder: Path) -> bool:
     try:
         return os.path.samestat(entry.stat(), folder.stat())
-    except OSError:  # an output folder that is still to be made
+    except OSError:  # the output folder does not exist yet
         return False

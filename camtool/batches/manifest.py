@@ -1,9 +1,9 @@
-"""What an output folder holds, and of what it was made.
+"""The manifest of an output folder: which files a batch made, and from what.
 
-A line of JSON for each drawing, appended when its files are in place, so that a run which ends
-in any way leaves a manifest that can be used: a line that was cut short is passed over, and of
-several for one drawing the last counts. A run that ends well writes it anew, sorted, without those
-whose files are all gone: it never holds more than the folder does.
+There is a line of JSON for each drawing, appended when its files are in place, so that the
+manifest can be used however the run ends: incomplete lines are skipped, and of several lines for
+one drawing the last counts. A run that ends normally rewrites it, sorted, without the drawings
+whose files are all gone.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ NAME = ".camtool-batch.jsonl"
 
 @dataclass(frozen=True)
 class Entry:
-    """One drawing: the digest of all that its outputs depend on, and theirs by name."""
+    """One drawing: the digest of all that its outputs depend on, and the digests of its outputs by
+    name."""
 
     key: str
     files: Mapping[str, str]
@@ -40,14 +41,14 @@ class Manifest:
         self._entries, self._tidy = _read(self._place)
 
     def up_to_date(self, stem: str, key: str) -> Entry | None:
-        """The entry if it was made of just this and its files are as they were written."""
+        """The entry of a drawing if its key is the same and its files are unchanged."""
         entry = self._entries.get(stem)
         if entry is None or entry.key != key:
             return None
         return entry if all(self._is(*each) for each in entry.files.items()) else None
 
     def outputs(self) -> frozenset[Path]:
-        """All files that it knows of, resolved."""
+        """All files of all entries, resolved."""
         names = (name for entry in self._entries.values() for name in entry.files)
         places = RealPaths()
         return frozenset(places.of(self._out / name) for name in names)
@@ -56,7 +57,7 @@ class Manifest:
         """Append an entry; OSError when the disk does not take it."""
         self._entries[stem] = entry
         self._tidy = False
-        # The line break comes first too: what a full disk cut short must not take this line along.
+        # The line break comes first too, in case a full disk has cut the line before short.
         line = f"\n{_line(stem, entry)}\n".encode()
         handle = os.open(self._place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         try:
@@ -66,7 +67,7 @@ class Manifest:
             os.close(handle)
 
     def tidy(self, write: Callable[[dict[str, bytes]], None]) -> None:
-        """Write it anew, one line for each drawing that has files, unless it is so already."""
+        """Rewrite the manifest with a line for each drawing that has files, unless it is so."""
         kept = [stem for stem in sorted(self._entries) if self._there(self._entries[stem])]
         if self._tidy and len(kept) == len(self._entries):
             return
@@ -96,8 +97,8 @@ def _line(stem: str, entry: Entry) -> str:
 
 
 def _read(place: Path) -> tuple[dict[str, Entry], bool]:
-    """The entries of the lines that are whole, none when there is no manifest; whether it is as
-    `tidy` writes it."""
+    """The entries of the complete lines, none without a manifest; and whether it is as `tidy`
+    writes it."""
     try:
         lines = place.read_bytes().splitlines()
     except OSError:
@@ -117,12 +118,10 @@ def _read(place: Path) -> tuple[dict[str, Entry], bool]:
 
 # Digests by which a batch knows what is up to date.
 
-CHUNK_BYTES = 1 << 20
-"""How much of a file is read at a time for its digest: memory stays small for any drawing."""
-
 
 def digest_of(*parts: str | bytes) -> str:
-    """The digest of several parts in their order, each with its length: none runs into another."""
+    """The digest of several parts in their order, each with its length: `ab`, `c` differs from
+    `a`, `bc`."""
     digest = hashlib.sha256()
     for part in parts:
         data = part.encode("utf-8", "surrogateescape") if isinstance(part, str) else part
@@ -133,11 +132,8 @@ def digest_of(*parts: str | bytes) -> str:
 
 def file_digest(path: Path) -> str:
     """The digest of a file's content, equal to `content_digest` of it; OSError without one."""
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while chunk := stream.read(CHUNK_BYTES):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def content_digest(data: bytes) -> str:
@@ -151,8 +147,8 @@ def code_digest(files: Iterable[Path]) -> str:
 
 
 def packages_digest(name: str) -> str:
-    """The digest of the versions of all packages that the package `name` needs, without extras;
-    that of nothing where it is not installed as a package."""
+    """The digest of the versions of all packages that the package `name` requires, without extras;
+    of no versions where it is not installed as a package."""
     from importlib import metadata
 
     try:
@@ -174,7 +170,7 @@ def _version(name: str) -> str:
         return ""
 
 
-# Where files really are: as `Path.resolve`, quick for many files of few folders.
+# Real paths: as `Path.resolve`, but fast for many files in few folders.
 
 
 class RealPaths:

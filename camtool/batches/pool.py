@@ -1,7 +1,8 @@
-"""Processes of this computer that make drawings: each is warm, and each may die alone.
+"""Worker processes of this computer, any of which may die or be stopped without harm to the rest.
 
-A pool of the standard library is broken for good when one of its processes is killed. Here each
-worker has a pipe of its own, so its end shows whose drawing it was, and another takes its place.
+When a process of a standard library's pool is killed, the whole pool is broken. Here each worker
+has a pipe of its own: the end of the pipe shows which drawing it was making, and a new worker
+takes its place.
 """
 
 from __future__ import annotations
@@ -24,20 +25,20 @@ from camtool.batches.run import Made, Task, Work
 from camtool.errors import CamtoolError
 
 TICK_S = 0.2
-"""How long results are waited for before the caller gets a moment (to redraw, to stop)."""
+"""How long to wait for a result before the caller gets a turn (to redraw, to stop)."""
 
 END_S = 2.0
-"""How long a worker that was told to end may take before it is killed."""
+"""How long a worker may take to end before it is killed."""
 
 FAILED_STARTS = 3
-"""So many workers in a row that die before they are ready: no worker can live here."""
+"""How many workers in a row may die before they are ready; then the run ends."""
 
 
 @dataclass(frozen=True)
 class PoolOptions:
-    """How many processes; the most time for one drawing, s (None: any); after how many drawings,
-    or with how much memory (MiB), a worker is replaced by a fresh one; whether the first must be
-    ready before the others begin, because it compiles what they all load."""
+    """`jobs` processes, each drawing in at most `timeout_s` (None: no limit). A worker is replaced
+    after `recycle_after` drawings, or when it has taken more than `recycle_mib` MiB. With
+    `first_alone` the others start when the first one is ready: it compiles what they all load."""
 
     jobs: int = 1
     timeout_s: float | None = None
@@ -57,7 +58,7 @@ class _Worker:
 
 
 class LocalPool:
-    """`jobs` workers for one Work."""
+    """Worker processes for one Work."""
 
     def __init__(self, work: Work, options: PoolOptions) -> None:
         self._work = work
@@ -67,9 +68,9 @@ class LocalPool:
         self._warm = not options.first_alone
 
     def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
-        """Every task's result once, None every `TICK_S` without one; closing kills the workers.
+        """One result for each task, in any order, and None after each `TICK_S` without a result.
 
-        CamtoolError when no worker can be started at all.
+        Closing the generator kills the workers. CamtoolError when no worker can be started.
         """
         queue = deque(tasks)
         try:
@@ -77,8 +78,8 @@ class LocalPool:
                 self._staff(queue)
                 ready = wait([worker.pipe for worker in self._workers], TICK_S)
                 came = [worker for worker in self._workers if worker.pipe in ready]
-                results = [each for worker in came if (each := self._hear(worker))]
-                results += self._late()
+                results = [each for worker in came if (each := self._received(worker))]
+                results += self._overdue()
                 yield from results
                 if not results:
                     yield None
@@ -86,7 +87,7 @@ class LocalPool:
             self._end()
 
     def _staff(self, queue: deque[Task]) -> None:
-        """As many workers as there is work for, each with a task."""
+        """Start workers while there are tasks for them; give each free worker a task."""
         busy = sum(worker.task is not None for worker in self._workers)
         wanted = min(self._options.jobs, busy + len(queue))
         if not self._warm:
@@ -99,7 +100,7 @@ class LocalPool:
                 worker.task, worker.since_s = task, time.monotonic()
                 try:
                     worker.pipe.send(task)
-                except OSError:  # it died while it had nothing to do: no drawing is to blame
+                except OSError:  # it died while idle, not because of this drawing
                     worker.task = None
                     queue.appendleft(task)
                     self._drop(worker)
@@ -109,16 +110,16 @@ class LocalPool:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=serve, args=(theirs,), daemon=True)
-        with _interrupts_held():
+        with _interrupts_blocked():
             process.start()
         theirs.close()
         worker = _Worker(process, ours)
-        with suppress(OSError):  # of its end the pipe tells
+        with suppress(OSError):  # it has ended: the pipe shows that later
             ours.send(self._work)
         return worker
 
-    def _hear(self, worker: _Worker) -> tuple[Task, Made] | None:
-        """What a worker has to say: that it is ready, a result, or nothing any more."""
+    def _received(self, worker: _Worker) -> tuple[Task, Made] | None:
+        """The result that a worker sent; None when it only says that it is ready, or died idle."""
         try:
             message = worker.pipe.recv()
         except (EOFError, OSError):
@@ -152,20 +153,20 @@ class LocalPool:
             seconds=time.monotonic() - worker.since_s,
         )
 
-    def _late(self) -> list[tuple[Task, Made]]:
-        """Those that took too long: killed."""
+    def _overdue(self) -> list[tuple[Task, Made]]:
+        """Kill the workers that have taken too long; an error for each of their drawings."""
         limit = self._options.timeout_s
         if limit is None:
             return []
-        late = []
+        overdue = []
         for worker in list(self._workers):
             spent = time.monotonic() - worker.since_s
             if worker.task is not None and spent > limit:
                 error = f"{worker.task.source}: took longer than --timeout {limit:g} s"
-                late.append((worker.task, Made(error=error, seconds=spent)))
+                overdue.append((worker.task, Made(error=error, seconds=spent)))
                 worker.process.kill()
                 self._drop(worker)
-        return late
+        return overdue
 
     def _drop(self, worker: _Worker) -> None:
         self._workers.remove(worker)
@@ -194,13 +195,14 @@ def _cause(code: int | None) -> str:
         name = signal.Signals(-code).name
     except ValueError:
         name = f"signal {-code}"
-    short = ": the system kills so when memory runs out" if name == "SIGKILL" else ""
-    return f"killed by {name}{short}"
+    hint = ", perhaps because memory ran out" if name == "SIGKILL" else ""
+    return f"killed by {name}{hint}"
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits: a worker that begins inherits that, and so is never stopped halfway in."""
+def _interrupts_blocked() -> Iterator[None]:
+    """Within the block, Ctrl-C waits. A worker that is started here inherits this: Ctrl-C cannot
+    stop it before it ignores the signal."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -211,7 +213,7 @@ def _interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, old)
 
 
-# One worker: takes tasks from a pipe, sends back what it made of them, until the pipe ends.
+# One worker: it takes tasks from its pipe and sends back the results, until the pipe ends.
 
 READY = "ready"
 """What a worker sends when it is warm."""
@@ -220,16 +222,16 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def serve(pipe: Connection) -> None:
-    """The worker's whole life: first a Work comes, then tasks; None or the pipe's end ends it.
+    """The main function of a worker: it receives a Work, then tasks, until None or the pipe's end.
 
-    Ctrl-C reaches every process of a terminal, but what it means the parent decides.
+    Ctrl-C reaches every process of a terminal; workers ignore it, because the parent ends them.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in _ONE_THREAD:  # before numpy: workers side by side share the cores already
+    for name in _ONE_THREAD:  # before numpy is loaded: the workers share the cores already
         os.environ.setdefault(name, "1")
     try:
         work: Work = pipe.recv()
-        with suppress(Exception):  # what is wrong shows at every drawing, by its name
+        with suppress(Exception):  # the fault shows again at each drawing, with its name
             work.warm()
         pipe.send(READY)
         while (task := pipe.recv()) is not None:
@@ -239,7 +241,7 @@ def serve(pipe: Connection) -> None:
 
 
 def made_of(work: Work, task: Task, data: bytes | None) -> Made:
-    """What the work makes of a task; whatever goes wrong is an error of this drawing alone."""
+    """The outputs of one drawing; any exception becomes an error of this drawing alone."""
     begin = time.perf_counter()
     try:
         made = work.make(task, data)
@@ -257,10 +259,10 @@ def made_of(work: Work, task: Task, data: bytes | None) -> Made:
 
 
 def peak_mib() -> float:
-    """The most memory that this process has had, MiB; 0 where the system does not tell.
+    """The most memory that this process has had, MiB; 0 where the system does not say.
 
-    Linux's getrusage would tell that of the parent at the fork where it was more, even behind an
-    exec; VmHWM is that of the program itself.
+    Linux's getrusage gives the parent's memory at the fork where that was more, even after an
+    exec; VmHWM is that of this program alone.
     """
     try:
         status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")

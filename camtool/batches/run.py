@@ -1,4 +1,4 @@
-"""A batch: what is up to date is passed over, the rest is made, written and noted."""
+"""A batch: drawings that are up to date are skipped, the others are made, written and recorded."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from camtool.batches.manifest import Entry, Manifest, content_digest, digest_of, file_digest
 from camtool.errors import OutputError
 
-# What goes to a worker and what comes back: small, plain, and good to send over a wire.
+# What goes to a worker and what comes back: small records that can be pickled.
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Task:
     """One drawing: its name as the user wrote it, and its outputs' common name.
 
     `stem` is relative to the output folder, with / between folders and without extension.
-    `order` is whatever the Work wants to be told of this drawing (its job).
+    `order` is whatever the Work needs besides (the job of this drawing).
     """
 
     source: str
@@ -33,15 +33,12 @@ class Task:
         return Path(self.source)
 
 
-@dataclass(frozen=True)
-class Made:
-    """What a Work made of a drawing. `files` by extension, none when there is an `error`;
-    `content` is the digest of the drawing's bytes that it was made of; `figures` are a few
-    numbers for the summary; `remarks` are findings, one line each, errors first; `code` is that
-    of the finding which is the error, "" for another one."""
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What the summary says of one drawing: `remarks` are findings, one line each, errors first;
+    `figures` are a few numbers; `code` is that of the finding which is the error, "" for other
+    errors."""
 
-    content: str = ""
-    files: Mapping[str, bytes] = field(default_factory=dict)
     error: str | None = None
     remarks: tuple[str, ...] = ()
     warnings: int = 0
@@ -50,24 +47,33 @@ class Made:
     code: str = ""
 
 
+@dataclass(frozen=True)
+class Made(Result):
+    """What a Work made of a drawing: `files` by extension, none when there is an `error`;
+    `content` is the digest of the bytes of the drawing."""
+
+    content: str = ""
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
 class Work(Protocol):
-    """What is done to each drawing; it is sent to every worker."""
+    """What is done with each drawing; every worker gets it."""
 
     def warm(self) -> None:
-        """What a new worker does before its first drawing."""
+        """Load what every drawing needs; a new worker does so before its first drawing."""
 
     def make(self, task: Task, data: bytes | None) -> Made:
-        """The outputs of a drawing; `data` is its content, None where the file can be read."""
+        """The outputs of a drawing; `data` is its content, None to read the file."""
 
     def digest(self) -> str:
-        """The digest of all that outputs depend on but the drawing and its order: our code too."""
+        """The digest of all that outputs depend on, except the drawing and its order."""
 
 
 class Pool(Protocol):
-    """Workers: tasks in, results out in any order. None is a moment in which nothing came."""
+    """Workers: tasks in, results out in any order; None when none has come for a moment."""
 
     def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
-        """Every task's result once; closing the generator ends the workers."""
+        """One result for each task; closing the generator ends the workers."""
 
 
 class State(StrEnum):
@@ -80,34 +86,29 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Result):
     """What became of one drawing; `files` are relative to the output folder."""
 
     source: str
     stem: str
     state: State
     files: tuple[str, ...] = ()
-    error: str | None = None
-    remarks: tuple[str, ...] = ()
-    warnings: int = 0
-    figures: Mapping[str, float] = field(default_factory=dict)
-    seconds: float = 0.0
-    code: str = ""
 
 
 # The run.
 
 Writer = Callable[[dict[str, bytes]], None]
-"""Writes all files or none; OutputError names the one that cannot be written."""
+"""Writes all of some files or none; OutputError names the one that cannot be written."""
 
 SCRIPT = ".py"
-"""A script reads whatever it likes: whether what it makes is up to date cannot be known."""
+"""Scripts are made again in every run: they may read any file, so that nobody knows whether their
+outputs are up to date."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """Where outputs go, how they are written, the digest of all they depend on but the drawing
-    (`base` for all, and each task's own in `own`), and whether all are made anew."""
+    """Where outputs go and how they are written; the digest of all that they depend on besides the
+    drawing (`base` for all, `own` for each task by stem); `force` makes all of them again."""
 
     out: Path
     write: Writer
@@ -123,9 +124,9 @@ class Order:
 def run_batch(
     tasks: Sequence[Task], order: Order, manifest: Manifest, pool: Pool
 ) -> Generator[Outcome | None]:
-    """The outcome of every task, in the order in which they come; None is an idle moment.
+    """The outcome of every task, in the order in which they come; None as a Pool gives it.
 
-    Closing the generator stops the workers; whatever has been written is whole and noted.
+    Closing the generator stops the workers; all files written by then are complete and recorded.
     """
     left: list[Task] = []
     for task in tasks:
@@ -153,13 +154,13 @@ def _up_to_date(task: Task, order: Order, manifest: Manifest) -> Entry | None:
         return None
     try:
         content = file_digest(task.path)
-    except OSError:  # making it says what is wrong with it
+    except OSError:  # making it gives the error
         return None
     return manifest.up_to_date(task.stem, order.key(task, content))
 
 
 def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outcome:
-    """A result, written."""
+    """Write a result; its outcome."""
     error, remarks = made.error, made.remarks
     names: tuple[str, ...] = ()
     if error is None:
@@ -182,17 +183,17 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
         task.stem,
         State.MADE if error is None else State.FAILED,
         names,
-        error,
-        remarks,
-        made.warnings,
-        made.figures,
-        made.seconds,
-        made.code,
+        error=error,
+        remarks=remarks,
+        warnings=made.warnings,
+        figures=made.figures,
+        seconds=made.seconds,
+        code=made.code,
     )
 
 
 def _written(task: Task, files: Mapping[str, bytes], order: Order) -> str | None:
-    """Writes a drawing's files; what went wrong, None when nothing did."""
+    """Write the files of a drawing; the error, None without one."""
     places = {str(order.out / name): data for name, data in files.items()}
     try:
         (order.out / task.stem).parent.mkdir(parents=True, exist_ok=True)

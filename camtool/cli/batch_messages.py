@@ -176,7 +176,7 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> by
     counts = Counter(each.state for each in outcomes)
     rows: list[dict[str, Any]] = []
     for outcome in outcomes:
-        row = asdict(outcome)
+        row = {"source": "", "state": "", "files": (), **asdict(outcome)}  # the drawing first
         row["state"] = outcome.state.value
         del row["stem"]
         rows.append(row)
