@@ -24,7 +24,13 @@ from camtool.pictures.strokes import (
     turns_of,
 )
 from camtool.pictures.trace import Trace, exaggerated, trace_of
-from camtool.pictures.view import points_box, union, window
+from camtool.pictures.view import points_box, round_step, union, window
+
+Place = tuple[float, float]
+"""x, y in mm."""
+
+MOST_NUMBERED = 100
+"""Of more contours than this only every 2nd, 5th, 10th … has its number."""
 
 NOWHERE: Floats = np.empty((0, 2))
 NO_MOVES = Strokes((), (), (), NOWHERE, NOWHERE, np.zeros(2))
@@ -41,16 +47,12 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places (P, 2) mm of a drawing: open ends, drill centres, and what is wrong or unclear."""
+    """Places (P, 2) mm of a drawing: open ends, drill centres, and crossings and branches, where
+    a contour is ambiguous."""
 
     gaps: Floats
     points: Floats
-    doubts: Floats
-
-    @property
-    def any(self) -> bool:
-        """Whether there is one."""
-        return bool(len(self.gaps) or len(self.points) or len(self.doubts))
+    ambiguous: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +98,16 @@ class Content:
     def starts(self) -> Floats:
         """(S, 2) starts of contours where no plunge is marked."""
         return bare_starts(self.moves)
+
+    @cached_property
+    def order(self) -> tuple[list[str], list[Place]]:
+        """The numbers of contours, from 1, and where those begin; of many contours only some."""
+        starts: list[Place] = self.moves.starts.tolist()
+        step = (
+            1 if len(starts) <= MOST_NUMBERED else round(round_step(len(starts) / MOST_NUMBERED))
+        )
+        chosen = [k for k in range(len(starts)) if k == 0 or (k + 1) % step == 0]
+        return [str(k + 1) for k in chosen], [starts[k] for k in chosen]
 
     @property
     def swept(self) -> tuple[Chain, ...]:
@@ -171,12 +183,12 @@ def _places(drawing: Drawing) -> Places:
     def columns(points: list[tuple[float, float]]) -> Floats:
         return np.array(points, dtype=np.float64).reshape(-1, 2)
 
-    doubts = [crossing.at_mm for crossing in drawing.healing.crossings]
-    doubts += [branch.at_mm for branch in drawing.healing.branches]
+    ambiguous = [crossing.at_mm for crossing in drawing.healing.crossings]
+    ambiguous += [branch.at_mm for branch in drawing.healing.branches]
     return Places(
         gaps=columns([gap.at_mm for gap in drawing.gaps]),
         points=columns([mark.at_mm for mark in drawing.marks]),
-        doubts=columns(doubts),
+        ambiguous=columns(ambiguous),
     )
 
 

@@ -1,13 +1,17 @@
-"""The layers of a picture, one row each: its name, when it has something, how it is drawn, and
-what the legend says of it.
+"""The layers of pictures, one row each: what a layer consists of, or how it is drawn, and what the
+legend says of it.
 
-`LAYERS` is the table. Whatever lists, checks, draws or explains layers reads it, so that a layer
-is added by one row. Nothing here loads numpy: help and completion ask for the names.
+`LAYERS` is the table. Whatever lists, checks, draws or explains layers reads it, the viewer's page
+too, so that a layer is added by one row. Most rows name the parts of their layer: lines, dots or
+texts, which pictures and pages draw and explain alike. A row that draws in a manner of its own is
+drawn so in pictures; for a page, the viewer's scripts have to know it by name
+(`camtool.pictures.viewer.page.SCRIPTED`). Nothing here loads numpy: help and completion ask for
+the names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -32,8 +36,9 @@ from camtool.pictures.colours import (
 from camtool.pictures.svg import Look, PathData, element, number, title
 
 if TYPE_CHECKING:
-    from camtool.pictures.content import Content
+    from camtool.pictures.content import Content, Place
     from camtool.pictures.plot import Plot
+    from camtool.pictures.strokes import Chain
     from camtool.pictures.view import View
 
 SWATCH = 34.0
@@ -42,9 +47,10 @@ SWATCH = 34.0
 MOST_LAYERS_NAMED = 7
 """More layers of a drawing than this are counted, not named, in the legend."""
 
-TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN, RAPID_PEN = 2.7, 2.8, 4.8, 2.8, 1.4
+TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 RING = 8.0
 
+RAPID_LINE: Look = {"stroke": RAPID, "stroke-width": 1.4, "stroke-dasharray": "7 5"}
 PLUNGE_MARK: Look = {"r": 5.0, "fill": PLUNGE, "stroke": PAPER, "stroke-width": 1.6}
 START_MARK: Look = {"r": 5.0, "fill": PAPER, "stroke": FEED, "stroke-width": 2.2}
 REVERSAL_MARK: Look = {"r": 3.4, "fill": REVERSAL, "stroke": PAPER, "stroke-width": 1.0}
@@ -56,33 +62,109 @@ DOUBT_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of the legend: its swatch (already centred on height 0, from x 0) and its text."""
+    """One line of the legend: its swatch (from x 0 to `SWATCH`, centred on height 0; "" for none)
+    and its text."""
 
     swatch: str
     name: str
 
 
-def _nothing(*_: object) -> Iterable[Entry]:
-    return ()
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines and arcs of one look, with the widths and dashes of the page, as a group of this id.
+    The legend calls them `name`."""
+
+    id: str
+    name: str
+    chains: Sequence[Chain]
+    look: Look
+
+    def __bool__(self) -> bool:
+        return bool(self.chains)
+
+    def draw(self, plot: Plot) -> str:
+        """The lines in mm."""
+        mm, look = plot.view.mm, {"fill": "none", **self.look}
+        look["stroke-width"] = mm(float(look["stroke-width"]))
+        if "stroke-dasharray" in look:
+            dashes = str(look["stroke-dasharray"]).split()
+            look["stroke-dasharray"] = " ".join(f"{mm(float(dash)):.9g}" for dash in dashes)
+        return plot.lines(self.id, self.chains, look)
+
+    def entries(self, view: View) -> Iterator[Entry]:
+        """Its line of the legend."""
+        look = self.look
+        dashes = str(look.get("stroke-dasharray", ""))
+        swatch = line_swatch(str(look["stroke"]), float(look["stroke-width"]), dashes)
+        yield Entry(swatch, self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Dots:
+    """Round marks of one look at `places` (x, y) mm, as a group of this id. The legend calls one
+    of them `name`."""
+
+    id: str
+    name: str
+    places: Sequence[Place]
+    look: Look
+
+    def __bool__(self) -> bool:
+        return bool(self.places)
+
+    def draw(self, plot: Plot) -> str:
+        """The marks, in units of the page."""
+        return plot.dots(self.id, self.places, self.look)
+
+    def entries(self, view: View) -> Iterator[Entry]:
+        """Its line of the legend, if any of the marks is in view."""
+        if any(view.shows(*place) for place in self.places):
+            yield Entry(dot_swatch(self.look), self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Texts:
+    """Short texts of one colour beside their `places` (x, y) mm, as a group of this id; one that
+    finds no room is left out. They explain themselves: the legend does not name them."""
+
+    id: str
+    texts: Sequence[str]
+    places: Sequence[Place]
+    colour: str
+
+    def __bool__(self) -> bool:
+        return bool(self.places)
+
+    def draw(self, plot: Plot) -> str:
+        """The texts, in units of the page."""
+        return plot.texts(self.id, self.texts, self.places, self.colour)
+
+    def entries(self, view: View) -> Iterator[Entry]:
+        """None."""
+        yield from ()
+
+
+Part = Lines | Dots | Texts
 
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer. `holds` says whether it has something; then `draw` gives its SVG, and `legend`
-    its entries.
+    """One layer. `parts` are what it consists of; a row without them says what it `holds`, how to
+    `draw` that and what its `legend` is. A `legend` beside `parts` takes the place of theirs.
 
     Layers `in_mm` lie below all others and are drawn in mm, Y up; the others in units of the page.
     Among its kind, one of a higher `height` covers those of lower ones; `ground` is drawn below
-    all. `place` is its place in the legend. `usual`: it is shown when nobody says. `needs` is what
-    a picture must be of: a "drawing", "moves", or the predicted "path". Where a predicted path is
-    shown, it is left out unless it is `under_path`. `hint` says why it may be empty, where the
-    reason is not in the drawing.
+    all. `place` is its place in the legend. `usual`: it is shown unless layers are chosen. `needs`
+    is what a picture must be of: a "drawing", "moves", or the predicted "path". Where a predicted
+    path is shown, it is left out unless it is `under_path`. `hint` says why it may be empty, where
+    the reason is not in the drawing. `key` switches it in the viewer's page.
     """
 
     name: str
-    holds: Callable[[Content], object]
-    draw: Callable[[Content, Plot], str]
-    legend: Callable[[Content, View], Iterable[Entry]] = _nothing
+    parts: Callable[[Content], Sequence[Part]] | None = None
+    holds: Callable[[Content], object] | None = None
+    draw: Callable[[Content, Plot], str] | None = None
+    legend: Callable[[Content, View], Iterable[Entry]] | None = None
     ground: Callable[[Content, Plot], str] | None = None
     in_mm: bool = False
     height: int = 100
@@ -91,6 +173,7 @@ class Layer:
     needs: str = "moves"
     under_path: bool = True
     hint: str = ""
+    key: str = ""
 
     def is_in(self, content: Content) -> bool:
         """Whether the picture shows it, and it has something."""
@@ -98,8 +181,25 @@ class Layer:
         return (
             (self.usual if shown is None else self.name in shown)
             and (self.under_path or content.trace is None)
-            and bool(self.holds(content))
+            and (bool(self.parts_in(content)) or bool(self.holds and self.holds(content)))
         )
+
+    def parts_in(self, content: Content) -> list[Part]:
+        """Its parts that are not empty."""
+        return [part for part in self.parts(content) if part] if self.parts else []
+
+    def drawn(self, content: Content, plot: Plot) -> str:
+        """Its SVG; empty when nothing of it is in view."""
+        if self.draw is not None:
+            return self.draw(content, plot)
+        parts = (part.draw(plot) for part in self.parts_in(content))
+        return "\n".join(part for part in parts if part)
+
+    def entries(self, content: Content, view: View) -> Iterable[Entry]:
+        """Its lines of the legend."""
+        if self.legend is not None:
+            return self.legend(content, view)
+        return [entry for part in self.parts_in(content) for entry in part.entries(view)]
 
 
 def line_swatch(colour: str, width: float, dashes: str = "") -> str:
@@ -162,24 +262,13 @@ def _drawing_legend(content: Content, view: View) -> Iterator[Entry]:
             yield Entry("", f"and {more} more layers")
 
 
-def _doubts(content: Content, plot: Plot) -> str:
-    kinds = [plot.dots(name, places, look) for name, _, places, look in _kinds(content)]
-    return "\n".join(kind for kind in kinds if kind)
-
-
-def _doubts_legend(content: Content, view: View) -> Iterator[Entry]:
-    for _, name, places, look in _kinds(content):
-        yield from _mark(name, places, look, view)
-
-
-def _kinds(content: Content) -> list[tuple[str, str, Iterable[tuple[float, float]], Look]]:
-    """(id, name for people, places, look): open ends, centres of holes, and where a contour is not
-    clear."""
+def _doubts(content: Content) -> list[Part]:
+    """Open ends, drill centres, and places where a contour is ambiguous."""
     places = content.places
     return [
-        ("gaps", "open end", places.gaps.tolist(), GAP_MARK),
-        ("points", "point", places.points.tolist(), POINT_MARK),
-        ("doubts", "crossing or branch", places.doubts.tolist(), DOUBT_MARK),
+        Dots("gaps", "open end", places.gaps.tolist(), GAP_MARK),
+        Dots("points", "point", places.points.tolist(), POINT_MARK),
+        Dots("doubts", "crossing or branch", places.ambiguous.tolist(), DOUBT_MARK),
     ]
 
 
@@ -212,18 +301,6 @@ def _travel_legend(content: Content, view: View) -> Iterator[Entry]:
         yield Entry(line_swatch(TRAVEL, 2.0), f"travel {wide:g} × {high:g} mm")
 
 
-def _rapids(content: Content, plot: Plot) -> str:
-    """Thin and dashed."""
-    mm = plot.view.mm
-    line: Look = {"fill": "none", "stroke": RAPID, "stroke-width": mm(RAPID_PEN)}
-    dashes = f"{mm(7.0):.9g} {mm(5.0):.9g}"
-    return plot.lines("rapids", content.moves.rapids, {**line, "stroke-dasharray": dashes})
-
-
-def _rapids_legend(content: Content, view: View) -> Iterator[Entry]:
-    yield Entry(line_swatch(RAPID, 1.6, "7 5"), "rapid")
-
-
 def _feeds(content: Content, plot: Plot) -> str:
     """Solid, and slopes in the colour of plunges; pale and thin below a predicted path."""
     moves, pale = content.moves, content.trace is not None
@@ -247,30 +324,6 @@ def _feeds_legend(content: Content, view: View) -> Iterator[Entry]:
         yield Entry(line_swatch(PLUNGE, 2.8), "slope")
 
 
-def _plunges(content: Content, plot: Plot) -> str:
-    return plot.dots("plunges", content.moves.plunges.tolist(), PLUNGE_MARK)
-
-
-def _starts(content: Content, plot: Plot) -> str:
-    return plot.dots("starts", content.starts.tolist(), START_MARK)
-
-
-def _order(content: Content, plot: Plot) -> str:
-    return plot.order(content.moves.starts.tolist())
-
-
-def _arrows(content: Content, plot: Plot) -> str:
-    return plot.arrows(content.moves.feeds)
-
-
-def _reversals(content: Content, plot: Plot) -> str:
-    return plot.dots("reversals", content.reversals.tolist(), REVERSAL_MARK)
-
-
-def _reversals_legend(content: Content, view: View) -> Iterable[Entry]:
-    return _mark("reversal", content.reversals.tolist(), REVERSAL_MARK, view)
-
-
 # What is predicted.
 
 
@@ -283,12 +336,9 @@ def _path_legend(content: Content, view: View) -> Iterator[Entry]:
     yield Entry(map_swatch(4.0), f"predicted path, {said}")
 
 
-def _worst(content: Content, plot: Plot) -> str:
-    return plot.ranks("worst", content.worst.tolist(), WORST_MARK)
-
-
-def _worst_legend(content: Content, view: View) -> Iterable[Entry]:
-    return _mark("largest errors, by rank", content.worst.tolist(), WORST_MARK, view)
+def _worst_legend(content: Content, view: View) -> Iterator[Entry]:
+    if any(view.shows(*place) for place in content.worst.tolist()):
+        yield Entry(dot_swatch(WORST_MARK), "largest errors, by rank")
 
 
 # Part zero.
@@ -316,20 +366,12 @@ def _cross(at: tuple[float, float], size: float, name: Look) -> str:
     return element("g", {**name, **line}, element("circle", ring), lines)
 
 
-def _mark(
-    name: str, places: Iterable[tuple[float, float]], look: Look, view: View
-) -> Iterator[Entry]:
-    """The entry of round marks, if any of them is in view."""
-    if any(view.shows(*place) for place in places):
-        yield Entry(dot_swatch(look), name)
-
-
 LAYERS = (
     Layer(
         "drawing",
-        lambda content: content.outlines,
-        _drawing,
-        _drawing_legend,
+        holds=lambda content: content.outlines,
+        draw=_drawing,
+        legend=_drawing_legend,
         ground=_body,
         in_mm=True,
         height=3,
@@ -339,9 +381,9 @@ LAYERS = (
     ),
     Layer(
         "swept",
-        lambda content: content.swept,
-        _swept,
-        _swept_legend,
+        holds=lambda content: content.swept,
+        draw=_swept,
+        legend=_swept_legend,
         in_mm=True,
         height=1,
         place=6,
@@ -349,9 +391,9 @@ LAYERS = (
     ),
     Layer(
         "travel",
-        lambda content: content.scene.travel_mm,
-        _travel,
-        _travel_legend,
+        holds=lambda content: content.scene.travel_mm,
+        draw=_travel,
+        legend=_travel_legend,
         in_mm=True,
         height=2,
         place=11,
@@ -359,9 +401,8 @@ LAYERS = (
     ),
     Layer(
         "rapids",
-        lambda content: content.moves.rapids,
-        _rapids,
-        _rapids_legend,
+        lambda content: [Lines("rapids", "rapid", content.moves.rapids, RAPID_LINE)],
+        legend=lambda content, view: [Entry(line_swatch(RAPID, 1.6, "7 5"), "rapid")],
         in_mm=True,
         height=4,
         place=3,
@@ -369,47 +410,55 @@ LAYERS = (
     ),
     Layer(
         "feeds",
-        lambda content: content.moves.feeds or content.moves.ramps,
-        _feeds,
-        _feeds_legend,
+        holds=lambda content: content.moves.feeds or content.moves.ramps,
+        draw=_feeds,
+        legend=_feeds_legend,
         in_mm=True,
         height=5,
         place=2,
     ),
     Layer(
         "plunges",
-        lambda content: len(content.moves.plunges),
-        _plunges,
-        lambda content, view: [Entry(dot_swatch(PLUNGE_MARK), "plunge")],
+        lambda content: [Dots("plunges", "plunge", content.moves.plunges.tolist(), PLUNGE_MARK)],
+        legend=lambda content, view: [Entry(dot_swatch(PLUNGE_MARK), "plunge")],
         height=4,
         place=4,
         under_path=False,
     ),
     Layer(
         "starts",
-        lambda content: len(content.starts),
-        _starts,
-        lambda content, view: [Entry(dot_swatch(START_MARK), "start")],
+        lambda content: [Dots("starts", "start", content.starts.tolist(), START_MARK)],
+        legend=lambda content, view: [Entry(dot_swatch(START_MARK), "start")],
         height=3,
         place=5,
         under_path=False,
     ),
-    Layer("order", lambda content: len(content.moves.starts), _order, height=7, under_path=False),
-    Layer("arrows", lambda content: content.moves.feeds, _arrows, height=2, under_path=False),
+    Layer(
+        "order",
+        lambda content: [Texts("order", *content.order, INK)],
+        height=7,
+        under_path=False,
+    ),
+    Layer(
+        "arrows",
+        holds=lambda content: content.moves.feeds,
+        draw=lambda content, plot: plot.arrows(content.moves.feeds),
+        height=2,
+        under_path=False,
+    ),
     Layer(
         "reversals",
-        lambda content: len(content.reversals),
-        _reversals,
-        _reversals_legend,
+        lambda content: [Dots("reversals", "reversal", content.reversals.tolist(), REVERSAL_MARK)],
         height=1,
         place=7,
         usual=False,
+        key="v",
     ),
     Layer(
         "path",
-        lambda content: content.trace is not None,
-        _path,
-        _path_legend,
+        holds=lambda content: content.trace is not None,
+        draw=_path,
+        legend=_path_legend,
         in_mm=True,
         height=6,
         place=1,
@@ -417,31 +466,23 @@ LAYERS = (
     ),
     Layer(
         "worst",
-        lambda content: len(content.worst),
-        _worst,
-        _worst_legend,
+        holds=lambda content: len(content.worst),
+        draw=lambda content, plot: plot.ranks("worst", content.worst.tolist(), WORST_MARK),
+        legend=_worst_legend,
         height=8,
         place=8,
         needs="path",
     ),
     Layer(
         "zero",
-        lambda content: not content.is_empty,
-        _zero,
-        _zero_legend,
+        holds=lambda content: not content.is_empty,
+        draw=_zero,
+        legend=_zero_legend,
         height=5,
         place=10,
         needs="drawing",
     ),
-    Layer(
-        "doubts",
-        lambda content: content.places.any,
-        _doubts,
-        _doubts_legend,
-        height=6,
-        place=9,
-        needs="drawing",
-    ),
+    Layer("doubts", _doubts, height=6, place=9, needs="drawing"),
 )
 """All layers, in the order in which help and messages name them."""
 
@@ -478,6 +519,11 @@ def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
     return left
 
 
+def from_the_ground_up() -> list[Layer]:
+    """All layers, each after those that it covers."""
+    return sorted(LAYERS, key=lambda layer: layer.height)
+
+
 def layers_in(content: Content) -> list[str]:
     """The names of the layers that hold something in a picture, wherever its window lies."""
     return [layer.name for layer in LAYERS if layer.is_in(content)]
@@ -487,17 +533,15 @@ def legend_of(content: Content, view: View) -> list[Entry]:
     """The legend: only what is present and within view."""
     there = (layer for layer in LAYERS if layer.is_in(content))
     placed = sorted(there, key=lambda layer: layer.place)
-    return [entry for layer in placed for entry in layer.legend(content, view)]
+    return [entry for layer in placed for entry in layer.entries(content, view)]
 
 
 def drawn(content: Content, plot: Plot) -> list[str]:
     """What lies in the plot, from the ground up: what is drawn in mm in one group, the rest above
     it."""
-    there = sorted(
-        (layer for layer in LAYERS if layer.is_in(content)), key=lambda layer: layer.height
-    )
+    there = [layer for layer in from_the_ground_up() if layer.is_in(content)]
     lines = [layer.ground(content, plot) for layer in there if layer.ground is not None]
-    lines += [layer.draw(content, plot) for layer in there if layer.in_mm]
+    lines += [layer.drawn(content, plot) for layer in there if layer.in_mm]
     lines = [line for line in lines if line]
     group = element("g", {"id": "mm", "transform": plot.view.matrix()}, *lines) if lines else ""
-    return [group, *(layer.draw(content, plot) for layer in there if not layer.in_mm)]
+    return [group, *(layer.drawn(content, plot) for layer in there if not layer.in_mm)]

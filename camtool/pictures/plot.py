@@ -12,14 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.pictures import text
-from camtool.pictures.colours import BODY, FEED, INK, PLOT
+from camtool.pictures.colours import BODY, FEED, PLOT
+from camtool.pictures.content import Place
 from camtool.pictures.strokes import Chain, path_data
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import Style
 from camtool.pictures.trace import Trace, trace_layer
-from camtool.pictures.view import View, round_step
-
-Place = tuple[float, float]
+from camtool.pictures.view import View
 
 MOST_BODIES = 500
 """The light fill shows what is closed; drawings of more paths go without."""
@@ -42,18 +41,15 @@ SMALLEST_MARK = 0.3
 TIE_DECIMALS = 4
 
 CAP = 12.0
-"""Height of the digits on the page."""
+"""Height of the letters of labels on the page."""
 
 HALO = 5.0
-"""Width of the ground's colour round the digits."""
+"""Width of the rim in the ground's colour round the letters."""
 
 AWAY = 9.0
 CLEAR = 3.0
-MOST = 400
-"""No more numbers are tried."""
-
-MOST_ALL = 100
-"""Of more contours than this only every 2nd, 5th, 10th … has its number."""
+MOST_LABELS = 400
+"""Of more texts than this only the first ones are tried."""
 
 DIRECTIONS = ((1.0, -1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
@@ -154,19 +150,20 @@ class Plot:
             return ""
         return element("g", {"id": "arrows"}, element("path", {"d": str(data), "fill": FEED}))
 
-    def order(self, places: Sequence[Place]) -> str:
-        """The numbers of contours; of very many, each 2nd, 5th, 10th …"""
-        numbers = placed(places, self.view, every(len(places)))
-        return _group("order", [_written(one, INK) for one in numbers])
+    def texts(self, name: str, texts: Sequence[str], places: Sequence[Place], colour: str) -> str:
+        """Short texts beside their places, none over another."""
+        labels = labels_beside(texts, places, self.view)
+        return _group(name, [_written(label, colour) for label in labels])
 
     def ranks(self, name: str, places: Sequence[Place], look: Look) -> str:
         """A ring at each place with its number, in the colour of the ring."""
-        numbers = placed(places, self.view)
+        ranks = [str(rank) for rank in range(1, len(places) + 1)]
+        labels = labels_beside(ranks, places, self.view)
         rings = []
-        for one in numbers:
-            at: Look = {"cx": number(one.at[0]), "cy": number(one.at[1])}
+        for label in labels:
+            at: Look = {"cx": number(label.at[0]), "cy": number(label.at[1])}
             rings.append(element("circle", {**at, **look}))
-        return _group(name, [*rings, *(_written(one, str(look["stroke"])) for one in numbers)])
+        return _group(name, [*rings, *(_written(label, str(look["stroke"])) for label in labels)])
 
 
 def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], float]:
@@ -194,44 +191,35 @@ def _arrow(data: PathData, at: tuple[float, float], heading: float) -> None:
 
 
 @dataclass(frozen=True)
-class Number:
-    """A number beside the place that it belongs to, both on the page; `box` is left, top, right,
-    bottom."""
+class Label:
+    """A short text beside the place that it belongs to, both on the page; `box` is left, top,
+    right, bottom."""
 
-    name: str
+    text: str
     at: tuple[float, float]
     box: tuple[float, float, float, float]
 
 
-def every(count: int) -> int:
-    """How far apart the numbers of so many contours are."""
-    return 1 if count <= MOST_ALL else round(round_step(count / MOST_ALL))
-
-
-def placed(places: Sequence[tuple[float, float]], view: View, step: int = 1) -> list[Number]:
-    """Numbers from 1 at places in mm, or the first and each that `step` divides, none over
-    another."""
-    found: list[Number] = []
-    boxes: list[tuple[float, float, float, float]] = []
-    indices = [k for k in range(len(places)) if k == 0 or (k + 1) % step == 0]
-    for index in indices[:MOST]:
-        place = places[index]
+def labels_beside(texts: Sequence[str], places: Sequence[Place], view: View) -> list[Label]:
+    """Texts beside their places in mm, none over another: one that finds no room is left out."""
+    found: list[Label] = []
+    for words, place in list(zip(texts, places, strict=True))[:MOST_LABELS]:
         if not view.shows(*place):
             continue
-        name, at = str(index + 1), view.page(*place)
+        at = view.page(*place)
         for direction in DIRECTIONS:
-            box = _beside(name, at, direction)
-            if _inside(box, view) and not any(_touch(box, other) for other in boxes):
-                found.append(Number(name, at, box))
-                boxes.append(box)
+            box = _beside(words, at, direction)
+            if _inside(box, view) and not any(_touch(box, label.box) for label in found):
+                found.append(Label(words, at, box))
                 break
     return found
 
 
 def _beside(
-    name: str, at: tuple[float, float], direction: tuple[float, float]
+    words: str, at: tuple[float, float], direction: tuple[float, float]
 ) -> tuple[float, float, float, float]:
-    wide = text.width(name, CAP)
+    """The box of a text to the right or left of a place, and below or above it."""
+    wide = text.width(words, CAP)
     left = at[0] + AWAY if direction[0] > 0.0 else at[0] - AWAY - wide
     top = at[1] + 0.5 * AWAY if direction[1] > 0.0 else at[1] - 0.5 * AWAY - CAP
     return left, top, left + wide, top + CAP
@@ -253,8 +241,8 @@ def _group(name: str, parts: list[str]) -> str:
     return element("g", {"id": name}, *parts) if parts else ""
 
 
-def _written(one: Number, colour: str) -> str:
-    style, at = Style(CAP, colour), (one.box[0], one.box[3])
+def _written(label: Label, colour: str) -> str:
+    style, at = Style(CAP, colour), (label.box[0], label.box[3])
     halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": HALO}
-    below = element("path", {"d": text.strokes(one.name, at, style), **halo})
-    return below + "\n" + text.label(one.name, at, style)
+    below = element("path", {"d": text.strokes(label.text, at, style), **halo})
+    return below + "\n" + text.label(label.text, at, style)

@@ -17,7 +17,7 @@ from camtool.pictures.draw import draw
 from camtool.pictures.layers import chosen, layer_names, layers_in, usual_layers
 from camtool.pictures.options import Options
 from camtool.pictures.page import page_of
-from camtool.pictures.plot import CLEAR, every, placed
+from camtool.pictures.plot import CLEAR, labels_beside
 from camtool.pictures.scene import Scene
 from camtool.pictures.strokes import turns_of
 from camtool.toolpath.builder import ToolpathBuilder
@@ -132,11 +132,12 @@ def test_no_number_covers_another_and_crowded_ones_are_left_out() -> None:
     view = page_of(content_of(SCENES["many paths"])).view
     rng = np.random.default_rng(7)
     for count in (10, 100, 400):
-        found = placed(rng.uniform(0.0, 500.0, (count, 2)).tolist(), view)
-        for one, other in combinations([number.box for number in found], 2):
+        numbers = [str(number) for number in range(1, count + 1)]
+        found = labels_beside(numbers, rng.uniform(0.0, 500.0, (count, 2)).tolist(), view)
+        for one, other in combinations([label.box for label in found], 2):
             apart = one[2] + CLEAR <= other[0] or other[2] + CLEAR <= one[0]
             assert apart or one[3] + CLEAR <= other[1] or other[3] + CLEAR <= one[1]
-        names = [int(number.name) for number in found]
+        names = [int(label.text) for label in found]
         assert names == sorted(names)
         assert len(names) <= count
     assert len(found) < 400  # there is no room for all
@@ -222,7 +223,8 @@ def test_of_very_many_contours_some_are_numbered() -> None:
     assert shown[0] == 1
     assert len(shown) > 30
     assert all(number % 20 == 0 for number in shown[1:])
-    assert (every(100), every(101), every(7000)) == (1, 2, 100)
+    first = {count: content_of(rows_of_marks(count)).order[0][:3] for count in (100, 101, 7000)}
+    assert first == {100: ["1", "2", "3"], 101: ["1", "2", "4"], 7000: ["1", "100", "200"]}
 
 
 def test_rims_of_marks_shrink_with_them() -> None:
@@ -256,18 +258,11 @@ ONE_ROW = """
 import sys
 from camtool.pictures import layers
 
-def corners(content, *_):
-    return [place for chain in content.outlines for place in chain.points.tolist()]
+def corners(content):
+    places = [place for chain in content.outlines for place in chain.points.tolist()]
+    return [layers.Dots("corners", "corner", places, layers.POINT_MARK)]
 
-layers.LAYERS += (
-    layers.Layer(
-        "corners",
-        corners,
-        lambda content, plot: plot.dots("corners", corners(content), layers.POINT_MARK),
-        lambda content, view: [layers.Entry(layers.dot_swatch(layers.POINT_MARK), "corner")],
-        needs="drawing",
-    ),
-)
+layers.LAYERS += (layers.Layer("corners", corners, needs="drawing"),)
 from camtool.cli.main import main
 sys.argv = ["camtool", "preview", *sys.argv[1:]]
 main()
@@ -276,7 +271,7 @@ main()
 
 
 def test_a_layer_is_added_by_one_row(tmp_path: Path) -> None:
-    """Help, pictures, legends, checks and messages know it."""
+    """Help, pictures, legends, checks, messages and the viewer's pages know it."""
 
     def ran(*arguments: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-c", ONE_ROW, *arguments]
@@ -299,3 +294,6 @@ def test_a_layer_is_added_by_one_row(tmp_path: Path) -> None:
     (tmp_path / "a.nc").write_text("G0 X1\nG1 X2 F100\nM2\n")
     said = ran(str(tmp_path / "a.nc"), *program).stderr
     assert "--layers corners: nothing in this picture" in said
+    page = tmp_path / "box.html"
+    assert ran(box, "-o", str(page)).returncode == 0
+    assert '"rows":[{"name":"corners",' in page.read_text()

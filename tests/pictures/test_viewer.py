@@ -14,11 +14,13 @@ import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.colours import BINS
+from camtool.pictures.content import content_of
 from camtool.pictures.draw import render
+from camtool.pictures.layers import LAYERS
 from camtool.pictures.scene import Line, Playback, Round, Scene, Table, by_feed
 from camtool.pictures.trace import bins_of, exaggerated, trace_of
 from camtool.pictures.viewer.columns import columns_of, packed, traced_of
-from camtool.pictures.viewer.page import MOST_PLOTS, SCRIPTS, viewer_page
+from camtool.pictures.viewer.page import MOST_PLOTS, SCRIPTED, SCRIPTS, viewer_page
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 from tests.pictures.conftest import NASTY, SCENES, circle, drawing_of, followed, line
@@ -119,6 +121,12 @@ def test_names_stay_names(words: str) -> None:
     assert str(head["blocks"]).count("\n") == 2
 
 
+def test_every_layer_is_drawn_by_its_parts_or_by_the_script() -> None:
+    for layer in LAYERS:
+        assert (layer.name in SCRIPTED) or (layer.parts is not None), layer.name
+    assert {layer.name for layer in LAYERS} >= SCRIPTED
+
+
 def test_columns_come_back_as_they_went_in(scenes: dict[str, Scene]) -> None:
     scene = busy(scenes["result"])
     assert scene.playback is not None
@@ -129,7 +137,7 @@ def test_columns_come_back_as_they_went_in(scenes: dict[str, Scene]) -> None:
         np.arange(len(scene.trace_points if scene.trace_points is not None else ())),
     )
     wide = {"wide": np.array([7, -70_000], dtype="<i4"), "short": np.array([0, 900], dtype="<i4")}
-    columns = {**columns_of(scene, run), **traced_of(scene, run, 20.0).columns, **wide}
+    columns = {**columns_of(content_of(scene), run), **traced_of(scene, run, 20.0).columns, **wide}
     named, data = packed(columns)
     for name, (kind, offset, count) in named.items():
         assert offset % 4 == 0
@@ -174,7 +182,8 @@ def test_the_wanted_path_breaks_where_it_does() -> None:
     paths = [line((0.0, 0.0), (1.0, 0.0, 1.0), (1.0, 2.0)), line((5.0, 5.0), (6.0, 5.0))]
     wanted = Segments.of(Polylines.of(paths))
     toolpath = followed(drawing_of(paths, ["a", "b"]))
-    columns = columns_of(Scene("t", toolpath=toolpath, wanted=wanted), run_of(toolpath))
+    scene = Scene("t", toolpath=toolpath, wanted=wanted)
+    columns = columns_of(content_of(scene), run_of(toolpath))
     assert columns["wanted_break"].tolist() == [0, 2]
     assert columns["wanted_begin"].tolist() == [[0.0, 0.0], [5.0, 5.0]]
     assert columns["wanted_arc"].tolist() == [1]

@@ -7,11 +7,14 @@ from typing import Any
 import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
+from camtool.pictures import layers
+from camtool.pictures.draw import draw
 from camtool.pictures.scene import Scene
 from camtool.pipeline import verify_program
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
+from tests.oracles import svg_page
 from tests.pictures.conftest import SCENES, circle
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser, find_move, paper, shown
 from tests.pictures.viewer_pages import busy, traced
@@ -44,11 +47,47 @@ def test_every_layer_is_switched_by_its_key(shown: Any) -> None:
     assert view.pixels("signs") > whole["signs"]
 
 
+ROW = layers.Layer(
+    "hints",
+    lambda content: [
+        layers.Lines("edges", "edge", content.outlines, layers.RAPID_LINE),
+        layers.Dots("corners", "corner", [(1.0, 1.0), (3.0, 1.0)], layers.PLUNGE_MARK),
+        layers.Texts("names", ["A", "B"], [(1.0, 1.0), (3.0, 1.0)], layers.INK),
+    ],
+    key="h",
+)
+"""A layer that neither pictures nor the page's script know."""
+
+
+def test_a_row_of_the_table_is_a_layer_of_pictures_and_of_pages(
+    shown: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(layers, "LAYERS", (*layers.LAYERS, ROW))
+    scene = busy(SCENES["toolpath"])
+    picture = svg_page.parse(draw(scene))
+    for name in ("edges", "corners", "names"):
+        assert svg_page.group(picture, name) is not None, name
+    assert {"edge", "corner"} <= {group.get("aria-label") for group in picture.iter()}
+    view = shown(scene)
+    label = view.page.locator("#layers label", has_text="hints")
+    assert label.inner_text().split() == ["edge", "corner", "A", "hints", "H"]
+    assert label.locator("input").is_checked()
+    swatches = label.locator(".swatch")
+    look = "(all) => all.map((one) => getComputedStyle(one))"
+    borders = swatches.evaluate_all(f"{look}.map((style) => style.borderTopColor)")
+    assert borders[:2] == ["rgb(139, 150, 163)", "rgb(255, 255, 255)"]
+    whole = view.pixels("signs")
+    view.press("h")
+    assert view.pixels("signs") < whole
+    label.locator("input").check()
+    assert view.pixels("signs") == whole
+
+
 def test_beside_a_predicted_path_signs_are_off(shown: Any) -> None:
     view = shown(traced(_signs(busy(SCENES["result"]))))
     names = view.page.locator("#layers label:not(:has(:checked))").all_inner_texts()
     assert [name.split("\n")[0] for name in names] == [
-        "starts", "order of contours", "directions", "reversals of X and Y",
+        "starts", "order of contours", "directions", "reversal",
     ]  # fmt: skip
 
 

@@ -16,9 +16,9 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.pictures.colours import BINS
-from camtool.pictures.content import bare_starts
+from camtool.pictures.content import Content
+from camtool.pictures.layers import Lines, Part
 from camtool.pictures.scene import Playback, Scene
-from camtool.pictures.strokes import strokes_of, turns_of
 from camtool.pictures.trace import Trace, bins_of, nearest_points
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
@@ -32,13 +32,35 @@ ALIGN_BYTES = 4
 """Every column begins at a multiple of this: browsers refuse others."""
 
 
-def columns_of(scene: Scene, run: Playback | None) -> Columns:
-    """All columns of the page; those of what the scene does not have are empty."""
+def columns_of(content: Content, run: Playback | None) -> Columns:
+    """The columns of the page for what its scripts know by name; those of what the scene does not
+    have are empty."""
+    scene = content.scene
+    places = {
+        "start_at": content.moves.starts,
+        "bare_at": content.starts,
+        "plunge_at": content.moves.plunges,
+    }
     return {
         **_drawing(scene.drawing),
         **_moves(scene.toolpath, run),
-        **_marks(scene.toolpath),
+        **{name: points.astype(FLOAT) for name, points in places.items()},
         **_wanted(scene.wanted if run is not None else None),
+    }
+
+
+def part_columns(name: str, part: Part) -> Columns:
+    """The columns of a part of a layer, which begin with `name`: the places of dots and texts, or
+    from where to where lines and arcs go."""
+    if not isinstance(part, Lines):
+        return {f"{name}_at": np.array(part.places, dtype=FLOAT).reshape(-1, 2)}
+    chains = part.chains
+    sweep = np.concatenate([chain.sweep for chain in chains])
+    centre = np.concatenate([chain.centre for chain in chains])
+    return {
+        **_bends(name, sweep != 0.0, centre, sweep),
+        f"{name}_from": np.concatenate([chain.points[:-1] for chain in chains]).astype(FLOAT),
+        f"{name}_to": np.concatenate([chain.points[1:] for chain in chains]).astype(FLOAT),
     }
 
 
@@ -69,7 +91,7 @@ def _narrow(column: npt.NDArray[np.generic]) -> tuple[str, npt.NDArray[np.generi
     return "i4", column
 
 
-def layer_names(drawing: Drawing) -> list[str]:
+def drawing_layers(drawing: Drawing) -> list[str]:
     """The layers in the order of their first paths, then of their first points."""
     return list(dict.fromkeys((*drawing.layers, *(mark.layer for mark in drawing.marks))))
 
@@ -82,7 +104,7 @@ def _drawing(drawing: Drawing | None) -> Columns:
             **{name: none.astype(FLOAT) for name in ("drawn_from", "drawn_to", "mark_at")},
             **{name: none.astype(INT) for name in ("drawn_path", "drawn_layer", "mark_layer")},
         }
-    segments, names = Segments.of(drawing.paths), layer_names(drawing)
+    segments, names = Segments.of(drawing.paths), drawing_layers(drawing)
     number = {name: index for index, name in enumerate(names)}
     layer = np.array([number[name] for name in drawing.layers], dtype=INT)
     marks = drawing.marks
@@ -130,19 +152,6 @@ def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
     rise = np.abs(toolpath.end[:, 2] - toolpath.starts[:, 2]) > POSITION_EPS_MM
     sorts = np.where(toolpath.kind == Kind.RAPID, 0, np.where(rise, 2, 1))
     return np.where(toolpath.is_motion, sorts, 0).astype(BYTE)
-
-
-def _marks(toolpath: Toolpath | None) -> Columns:
-    """Places (x, y) mm: where contours begin, where no plunge marks that, where the tool goes
-    straight down, and where X or Y turns back."""
-    none = np.empty((0, 2))
-    starts = bare = plunges = turns = none
-    if toolpath is not None:
-        strokes = strokes_of(toolpath)
-        starts, bare, plunges = strokes.starts, bare_starts(strokes), strokes.plunges
-        turns = np.unique(turns_of(toolpath), axis=0)
-    places = {"start_at": starts, "bare_at": bare, "plunge_at": plunges, "turn_at": turns}
-    return {name: points.astype(FLOAT) for name, points in places.items()}
 
 
 def _wanted(wanted: Segments | None) -> Columns:

@@ -36,14 +36,30 @@ from camtool.pictures.colours import (
     bin_colours,
     on_dark,
 )
+from camtool.pictures.content import Content, content_of
+from camtool.pictures.layers import Lines, Part, Texts, from_the_ground_up
 from camtool.pictures.polar import ROOM, dial_of, notes, plot, shown
 from camtool.pictures.scene import Playback, Scene, Table, by_feed
 from camtool.pictures.svg import Look, element, number
-from camtool.pictures.viewer.columns import Traced, columns_of, layer_names, packed, traced_of
+from camtool.pictures.viewer.columns import (
+    Columns,
+    Traced,
+    columns_of,
+    drawing_layers,
+    packed,
+    part_columns,
+    traced_of,
+)
 from camtool.units import UM_PER_MM
 
 SCRIPTS = ("data.js", "paint.js", "stage.js", "panel.js", "main.js")
 """The files of the script in their order; the last one begins."""
+
+SCRIPTED = frozenset(
+    ("drawing", "swept", "travel", "rapids", "feeds", "plunges", "starts", "order", "arrows")
+) | {"path", "worst", "zero", "doubts"}
+"""The layers that the script knows by name, since they change with the time, the zoom or the other
+switches. It draws all others by their parts."""
 
 LEAST_TOP_UM = 1e-3
 """The colour map ends here when no error is larger."""
@@ -54,9 +70,10 @@ _SLOT = re.compile(r"\{([a-z]+)\}")
 def viewer_page(scene: Scene) -> bytes:
     """The HTML file of a scene, UTF-8. Where the scene does not tell how its toolpath runs, every
     move takes as long as its feed says. ValueError when that is the run of another toolpath."""
-    run = _run(scene)
+    run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
-    named, data = packed({**columns_of(scene, run), **traced.columns})
+    rows, columns = _rows(content)
+    named, data = packed({**columns_of(content, run), **traced.columns, **columns})
     script = '(() => {\n"use strict";\n' + "\n".join(map(_file, SCRIPTS)) + "})();\n"
     style = _file("viewer.css")
     title = _printable(scene.title) or "camtool"
@@ -68,7 +85,7 @@ def viewer_page(scene: Scene) -> bytes:
         "style": style,
         "script": script,
         "circles": circles_of(scene),
-        "head": _json({"columns": named, **_head(scene, run, traced)}),
+        "head": _json({"columns": named, **_head(scene, run, traced), "rows": rows}),
         "columns": base64.b64encode(data).decode("ascii"),
     }
     # One pass: what stands in a slot is never looked through for slots.
@@ -84,7 +101,7 @@ def _run(scene: Scene) -> Playback | None:
 
 def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, object]:
     drawing, toolpath = scene.drawing, scene.toolpath
-    names = [] if drawing is None else layer_names(drawing)
+    names = [] if drawing is None else drawing_layers(drawing)
     blocks = None if run is None or run.blocks is None else run.blocks
     return {
         "layers": [
@@ -107,6 +124,41 @@ def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, objec
         "travel_mm": scene.travel_mm,
         "doubts": [] if drawing is None else _doubts(drawing),
     }
+
+
+def _rows(content: Content) -> tuple[list[dict[str, object]], Columns]:
+    """The layers that the script draws by their parts, from the ground up, and their columns."""
+    rows: list[dict[str, object]] = []
+    columns: Columns = {}
+    for layer in from_the_ground_up():
+        parts = [] if layer.name in SCRIPTED else layer.parts_in(content)
+        shown = []
+        for index, part in enumerate(parts):
+            name = f"{layer.name}_{index}"
+            columns |= part_columns(name, part)
+            shown.append({"columns": name, **_looks(part)})
+        if shown:
+            is_on = layer.usual and (layer.under_path or content.trace is None)
+            rows.append({"name": layer.name, "key": layer.key, "on": is_on, "parts": shown})
+    return rows, columns
+
+
+def _looks(part: Part) -> dict[str, object]:
+    """What a part is called, and how it looks on light and on dark ground."""
+    if isinstance(part, Texts):
+        return {"texts": part.texts, "line": _tones(part.colour)}
+    look = part.look
+    line = {"line": _tones(look["stroke"]), "width": look["stroke-width"]}
+    if isinstance(part, Lines):
+        dashes = str(look.get("stroke-dasharray", "")).split()
+        return {"legend": part.name, **line, "dash": [float(dash) for dash in dashes]}
+    return {"legend": part.name, **line, "radius": look["r"], "fill": _tones(look["fill"])}
+
+
+def _tones(colour: str | float) -> dict[str, str] | None:
+    """A colour on light and on dark ground; None for none."""
+    paint = str(colour)
+    return None if paint == "none" else {"light": paint, "dark": on_dark(paint)}
 
 
 def _doubts(drawing: Drawing) -> list[tuple[float, float]]:

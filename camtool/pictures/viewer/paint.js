@@ -286,7 +286,9 @@ function paintSigns(ctx, view, moves, layers, colours) {
   const { columns, head, on } = layers, ring = { fill: colours.paper, line: colours.feed, width: 2 };
   const disc = (fill) => ({ fill, line: colours.paper, width: 1.2 });
   ctx.setLineDash([]);
-  if (on.get("turn")) paintDots(ctx, view, columns.turn_at, 3.2, disc(colours.turn));
+  for (const { name, parts } of head.rows) {
+    if (on.get(`row ${name}`)) for (const part of parts) paintPart(ctx, view, part, layers, colours);
+  }
   if (on.get("arrow")) paintArrows(ctx, view, moves, columns.move_sort, colours);
   if (on.get("start")) {
     paintDots(ctx, view, columns.bare_at, 4.5, ring);
@@ -300,6 +302,21 @@ function paintSigns(ctx, view, moves, layers, colours) {
   const worst = head.worst.flatMap(({ at, off }) => at.map((mm, k) => mm + (layers.times - 1) * off[k]));
   paintDots(ctx, view, worst, 8, red);
   paintNumbers(ctx, view, worst, colours.tool, colours);
+}
+
+/** Lines, texts or dots of a layer that the page describes by its parts. */
+function paintPart(ctx, view, part, layers, colours) {
+  const { columns } = layers, { columns: name, texts, radius, width, dash } = part;
+  const line = layers.tone(part.line);
+  if (texts) paintTexts(ctx, view, texts, columns[`${name}_at`], line, colours);
+  else if (dash) {
+    part.track = part.track || new Track(
+      Float64Array.from(columns[`${name}_from`]), Float64Array.from(columns[`${name}_to`]),
+      columns[`${name}_arc`], columns[`${name}_bend`],
+    );
+    const every = new Uint8Array(part.track.count);
+    paintTrack(ctx, view, part.track, { from: 0, to: every.length }, every, [{ colour: line, width, dash }]);
+  } else paintDots(ctx, view, columns[`${name}_at`], radius, { fill: layers.tone(part.fill), line, width });
 }
 
 /** Round signs at `places` (2 P) mm, smaller where there are very many; one for each pixel. */
@@ -318,8 +335,10 @@ function paintDots(ctx, view, places, radius, { fill, line, width }) {
     path.arc(x, y, size, 0, TURN);
   }
   ctx.lineWidth = width * Math.min(1, size / radius + 0.3);
-  ctx.strokeStyle = line;
-  ctx.stroke(path);
+  if (line) {
+    ctx.strokeStyle = line;
+    ctx.stroke(path);
+  }
   if (!fill) return;
   ctx.fillStyle = fill;
   ctx.fill(path);
@@ -361,18 +380,24 @@ function addArrow(path, view, moves, row, share) {
   path.closePath();
 }
 
-/** Numbers from 1 beside places; one that finds no room is left out. */
+/** Numbers from 1 beside places. */
 function paintNumbers(ctx, view, places, colour, colours) {
+  const texts = Array.from({ length: places.length / 2 }, (_, index) => String(index + 1));
+  paintTexts(ctx, view, texts, places, colour, colours);
+}
+
+/** Texts beside places (2 P) mm; one that finds no room is left out. */
+function paintTexts(ctx, view, texts, places, colour, colours) {
   ctx.font = `bold ${NUMBER_PX}px system-ui, sans-serif`;
   ctx.lineJoin = "round";
   ctx.lineWidth = 4;
   ctx.strokeStyle = colours.paper;
   ctx.fillStyle = colour;
-  const taken = [], count = Math.min(places.length / 2, MOST_NUMBERS);
+  const taken = [], count = Math.min(texts.length, MOST_NUMBERS);
   for (let index = 0; index < count; index++) {
     const x = view.px(places[2 * index]), y = view.py(places[2 * index + 1]);
     if (!view.shows(x, y)) continue;
-    const name = String(index + 1), wide = ctx.measureText(name).width;
+    const name = texts[index], wide = ctx.measureText(name).width;
     for (const [across, up] of [[1, 1], [-1, 1], [1, -1], [-1, -1]]) {
       const from = across > 0 ? x + 9 : x - 9 - wide, base = up > 0 ? y - 5 : y + 5 + NUMBER_PX;
       const box = [from, base - NUMBER_PX, from + wide, base + 2];

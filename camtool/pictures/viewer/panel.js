@@ -56,19 +56,29 @@ class LayerPanel {
     this.layers = layers;
     this.changed = changed;
     this.boxes = new Map();
+    this.swatchOf = new Map();
     for (const layer of layers.list) find("layers").append(this.label(layer));
     this.colourChoice();
     this.timesChoice();
   }
 
-  label({ key, name, letter }) {
+  label({ key, name, letter, parts }) {
     const box = element("input", undefined, { type: "checkbox" }), label = element("label");
     box.checked = this.layers.on.get(key);
     box.addEventListener("change", () => {
       this.layers.on.set(key, box.checked);
       this.changed();
     });
-    label.append(box, element("i", undefined, { class: `swatch ${key.split(" ")[0]}` }), element("span", name));
+    label.append(box);
+    if (!parts.length) {
+      label.append(element("i", undefined, { class: `swatch ${key.split(" ")[0]}` }), element("span", name));
+    }
+    for (const part of parts) {
+      const kind = part.texts ? "texts" : part.dash ? "lines" : "dots";
+      const swatch = element("i", part.texts && part.texts[0], { class: `swatch ${kind}` });
+      this.swatchOf.set(part, swatch);
+      label.append(swatch, element("span", part.legend || name));
+    }
     if (!letter) return label;
     box.setAttribute("aria-keyshortcuts", letter);
     label.append(element("kbd", letter.toUpperCase(), { "aria-hidden": "true" }));
@@ -124,8 +134,15 @@ class LayerPanel {
     if (choice.options.length) step(choice, choice.selectedIndex === choice.options.length - 1 ? -choice.selectedIndex : 1);
   }
 
-  /** A drawing alone has the colours of its layers. */
+  /** A drawing alone has the colours of its layers, and parts of other layers their own. */
   swatches() {
+    const { layers } = this;
+    for (const [{ texts, dash, line, fill }, { style }] of this.swatchOf) {
+      if (texts) style.color = layers.tone(line);
+      else style.borderColor = layers.tone(line) || "transparent";
+      if (dash && dash.length) style.borderStyle = "dashed";
+      if (fill) style.background = layers.tone(fill);
+    }
     const found = document.querySelectorAll(".swatch.drawing");
     this.layers.drawingStyles(palette(), true).forEach((style, index) => {
       found[index].style.borderColor = style.colour;

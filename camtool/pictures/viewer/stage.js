@@ -56,7 +56,7 @@ function clock(seconds) {
 const SORTS = ["rapid", "feed", "plunge"];
 const COLOURS = [
   "paper", "ink", "quiet", "grid", "drawing", "feed", "rapid", "plunge", "pale", "tool", "pick",
-  "swept", "travel", "turn", "wanted",
+  "swept", "travel", "wanted",
 ];
 
 /** The colours of the page as they are now: the system's preference, or paper. */
@@ -102,14 +102,14 @@ class Layers {
       this.add("order", "order of contours", "o", plain);
       this.add("arrow", "directions", "a", plain);
     }
-    if (columns.turn_at.length) this.add("turn", "reversals of X and Y", "v", false);
+    for (const { name, key, on, parts } of head.rows) this.add(`row ${name}`, name, key, on, parts);
     if (head.worst.length) this.add("worst", "worst places", "x");
     if (head.doubts.length) this.add("doubt", "open ends, crossings", "u");
     this.add("zero", "part zero", "z");
   }
 
-  add(key, name, letter, isOn = true) {
-    this.list.push({ key, name, letter });
+  add(key, name, letter, isOn = true, parts = []) {
+    this.list.push({ key, name, letter, parts });
     this.on.set(key, isOn);
   }
 
@@ -161,6 +161,9 @@ class Layers {
   }
 
   get isDark() { return matchMedia("(prefers-color-scheme: dark)").matches && !this.printing; }
+
+  /** A colour that is given for light and for dark ground; undefined for none. */
+  tone(colours) { return colours ? colours[this.isDark ? "dark" : "light"] : undefined; }
 
   mapColours() { return this.isDark ? this.head.map.dark : this.head.map.light; }
 
