@@ -85,11 +85,13 @@ def test_closing_ends_the_workers(tmp_path: Path) -> None:
 
 
 def test_the_first_is_ready_before_the_others_begin(tmp_path: Path) -> None:
-    pool = LocalPool(Obedient(), PoolOptions(jobs=2, first_alone=True))
-    results = pool.results(tasks_of(tmp_path, "a", "b", "c"))
-    seen = {len(multiprocessing.active_children())}
-    while next(results) is None:
-        seen.add(len(multiprocessing.active_children()))
-    assert seen <= {0, 1, 2}
-    assert sorted(each[0].stem for each in results if each is not None)
-    assert not multiprocessing.active_children()
+    for first_alone, order in ((True, ["begin", "end"]), (False, ["begin", "begin"])):
+        notes = tmp_path / f"notes-{first_alone}"
+        made = run(
+            tasks_of(tmp_path, "a", "sleep 1", "sleep 1"),
+            Obedient(notes=notes),
+            jobs=2,
+            first_alone=first_alone,
+        )
+        assert sorted(made) == list("012")
+        assert notes.read_text().split()[:2] == order

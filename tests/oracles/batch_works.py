@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from camtool.batches.manifest import content_digest
 from camtool.batches.pool import made_of
@@ -14,13 +15,24 @@ from camtool.batches.run import Made, Task, Work
 from camtool.errors import DrawingError
 
 
+WARM_S = 0.3
+"""How long a worker takes to be warm when it notes when it begins and when it ends."""
+
+
 @dataclass(frozen=True)
 class Obedient:
-    """Makes `.out` of a drawing, or comes to the end that its content names."""
+    """Makes `.out` of a drawing, or comes to the end that its content names; writes to `notes`
+    when it begins and ends to be warm."""
 
     dies_warm: bool = False
+    notes: Path | None = None
 
     def warm(self) -> None:
+        if self.notes is not None:
+            for word in ("begin", "end"):
+                with self.notes.open("a") as stream:
+                    stream.write(f"{word}\n")
+                time.sleep(WARM_S)
         if self.dies_warm:
             os.kill(os.getpid(), signal.SIGKILL)
 

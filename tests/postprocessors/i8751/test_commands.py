@@ -1,4 +1,4 @@
-"""The i8751 target by its commands, with the sample machine."""
+"""Programs of this machine by the commands `post` and `verify`, with the sample machine."""
 
 from pathlib import Path
 
