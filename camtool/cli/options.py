@@ -350,35 +350,16 @@ def drawing_options(command: Command) -> Command:
             type=float,
             help="Pixels per inch of an SVG.  [96, or what its program took]",
         ),
-        option(
-            _READ,
-            "--tolerance",
-            "tolerance_mm",
-            callback=length,
-            metavar="LENGTH",
-            help="How near arcs come to curves of the part.",
+        _length(
+            "--tolerance", "tolerance_mm", "LENGTH", "How near arcs come to curves of the part."
         ),
-        option(
-            _READ,
-            "--gap",
-            "gap_mm",
-            callback=length,
-            metavar="LENGTH",
-            help="Ends nearer than this are joined.",
-        ),
+        _length("--gap", "gap_mm", "LENGTH", "Ends nearer than this are joined."),
         _switch("--across-layers", "Join ends of different layers too."),
         _switch("--recognise-arcs", "Chords on one circle become arcs again."),
         option(_READ, "--text", type=click.Choice(TEXTS), help="What to do with text.  [skip]"),
         _switch("--dimensions", "Read the lines of dimensions too."),
         option(_READ, "--layout", metavar="NAME", help="A layout of a DXF, not model space."),
-        option(
-            _READ,
-            "--section-z",
-            "section_z_mm",
-            callback=length,
-            metavar="HEIGHT",
-            help="Cut a solid at this height.",
-        ),
+        _length("--section-z", "section_z_mm", "HEIGHT", "Cut a solid at this height."),
         _switch("--allow-scripts", "Run a build123d script, with your rights."),
         _patterns("--layer", "Only these layers (CUT, ENG*)."),
         _patterns("--exclude-layer", "Not these layers."),
@@ -391,6 +372,10 @@ def drawing_options(command: Command) -> Command:
 def _switch(flag: str, text: str) -> Option:
     """A flag that is None unless given, so that defaults apply."""
     return option(_READ, flag, is_flag=True, default=None, help=text)
+
+
+def _length(flag: str, name: str, metavar: str, text: str) -> Option:
+    return option(_READ, flag, name, callback=length, metavar=metavar, help=text)
 
 
 def _patterns(flag: str, text: str) -> Option:
