@@ -21,10 +21,7 @@ from pathlib import Path, PurePath
 from camtool.batches.manifest import RealPaths
 from camtool.batches.run import Task
 from camtool.errors import InputError, OutputError
-
-SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
-"""The extensions that a folder is searched for. Other files too have the extensions of lists of
-points and of scripts: those are taken only by name or by a pattern."""
+from camtool.importers.options import SUFFIXES
 
 
 def find_tasks(

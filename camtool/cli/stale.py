@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.batches.inputs import SUFFIXES, find_tasks
 from camtool.cli.messages import say
 from camtool.cli.options import OWN_JOB, SectionedCommand, talk_options
 from camtool.cli.post import Posting, posting_options
 from camtool.errors import CamtoolError, InputError
 from camtool.findings import Severity
+from camtool.importers.options import SUFFIXES
 
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
@@ -95,6 +95,9 @@ def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:
     """
     if not programs.is_dir():
         raise InputError("is no folder", file=str(programs), mend="give the --out of the batch")
+
+    from camtool.batches.inputs import find_tasks
+
     return {programs / task.stem: [task.path] for task in find_tasks(files, programs)}
 
 

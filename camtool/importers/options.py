@@ -11,6 +11,10 @@ from camtool.units import MM_PER_UNIT
 FORMATS = ("dxf", "svg", "points", "solid")
 """Names of the formats, each with a package of that name beside this file."""
 
+SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
+"""The extensions by which a folder is searched for drawings. Lists of points and scripts share
+theirs with other files, so that they must be named or matched by a pattern."""
+
 TEXTS = ("skip", "outline", "stroke")
 """What becomes of text: left out, the outlines of its font, or the lines of an engraving font."""
 

@@ -13,8 +13,8 @@ import pytest
 
 from camtool.batches.lock import alone_in
 from camtool.batches.run import Made, Pool, Task
-from camtool.cli import batch, batch_work
-from camtool.cli.batch import stoppable
+from camtool.cli import batch_run, batch_work
+from camtool.cli.batch_run import stoppable
 from camtool.cli.options import DrawingFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.errors import CamtoolError
@@ -32,11 +32,11 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[HerePool]:
     """The drawings are made in this process; the pool of each run, to see what it was asked."""
     made: list[HerePool] = []
 
-    def here(run: batch.BatchRun, note: object) -> Pool:
+    def here(run: batch_run.BatchRun, note: object) -> Pool:
         made.append(HerePool(run.work))
         return made[-1]
 
-    monkeypatch.setattr(batch, "pool_for", here)
+    monkeypatch.setattr(batch_run, "pool_for", here)
     monkeypatch.setattr(batch_work, "code_digest", lambda files: "of no matter here")
     return made
 
@@ -314,7 +314,7 @@ def test_a_run_that_is_interrupted_at_once_says_so(
     def interrupted(path: Path) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(batch, "own_job", interrupted)
+    monkeypatch.setattr(batch_run, "own_job", interrupted)
     done = camtool("batch", "drawings/in", *PIC, *QUICK)
     assert done.returncode == 128 + signal.SIGINT
     assert b"interrupted; written files are complete" in done.stderr
@@ -330,7 +330,7 @@ def test_a_run_that_cannot_go_on_still_sums_up(
             yield from super().results(tasks[:1])
             raise CamtoolError("the scheduler was lost", where="--scheduler")
 
-    monkeypatch.setattr(batch, "pool_for", lambda run, note: Lost(run.work))
+    monkeypatch.setattr(batch_run, "pool_for", lambda run, note: Lost(run.work))
     sources = ("drawings/letter.svg", "drawings/in/square.dxf")
     done = camtool("batch", *sources, *PIC, *QUICK, "--json", "-")
     assert done.returncode == 2

@@ -121,7 +121,7 @@ def test_every_command_draws_the_same_picture(drawing: str) -> None:
 def test_a_batch_draws_the_same_pictures_and_again_when_they_shall_look_otherwise(
     drawing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("camtool.cli.batch.pool_for", lambda run, note: HerePool(run.work))
+    monkeypatch.setattr("camtool.cli.batch_run.pool_for", lambda run, note: HerePool(run.work))
     run("post", drawing, *POST, *LOOKS, "--preview", "a.svg")
     batch = ("batch", drawing, *POST[:-2], "-o", "build", "--preview", "svg")
     run(*batch, "--size", "300")

@@ -14,7 +14,6 @@ from camtool.batches.pool import made_of
 from camtool.batches.run import Made, Task, Work
 from camtool.errors import DrawingError
 
-
 WARM_S = 0.3
 """How long a worker takes to be warm when it notes when it begins and when it ends."""
 
