@@ -49,9 +49,9 @@ def hypotheses() -> dict[str, tuple[str, ...]]:
         "no mechanics at all": NONE,
         "as shipped": (),
         "a lead of 0.5 mm": LEAD,
-        "play = compensation": EVEN,
+        "backlash = compensation": EVEN,
         "both": (*LEAD, *EVEN),
-        "play by region": MAP,
+        "backlash by region": MAP,
         "calibrated by the circles": settings_of(calibrated(0, 1, 2)),
     }
 

@@ -134,5 +134,6 @@ def test_linuxcnc(bless: bool) -> None:
                 mm(apart * UM, 1),
             ]
         )
-    heads = ["program", "LinuxCNC, s", "model, s", "%", "it is off ours, µm", "we are off its, µm"]
+    heads = ["program", "LinuxCNC, s", "model, s", "%"]
+    heads += ["LinuxCNC off the model, µm", "model off LinuxCNC, µm"]
     check("referee-linuxcnc", heads, rows, bless)
