@@ -28,17 +28,18 @@ if TYPE_CHECKING:
     from camtool.verification.verify import Verification
 
 WINDOW_STEPS = 30.0
-"""The picture shows so many steps of the coarser axis to each side of the worst place ..."""
+"""The picture shows this many steps of the coarser axis to each side of the worst place ..."""
 
 WINDOW_ERRORS = 1.5
-"""... or so many times the largest error, where that is more ..."""
+"""... or this many times the largest error, if that is more ..."""
 
 WHOLE = 2.0
 """... or the whole path, unless it is this many times larger than that."""
 
 
 ROOM = 0.25
-"""Paths are taken from a window larger by this share to each side: the page may show more."""
+"""Paths are taken from a window that is larger by this share to each side, because the page may
+show more."""
 
 EFFECTS = ("play", "compensation", "scale", "squareness", "repeatability")
 """The parts of the mechanics that can be left out."""

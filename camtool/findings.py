@@ -655,7 +655,8 @@ _TEXTS: Final = _Texts()
 
 
 MOST_ALIKE = 3
-"""So many findings of one code and severity are listed one by one where people read them."""
+"""At most this many findings of one code and severity are listed one by one in texts for
+people."""
 
 
 class AnyFinding(Protocol):

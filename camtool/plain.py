@@ -14,10 +14,10 @@ from typing import Any
 from unicodedata import category
 
 LONGEST_WORD = 200
-"""Letters without a space between that are shown; of more, the beginning and the end."""
+"""Longer words without a space are shortened to their beginning and end, in characters."""
 
 LONGEST_LINE = 2000
-"""Letters of a line that are shown; of more, the beginning and the end."""
+"""Longer lines are shortened to their beginning and end, in characters."""
 
 _LONG = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 _BYTES_FROM = 0xDC00

@@ -21,13 +21,13 @@ from camtool.errors import MachineError
 from camtool.patterns import guess
 
 DEEPEST = 50
-"""Tables and lists within each other; those of machines and jobs are five deep at most."""
+"""Deepest nesting of tables and lists; those of machines and jobs are five deep at most."""
 
 _PARTS = re.compile(r"[=,{}\[\]\n]")
 """Between these a TOML text holds one key or one value."""
 
 MOST_SHOWN = 40
-"""Numbers of more characters are not repeated in messages."""
+"""Messages do not repeat numbers of more characters."""
 
 Table = dict[str, Any]
 _T = TypeVar("_T")

@@ -32,11 +32,11 @@ CLOSE_S = 5.0
 """How long the scheduler may take to close the connection."""
 
 ALONE_S = 5.0
-"""After how long without any worker a message says so: they may come later, or never."""
+"""After this time without any worker a message says so: workers may come later, or never."""
 
 AHEAD = 2
-"""How many drawings are sent for each thread of the cluster: one is made, one waits. More would
-only take memory."""
+"""Number of drawings that are sent for each thread of the cluster: one is made, one waits. More
+would only take memory."""
 
 _MEND = "what is written is whole; the same command goes on"
 

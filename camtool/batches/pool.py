@@ -31,7 +31,7 @@ END_S = 2.0
 """How long a worker may take to end before it is killed."""
 
 FAILED_STARTS = 3
-"""How many workers in a row may die before they are ready; then the run ends."""
+"""The run ends when this many workers in a row die before they are ready."""
 
 
 @dataclass(frozen=True)

@@ -42,20 +42,23 @@ ROUNDS = 50
 """Rounds of Gauss-Newton at most; a handful is usual."""
 
 SETTLED = 1e-13
-"""It has settled when no parameter moves by more than this (of 1, of a mm, of a tangent)."""
+"""The search has converged when no parameter moves by more than this (of 1, of a mm, of a
+tangent)."""
 
 TOLD_APART = 1e-9
-"""Singular values below this part of the largest are zero: directions that no reading tells."""
+"""Singular values below this part of the largest count as zero: directions that no reading
+determines."""
 
 INVOLVED = 1e-6
 """A parameter takes part in such a direction when its share is above this."""
 
 OUTLIER_SIGMAS = 3.0
-"""A reading whose residual is above so many of its standard deviations is named an outlier."""
+"""A reading whose residual exceeds this many of its standard deviations is reported as an
+outlier."""
 
 OUTLIER_FREEDOM = 4
-"""The other readings say that standard deviation when they are so many more than the parameters;
-fewer ones say it too badly, and the instrument's own uncertainty does."""
+"""The other readings determine that standard deviation when they exceed the parameters by this
+many; otherwise the uncertainty of the instrument is used."""
 
 
 @dataclass(frozen=True)
@@ -167,8 +170,8 @@ def _wish(parameter: Parameter) -> int:
 # The numbers of the machine.
 
 NONE_LEFT_SIGMAS = 3.0
-"""A play below zero by no more than so many standard uncertainties, or than a step, is none;
-beyond, a fault of the measurements."""
+"""A backlash below zero by no more than this many standard uncertainties, or than a step, counts
+as 0; below that, the measurements are at fault."""
 
 
 @dataclass(frozen=True)

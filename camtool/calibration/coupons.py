@@ -38,21 +38,22 @@ Point = tuple[float, float]
 # is cut, and easy to measure.
 
 FINENESS = 50.0
-"""The shorter side of a region has so many units of the grid on which its coupons lie, or a few
-more: the unit is a round number."""
+"""The shorter side of a region has this many units of the grid of its coupons, or a few more: the
+unit is a round number."""
 
 MARGIN_UNITS = 2
 """Units of that grid that stay free around each coupon."""
 
 RUN_UP_UNITS = 4
-"""Units of that grid that a run-up takes at least."""
+"""Shortest run-up, in units of that grid."""
 
 RUN_UP_PLAYS = 3.0
-"""A run-up is at least so many times as long as the machine's play and its compensation. More than
-two: half of the longest line of a coupon, in whose middle the tool begins, then takes them up."""
+"""A run-up is at least this many times as long as the machine's backlash and its compensation
+together. The tool begins in the middle of the longest line of a coupon, so more than two are
+needed to take both up."""
 
 SAME = 1e-9
-"""Numbers of units within this part of a whole number are that number."""
+"""Numbers of units within this part of a whole number count as that number."""
 
 MOST_REGIONS = 9
 """Columns and rows of regions at most."""
@@ -342,7 +343,7 @@ COLOUR = 5
 """Index of the colour of all lines in DXF: blue."""
 
 DECIMALS = 9
-"""Of numbers in SVG."""
+"""Decimals of numbers in SVG."""
 
 
 def dxf(sheet: Sheet) -> bytes:

@@ -34,8 +34,8 @@ Any3 = Literal["x", "y", "z"]
 _ZERO_IS_A_RESULT = ("shorter_by_mm", "gap_x_mm", "gap_y_mm")
 
 MOST_TIMES = 2.0
-"""A length that comes out more than so many times as long as its nominal one, or shorter than
-this part of it, is no measurement of it but a slip: a wrong unit, a lost digit."""
+"""A length that exceeds its nominal one by more than this factor, or is shorter by more, is taken
+for a mistake: a wrong unit, a lost digit."""
 
 
 class Added(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -71,7 +71,7 @@ ROUNDING = 1e-12
 """Derivatives below this part of the largest by the same parameter are rounding errors."""
 
 DERIVATIVE_STEP = 1e-30
-"""The imaginary part that derivatives are taken with: its square vanishes beside any number."""
+"""Imaginary part with which derivatives are computed: its square vanishes beside any number."""
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ PAIRS_AT_A_TIME = 1 << 16
 """How many pairs of boxes are handled at a time: it bounds the memory."""
 
 FAN = 16
-"""So many boxes are a block of an index."""
+"""Number of boxes in a block of an index."""
 
 BLOCKS_AT_A_TIME = PAIRS_AT_A_TIME // FAN
-"""So many blocks are looked into together."""
+"""Number of blocks that are examined together."""
 
 IN_ORDER = 2048
 """An index of no more boxes than this keeps their order: sorting takes longer than it saves."""
@@ -32,7 +32,7 @@ NOWHERE = (np.inf, np.inf, -np.inf, -np.inf)
 """A box that touches none."""
 
 MOST_LOOKS = 4_000_000_000
-"""A sweep that would have to look at more pairs of boxes than this is shortened."""
+"""A sweep that would have to examine more pairs of boxes than this is shortened."""
 
 
 class BoxIndex:

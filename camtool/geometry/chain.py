@@ -180,10 +180,10 @@ SAME_TURN_RAD = 1e-6
 """Turns that differ by less are equal at a branch."""
 
 MOST_PAIRS = 4_000_000
-"""More pairs of ends than this are not looked at together: nearer ones are joined before."""
+"""More pairs of ends than this are not examined together: nearer ones are joined first."""
 
 MOST_NEIGHBOURS = 64
-"""So many others are looked at for each end where very many ends meet at one point."""
+"""Number of other ends that are examined for each end where very many ends meet at one point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -561,11 +561,11 @@ SHARPEST_TURN_RAD = 2.6
 lines of a hatch do: their ends are no gap."""
 
 SPACING_SHARE = 0.1
-"""Ends of two paths are a gap when they are nearer than this share of the distance that ends
-strewn at random over the drawing would have: among very many strokes some ends are near."""
+"""Ends of two paths are a gap when they are nearer than this share of the mean distance of
+randomly scattered ends: among very many strokes some ends are near by chance."""
 
 FINEST_CELLS = 16.0
-"""The grid in which near ends are looked for has no cell below this share of the reach."""
+"""The grid for the search of near ends has no cell below this share of the reach."""
 
 
 def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float) -> list[Gap]:

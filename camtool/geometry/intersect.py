@@ -218,16 +218,17 @@ def _touching(found: Crossings, frames: Frames, eps: float) -> Bools:
 # So a contour that touches itself, at a corner or along a run (a keyhole), does not cross itself.
 
 PAIRS_AT_A_TIME = 1 << 16
-"""So many pairs of segments are looked at exactly at a time: it bounds the memory."""
+"""Number of pairs of segments that are examined exactly at a time: it bounds the memory."""
 
 MOST_CROSSINGS = 1000
-"""Looking for crossings ends when there are more than this."""
+"""The search for crossings ends when there are more than this."""
 
 MOST_PAIRS = 4_000_000
-"""Looking for crossings ends after so many pairs of segments with boxes that touch."""
+"""The search for crossings ends after this many pairs of segments whose boxes touch."""
 
 ALONG_RAD = 1e-6
-"""Directions nearer than this run along each other: that is touching, not crossing."""
+"""Segments whose directions differ by less run along each other: that is touching, not
+crossing."""
 
 
 def self_crossings_of(lines: Polylines, layers: Sequence[str]) -> tuple[SelfCrossing, ...]:

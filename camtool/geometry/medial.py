@@ -25,17 +25,17 @@ from camtool.geometry.measure import segment_boxes, segment_lengths
 from camtool.geometry.polylines import Polylines, Segments
 
 FIRST_SAMPLES = 9
-"""Places on each element at which the discs are looked for first."""
+"""Number of places on each element at which discs are computed first."""
 
 HALVINGS = 32
-"""So often the gap in which the partner changes is halved: to 1e-10 of an element or less."""
+"""How often the gap in which the partner changes is halved: to 1e-10 of an element or less."""
 
 STILL_MM = 1e-6
-"""Where discs at both ends and in the middle of a gap are nearer than this, nothing is looked for:
-at the common centre of several arcs any of them may seem to be the partner."""
+"""Where the discs at both ends and in the middle of a gap are nearer than this, the gap is not
+searched: at the common centre of several arcs any of them may seem to be the partner."""
 
 MOST_ROUNDS = 200
-"""Samples are halved, and looked for from the other side, no more often than this."""
+"""Samples are halved, and searched from the other side, no more often than this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +200,7 @@ def _seen_from_partners(boundary: Boundary, trace: Trace) -> Trace:
 # The boundary of a region as elements that discs in it can touch: lines, arcs, reflex corners.
 
 ROUND_RAD = 1e-9
-"""A reflex corner that turns by less is none: rounding of the tangents."""
+"""A reflex corner that turns by less is smooth: the tangents are rounded."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,15 +74,15 @@ NODE_EPS_MM = 1e-8
 """Ends and meetings of raw elements nearer than this are one node."""
 
 VALIDITY_EPS_MM = 2e-7
-"""How much nearer to the source than the distance a slice may be and is still kept."""
+"""A slice may be nearer to the source than the distance by this much and is still kept."""
 
 CUSP_EPS_RAD = 1e-3
-"""A corner this near to a full turn back is capped on both its sides: rounding, or arcs that cross
-again beside the corner, decide which side is the inner one."""
+"""A corner that differs from a full reversal by less is capped on both sides: rounding, or arcs
+that cross again beside the corner, decide which side is the inner one."""
 
 SHARP_LIMIT = 100.0
-"""A sharp corner may be so many times the distance away from the source, and is cut off there: it
-is one sharper than 1.1°."""
+"""A sharp corner is cut off at this many times the distance from the source: this concerns corners
+sharper than 1.1°."""
 
 JOINS = ("round", "mitre", "sharp")
 
@@ -368,8 +368,8 @@ def _in_order(sources: list[Ints], parts: list[Segments], kites: Floats) -> RawO
 # Stage 2: elements without the ends that are too near to the source.
 
 TRIM_SPARE = 10.0
-"""Ends stay that are too near by so many times VALIDITY_EPS_MM: the tips that are left beyond
-the last cut are then judged to be invalid."""
+"""Ends that are too near by up to this many times VALIDITY_EPS_MM stay: the tips beyond the last
+cut are judged invalid later."""
 
 
 def trim_raw(raw: RawOffset, source: Arrays, asked: Offset) -> RawOffset:

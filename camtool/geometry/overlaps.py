@@ -209,13 +209,14 @@ def _together(parts: list[Polylines]) -> Polylines:
 # long, or its direction would not be known well enough to say that they are on one line.
 
 SHORTEST_SHARES = 32.0
-"""Intervals share so many times their tolerance at least, or they count as apart."""
+"""Intervals that share less than this many times their tolerance count as apart."""
 
 BINS = 50
-"""Directions of lines are sorted into so many bins; 2/SHORTEST_SHARES rad is less than one."""
+"""Number of bins into which the directions of lines are sorted; 2/SHORTEST_SHARES rad is less than
+one bin."""
 
 MOST_PAIRS = 2_000_000
-"""No more pairs of intervals on each other than this are looked at."""
+"""At most this many pairs of overlapping intervals are examined."""
 
 
 @dataclass(frozen=True, eq=False)

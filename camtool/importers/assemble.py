@@ -218,10 +218,11 @@ LARGEST_MM = 2000.0
 """A drawing whose longer side is above this was probably read in the wrong unit."""
 
 MAX_GAP_FINDINGS = 20
-"""So many gaps get a finding of their own, largest first; the others are counted in one."""
+"""At most this many gaps get a finding of their own, largest first; one finding counts the
+others."""
 
 MAX_PLACES = 20
-"""So many branches, and so many crossing paths, get a finding of their own."""
+"""At most this many branches, and as many crossing paths, get a finding of their own."""
 
 
 def counted(skipped: Sequence[Skipped]) -> list[Skipped]:

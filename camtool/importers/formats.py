@@ -22,10 +22,11 @@ from camtool.importers.options import FORMATS
 BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
 
 HEAD_BYTES = 4096
-"""How much of a file decides on its format."""
+"""Number of bytes of a file that decide its format."""
 
 XML_HEAD_BYTES = 1 << 20
-"""How far into an XML file its first element is looked for, behind comments and a DOCTYPE."""
+"""The first element of an XML file is searched for in this many bytes, after comments and a
+DOCTYPE."""
 
 _EXTENSIONS = {
     ".dxf": "dxf",

@@ -28,7 +28,7 @@ GAP_MM = 0.01
 """Open ends that lie nearer than this are joined (docs/numerics.md)."""
 
 DPI = 96.0
-"""Pixels per inch, as CSS has it."""
+"""Pixels per inch, as in CSS."""
 
 _MM_PER_INCH = 25.4
 

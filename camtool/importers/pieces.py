@@ -20,7 +20,7 @@ from camtool.importers.options import Selection
 from camtool.patterns import guess, matches
 
 MAX_COORDINATE_MM = 1e9
-"""Beyond this doubles cannot tell positions apart that differ by POSITION_EPS_MM."""
+"""Beyond this, doubles cannot distinguish positions that differ by POSITION_EPS_MM."""
 
 
 class Unusable(Exception):
@@ -57,7 +57,7 @@ class Piece:
 
 
 NAMED = 12
-"""So many names are listed when a pattern chooses none of them."""
+"""At most this many names are listed when a pattern matches none of them."""
 
 
 class NoMatchError(DrawingError):

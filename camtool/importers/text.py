@@ -283,17 +283,17 @@ NUMBERED = re.compile(r"%%(03[2-9]|0[4-9]\d|1\d\d|2[0-4]\d|25[0-5])", re.ASCII)
 """A character by its number, 32 to 255."""
 
 MAX_CHARACTERS = 20_000
-"""Of one text, codes included; CAD programs write 250 into TEXT and about 2000 into MTEXT by
-hand."""
+"""Longest text, codes included; CAD programs limit input by hand to 250 in TEXT and about 2000 in
+MTEXT."""
 
 MAX_SIGNS_NAMED = 20
-"""So many of the characters that a font lacks are named."""
+"""At most this many of the characters that a font lacks are named."""
 
 MAX_NUMBER = 1e60
 """Sizes and places beyond it are refused: products of a few of them would not be finite."""
 
 MAX_OBLIQUE_DEG = 85.0
-"""Letters lean no further; CAD programs refuse more."""
+"""Largest slant of letters; CAD programs refuse more."""
 
 
 def finite(*values: float) -> tuple[float, ...]:

@@ -25,7 +25,7 @@ WITHIN = {"pocket": "it is cleared as a pocket", "vcarve": "it is carved"}
 """Kinds of operation that take all within their contours, and why."""
 
 NOT_KNOWN_MM = math.inf
-"""The depth of an operation that says none, where no machine says one."""
+"""The depth of an operation where neither the job nor the machine gives one."""
 
 
 def described(

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 
 MOST_LOOKS = 4
-"""A drawing whose scale follows from its own size is read no more often than this: its size is
-known within the tolerance of the look before."""
+"""A drawing whose scale follows from its own size is read no more often than this: each reading
+knows its size within the tolerance of the previous one."""
 
 
 def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Drawing:

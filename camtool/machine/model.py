@@ -42,7 +42,7 @@ class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 AS_CODED = 0.0
-"""What `Axis.real_step_mm` is before it becomes the coded step; no file can say it."""
+"""The value of `Axis.real_step_mm` before it is set to the coded step; no file can contain it."""
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -154,7 +154,7 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 # The mechanics beyond its single axes.
 
 MAX_SQUARENESS_RAD = 0.1
-"""No machine is out of square by more (5.7°): a larger number was meant in other units."""
+"""No machine is out of square by more (5.7°): a larger number is in the wrong unit."""
 
 
 class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

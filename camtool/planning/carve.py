@@ -65,7 +65,7 @@ from camtool.planning.paths import backwards, joined
 from camtool.planning.ramps import feeds_along
 
 CROSSINGS_SHOWN = 3
-"""So many places where paths cross are named."""
+"""At most this many places where paths cross are named."""
 
 CARVE_TOLERANCE_MM = 5e-4
 """A carved wall may be off its line by this much: half a micrometre."""
@@ -79,10 +79,11 @@ FIT_SHARE = 0.75
 samples takes less than the rest."""
 
 FEWEST_FOR_ARC = 5
-"""An arc is laid through three of at least so many samples."""
+"""An arc is fitted through three of at least this many samples."""
 
 LEAST_SWEEP_RAD = 1e-4
-"""What turns less is no arc: its centre would lie too far off to be counted with."""
+"""Samples that turn by less do not become an arc: its centre would be too far away for exact
+numbers."""
 
 MOST_SWEEP_RAD = 2.0
 """An arc of the axis that turns farther is divided."""

@@ -42,10 +42,10 @@ from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, rapids_through_stock
 
 FEED_TOLERANCE = 1e-6
-"""A feed may exceed its limit by this part of it: by rounding alone."""
+"""A feed may exceed its limit by this part of it, by rounding alone."""
 
 MOST_LISTED = 10
-"""So many rapids are listed; the last one says how many more there are."""
+"""At most this many rapids are listed; the last finding counts the others."""
 
 IN_PASSES = ("profile", "pocket", "engrave")
 """Kinds of operation that go down in passes, each of one depth."""

@@ -43,7 +43,7 @@ SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Parts of the step that are tried where it leaves tips: rings alone make a smoother path."""
 
 MOST_MARGIN = 0.5
-"""The most that is left for the ring round the walls, over the tool's radius."""
+"""The largest distance that is left for the ring along the walls, over the tool's radius."""
 
 SLOT_TOLERANCE = 1e-3
 """A slot narrower than the tool by up to this part of its diameter counts as wide as the tool."""
@@ -61,10 +61,10 @@ SLOT_LEAST = 0.5
 """The shortest band, all round, that counts as a slot, over the tool's diameter."""
 
 BAND_PLACES = 200
-"""In how many places a band is measured."""
+"""Number of places at which a band is measured."""
 
 ON_LINE_MM = 5e-6
-"""A place this near to the boundary of a region is still in it."""
+"""A place this near to the boundary of a region is still inside it."""
 
 POLE_SHARE = 0.01
 """How near to its true place the pole of a region is looked for, over the extent of the region."""

@@ -26,7 +26,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Compensated, Kind, Move, Toolpath
 
 OVERSHOOT = 0.5
-"""The share of what the controller compensates too much that an axis overshoots at a reversal."""
+"""An axis overshoots at a reversal by this share of the controller's excess compensation."""
 
 STILL_STEPS = 0.5
 """An axis that goes less than this much of a coded step does not move."""
@@ -35,7 +35,7 @@ KICK_STEPS = 1.0
 """The step back that makes the controller compensate, in coded steps."""
 
 AHEAD_MM = 1e-9
-"""Positions nearer than this are one."""
+"""Positions nearer than this are equal."""
 
 LEAST_SHARE = 1e-9
 """An edge nearer than this share of a segment to its end is that end."""

@@ -36,7 +36,7 @@ from camtool.planning.ramps import (
 from camtool.planning.tabs import Tab, bridges_of, raised, tabs_of
 
 START_SNAP_MM = 1e-3
-"""A start nearer than this to a vertex is that vertex: no move shorter than it is made."""
+"""A start nearer than this to a vertex is moved to that vertex, so that no shorter move arises."""
 
 START_CORNER_RAD = 0.1
 """A path that turns by more than this at a vertex has a corner there."""

@@ -44,10 +44,11 @@ PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
 """Where on a row it is asked which lines are nearest; its ends lie beside its neighbours' too."""
 
 AS_NEAR_MM = 1e-4
-"""Lines that are farther away by no more than this are as near."""
+"""Lines whose distances differ by no more than this count as equally near."""
 
 SAME_SIZE_MM = 1e-3
-"""A contour whose size is that of its line, but for the tool, within this runs round it alone."""
+"""A contour whose size, without the tool, is that of its line within this runs round that line
+alone."""
 
 
 def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> Drawn:

@@ -37,7 +37,7 @@ ROUND_MM = 5e-3
 """A closed path is a circle when its points are off the mean radius by no more than this."""
 
 SAMPLES_ROUND = 64.0
-"""At least so many points of a path are looked at to see whether it is a circle."""
+"""At least this many points of a path are examined to see whether it is a circle."""
 
 SAME_HOLE_MM = 1e-2
 """Holes whose centres are nearer than this are one."""
@@ -49,16 +49,16 @@ PECK_TOP_MM = 0.5
 """Between two pecks the drill comes up to this height above the stock, or to safe z if lower."""
 
 PECK_CLEARANCE_MM = 0.2
-"""A drill goes back as a rapid to this height above the last depth, or to half a peck if lower."""
+"""A drill returns as a rapid to this height above the last depth, or to half a peck if lower."""
 
 PECK_SHARE = 1e-9
-"""A last peck shorter than this share of the others is none."""
+"""A last peck shorter than this share of the others is left out."""
 
 MOVES_OF_PECK = 3
 """Down, out, and back to just above."""
 
 NAMES_SHOWN = 3
-"""So many paths are named in a finding; the others are counted."""
+"""At most this many paths are named in a finding; the others are counted."""
 
 
 @dataclass(frozen=True)

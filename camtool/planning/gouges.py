@@ -40,7 +40,7 @@ GOUGE_TOLERANCE_MM = 1e-4
 """Another contour may be cut into by this much before it is a gouge: a tenth of a micrometre."""
 
 SAMPLES_ROUND = 500
-"""How far a path goes across another one is looked up at so many places of it."""
+"""Number of places of a path at which its distance across another one is measured."""
 
 
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:

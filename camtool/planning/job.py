@@ -55,10 +55,11 @@ FRAMES = ("*border*", "*frame*", "*title*")
 """Layers, by patterns of their names, of what belongs to the sheet of paper."""
 
 THROUGH_MM = 1.0
-"""How far cuts may go below a stock, into the spoilboard, where the job does not say how far."""
+"""Default limit of cuts below the stock, into the spoilboard."""
 
 THROUGH_SHARE = 0.5
-"""And no farther than this part of its thickness: thin stock has a thin board under it."""
+"""Cuts below the stock go no deeper than this part of its thickness either: thin stock has a thin
+board under it."""
 
 TOOL_KINDS = ("flat", "v", "drill")
 """Shapes of tools: an end mill (or a point of no width), a V bit, a drill."""
@@ -68,13 +69,13 @@ MOST = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "": 1e6}
 eleven days; and a million of what has no unit."""
 
 LEAST = 1e-6
-"""The least that a number above 0 may be, of any unit: a nanometre."""
+"""The least value of a number above 0, in any unit: a nanometre."""
 
 MOST_WIDE_MM = 1000.0
-"""No tool is wider than a metre, and nothing more is left on a wall."""
+"""No tool is wider than a metre, and no allowance is larger."""
 
 FARTHEST_MM = 1e9
-"""Places in a drawing lie no farther from its zero (a thousand kilometres: maps do)."""
+"""Positions in a drawing are no farther from its zero (a thousand kilometres, as in maps)."""
 
 MOST_MOVES = 1_000_000
 """Passes, pecks and laps that make more moves than this of a drawing are taken as a mistake: a

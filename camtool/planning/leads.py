@@ -35,7 +35,7 @@ LEAD_SLACK_MM = 1e-5
 """A lead may come nearer to wanted material than the tool's radius by this much."""
 
 LEAD_HALVINGS = 4
-"""So often a lead that does not fit is halved before it is left out."""
+"""A lead that does not fit is halved this many times before it is left out."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 ROUNDED_DECIMALS = 10
-"""Places are rounded to so many decimals of a mm: far above the noise of doubles, and far below
-what any machine or tolerance knows."""
+"""Positions are rounded to this many decimals of a mm: far coarser than the noise of doubles, and
+far finer than any machine or tolerance."""
 
 Approach = Callable[[Run], tuple[float, float] | None]
 """Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""

@@ -9,7 +9,7 @@ from camtool.machine.model import Machine
 from camtool.planning.job import Operation, Tool
 
 MOST_PLACES = 12
-"""So many findings of a kind are listed one by one, the others are counted."""
+"""At most this many findings of a kind are listed one by one, the others are counted."""
 
 
 def at_place(name: str, point: Sequence[float]) -> str:

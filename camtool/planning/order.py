@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 KICKS_EACH = 20
-"""Kicks for each item: work against length."""
+"""Number of kicks for each item: work against length."""
 
 LEAST_KICKS = 700
-"""Kicks for few items: it is done at once all the same."""
+"""Number of kicks for few items: the search is still instantaneous."""
 
 MOST_KICKS = 4000
-"""No more kicks than this, however many items: below a second of work."""
+"""At most this many kicks for any number of items: less than a second of work."""
 
 SEED = 20_011
-"""Where the pseudo-random places of the kicks begin."""
+"""Seed of the pseudo-random places of the kicks."""
 
 MOST_PLACES = 8
-"""So many of its variants, evenly spread, show where an item of more lies for its neighbours."""
+"""Number of evenly spread variants that stand for the positions of an item with more of them."""
 
 SHOWN_ITEMS = 5
-"""An error message names no more items than this."""
+"""At most this many items are named in an error message."""
 
 
 SPECK_MM = 1e-4

@@ -31,7 +31,7 @@ LARGEST_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
 taken for the other side of it."""
 
 SLOPE_EPS = 1e-9
-"""Parts of a helix whose slopes (mm per mm) differ by no more than this go on in each other."""
+"""Parts of a helix whose slopes (mm per mm) differ by no more than this are joined."""
 
 
 @dataclass(frozen=True, eq=False)

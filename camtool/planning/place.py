@@ -23,13 +23,13 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, encloses, wit
 from camtool.planning.job import Job, Placement
 
 MOST_SIZE_MM = 1e5
-"""What is cut is no larger than this: 100 m, as the longest travel of a machine file."""
+"""The cut geometry is no larger than this: 100 m, as the longest travel of a machine file."""
 
 MOST_AWAY_MM = 1e6
-"""And it lies no farther from part zero than a kilometre."""
+"""The cut geometry is no farther from part zero than this, a kilometre."""
 
 MOST_POINTS = 10_000_000
-"""No more vertices than this are made by copies: far beyond any program, well within memory."""
+"""Copies make at most this many vertices: far beyond any program, well within memory."""
 
 SCALE_SHARE = 1e-3
 """A drawing counts as read for a scale that differs by no more than this share of it."""

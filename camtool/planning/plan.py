@@ -58,7 +58,7 @@ from camtool.toolpath.moves import Toolpath
 HOME: Point = (0.0, 0.0)
 
 MOST_OVERLAPS = 20
-"""Contours are cut no more times round than this beyond their starts: once is enough."""
+"""A contour may overlap its own start by at most this many times its length: once is enough."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,16 +60,16 @@ MOST_STEPS = 10_000
 """More steps than this across a pocket are taken as a mistake."""
 
 HELIX_MOST = 0.5
-"""The largest radius of a helix when none is asked for, over the tool's radius."""
+"""Default of the largest radius of a helix, over the tool's radius."""
 
 HELIX_LEAST = 0.1
-"""The smallest radius of a helix that is worth it, over the tool's radius."""
+"""The smallest useful radius of a helix, over the tool's radius."""
 
 HELIX_MOST_TURNS = 200
 """A helix of more turns than this at one level is not made."""
 
 RAMP_MOST_LAPS = 20
-"""A ramp that would go to and fro on the whole path more often than this becomes a plunge."""
+"""A ramp that would go back and forth on the whole path more often than this becomes a plunge."""
 
 Link = Callable[[Floats, Floats], Floats | None]
 """From a place (2,) to another: (k, 3) over the floor, or None when there is no link."""

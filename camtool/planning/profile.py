@@ -41,7 +41,7 @@ ROOM_TOLERANCE_MM = 1e-4
 """Two contours may be nearer than the tool is wide by this much before they count as joined."""
 
 FAR_CORNER = 5.0
-"""Joins that take the tool farther from a corner than so many times its distance from the wall
+"""Joins that take the tool farther from a corner than this many times its distance from the wall
 are reported: corners sharper than 23 degrees."""
 
 SLOT_TOLERANCE_MM = 5e-4

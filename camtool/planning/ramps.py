@@ -39,7 +39,7 @@ from camtool.planning.paths import MeasuredPath
 ZProfile = list[tuple[float, float]]
 
 MOST_LAPS = 200.0
-"""A ramp as long as more laps than this (passes along an open path) is not made."""
+"""A ramp longer than this many laps (passes along an open path) is not made."""
 
 
 def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZProfile:

@@ -33,7 +33,7 @@ TOGETHER_MM = 5e-6
 """Two boundaries nearer than this run together: above the error of two offsets in a row."""
 
 SAME_PLACE_MM = 2e-5
-"""Ends of sections nearer than this are one place."""
+"""Ends of sections nearer than this are at one place."""
 
 LEAST_FOOT = 1e-3
 """Pieces smaller than this part of the tool's disc are left out: the foot of a square corner is

@@ -35,7 +35,7 @@ RELIEF_MATCH_MM = 1e-5
 """The tool stands at a corner when its distances from both walls differ by no more than this."""
 
 RELIEF_TURN_RAD = 1e-2
-"""Where the tool's path turns by no more than this, it stands at no corner."""
+"""Where the tool's path turns by no more than this, there is no corner."""
 
 RELIEF_SLACK_MM = 1e-4
 """A relief may come nearer to other wanted lines than the tool's radius by this much."""

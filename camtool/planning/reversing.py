@@ -43,20 +43,19 @@ from camtool.planning.paths import flat
 from camtool.units import UM_PER_MM
 
 ALIKE_MM = 1e-4
-"""Predicted errors that differ by less are alike: a tenth of a micrometre, below a step."""
+"""Predicted errors that differ by less are equal: a tenth of a micrometre, below a step."""
 
 SAMPLES = 9
-"""So many points of each part are moved by the error, to see how far from the path they come: on
-a quarter of a circle the greatest distance is then found within 0.5 %."""
+"""Number of points of each part that are shifted by the error, to find their distance from the
+path: on a quarter of a circle the greatest distance is then found within 0.5 %."""
 
 APPROACH_MARGIN_MM = 0.05
-"""An approach is longer by this much than what compensation leaves of the backlash: the backlash
-is not the same all over a table (that of the PIC machine by 14 µm in X and 28 µm in Y,
-L2370-2373)."""
+"""An approach is longer by this much than the backlash that compensation leaves, because backlash
+varies over a table (on the PIC machine by 14 µm in X and 28 µm in Y, L2370-2373)."""
 
 REVERSAL_STEPS = 0.5
-"""An axis has turned round when it came back by this much of a coded step, as the simulation of
-controllers that follow paths has it."""
+"""An axis has reversed when it has come back by this much of a coded step, as in the simulation of
+controllers that follow paths."""
 
 
 @dataclass

@@ -14,7 +14,7 @@ from camtool.planning.job import Job, Operation
 from camtool.planning.naming import key_of, operation_name, own_numbers
 
 FEED_TOLERANCE = 1e-9
-"""A feed may exceed the highest one by this part of it: by rounding alone."""
+"""A feed may exceed the highest one by this part of it, by rounding alone."""
 
 
 PASS_SLACK = 1e-9

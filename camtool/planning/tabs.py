@@ -48,7 +48,7 @@ from camtool.planning.paths import QUARTER, MeasuredPath
 from camtool.planning.ramps import ZProfile, feeds_along, lifted
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
-"""How steep the sides of ramped tabs are when the tool may plunge."""
+"""Slope of the sides of ramped tabs when the tool may plunge."""
 
 COUNT_SLACK = 1e-9
 """The path may be longer than tabs times their spacing by this part, by rounding."""
@@ -57,16 +57,18 @@ TAB_CORNER_RAD = 0.1
 """A path that turns by more than this at a vertex has a corner, where no tab is put."""
 
 PLACES_PER_SIDE = 32
-"""So many places on either side of the centre of its share are tried for a tab on a corner."""
+"""Number of places on either side of the centre of its share that are tried for a tab on a
+corner."""
 
 TAB_SLACK_MM = 1e-5
 """A bridge may be narrower than asked by this much."""
 
 WIDTH_ROUNDS = 8
-"""How long a tab is on a bend is found among so many places, so often, each time closer."""
+"""The length of a tab on a bend is searched in this many rounds of as many places, each round
+finer."""
 
 BRIDGE_SLACK_MM = 1e-4
-"""A bridge may be cut into by this much: by rounding, where its own contour goes up and down."""
+"""A bridge may be cut into by this much, by rounding, where its own contour goes up and down."""
 
 
 @dataclass(frozen=True)

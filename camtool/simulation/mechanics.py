@@ -26,7 +26,7 @@ from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.simulation.motion import Effects
 
 REVERSAL_STEPS = 0.5
-"""An axis has reversed when it came back by this much of a coded step."""
+"""An axis has reversed when it has come back by this much of a coded step."""
 
 
 @dataclass(frozen=True)

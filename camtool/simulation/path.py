@@ -44,7 +44,8 @@ from camtool.simulation.samples import (
 from camtool.toolpath.moves import Kind, Toolpath
 
 SPREAD_STEPS = 2.0
-"""Ends of an arc at two radii that differ by so many steps or fewer were made so by rounding."""
+"""The radii at the two ends of an arc that differ by this many steps or fewer differ by
+rounding."""
 
 LEAST_CHORD_STEPS = 2.0
 """An arc with its ends nearer than this keeps its centre: they give no direction."""

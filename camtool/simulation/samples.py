@@ -26,7 +26,7 @@ MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or wider when a program would have more of them than this."""
 
 SPACING_EPS = 1e-6
-"""Samples may be wider apart by this part of their spacing: by rounding alone."""
+"""Samples may be farther apart by this part of their spacing, by rounding alone."""
 
 TURN_EPS_RAD = 1e-9
 """A turning point nearer than this to an end of its arc is that end."""

@@ -29,16 +29,16 @@ from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath
 
 MAX_CHORD_SWEEP_RAD = 0.5 * math.pi
-"""No chord stands for more of an arc than this, however wide the tolerance: a circle has four."""
+"""No chord replaces more of an arc than this, however wide the tolerance: a circle has four."""
 
 SWEEP_EPS_RAD = 1e-9
-"""A sweep may exceed the one that is wanted by this much, by rounding alone, unsplit."""
+"""A sweep may exceed the wanted one by this much, by rounding alone, without being split."""
 
 STEP_EPS = 1e-9
 """A slope may exceed its number of whole steps by this part of one, by rounding alone."""
 
 MAX_PARTS = 10_000_000
-"""A toolpath that would become more rows than this is refused: a tolerance far too fine."""
+"""A toolpath that would become more rows than this is refused: its tolerance is far too fine."""
 
 
 @dataclass(frozen=True, eq=False)

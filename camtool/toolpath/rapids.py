@@ -30,13 +30,13 @@ STOCK_TOP_MM = 0.0
 """Part zero lies on the stock."""
 
 CLEARED_MM = 0.01
-"""A rapid's disc may stick out of what is cleared by this much."""
+"""A rapid's disc may extend beyond the cleared area by this much."""
 
 HEIGHT_EPS_MM = 1e-6
-"""Heights that differ by less are one, and a rapid this little below the top is on it."""
+"""Heights that differ by less are equal, and a rapid this little below the top is on it."""
 
 SLOPE_PARTS = 8
-"""A rapid in XY and Z at once is looked at in so many pieces, each at its lowest height."""
+"""A rapid in XY and Z at once is examined in this many pieces, each at its lowest height."""
 
 CHORD_SHARE, ROUND_SHARE = 0.25, 0.125
 """Parts of the tolerance by which chords stray from arcs, and polygons from discs."""

@@ -18,15 +18,15 @@ COVERAGE_MM = 0.005
 """A move is missing, or extra, when farther than this from all moves of the other side ..."""
 
 COVERAGE_STEPS = 4.0
-"""... or than so many steps of the coarser axis, where that is more ..."""
+"""... or than this many steps of the coarser axis, if that is more ..."""
 
 COVERAGE_RESOLUTIONS = 1.5
-"""... or than so many resolutions of a dialect that is coarser than the steps: vertices are off
+"""... or than this many resolutions of a dialect that is coarser than the steps: vertices are off
 by up to 0.71 of them, and starts that a machine cannot reach by up to 1.41."""
 
 DEPTH_FITS = 2.0
-"""Heights may differ by as much as coverage allows, by so many steps of Z, or by so many fit
-tolerances, where that is more: slopes of machines without slopes are steps that high."""
+"""Heights may differ by as much as coverage allows, by this many steps of Z, or by this many fit
+tolerances, whichever is most: slopes of machines without slopes are steps that high."""
 
 SAMPLE_MM = 0.01
 """Spacing of the points on decoded and wanted moves that are compared with each other."""
@@ -36,7 +36,7 @@ TRACE_POINTS = 20_000
 
 
 WORST_LISTED = 10
-"""So many moves with the largest errors are in a report, unless more are asked for."""
+"""Number of moves with the largest errors in a report, unless more are asked for."""
 
 
 @dataclass(frozen=True)

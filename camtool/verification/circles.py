@@ -27,7 +27,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.cuts import CutMoves
 
 FIT_ROUNDS = 30
-"""The least-squares centre converges in about four rounds; more than this many are not tried."""
+"""The search of the least-squares centre, which takes about four rounds, ends after this many."""
 
 FIT_END_MM = 1e-9
 """The least-squares centre is found when it moves by less than this."""

@@ -116,8 +116,8 @@ def _same(one: Toolpath, other: Toolpath) -> bool:
 # What a job asks of a program, and the two sides that are compared: decoded and written.
 
 LIMIT_UNITS = 1.5
-"""Moves may be so many units of the dialect apart: ends are rounded by up to 0.71 of them, and
-centres of arcs on top."""
+"""Moves may be this many units of the dialect apart: ends are rounded by up to 0.71 of them, and
+centres of arcs add to that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,10 +382,10 @@ def _again(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Fi
 # Feeds, spindle, tool, dwells, clearance and end of a program, against what was asked for.
 
 FEED_SHARE = 0.5
-"""A feed is another one when it is off by more than this part of the dialect's unit of feeds."""
+"""A feed differs when it is off by more than this part of the dialect's unit of feeds."""
 
 DWELL_S = 0.0005
-"""A dwell that is shorter by less is as long."""
+"""A dwell that is shorter by less counts as equal."""
 
 OFF = 0.0
 """Stands for a spindle that does not turn, and for no tool."""

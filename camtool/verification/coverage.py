@@ -303,11 +303,11 @@ def _paired(holes: Holes, others: Holes, limits_mm: tuple[float, float]) -> tupl
 # Which way round a program cuts, wherever its moves lie on those that it is compared with.
 
 ALONG = 0.7
-"""Two moves on each other run the same way when the cosine between them is above this, and the
-other way when it is below minus this; between, one crosses the other."""
+"""Two moves that coincide have the same direction when the cosine between them is above this, and
+opposite directions when it is below minus this; between these, they cross."""
 
 LONG_ENOUGH = 1.5
-"""Moves shorter than so many times what they may be apart have no sure direction: their ends are
+"""Moves shorter than this many times their tolerance have no certain direction: their ends are
 rounded by up to 1.41 units in all, which turns a longer one by no more than 32 degrees."""
 
 Limits = tuple[float, float]
@@ -442,7 +442,7 @@ def other_way(compared: Compared, turned: Ints) -> Iterator[Finding]:
 # Places in words, for findings: points, blocks, and how many more there are.
 
 FINDINGS_PER_CODE = 20
-"""No more findings of one kind are listed; the last one says how many there are."""
+"""At most this many findings of one kind are listed; the last one counts all."""
 
 
 def at_point(point: Floats | tuple[float, float]) -> str:

@@ -24,10 +24,10 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 
 FEWEST_SAMPLES = 4
-"""Each line and arc is sampled in at least so many parts: short moves must not slip through."""
+"""Each line and arc is sampled in at least this many parts, so that short moves are not missed."""
 
 MOST_SAMPLES = 200_000
-"""Long programs are sampled more coarsely, so that about so many points come together."""
+"""Long programs are sampled more coarsely, so that there are about this many points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +217,11 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
 # that ends where it starts is its own loop. There-and-back is none: a loop holds an area.
 
 AS_LONG = 0.98
-"""A loop of at least this part of the longest one's length is as good, if it comes later."""
+"""A later loop of at least this part of the longest one's length is preferred to it."""
 
 FEW_PLACES = 48
-"""So many places of a contour are compared each with each: cells take longer to make."""
+"""Up to this many places of a contour are compared each with each: cells would take longer to
+make."""
 
 NO_LOOP = -1
 """First and last row of a contour without a loop."""

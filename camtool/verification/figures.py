@@ -235,8 +235,8 @@ def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
 # Figures of contours, the worst moves, and ends that are not reached.
 
 END_STEPS = 1.5
-"""A move has missed its end when the controller stands more than so many steps beside it: one
-step of an interpolator's last rounding is none."""
+"""A move has missed its end when the controller stands more than this many steps beside it: one
+step can be rounding by the interpolator."""
 
 
 @dataclass(frozen=True)

@@ -21,16 +21,16 @@ from camtool.verification.cuts import CutMoves, Samples
 from camtool.verification.nearest import ANY_CONTOUR, Found, Groups, Target, ranges, run_offsets
 
 MOST_TRIES = 4
-"""So many wanted contours are tried for a decoded one."""
+"""Number of wanted contours that are tried for a decoded one."""
 
 LEAST_MM = 1e-6
-"""What is nearer than this at its height is found even when no distance is allowed."""
+"""Moves nearer than this at their height are found even when no distance is allowed."""
 
 SAMPLES_PER_GROUP = 64
-"""So many neighbouring samples share one search for near moves, unless moves lie close."""
+"""Number of neighbouring samples that share one search for near moves, unless moves lie close."""
 
 GAPS_PER_GROUP = 4.0
-"""A search reaches along so many gaps between moves: its box holds about their square."""
+"""A search extends along this many gaps between moves: its box holds about their square."""
 
 
 @dataclass(frozen=True, eq=False)

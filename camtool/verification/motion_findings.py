@@ -34,8 +34,8 @@ from camtool.verification.figures import RowFigures, Tally, missed_ends
 
 AXES = "XYZ"
 CLEARED_COVERAGES = 2.0
-"""A rapid may stick out of what is cleared by so many tolerances of the coverage: it and the cuts
-beside it are rounded each on its own."""
+"""A rapid may extend beyond the cleared area by this many tolerances of the coverage: it and the
+cuts beside it are each rounded on their own."""
 
 TRAVEL_EPS_MM = 1e-6
 """A span may exceed the travel by this much, by rounding alone."""

@@ -28,13 +28,13 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.verification.cuts import CutMoves
 
 PAIRS_AT_ONCE = 1 << 17
-"""Pairs of point and move that are worked on together: bounds memory, fits a processor's cache."""
+"""Pairs of point and move that are computed together: bounds memory, fits a processor's cache."""
 
 GROUPS_AT_ONCE = 1 << 13
 """Groups whose near moves are searched together: bounds memory."""
 
 MARGIN_GROWTH = 4.0
-"""The margin of a search grows by this factor while nothing at all was found."""
+"""The margin of a search grows by this factor until something is found."""
 
 MARGIN_SLACK = 1.001
 """A margin is set this much above the distance it must reach, so that rounding cannot matter."""
@@ -282,13 +282,13 @@ class Target:
 # over the same places: a search asks the layers at its own height alone.
 
 GAPS_PER_PIECE = 4.0
-"""A piece is as long as so many gaps between moves, if `MORE_PIECES` allow it."""
+"""A piece is as long as this many gaps between moves, if `MORE_PIECES` allows it."""
 
 MORE_PIECES = 400_000
-"""Cutting adds no more pieces than this: bounds memory, some 100 MB."""
+"""Cutting adds at most this many pieces: bounds memory, some 100 MB."""
 
 PIECES_OF_LAYER = 512
-"""A layer takes moves of further heights until it has so many pieces."""
+"""A layer takes moves of further heights until it has this many pieces."""
 
 
 def levels_of(z: Floats) -> Ints:

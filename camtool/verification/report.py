@@ -429,7 +429,7 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
 # The report in words.
 
 MOST_OPERATIONS = 6
-"""So many operations are told one by one."""
+"""At most this many operations are listed one by one."""
 
 
 def clock(seconds: float) -> str:
@@ -588,7 +588,8 @@ def percent(value: float | None) -> str:
 # job gives the same bytes.
 
 NAME_SHOWN = 200
-"""A cell or a finding's words are shortened to so many characters on a page; JSON has them all."""
+"""A cell or a finding's text is shortened to this many characters on a page; JSON has all of
+it."""
 
 
 @dataclass(frozen=True)
@@ -802,10 +803,10 @@ def _at(at_mm: tuple[float, float]) -> str:
 # picture, a mention or a formula.
 
 MARKDOWN_ROWS = 12
-"""So many rows of each table go into Markdown; JSON holds them all."""
+"""Markdown has at most this many rows of each table; JSON has them all."""
 
 MARKDOWN_FINDINGS = 50
-"""So many findings go into Markdown, the gravest first; JSON holds them all."""
+"""Markdown has at most this many findings, the gravest first; JSON has them all."""
 
 PAGE_BYTES = 65_000
 """A page ends before it is longer: a comment on GitHub holds 65,536 characters, and a job's
@@ -892,7 +893,8 @@ def _markdown_table(sheet: Sheet) -> Iterator[str]:
 # and its policy forbids both besides.
 
 HTML_ROWS = 500
-"""So many rows of each table and so many findings go into a page of HTML; JSON holds them all."""
+"""A page of HTML has at most this many rows of each table and as many findings; JSON has them
+all."""
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 

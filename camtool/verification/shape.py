@@ -40,28 +40,30 @@ TOLERANCE_SHARE = 2e-3
 """... and at most this share of the tool's radius."""
 
 FEWEST_QUARTER = 8
-"""A quarter of the tool's edge is so many chords at least."""
+"""A quarter of the tool's edge has at least this many chords."""
 
 KEPT_SHARE = 0.25
-"""Chords of what must stay are nearer to their arcs than those of cuts, by this part."""
+"""Chords of material to be kept are nearer to their arcs than those of cuts: within this part of
+the tolerance."""
 
 KEPT_SLACK_MM = 1e-3
-"""What must stay counts as thinner by a micrometre: carvings and tight slots are as exact."""
+"""Material to be kept counts as thinner by a micrometre: carvings and tight slots are as exact."""
 
 DEPTH_SPACING_MM = 0.02
-"""How deep a strip is, is looked at in places no farther apart than this ..."""
+"""The depth of a strip is measured at places no farther apart than this ..."""
 
 MOST_PLACES = 20_000
-"""... but in about so many of them at most."""
+"""... but at no more than about this many of them."""
 
 OVERCUT_MM = 0.005
 """A plan that goes beyond the drawing by more than this is in error."""
 
 MOST_MOVES = 10_000
-"""Programs of more cutting moves get no shape: to sweep them takes longer than all the rest ..."""
+"""Programs of more cutting moves get no shape: sweeping them would take longer than all other work
+..."""
 
 MOST_POINTS = 200_000
-"""... and none whose path needs more points than this to be true."""
+"""... and none whose path needs more points than this to be exact."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 BINS_KEPT = 64
-"""The bins of so many circles are kept for pictures, 52 kB each."""
+"""The bins of at most this many circles are kept for pictures, 52 kB each."""
 
 
 @dataclass(frozen=True, eq=False)

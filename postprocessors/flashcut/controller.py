@@ -52,7 +52,7 @@ from .timers import feeds_of, half_periods_ms, shortest_ms
 _Machine = Machine[FlashcutController, Dialect]
 
 MOVES_AT_ONCE = 1 << 14
-"""Chords and other moves that are worked on together: some 100 bytes each."""
+"""Chords and other moves that are computed together: some 100 bytes each."""
 
 
 class FlashcutModel(ControllerModel[FlashcutController, Dialect]):
@@ -199,7 +199,7 @@ of more milliseconds are refused, and positions and radii of more than a quarter
 that no displacement between two of them has more."""
 
 CHORD_GUARD = 1e-9
-"""Part of a chord: an arc longer than whole chords by less has no further one."""
+"""Part of a chord: an arc that exceeds whole chords by less gets no further one."""
 
 
 def followed(toolpath: Toolpath, machine: _Machine) -> Toolpath:

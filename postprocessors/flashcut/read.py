@@ -30,13 +30,14 @@ FEED_GUARD: Final = 1e-9
 """Part of a feed: a feed above its limit by less is at the limit."""
 
 LIMITED_GUARD: Final = 0.01
-"""Part of a feed: whole milliseconds bring it no nearer than this at the fastest."""
+"""Part of a feed: a feed above the highest by more counts as limited; half periods are whole
+milliseconds, so less is rounding."""
 
 WARNED_PART: Final = 0.5
-"""Part of the programmed feed: a cut that gets less is a warning, not a remark."""
+"""Part of the programmed feed: a cut that gets less gives a warning instead of a remark."""
 
 MOST_MS: Final = 1e9
-"""Half periods longer than this make no shorter axis too long."""
+"""Half periods longer than this make no shorter axis go too far."""
 
 TEMPLATES: Final = {
     "G00": ("XY", "Z"),

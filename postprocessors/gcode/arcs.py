@@ -31,7 +31,7 @@ FLAT_UNITS: Final = 0.5
 """An arc with less sagitta (in units) is a line."""
 
 LINE_SAGITTA_UNITS: Final = 1.0
-"""Lines in place of an arc stray from it by no more (in units), their rounding not counted."""
+"""Lines that replace an arc deviate from it by no more (in units), their rounding not counted."""
 
 RECENTRE_UNITS: Final = 1.5
 """A centre may move by this many units, or by the controller's tolerance if that is more."""

@@ -31,7 +31,7 @@ SHOWN_CHARS: Final = 32
 """An error message shows no more of a line than this."""
 
 LINE_CHARS: Final = 4096
-"""A longer line is refused where the dialect itself has no limit: no machine reads such."""
+"""A longer line is refused where the dialect itself has no limit: no machine reads such lines."""
 
 # Possessive (++): a number is matched in one way only, so that no line costs more than its length.
 _NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?|\.\d++)"

@@ -22,7 +22,8 @@ ARC_RADIUS_SPREAD_MM: Final = 0.05
 """The radii at the start and at the end of a wanted arc may differ by this much, no more."""
 
 FEED_TOLERANCE: Final = 1e-6
-"""A feed within this part of a limit is at it, within this much of a whole F word it is whole."""
+"""A feed within this part of a limit is at it, and an F word within this much of a whole number is
+whole."""
 
 
 def check(toolpath: Toolpath, machine: Machine) -> None:

@@ -24,10 +24,10 @@ POWER_OF_TEN_TOLERANCE: Final = 1e-9
 """`feed.unit_mm_min` must be a power of ten to this part of its logarithm."""
 
 MOST_FEED_DECIMALS: Final = 6
-"""`feed.unit_mm_min` is no smaller than 10 to the minus this."""
+"""`feed.unit_mm_min` is at least 10 to the power of minus this."""
 
 UNIT_GUARD: Final = 1e-9
-"""Part of a length: a last decimal that is worth a step by less is worth a step."""
+"""Part of a length: the unit of the last decimal may exceed a limit by this, by rounding alone."""
 
 
 class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

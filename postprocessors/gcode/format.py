@@ -26,7 +26,7 @@ MOST_UNITS: Final = 10**15
 """Whole units beyond this are not written: their decimals would no longer be exact in a float."""
 
 COMMENT_CHARS: Final = 60
-"""No comment is longer, its parentheses not counted."""
+"""Longest comment, without its parentheses."""
 
 # Letters, digits and signs that mean nothing to any controller. Left out on purpose: ( ) ; % and
 # line ends, which end comments or programs; , which makes a comment active in LinuxCNC (MSG, …);

@@ -33,7 +33,7 @@ Point = tuple[float, float]
 
 
 MM_PER_INCH: Final = 25.4
-"""What one unit of a coordinate is under G20."""
+"""Length of one unit of a coordinate under G20, mm."""
 
 FEED_GUARD: Final = 1e-9
 """Part of a feed: a feed above its limit by less is at the limit."""
@@ -43,10 +43,11 @@ MOTION_GROUP: Final = "motion"
 NO_FEED: Final = "a feed move, and no feed yet"
 
 TURNS_TOLERANCE: Final = 1e-3
-"""Turns: a P beside a whole number by no more is that number (rs274 takes 2.001)."""
+"""Turns: a P that differs from a whole number by no more counts as that number (rs274 takes
+2.001)."""
 
 MOST_TURNS: Final = 10_000
-"""Turns of an arc, each of which is a move."""
+"""Largest number of turns of an arc, each of which is a move."""
 
 _TURN: Final = 2.0 * math.pi
 

@@ -39,7 +39,7 @@ from .dialect import Dialect, GrblController
 _Machine = Machine[GrblController, Dialect]
 
 ALWAYS_ON = 255
-"""The $1 that leaves the motors on, and holds nothing at a stop."""
+"""The $1 that leaves the motors on, and causes no delay at a stop."""
 
 DWELL_STEP_S = 0.05
 """Dwells are counted in whole steps of this, rounded up (DWELL_TIME_STEP, `delay_sec`)."""
@@ -152,7 +152,8 @@ MAX_STEPS = 1 << 29
 64 bits. grbl's own 32-bit floats count no single steps beyond 2²⁴."""
 
 STRAIGHT_COS = 0.999999
-"""Cosine between two blocks beyond which a corner is none, or a way straight back (planner.c)."""
+"""Cosine between two blocks beyond which they count as straight on, or as straight back
+(planner.c)."""
 
 LEAST_SPEED_MM_S = 1.0 / 60.0
 """No block is slower (MINIMUM_FEED_RATE, config.h)."""
@@ -266,7 +267,7 @@ def _from_rest(blocks: Blocks, path: Toolpath) -> np.ndarray[tuple[int], np.dtyp
 Singles = npt.NDArray[np.float32]
 
 MAX_DIGITS = 8
-"""grbl drops the digits of a number behind so many (MAX_INT_DIGITS, nuts_bolts.c)."""
+"""grbl drops the digits of a number after this many (MAX_INT_DIGITS, nuts_bolts.c)."""
 
 DECIMAL_EPS = 1e-6
 """Units of the last decimal: a number farther than this from all such units was not written with

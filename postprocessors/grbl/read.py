@@ -21,10 +21,10 @@ from .dialect import MOST_TOOL, Dialect, GrblController, GrblMachine
 from .findings import FEED_TOO_SLOW
 
 SLOW_GUARD: Final = 1e-6
-"""Part of a feed: one below the slowest by less is the slowest."""
+"""Part of a feed: one below the slowest by less counts as the slowest."""
 
 MIST: Final = 70
-"""M7, tenfold: grbl's error 20 as it ships (ENABLE_M7 of config.h is off)."""
+"""M7, tenfold: grbl's error 20 in its default configuration (ENABLE_M7 of config.h is off)."""
 
 GROUPS: Final = {
     **dict.fromkeys((0, 10, 20, 30, 800), "motion"),

@@ -34,7 +34,7 @@ from .pulses import PulseTimes
 _Machine = Machine[I8751Controller, Dialect]
 
 ROWS_AT_ONCE = 1 << 14
-"""Rows whose legs are worked out together: some 5 MB."""
+"""Rows whose legs are computed together: some 5 MB."""
 
 
 class I8751Model(ControllerModel[I8751Controller, Dialect]):

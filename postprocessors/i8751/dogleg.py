@@ -40,7 +40,7 @@ import numpy as np
 from camtool.arrays import Ints
 
 FREE: Final = -1
-"""A reach that binds nothing: rapids may take any dog-leg."""
+"""A reach without limit: rapids may take any dog-leg."""
 
 
 def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> Ints:

@@ -30,7 +30,7 @@ RAMP_PULSES: Final = 45
 """Pulses of the ramp, up and down (L3199-3203)."""
 
 RAMP_RELOAD: Final = 5
-"""What each pulse of the ramp takes off the delay (L3213-3236)."""
+"""Each pulse of the ramp reduces the delay by this (L3213-3236)."""
 
 DECLARED_HZ: Final = 70.0
 """The rate of pulses that the thesis declares for the cruise (L3187-3191)."""

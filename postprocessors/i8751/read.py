@@ -37,9 +37,9 @@ SHOWN_CHARS: Final = 40
 ACCESS: Final = 0x13
 """The byte that opens the access, as it is read."""
 PACKET_END: Final = 0x45
-"""The byte behind a packet, as it is read."""
+"""The byte after a packet, as it is read."""
 DATA_END: Final = 0x54
-"""The byte behind the last packet, as it is read."""
+"""The byte after the last packet, as it is read."""
 
 _MOTOR: Final = rb"(?:\x05|([\x03\x04])(.)(.))"
 
@@ -329,10 +329,11 @@ def replies(data: bytes, decoded: Decoded, dialect: Dialect) -> list[str]:
 # rounded to whole steps, as the operator's program must do; each on its own.
 
 WHOLE_STEP_TOLERANCE: Final = 0.05
-"""A distance within this much (in steps) of a whole step is that step, without a word."""
+"""A distance within this much (in steps) of a whole step counts as that step, without a
+finding."""
 
 SHOWN_AHEAD: Final = 12
-"""A comma so many characters behind the fault is taken for a decimal one."""
+"""A comma up to this many characters after the fault is taken for a decimal one."""
 
 LAST_LINE: Final = "END"
 

@@ -61,9 +61,9 @@ BACKWARD: Final = 4
 STOPPED: Final = 5
 """A motor stands (05H)."""
 END_OF_PACKET: Final = 0x45
-"""The byte behind a packet (45H)."""
+"""The byte after a packet (45H)."""
 END_OF_DATA: Final = 0x54
-"""The byte behind the last packet (54H)."""
+"""The byte after the last packet (54H)."""
 
 COLUMNS: Final = 18
 """Key, then M G PH PL for X and Y, a pair, the same for Z, a pair, end of packet."""
@@ -77,16 +77,16 @@ TEXT_EXTENSION: Final = ".txt"
 """Listings and hex dumps are text whatever the machine calls its programs."""
 
 LEAST_DECIMALS: Final = 3
-"""A listing has at least so many decimals of a millimetre."""
+"""A listing has at least this many decimals of a millimetre."""
 
 STEPS_PER_LAST_DIGIT: Final = 0.05
 """The last decimal of a listing is worth this part of the finest step or less."""
 
 MOST_MESSAGE_CHARS: Final = 60
-"""A comment of the hex dump takes so much of a text, no more."""
+"""Longest comment of the hex dump, in characters."""
 
 BYTES_WIDTH: Final = 24
-"""The comments of the hex dump stand in one column."""
+"""Width of the bytes in the hex dump, so that its comments are aligned."""
 
 
 def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:

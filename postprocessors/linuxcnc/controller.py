@@ -47,16 +47,16 @@ from .dialect import Dialect, LinuxcncController
 _Machine = Machine[LinuxcncController, Dialect]
 
 LEAST_WAY_MM = 1e-9
-"""What blends leave of a move is nothing when it is shorter."""
+"""The rest of a move between blends counts as nothing when it is shorter."""
 
 LAST_PART = 0.5
-"""Of its acceleration: what the last move before a wait uses in the mode "blend"."""
+"""Fraction of its acceleration that the last move before a wait uses in the mode "blend"."""
 
 REST_PERIODS = 1.0
 """Servo periods that coming to rest takes beyond the trapezoid (measured)."""
 
 PERIOD_EPS = 1e-6
-"""Periods: a time longer than a whole number of them by less is that number."""
+"""Periods: a time that exceeds a whole number of them by less counts as that number."""
 
 
 class LinuxcncModel(ControllerModel[LinuxcncController, Dialect]):
@@ -268,7 +268,8 @@ NORMAL_RATIO = np.sqrt(0.75)
 """How much of the acceleration a turn may take (BLEND_ACC_RATIO_NORMAL)."""
 
 TANGENT_RATIO = 0.5
-"""How much of it is used along the way of an arc (BLEND_ACC_RATIO_TANGENTIAL)."""
+"""Fraction of the acceleration that is used along the path of an arc
+(BLEND_ACC_RATIO_TANGENTIAL)."""
 
 LEAST_PERIODS = 1.02
 """Servo periods that the shortest move lasts (TP_MIN_SEGMENT_CYCLES, tp_types.h)."""
@@ -417,16 +418,16 @@ STRAIGHT_BACK_RAD = np.deg2rad(2.0)
 """A way back within this angle is a stop (SHARP_CORNER_DEG)."""
 
 TOLERANCE_PART = 0.25
-"""Of the shorter move: no blend leaves its corner by more (`tcFindBlendTolerance`)."""
+"""Fraction of the shorter move: no blend leaves its corner by more (`tcFindBlendTolerance`)."""
 
 LINE_PART = 0.5
-"""Of a line: a blend uses no more at each end (BLEND_DIST_FRACTION)."""
+"""Fraction of a line: a blend uses no more at each end (BLEND_DIST_FRACTION)."""
 
 ARC_END_PART = 2.0 / 3.0
-"""Of an arc: a blend at its end uses no more (`blendInit3FromArcLine`)."""
+"""Fraction of an arc: a blend at its end uses no more (`blendInit3FromArcLine`)."""
 
 ARC_START_PART = 1.0 / 3.0
-"""Of an arc: a blend at its start uses no more (`blendInit3FromLineArc`)."""
+"""Fraction of an arc: a blend at its start uses no more (`blendInit3FromLineArc`)."""
 
 LEAST_BEND_RAD = 1e-3
 """Moves that bend by less have no arc between them (TP_MIN_ARC_ANGLE)."""

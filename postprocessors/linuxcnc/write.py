@@ -16,7 +16,7 @@ MODES: Final = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
 offsets, feeds a minute: whatever the last program left."""
 
 MOST_TOOL: Final = 99_999
-"""Ours: LinuxCNC's tool tables hold far fewer."""
+"""Our choice: LinuxCNC's tool tables hold far fewer."""
 
 TOLERANCE: Final = NumberStyle(6, strip=True)
 

@@ -53,7 +53,7 @@ FARTHEST_UNITS = 32767
 """Distances from home are an int16 of tenths of a millimetre (L4625-4635)."""
 
 UNIT_MM = 0.1
-"""What the program counts in (L3202-3204)."""
+"""The unit of the program (L3202-3204)."""
 
 
 class MatlabRouterModel(ControllerModel[MatlabRouterController, Dialect]):
@@ -201,16 +201,17 @@ PATIENCE, PATIENCE_TICKS = 4.0, 400.0
 """A line is given up after so many times what its speeds should need, and two seconds more."""
 
 SETTLE_TAUS = 12.0
-"""Behind its last line a job is followed for so many time constants: 6e-6 of the speed is left."""
+"""A job is followed for this many time constants after its last line: 6e-6 of the speed is
+left."""
 
 PAIR_COUNTS = 10
-"""How far from the way's own speeds those of a line are looked for, in counts in a tick."""
+"""The speeds of a line are searched up to this far from those of its path, in counts in a tick."""
 
 PAIR_TOLERANCE = 1e-4
 """A sum of squares of speeds that is a whole number within this comes from a program."""
 
 ON_HOME_COUNTS = 0.5
-"""A place within so many counts of home is home."""
+"""A position within this many counts of home is home."""
 
 TEXT_FACTORS = ((10.0, 1), (100.0, 10), (1100.0, 100), (math.inf, 1000))
 """Equation 4.49 (L3077-3097): a distance up to so many tenths of a millimetre goes in so many
@@ -396,7 +397,7 @@ TICK_S = 0.005
 """The slaves' timer: (65536 − 53036) · 2 / 5 MHz (L2757)."""
 
 TICKS_PER_S = 200
-"""The same, the other way round."""
+"""Ticks in a second."""
 
 SIGNS = np.array([1, 1, -1])
 """Home is at the low ends of X and Y and at the top of Z: all distances are away from it."""
@@ -408,7 +409,7 @@ TEXT_KPD = (98.125, 159.124, 92.64)
 """The same."""
 
 IDENTIFIED = 70.0
-"""The drive at which gains were measured (L2704): whatever the friction, that speed stays."""
+"""The drive at which gains were measured (L2704): its speed does not depend on the friction."""
 
 
 def program_of(orders: Ints, pauses_s: Floats, machine: _Machine) -> Program:

@@ -21,16 +21,16 @@ UNIT_MM: Final = 0.1
 """Positions and distances are whole tenths of a millimetre (L3202-3204, L4444-4445)."""
 
 UNITS_PER_MM: Final = 10
-"""The same, the other way round."""
+"""Units in a millimetre."""
 
 GRID_TOLERANCE: Final = 1e-9
 """`grid_mm` is a whole multiple of the unit within this part of a unit."""
 
 CHUNK_UNITS: Final = 2
-"""The slaves run chunks of 0.2 mm: `factor = deci_mm / 2`, a whole division (L5589-5600)."""
+"""The slaves run chunks of 0.2 mm: `factor = deci_mm / 2`, an integer division (L5589-5600)."""
 
 FIXED_Y_UNITS: Final = 200
-"""What the listed master sends the Y slave in place of the first point (state 1, L4822)."""
+"""The listed master sends this to the Y slave instead of the first point (state 1, L4822)."""
 
 MOST_NUMBER: Final = 32767
 """Every number is a signed int16 in the master (L4625-4635)."""

@@ -38,14 +38,14 @@ from .findings import (
 from .strokes import Cuts
 
 TIE_TOLERANCE: Final = 1e-6
-"""A coordinate within this part of the grid of half-way between two of its lines is half-way, and
-goes to the farther one."""
+"""A coordinate within this part of the grid of half-way between two of its lines counts as
+half-way, and goes to the farther one."""
 
 FEED_TOLERANCE: Final = 1e-6
 """A feed within this many counts of the limit is on it."""
 
 FASTEST_COUNTS: Final = 1023
-"""The slaves throw away a speed that they measure above this (L5496-5516)."""
+"""The slaves discard a measured speed above this (L5496-5516)."""
 
 
 FEED_NOTICE: Final = 1e-6

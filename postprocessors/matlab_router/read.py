@@ -39,8 +39,8 @@ from .findings import (
 from .jobs import ReadJob, read_stream, read_text
 
 MOST_OFF: Final = 8.0
-"""Counts in 5 ms by which the speed of an axis may differ from what its distance asks for (the
-GUI's own differ by half a count, and by some when distances are cut short)."""
+"""The speed of an axis may differ from the one for its distance by this many counts in 5 ms (the
+GUI's own differ by half a count, and by some when distances are shortened)."""
 
 FEED_GUARD: Final = 1e-6
 """A speed that is above its limit by less than this (in counts) is at the limit."""

@@ -40,14 +40,14 @@ WINDOW_SLACK: Final = 4
 """The end is looked for from WINDOW[0]·L − slack to WINDOW[1]·L + slack iterations."""
 
 APART: Final = 16
-"""So many iterations more or less may another start of D take to a step: the paths may be one step
-apart at each of eight diagonals, and at the start."""
+"""Another start of D may take this many iterations more or less to a step: the paths may be one
+step apart at each of eight diagonals, and at the start."""
 
 LEAST_RADIUS_STEPS: Final = 4.0
 """An arc of a smaller radius is written as lines: its path has too few steps to be an arc."""
 
 LINE_SAGITTA: Final = 1.0
-"""A line in place of a piece of arc may stray from it by this many resolutions (the coarser of
+"""A line that replaces a piece of arc may deviate from it by this many resolutions (the coarser of
 step and unit); it bounds how far before its end an arc may be left for its closing line."""
 
 

@@ -36,7 +36,7 @@ FEED_TOLERANCE: Final = 1e-6
 """A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""
 
 MOST_FEED_UNITS: Final = 99
-"""Two digits (L3297-3309)."""
+"""Largest feed word: two digits (L3297-3309)."""
 
 ARC_RADIUS_SPREAD_MM: Final = 0.005
 """The radii at the start and at the end of an arc may differ by this much, no more. It is above

@@ -47,7 +47,7 @@ from .dialect import Dialect, ValcncController
 _Machine = Machine[ValcncController, Dialect]
 
 PIECES_AT_ONCE = 1 << 14
-"""Lines, those of arcs too, that are worked out together: some 5 MB."""
+"""Lines, those of arcs included, that are computed together: some 5 MB."""
 
 PIECE_EPS = 1e-9
 """A part of a piece by which an arc may be longer than whole pieces, by rounding alone."""

@@ -33,10 +33,10 @@ CHORD_GUARD: Final = 1e-9
 """Part of an arc's diameter: a chord longer by less is a diameter."""
 
 NEARLY_DIAMETER: Final = 0.9
-"""Part of an arc's diameter: for shorter chords the arcsine errs as little as the numbers do."""
+"""Part of an arc's diameter: for shorter chords the arcsine is as accurate as the numbers."""
 
 SCALE_GUARD: Final = 1e-12
-"""Part of a scale: X and Y whose scales differ by less are alike."""
+"""Part of a scale: X and Y whose scales differ by less have the same scale."""
 
 Point = tuple[float, float, float]
 

@@ -48,7 +48,7 @@ FEED_TOLERANCE: Final = 1e-6
 """A feed within this part of the machine's only speed is that speed."""
 
 MOST_UNITS: Final = 99_999.0
-"""An arc's centre farther from its start (in units of the program) makes it lines."""
+"""An arc becomes lines when its centre is farther from its start (in units of the program)."""
 
 
 def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:

@@ -28,7 +28,7 @@ from camtool.importers.dxf.walk import Walk
 from camtool.importers.options import ReadOptions
 
 REPAIRS_NAMED = 3
-"""So many repairs are named in full."""
+"""At most this many repairs are named in full."""
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:

@@ -40,7 +40,7 @@ from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.pieces import Piece, Unusable
 
 MAX_NESTING = 50
-"""Blocks within blocks, at most."""
+"""Largest depth of blocks within blocks."""
 
 _NOWHERE = Piece(np.zeros((0, 3)), False, "", "", "")
 
@@ -349,7 +349,7 @@ WHY_UNUSED = {
 OTHER = "is of a kind that camtool does not read"
 
 MAX_PARTS = 10_000
-"""So many parts may one entity be drawn with."""
+"""One entity may be drawn with at most this many parts."""
 
 
 def parts_of(entity: Any) -> list[Any]:
@@ -406,7 +406,7 @@ def text_shapes(
 # a kilobyte than anybody could draw.
 
 MAX_INSERTED = 100_000
-"""No drawing may grow by more entities than this through its blocks."""
+"""Blocks may add at most this many entities to a drawing."""
 
 
 class BlockSizes:

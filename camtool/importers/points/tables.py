@@ -419,7 +419,7 @@ NPY_START = b"\x93NUMPY"
 ZIP_START = b"PK\x03\x04"
 
 MAX_UNPACKED_BYTES = 1 << 28
-"""No more bytes than this are unpacked from one ZIP archive (268 MB: 16 million points)."""
+"""At most this many bytes are unpacked from one ZIP archive (268 MB: 16 million points)."""
 
 MAX_MEMBERS = 100_000
 """A ZIP archive with more members is refused."""

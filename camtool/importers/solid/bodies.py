@@ -135,7 +135,7 @@ def _listed(explorer: Any) -> Iterator[Any]:
 _AGAIN = "export it again as STEP (AP214 or AP242)"
 
 MAX_DEPTH = 100
-"""Assemblies are nested no deeper than this; a deeper one holds itself."""
+"""Assemblies are nested no deeper than this; a deeper one contains itself."""
 
 
 def load_step(path: str) -> list[Body]:

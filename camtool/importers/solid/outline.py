@@ -23,7 +23,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.solid.bodies import Body, subshapes
 
 SECTION_MARGIN = 0.1
-"""By this share of the body's size the plane of a section reaches over it."""
+"""The plane of a section extends beyond the body by this share of the body's size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +212,8 @@ FULL_TURN_RAD = 1e-9
 
 
 JOINT_MM = 1e-4
-"""Edges of one wire whose ends lie nearer than this meet; OpenCASCADE holds them to 1e-7 mm,
-files of other programs to 1e-5 and more."""
+"""Edges of one wire whose ends lie nearer than this meet; OpenCASCADE keeps them within 1e-7 mm,
+files of other programs within 1e-5 and more."""
 
 
 @dataclass(frozen=True, eq=False)

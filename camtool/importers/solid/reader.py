@@ -134,14 +134,14 @@ def _chosen(found: dict[str, Any], scale: float, height: float | None) -> list[F
 # `worker` in a process of its own: started, and what it found taken over.
 
 FILE_SECONDS = 60.0
-"""A STEP or BREP file may take so long, and SECONDS_PER_MB more for its size: damaged ones can
-keep OpenCASCADE busy for ever. Scripts may take their time."""
+"""Time limit for a STEP or BREP file, to which SECONDS_PER_MB is added for its size: damaged ones
+can keep OpenCASCADE busy for ever. Scripts have no limit."""
 
 SECONDS_PER_MB = 5.0
 """See FILE_SECONDS; a sound file takes about one second for a megabyte."""
 
 CHATTER_BYTES = 1 << 16
-"""So much of what OpenCASCADE prints is looked through for complaints."""
+"""Number of bytes of OpenCASCADE's output that are searched for complaints."""
 
 # -P: nothing that lies in the working directory is taken for a module.
 START = (

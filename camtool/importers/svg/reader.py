@@ -76,14 +76,14 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
 # element).
 
 MAX_USED = 50_000
-"""So many elements, curves and hundreds of corners may be drawn through `use`; a few nested ones
-could ask for billions."""
+"""At most this many elements, curves and hundreds of corners may be drawn through `use`; a few
+nested ones could ask for billions."""
 
 MAX_USE_DEPTH = 20
 """A `use` of a `use` of ...: deeper is a fault in the file."""
 
 MAX_LETTERS = 50_000
-"""So many letters are drawn, each of some dozens of arcs."""
+"""At most this many letters are drawn, each of some dozens of arcs."""
 
 _CORNERS_A_UNIT = 100
 _GROUPS = ("g", "a", "svg", "switch", "use")
@@ -450,7 +450,7 @@ ROUND_EPS_MM = POSITION_EPS_MM
 
 
 MAX_CURVE_MM = 1e6
-"""A curve that reaches further is left out: its fit to micrometres would take millions of arcs."""
+"""A curve that extends farther is left out: its fit to micrometres would take millions of arcs."""
 
 
 Fitted = tuple[Floats, Floats | None]

@@ -18,7 +18,7 @@ from camtool.importers.svg.tree import Node
 from camtool.units import MM_PER_UNIT
 
 FONT_PX = 16.0
-"""The font size, which em and ex are of, where nothing sets another."""
+"""Default font size, the base of em and ex."""
 
 LIMITS = {
     "clip-path": "is not applied: it is drawn whole",

@@ -28,7 +28,7 @@ from camtool.importers.svg.tree import Node
 from camtool.importers.text import MAX_CHARACTERS, Font, Ink, Look, Rule, Wanted, font_for, lacking
 
 MAX_FAMILIES = 8
-"""So many families of a list are looked for."""
+"""At most this many families of a list are tried."""
 
 DEFAULT_FAMILY = "sans-serif"
 """The family of a text that names none, as Inkscape takes it; renderers differ."""

@@ -36,10 +36,11 @@ MAX_ELEMENTS = 500_000
 """More elements than any drawing for a machine has; their tree would fill the memory."""
 
 MAX_ENTITY_SIGNS = 256
-"""An entity in the document type may stand for so much plain text, a namespace at most."""
+"""An entity in the document type may stand for at most this many characters of plain text, the
+length of a namespace."""
 
 MAX_REFERENCES = 10_000
-"""With entities of its own a file may have so many references to them."""
+"""Largest number of references to entities that the file defines."""
 
 _WRONG_PREFIX = "unbound prefix"
 
