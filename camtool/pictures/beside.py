@@ -1,9 +1,9 @@
-"""Scenes beside each other: before and after, in one window, at one scale, by one map of errors.
+"""Scenes beside each other, such as before and after: one window, one scale, one map of errors.
 
-What is high or square stands side by side, what is wide one below the other; more than two fill a
-grid. Each panel has its own title and notes; the legend, the scale bar and the colour bar are
-those of all. Polar plots share their magnification. A panel is drawn in units of its own and then
-moved to its place, so that equal scenes make equal panels.
+High or square panels stand side by side, wide ones one below the other; more than two fill a grid.
+Each panel has a title and notes of its own; legend, scale bar and colour bar belong to all. Polar
+plots share their magnification. A panel is drawn at (0, 0) and then moved to its place, so that
+equal scenes make equal panels.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ WIDE = 0.5
 """A window lower than this share of its width is wide."""
 
 NUMBERS_FOOT = 32.0
-"""Room below a plot for its numbers."""
+"""Height below a plot for its numbers."""
 
 
 def render_beside(scenes: Sequence[Scene], name: str, options: Options = AS_USUAL) -> bytes:
     """SVG or PNG bytes of the scenes for a file of this name; OutputError for other extensions,
-    OptionError for .html and where the options ask for what a scene does not have."""
+    OptionError for .html and for what a scene does not have."""
     if PurePath(name).suffix.lower() == ".html":
         raise OptionError(
             "a page shows one alone", file=name, mend="pictures side by side are .svg or .png"
@@ -96,8 +96,8 @@ def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
 
 
 def _views(contents: Sequence[Content], options: Options) -> tuple[Grid, list[View]]:
-    """Where each panel lies, and the view in it: all the same but for the length of its head.
-    Fitted twice, since the room of the colour bar follows from the height of the plots."""
+    """Where each panel lies, and its view: all alike but for the height of the head. Fitted twice,
+    since the width of the colour bar follows from the height of the plots."""
     window, top_um = contents[0].window, _top_um(contents)
     across, down = (window[:, 1] - window[:, 0]).tolist()
     columns = columns_of(len(contents), wide=down < WIDE * across)
@@ -115,12 +115,12 @@ def _views(contents: Sequence[Content], options: Options) -> tuple[Grid, list[Vi
 
 
 def _top_um(contents: Sequence[Content]) -> float | None:
-    """The end of the map of all."""
+    """The end of the colour map of all; None where no path is predicted."""
     return max((one.trace.top_um for one in contents if one.trace is not None), default=None)
 
 
 def _alike(contents: Sequence[Content]) -> list[Content]:
-    """The same with one window, one map of errors, and one colour for each layer by name."""
+    """The contents with one window, one map of errors, and one colour for each name of a layer."""
     top_um = _top_um(contents)
     window = union([one.window for one in contents if not one.is_empty])
     names = dict.fromkeys(group.name for one in contents for group in one.groups)
@@ -142,7 +142,7 @@ def _alike(contents: Sequence[Content]) -> list[Content]:
 
 
 def _entries(contents: Sequence[Content], view: View) -> list[Entry]:
-    """The legend of all, each entry once; layers of drawings are named alike in all."""
+    """The legend of all, each entry once, with the layers of all drawings."""
     groups = {(group.name, group.colour): group for one in contents for group in one.groups}
     every = tuple(groups.values())
     found = [entry for one in contents for entry in legend_of(replace(one, groups=every), view)]
@@ -175,14 +175,14 @@ def _polars(scenes: Sequence[Scene], which: int, options: Options) -> str:
     return sheet(_title(scenes), (page, foot), options, *grid.placed(panels), below)
 
 
-# Panels in rows and columns of a page: where each lies, and the names of its inner parts.
+# Panels in rows and columns of a page: where each lies, and the ids of its parts.
 
 GROWN = 1.25
-"""A page of panels side by side has so many times the units of another: letters become smaller,
-since each panel is."""
+"""Factor of the units of a page with panels side by side: letters become smaller, as each panel
+is."""
 
 TITLE_LINES = 2
-"""Panels are narrow: a long title goes on below."""
+"""Most lines of a panel's title."""
 
 _NAME = re.compile(r'( id="|url\(#)')
 
@@ -192,8 +192,9 @@ Head = tuple[str, Sequence[str]]
 
 @dataclass(frozen=True)
 class Grid:
-    """Panels of `width`, margins included, in `columns` on a page so wide; `heads` are drawn,
-    `downs` where those of each panel's row end; `rows` where each row begins."""
+    """Panels of `width`, margins included, in `columns` on a page of width `page`; `heads` are the
+    SVG of titles and notes, `downs` the heights at which those of each panel's row end; `rows` are
+    the heights at which the rows begin."""
 
     columns: int
     page: float
@@ -203,7 +204,7 @@ class Grid:
     rows: tuple[float, ...] = ()
 
     def with_bodies(self, height: float) -> Grid:
-        """The rows of panels that go on so far below their heads."""
+        """The grid with its rows, whose panels have this height below their heads."""
         rows = [0.0]
         for down in self.downs[:: self.columns]:
             rows.append(rows[-1] + down + height)
@@ -220,7 +221,7 @@ class Grid:
         return Box(box.left + x, box.top + y, box.right + x, box.bottom + y)
 
     def around(self, boxes: Sequence[Box]) -> Box:
-        """What holds the boxes of all panels, on the page."""
+        """The box round the boxes of all panels, on the page."""
         moved = [self.moved(index, box) for index, box in enumerate(boxes)]
         return Box(
             min(box.left for box in moved),
@@ -230,7 +231,7 @@ class Grid:
         )
 
     def placed(self, panels: Sequence[Sequence[str]]) -> list[str]:
-        """The panels in their places; the names of their inner parts begin with their own."""
+        """The panels in their places; the ids of their parts begin with that of the panel."""
         groups = []
         for index, parts in enumerate(panels):
             name = f"panel-{index + 1}"
@@ -242,23 +243,23 @@ class Grid:
 
 
 def columns_of(count: int, *, wide: bool) -> int:
-    """How many panels stand side by side."""
+    """Number of panels side by side."""
     return 1 if wide else math.ceil(math.sqrt(count))
 
 
 def page_units(columns: int, options: Options) -> float:
-    """Units of a page with so many columns."""
+    """Units of a page with this number of columns."""
     page = page_width(options.size_px or SVG_WIDTH_PX)
     return page if columns == 1 else round(GROWN * page)
 
 
 def panel_width(columns: int, room: float) -> float:
-    """Width of a panel, margins included, of so many in this room."""
+    """Width of each of `columns` panels, margins included, in a width of `room`."""
     return float(math.floor((room + (columns - 1) * MARGIN) / columns))
 
 
 def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) -> Grid:
-    """The grid for panels of these titles and notes, `bar` of the page's width left free."""
+    """The grid for panels of these titles and notes; a width of `bar` stays free."""
     width = panel_width(columns, page - bar)
     drawn = [title_and_notes(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
     downs = [down for _, down in drawn]

@@ -2,7 +2,7 @@
 
 The map runs from dark blue over magenta to orange, light and dark in even steps (the course of
 matplotlib's CC0 "plasma", without its yellow end, which is lost on white paper). Lightness grows
-all along it, so it reads the same to the colour-blind and in grey print; what is wrong glows.
+all along it, so that the colour-blind and a grey print show the same order.
 On a dark ground the map is cut at its other end: it runs from violet to plasma's yellow.
 Layers of a drawing are told apart by the colours of Okabe and Ito (jfly.uni-koeln.de/color).
 """
@@ -72,7 +72,7 @@ _DARK = {
     "#e69f00": "#f0c040",
     "#5a5a5a": "#8f8f8f",
 }
-"""The dark palette: what takes the place of each colour of the light one."""
+"""The colour of the dark palette for each of the light one."""
 
 _PAINT = re.compile('(fill|stroke)="(#[0-9a-f]{6})"')
 
@@ -99,12 +99,12 @@ def bin_colours(*, dark: bool = False) -> tuple[str, ...]:
 
 
 def on_dark(colour: str) -> str:
-    """What stands on dark ground for a colour of the light palette; KeyError for any other."""
+    """The colour of the dark palette for one of the light palette; KeyError for any other."""
     return _DARK[colour]
 
 
 def darkened(svg: str) -> str:
-    """A picture of the light palette in the dark one: only colours of fills and strokes change."""
+    """A picture in the dark palette: only the colours of its fills and strokes change."""
     instead = _DARK | dict(zip(bin_colours(), bin_colours(dark=True), strict=True))
     return _PAINT.sub(lambda found: f'{found[1]}="{instead[found[2]]}"', svg)
 

@@ -1,4 +1,4 @@
-"""The Content: a scene as what its layers draw, and the window that shows it."""
+"""The Content of a picture: what the layers draw of a scene, and the window that shows it."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.pictures.colours import DRAWING, LAYER_COLOURS
-from camtool.pictures.options import AS_USUAL, Options
-from camtool.pictures.scene import Scene
-from camtool.pictures.strokes import (
+from camtool.pictures.chains import (
     Chain,
-    Strokes,
+    Moves,
     chains_between,
     chains_box,
     chains_of,
-    strokes_of,
-    turns_of,
+    moves_of,
+    reversals_of,
 )
+from camtool.pictures.colours import DRAWING, LAYER_COLOURS
+from camtool.pictures.options import AS_USUAL, Options
+from camtool.pictures.scene import Scene
 from camtool.pictures.trace import Trace, exaggerated, trace_of
 from camtool.pictures.view import points_box, round_step, union, window
 
@@ -30,10 +30,10 @@ Place = tuple[float, float]
 """x, y in mm."""
 
 MOST_NUMBERED = 100
-"""Of more contours than this only every 2nd, 5th, 10th … has its number."""
+"""Of more contours than this only every 2nd, 5th, 10th … is numbered."""
 
 NOWHERE: Floats = np.empty((0, 2))
-NO_MOVES = Strokes((), (), (), NOWHERE, NOWHERE, np.zeros(2))
+NO_MOVES = Moves((), (), (), NOWHERE, NOWHERE, np.zeros(2))
 
 
 @dataclass(frozen=True)
@@ -57,15 +57,16 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """`outlines` of the drawing, by layer in `groups`; `strokes` of the moves, None without any;
-    `places` are those that the drawing notes; `trace` is what is shown of the predicted path.
-    `window` (2, 2) mm is what to show, and `crop_mm` whether that was asked for; `shown` are the
-    names of layers, None: the usual ones; `times` is how many times as large errors are drawn."""
+    """`outlines` are the paths of the drawing, in `groups` by its layers; `moves` those of the
+    toolpath, empty without one; `places` belong to the drawing; `trace` is the predicted path
+    where it is shown. `window` (2, 2) mm is the part of the plane that is shown, `crop_mm` the
+    part that was asked for; `shown` are the names of layers, None: the usual ones; `times` is the
+    factor of the errors that are drawn."""
 
     scene: Scene
     groups: tuple[Group, ...]
     outlines: tuple[Chain, ...]
-    strokes: Strokes | None
+    moves: Moves
     places: Places
     trace: Trace | None
     window: Floats
@@ -87,21 +88,25 @@ class Content:
         outlines = self.shown is None or "drawing" in self.shown
         points = self.shown is None or "doubts" in self.shown
         marked = (outlines and self.outlines) or (points and len(self.places.points))
-        return not (marked or self.strokes or self.trace)
+        return not (marked or self.scene.toolpath is not None or self.trace)
 
     @property
-    def moves(self) -> Strokes:
-        """The strokes, without any where there are no moves."""
-        return NO_MOVES if self.strokes is None else self.strokes
+    def is_drawing_alone(self) -> bool:
+        """Whether there are neither moves nor a predicted path."""
+        return self.scene.toolpath is None and self.trace is None
 
     @cached_property
     def starts(self) -> Floats:
-        """(S, 2) starts of contours where no plunge is marked."""
-        return bare_starts(self.moves)
+        """(S, 2) mm: starts of contours without a plunge."""
+        starts, plunges = self.moves.starts, self.moves.plunges
+        if not len(plunges):
+            return starts
+        plunged = {tuple(place) for place in _grid(plunges)}
+        return starts[[tuple(place) not in plunged for place in _grid(starts)]]
 
     @cached_property
     def order(self) -> tuple[list[str], list[Place]]:
-        """The numbers of contours, from 1, and where those begin; of many contours only some."""
+        """The numbers of contours, from 1, and where these begin; of many contours only some."""
         starts: list[Place] = self.moves.starts.tolist()
         step = (
             1 if len(starts) <= MOST_NUMBERED else round(round_step(len(starts) / MOST_NUMBERED))
@@ -111,17 +116,17 @@ class Content:
 
     @property
     def swept(self) -> tuple[Chain, ...]:
-        """What the tool covers, which is known where its diameter is."""
+        """The moves that cut, where the diameter of the tool is known."""
         return (*self.moves.feeds, *self.moves.ramps) if self.scene.tool_mm else ()
 
     @cached_property
     def reversals(self) -> Floats:
-        """(R, 2) where X or Y turns back."""
-        return NOWHERE if self.scene.toolpath is None else turns_of(self.scene.toolpath)
+        """(R, 2) mm: where X or Y reverses."""
+        return NOWHERE if self.scene.toolpath is None else reversals_of(self.scene.toolpath)
 
     @cached_property
     def worst(self) -> Floats:
-        """(W, 2) where the worst places are drawn."""
+        """(W, 2) mm: where the worst places are drawn."""
         places = np.array(self.scene.worst, dtype=np.float64).reshape(-1, 2)
         if self.scene.wanted is None or self.times == 1.0:
             return places
@@ -129,31 +134,32 @@ class Content:
 
 
 def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
-    """Everything that the page and its layers need to know of the scene."""
-    strokes = None if scene.toolpath is None else strokes_of(scene.toolpath)
+    """What the page and its layers need of the scene."""
+    moves = NO_MOVES if scene.toolpath is None else moves_of(scene.toolpath)
     trace = trace_of(scene, options.exaggerate)
     times = 1.0 if trace is None else trace.times
-    if strokes is not None and times != 1.0 and scene.wanted is not None:
-        strokes = replace(strokes, feeds=chains_between(scene.wanted), ramps=())
+    if scene.toolpath is not None and times != 1.0 and scene.wanted is not None:
+        moves = replace(moves, feeds=chains_between(scene.wanted), ramps=())
     outlines: tuple[Chain, ...] = ()
     groups: tuple[Group, ...] = ()
     places = Places(NOWHERE, NOWHERE, NOWHERE)
     if scene.drawing is not None:
         outlines = chains_of(scene.drawing.paths)
-        groups = _groups(scene.drawing, outlines, alone=strokes is None and trace is None)
+        alone = scene.toolpath is None and trace is None
+        groups = _groups(scene.drawing, outlines, alone=alone)
         places = _places(scene.drawing)
     shown = options.layers
-    # The window is that of all there is, whatever is shown of it.
+    # Layers that are not shown do not change the window.
     tool_mm = scene.tool_mm if shown is None or "swept" in shown else None
     return Content(
         scene=scene,
         groups=groups,
         outlines=outlines,
-        strokes=strokes,
+        moves=moves,
         places=places,
         trace=trace if shown is None or "path" in shown else None,
         window=(
-            _window(outlines, places.points, strokes, trace, tool_mm)
+            _window(outlines, places.points, moves, trace, tool_mm)
             if options.crop_mm is None
             else cropped(*options.crop_mm)
         ),
@@ -164,7 +170,8 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
 
 
 def _groups(drawing: Drawing, chains: Sequence[Chain], *, alone: bool) -> tuple[Group, ...]:
-    """The layers in order of first use: light below a toolpath, in strong colours when alone."""
+    """The layers in the order of their first paths: pale below a toolpath, in strong colours when
+    the drawing is alone."""
     names = tuple(dict.fromkeys(drawing.layers))
     members: dict[str, list[Chain]] = {name: [] for name in names}
     for name, chain in zip(drawing.layers, chains, strict=True):
@@ -193,14 +200,14 @@ def _places(drawing: Drawing) -> Places:
 
 
 def cropped(x: float, y: float, width: float, height: float) -> Floats:
-    """The window (2, 2) of a part that was asked for."""
+    """The window (2, 2) mm of a part of the plane."""
     return np.array([[x, x + width], [y, y + height]])
 
 
 def _window(
     outlines: tuple[Chain, ...],
     points: Floats,
-    strokes: Strokes | None,
+    moves: Moves,
     trace: Trace | None,
     tool_mm: float | None,
 ) -> Floats:
@@ -208,27 +215,18 @@ def _window(
     around = [points_box(np.zeros((1, 2)))]
     if trace is not None:
         part.append(points_box(trace.points[trace.cutting]))
-    if strokes is not None:
-        cuts = union([chains_box(strokes.feeds), chains_box(strokes.ramps)])
+    if moves is not NO_MOVES:
+        cuts = union([chains_box(moves.feeds), chains_box(moves.ramps)])
         reach = 0.5 * (tool_mm or 0.0) * np.array([-1.0, 1.0])
-        part += [None if cuts is None else cuts + reach, points_box(strokes.plunges)]
-        around += [chains_box(strokes.rapids), points_box(strokes.begin[None, :])]
+        part += [None if cuts is None else cuts + reach, points_box(moves.plunges)]
+        around += [chains_box(moves.rapids), points_box(moves.begin[None, :])]
     whole = union(part)
-    if whole is None and strokes is None:
+    if whole is None and moves is NO_MOVES:
         return window(None, None)
     return window(whole, union(around))
 
 
-def bare_starts(strokes: Strokes) -> Floats:
-    """(S, 2) starts of contours where no plunge is marked."""
-    starts = strokes.starts
-    if not len(strokes.plunges):
-        return starts
-    marked = {tuple(place) for place in _grid(strokes.plunges)}
-    return starts[[tuple(place) not in marked for place in _grid(starts)]]
-
-
 def _grid(points: Floats) -> list[list[float]]:
-    """Points as counts of the least distance that tells two positions apart."""
+    """Points as whole multiples of `POSITION_EPS_MM`."""
     counts: list[list[float]] = np.rint(points / POSITION_EPS_MM).tolist()
     return counts

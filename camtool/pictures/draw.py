@@ -1,7 +1,7 @@
-"""Pictures of drawings, toolpaths and predicted results: a Scene as SVG, and that as PNG.
+"""Pictures of drawings, toolpaths and predicted paths: a Scene as SVG, and PNG rendered from it.
 
-`content.py` sorts the scene into lines and marks, `layers.py` says how each layer draws them, and
-`page.py` where things lie; this file puts them together. Equal scenes give equal bytes: no dates,
+`content.py` sorts the scene into chains and places, `layers.py` draws them layer by layer, and
+`page.py` arranges the page; this file puts them together. Equal scenes give equal bytes: no dates,
 no random ids, no fonts. Inside the group "mm" coordinates are those of the part, in mm, Y up.
 """
 
@@ -60,11 +60,12 @@ def draw(scene: Scene, options: Options = AS_USUAL) -> str:
 
 
 def panel(content: Content, page: Page) -> list[str]:
-    """Head and plot with its axes, clipped: it covers nothing of its neighbours."""
+    """Head, plot and axes of one of several scenes; the plot is clipped, so that it covers none of
+    its neighbours."""
     box = page.view.box
     sides = (box.left, box.top, box.width, box.height)
     plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
-    # Named after its own sides: two pictures in one page share it only when it is the same.
+    # The id names its sides: two pictures in one page share it only where the clip is the same.
     clip = "clip-" + "-".join(number(side, 0) for side in sides)
     return [
         page.head,
@@ -76,7 +77,7 @@ def panel(content: Content, page: Page) -> list[str]:
 
 
 def png(svg: str, width_px: int) -> bytes:
-    """The PNG of an SVG text, `width_px` wide; OptionError when that is no sensible width."""
+    """The PNG of an SVG text, `width_px` wide; OptionError for a width that no picture has."""
     check_width(width_px)
     import resvg_py
 
@@ -87,7 +88,7 @@ def png(svg: str, width_px: int) -> bytes:
 
 
 def _plot(content: Content, view: View) -> list[str]:
-    """What lies in the plot; where that is nothing, it says so."""
+    """The SVG of the plot, with a label where there is nothing to draw."""
     layers = drawn(content, Plot(view))
     if not content.is_empty:
         return layers
@@ -107,7 +108,7 @@ def _beside(content: Content, page: Page) -> list[str]:
 
 def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
     """SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
-    extensions. HTML is the viewer, which has no options."""
+    extensions. HTML is the viewer's page, which takes no options."""
     if PurePath(name).suffix.lower() == ".html":
         from camtool.pictures.viewer.page import viewer_page
 
@@ -116,7 +117,8 @@ def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
 
 
 def rendered(drawn: Callable[[Options], str], name: str, options: Options) -> bytes:
-    """The same of whatever makes SVG text with options that say how wide."""
+    """SVG or PNG bytes for a file of this name; `drawn` makes SVG text by options with a width.
+    OutputError for other extensions."""
     suffix = PurePath(name).suffix.lower()
     if suffix not in (".svg", ".png"):
         raise OutputError("is no kind of picture that we make", file=name, mend="use .svg or .png")

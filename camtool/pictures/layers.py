@@ -1,10 +1,10 @@
 """The layers of pictures, one row each: what a layer consists of, or how it is drawn, and what the
-legend says of it.
+legend calls it.
 
 `LAYERS` is the table. Whatever lists, checks, draws or explains layers reads it, the viewer's page
-too, so that a layer is added by one row. Most rows name the parts of their layer: lines, dots or
-texts, which pictures and pages draw and explain alike. A row that draws in a manner of its own is
-drawn so in pictures; for a page, the viewer's scripts have to know it by name
+too: one row adds a layer. Most rows name the parts of their layer: lines, dots or
+texts, which pictures and pages draw and explain alike. For a row with a function
+of its own that draws, the viewer's script needs one as well
 (`camtool.pictures.viewer.page.SCRIPTED`). Nothing here loads numpy: help and completion ask for
 the names.
 """
@@ -36,16 +36,16 @@ from camtool.pictures.colours import (
 from camtool.pictures.svg import Look, PathData, element, number, title
 
 if TYPE_CHECKING:
+    from camtool.pictures.chains import Chain
     from camtool.pictures.content import Content, Place
     from camtool.pictures.plot import Plot
-    from camtool.pictures.strokes import Chain
     from camtool.pictures.view import View
 
 SWATCH = 34.0
-"""Width of the sample before a line of the legend."""
+"""Width of the swatch before a line of the legend."""
 
 MOST_LAYERS_NAMED = 7
-"""More layers of a drawing than this are counted, not named, in the legend."""
+"""The legend names so many layers of a drawing, and counts the others."""
 
 TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 RING = 8.0
@@ -57,7 +57,7 @@ REVERSAL_MARK: Look = {"r": 3.4, "fill": REVERSAL, "stroke": PAPER, "stroke-widt
 WORST_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.0}
 GAP_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.4}
 POINT_MARK: Look = {"r": 4.0, "fill": INK, "stroke": PAPER, "stroke-width": 1.2}
-DOUBT_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
+CROSSING_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines and arcs of one look, with the widths and dashes of the page, as a group of this id.
-    The legend calls them `name`."""
+    """Lines and arcs of one look, as a group of this id; its width and dashes are in units of the
+    page. The legend calls them `name`."""
 
     id: str
     name: str
@@ -124,8 +124,8 @@ class Dots:
 
 @dataclass(frozen=True, eq=False)
 class Texts:
-    """Short texts of one colour beside their `places` (x, y) mm, as a group of this id; one that
-    finds no room is left out. They explain themselves: the legend does not name them."""
+    """Short texts of one colour beside their `places` (x, y) mm, as a group of this id; a text
+    without room is left out. The legend does not name them."""
 
     id: str
     texts: Sequence[str]
@@ -149,15 +149,15 @@ Part = Lines | Dots | Texts
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer. `parts` are what it consists of; a row without them says what it `holds`, how to
-    `draw` that and what its `legend` is. A `legend` beside `parts` takes the place of theirs.
+    """One layer: either its `parts`, or functions: whether it `holds` anything in a picture, its
+    SVG (`draw`), its `legend`. A `legend` beside `parts` takes the place of theirs.
 
-    Layers `in_mm` lie below all others and are drawn in mm, Y up; the others in units of the page.
-    Among its kind, one of a higher `height` covers those of lower ones; `ground` is drawn below
-    all. `place` is its place in the legend. `usual`: it is shown unless layers are chosen. `needs`
-    is what a picture must be of: a "drawing", "moves", or the predicted "path". Where a predicted
-    path is shown, it is left out unless it is `under_path`. `hint` says why it may be empty, where
-    the reason is not in the drawing. `key` switches it in the viewer's page.
+    in_mm: it lies below all layers that are not, and is drawn in mm, Y up; the others are drawn in
+    units of the page. height: of two layers of a kind, the higher one covers the other. ground:
+    draws what lies below all layers. place: its order in the legend. usual: it is shown where no
+    layers are named. needs: what a picture must be of, a "drawing", "moves", or the predicted
+    "path". under_path: it is not left out where the predicted path is shown. hint: why it may be
+    empty, where the drawing is not the reason. key: switches it in the viewer's page.
     """
 
     name: str
@@ -176,7 +176,7 @@ class Layer:
     key: str = ""
 
     def is_in(self, content: Content) -> bool:
-        """Whether the picture shows it, and it has something."""
+        """Whether the picture shows it and it has something to show."""
         shown = content.shown
         return (
             (self.usual if shown is None else self.name in shown)
@@ -188,7 +188,7 @@ class Layer:
         """Its parts that are not empty."""
         return [part for part in self.parts(content) if part] if self.parts else []
 
-    def drawn(self, content: Content, plot: Plot) -> str:
+    def svg(self, content: Content, plot: Plot) -> str:
         """Its SVG; empty when nothing of it is in view."""
         if self.draw is not None:
             return self.draw(content, plot)
@@ -218,7 +218,7 @@ def dot_swatch(look: Look) -> str:
 
 
 def map_swatch(width: float) -> str:
-    """A piece of line that runs through the colours of the map."""
+    """A piece of line in all colours of the map."""
     step = SWATCH / BINS
     pieces = []
     for index, colour in enumerate(bin_colours()):
@@ -239,7 +239,7 @@ def _body(content: Content, plot: Plot) -> str:
 
 def _drawing(content: Content, plot: Plot) -> str:
     """The lines of the drawing, a group for each of its layers."""
-    alone = content.strokes is None and content.trace is None
+    alone = content.is_drawing_alone
     width = plot.pen(ALONE_PEN if alone else DRAWING_PEN, content.outlines)
     groups = [
         element("g", {"stroke": group.colour}, title(group.name), plot.path(group.chains))
@@ -249,7 +249,7 @@ def _drawing(content: Content, plot: Plot) -> str:
 
 
 def _drawing_legend(content: Content, view: View) -> Iterator[Entry]:
-    if content.strokes is not None or content.trace is not None:
+    if not content.is_drawing_alone:
         yield Entry(line_swatch(DRAWING, 5.0), "drawing")
     elif len(content.groups) == 1:
         name = content.groups[0].name
@@ -262,13 +262,13 @@ def _drawing_legend(content: Content, view: View) -> Iterator[Entry]:
             yield Entry("", f"and {more} more layers")
 
 
-def _doubts(content: Content) -> list[Part]:
+def _noted(content: Content) -> list[Part]:
     """Open ends, drill centres, and places where a contour is ambiguous."""
     places = content.places
     return [
         Dots("gaps", "open end", places.gaps.tolist(), GAP_MARK),
         Dots("points", "point", places.points.tolist(), POINT_MARK),
-        Dots("doubts", "crossing or branch", places.ambiguous.tolist(), DOUBT_MARK),
+        Dots("doubts", "crossing or branch", places.ambiguous.tolist(), CROSSING_MARK),
     ]
 
 
@@ -276,7 +276,7 @@ def _doubts(content: Content) -> list[Part]:
 
 
 def _swept(content: Content, plot: Plot) -> str:
-    """What the tool covers, at its true width."""
+    """The cuts at the true width of the tool."""
     width = content.scene.tool_mm or 0.0
     line: Look = {"fill": "none", "stroke": SWEPT, "stroke-width": width}
     ends: Look = {"stroke-linecap": "round", "stroke-linejoin": "round"}
@@ -292,7 +292,7 @@ def _travel(content: Content, plot: Plot) -> str:
 
 
 def _travel_legend(content: Content, view: View) -> Iterator[Entry]:
-    """Only where a side of the frame crosses the window."""
+    """Only where a side of the frame is in view."""
     wide, high = content.scene.travel_mm or (0.0, 0.0)
     (x0, x1), (y0, y1) = view.x_range, view.y_range
     overlaps = x0 <= wide and x1 >= 0.0 and y0 <= high and y1 >= 0.0
@@ -302,7 +302,7 @@ def _travel_legend(content: Content, view: View) -> Iterator[Entry]:
 
 
 def _feeds(content: Content, plot: Plot) -> str:
-    """Solid, and slopes in the colour of plunges; pale and thin below a predicted path."""
+    """Solid lines, slopes in the colour of plunges; pale and thin below a predicted path."""
     moves, pale = content.moves, content.trace is not None
     cuts = (*moves.feeds, *moves.ramps)
     pen = plot.round_pen(plot.pen(0.6 * FEED_PEN if pale else FEED_PEN, cuts))
@@ -332,8 +332,8 @@ def _path(content: Content, plot: Plot) -> str:
 
 
 def _path_legend(content: Content, view: View) -> Iterator[Entry]:
-    said = "by error" if content.times == 1.0 else f"error × {content.times:g}"
-    yield Entry(map_swatch(4.0), f"predicted path, {said}")
+    scale = "by error" if content.times == 1.0 else f"error × {content.times:g}"
+    yield Entry(map_swatch(4.0), f"predicted path, {scale}")
 
 
 def _worst_legend(content: Content, view: View) -> Iterator[Entry]:
@@ -482,7 +482,7 @@ LAYERS = (
         place=10,
         needs="drawing",
     ),
-    Layer("doubts", _doubts, height=6, place=9, needs="drawing"),
+    Layer("doubts", _noted, height=6, place=9, needs="drawing"),
 )
 """All layers, in the order in which help and messages name them."""
 
@@ -498,13 +498,13 @@ def layer_of(name: str) -> Layer:
 
 
 def usual_layers() -> frozenset[str]:
-    """The names of those that are shown when nobody says."""
+    """The names of the layers that are shown where none are named."""
     return frozenset(layer.name for layer in LAYERS if layer.usual)
 
 
 def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
-    """The layers `names` (none: the usual ones) but those `without`; OptionError for others, and
-    when none is left."""
+    """The layers `names` (none: the usual ones) except those `without`; OptionError for unknown
+    names, and when no layer is left."""
     shown, left_out = set(names), set(without)
     known = layer_names()
     for name in sorted(shown | left_out):
@@ -525,23 +525,23 @@ def from_the_ground_up() -> list[Layer]:
 
 
 def layers_in(content: Content) -> list[str]:
-    """The names of the layers that hold something in a picture, wherever its window lies."""
+    """The names of the layers that a picture has, whether in its window or not."""
     return [layer.name for layer in LAYERS if layer.is_in(content)]
 
 
 def legend_of(content: Content, view: View) -> list[Entry]:
-    """The legend: only what is present and within view."""
+    """The legend of the layers that are in the picture."""
     there = (layer for layer in LAYERS if layer.is_in(content))
     placed = sorted(there, key=lambda layer: layer.place)
     return [entry for layer in placed for entry in layer.entries(content, view)]
 
 
 def drawn(content: Content, plot: Plot) -> list[str]:
-    """What lies in the plot, from the ground up: what is drawn in mm in one group, the rest above
-    it."""
+    """The SVG of the plot, from the ground up: a group of all that is drawn in mm, and the rest
+    above it."""
     there = [layer for layer in from_the_ground_up() if layer.is_in(content)]
     lines = [layer.ground(content, plot) for layer in there if layer.ground is not None]
-    lines += [layer.drawn(content, plot) for layer in there if layer.in_mm]
+    lines += [layer.svg(content, plot) for layer in there if layer.in_mm]
     lines = [line for line in lines if line]
     group = element("g", {"id": "mm", "transform": plot.view.matrix()}, *lines) if lines else ""
-    return [group, *(layer.drawn(content, plot) for layer in there if not layer.in_mm)]
+    return [group, *(layer.svg(content, plot) for layer in there if not layer.in_mm)]

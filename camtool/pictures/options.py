@@ -1,4 +1,4 @@
-"""How a picture is to look: its size, its part, its palette, its layers."""
+"""How a picture looks: its size, its part of the plane, its palette, its layers."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from dataclasses import dataclass
 from camtool.errors import OptionError
 
 SMALLEST_PX, LARGEST_PX = 16, 20_000
-"""Widths of pictures that are allowed."""
+"""Least and greatest width of a picture."""
 
 SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
-"""Widths of pictures when nobody says."""
-
+"""Widths of pictures where none is given."""
 
 LEAST_TIMES, MOST_TIMES = 1.0, 1e6
-"""Errors may be drawn so many times as large."""
+"""Least and greatest factor of errors that are drawn larger."""
 
 
 @dataclass(frozen=True)
 class Options:
     """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
     the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
-    ground. `exaggerate`: the predicted path is drawn so many times as far from the wanted one.
-    `polar`: the plot of the radial errors of this circle, from 1, in place of the picture.
-    `layers` are the names of those to show, None: the usual ones. OptionError for sizes that make
-    no picture, and for a plot of a circle with what such a plot does not have: a part, a factor
-    or layers."""
+    ground. `exaggerate`: the factor by which the distance of the predicted path from the wanted
+    one is drawn larger. `polar`: the plot of the radial errors of this circle, from 1, in place of
+    the picture. `layers`: the names of the layers to show, None: the usual ones.
+
+    OptionError for a size or a part that makes no picture, a factor out of range, and a part,
+    a factor or layers with `polar`."""
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None
@@ -62,7 +62,7 @@ AS_USUAL = Options()
 
 
 def check_width(width_px: int) -> None:
-    """OptionError when no picture can be so wide."""
+    """OptionError for a width that no picture has."""
     if not SMALLEST_PX <= width_px <= LARGEST_PX:
         raise OptionError(
             f"a picture cannot be {width_px} pixels wide",

@@ -1,7 +1,7 @@
-"""Several paths laid over each other in one window: what differs between ways to run a program.
+"""Several predicted paths of one program over each other in one window.
 
-The wanted path lies below, pale and wide; each way to run it is one thin line with a colour of
-its own. The window is small (some tens of steps), so every step shows.
+The wanted path lies below, pale and wide; each variant is a thin line in a colour of its own. The
+window is small (some tens of steps), so every step shows.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from camtool.arrays import Floats
+from camtool.pictures.chains import moves_of
 from camtool.pictures.colours import FEED_PALE, LAYER_COLOURS
 from camtool.pictures.content import cropped
 from camtool.pictures.draw import rendered
@@ -31,7 +32,6 @@ from camtool.pictures.page import (
     title_and_notes,
 )
 from camtool.pictures.plot import Plot
-from camtool.pictures.strokes import strokes_of
 from camtool.pictures.svg import Look, PathData, element
 from camtool.pictures.trace import FINEST_SHARE
 from camtool.pictures.view import CROP_SHAPES, TALLEST, WIDEST, View, page_width
@@ -43,7 +43,7 @@ WANTED_PEN, RUN_PEN = 8.0, 2.0
 @dataclass(frozen=True, eq=False)
 class Overlay:
     """`window` (2, 2) mm [[xmin, xmax], [ymin, ymax]]; `wanted` the path without any error;
-    `runs` (name, strokes of points (n, 2) mm), in the order of the legend."""
+    `runs` (name, lines of points (n, 2) mm) of the variants, in the order of the legend."""
 
     title: str
     window: Floats
@@ -96,8 +96,8 @@ def _entries(overlay: Overlay) -> list[Entry]:
 
 def _paths(overlay: Overlay, view: View) -> str:
     """All paths in mm."""
-    strokes = strokes_of(overlay.wanted)
-    chains = (*strokes.feeds, *strokes.ramps)
+    moves = moves_of(overlay.wanted)
+    chains = (*moves.feeds, *moves.ramps)
     plot = Plot(view)
     pen = {**plot.round_pen(WANTED_PEN), "stroke": FEED_PALE}
     layers = [plot.lines("feeds", chains, pen)] if chains else []

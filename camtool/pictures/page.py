@@ -1,6 +1,7 @@
-"""The page of a picture: where its parts lie, and all that stands around the plot.
+"""The page of a picture: where its parts lie, and what stands around the plot.
 
-Head, axes with their numbers, legend, colour bar and scale bar; `sheet` puts everything on paper.
+That is the head, axes with their numbers, legend, colour bar and scale bar; `sheet` makes the SVG
+of all parts.
 """
 
 from __future__ import annotations
@@ -56,8 +57,8 @@ FITS = 3
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """`head` is ready; the legend's first row is centred on `legend_y`, the
-    scale bar on `bar_y`; `width` and `height` of the whole."""
+    """`head` is the SVG of title and notes, `rows` the legend; the first row is centred on
+    `legend_y`, the scale bar on `bar_y`; `width` and `height` are those of the page."""
 
     head: str
     view: View
@@ -70,7 +71,7 @@ class Page:
 
 
 def page_of(content: Content, width: float = PAGE) -> Page:
-    """The page of a picture alone."""
+    """The page of a picture of one scene."""
     head, down = title_and_notes(content.scene.title, content.notes, width)
     top = down + HEAD_GAP
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES
@@ -99,8 +100,8 @@ def fitted(
     shapes: tuple[float, float],
     beside: Callable[[View], float] = lambda view: 0.0,
 ) -> tuple[View, Ticks]:
-    """The view of a window on a page so wide and its ticks; `beside` tells how much room a view
-    needs right of it. Fitted thrice: the room for numbers follows from the scale."""
+    """The view of a window on a page of this width, and its ticks; `beside` gives the width that a
+    view needs right of it. Fitted `FITS` times: the room for numbers follows from the scale."""
     left, right = MARGIN + GUESSED_LEFT, width - MARGIN
     for _ in range(FITS):
         view = fit(window, left, top, right, shapes)
@@ -111,13 +112,13 @@ def fitted(
 
 
 def foot_of(rows: list[list[Entry]], legend_y: float) -> float:
-    """Height of a page whose legend of these rows begins at `legend_y`."""
+    """Height of a page whose legend has these rows, the first centred on `legend_y`."""
     return round(legend_y + max(len(rows) - 1, 0) * ROW_STEP + FOOT)
 
 
 def mat(box: Box, width: float, height: float) -> str:
-    """Paper round the plot of a page, which hides what leaves it. A clip would do the same, but
-    takes the renderer as long again as all lines together."""
+    """Paper round the plot of a page, which hides what leaves the plot. A clip would do the same,
+    but takes the renderer as long as all lines together."""
     path = PathData()
     paper = Box(0.0, 0.0, width, height + math.ceil(width / SMALLEST_PX))
     for each in (paper, box):
@@ -131,8 +132,8 @@ def mat(box: Box, width: float, height: float) -> str:
 
 
 def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) -> str:
-    """The whole SVG text of a picture: its parts on paper of `sizes`, width and height in units
-    of its own, as large and as dark as the options say."""
+    """The SVG text of a picture: its parts on paper of `sizes` (width and height in units of the
+    page), in the size and the palette of the options."""
     width, height = sizes
     size_px = options.size_px or SVG_WIDTH_PX
     root: Look = {
@@ -141,7 +142,7 @@ def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) 
         "height": number(size_px * height / width),
         "viewBox": f"0 0 {number(width)} {number(height)}",
     }
-    # Where the height is no whole number of pixels, the last row is paper all the same.
+    # The paper covers the last row of pixels also where the height is no whole number of them.
     below = math.ceil(width / size_px)
     paper = element("rect", {"width": width, "height": height + below, "fill": PAPER})
     picture = element("svg", root, title(name or "camtool picture"), paper, *parts)
@@ -161,26 +162,26 @@ LONGEST_ENTRY = 330.0
 BAR_WIDTH, BAR_GAP = 18.0, 26.0
 LEAST_BAR_SPACING = 85.0
 CLEAR_OF_TOP = 2.3
-"""Round numbers stay this many letters' heights below the largest error."""
+"""Round numbers are left out nearer than this many heights of a letter to the largest error."""
 
 BAR_TITLE = "error (µm)"
 
 
 def _name(entry: Entry) -> str:
-    """The text of an entry, shortened where it must be."""
+    """The text of an entry, shortened to `LONGEST_ENTRY`."""
     return text.shortened(entry.name, ENTRY.cap, LONGEST_ENTRY)
 
 
 def _width(entry: Entry) -> float:
-    """Room of an entry on its row, with the gap to the next."""
+    """Width of an entry in its row, with the gap to the next."""
     return SWATCH + SWATCH_GAP + text.width(_name(entry), ENTRY.cap) + ENTRY_GAP
 
 
 def title_and_notes(
     name: str, notes: Sequence[str], page: float = PAGE, *, lines: int = 1
 ) -> tuple[str, float]:
-    """Title, on at most so many lines, and notes at the top of a page so wide, and the height at
-    which they end."""
+    """The SVG of title, on at most `lines` lines, and notes at the top of a page of this width,
+    and the height at which they end."""
     room = page - 2.0 * MARGIN
     down = MARGIN
     parts = []
@@ -198,7 +199,7 @@ def title_and_notes(
 
 
 def _title_lines(name: str, room: float, most: int) -> list[str]:
-    """The title broken at blanks, and what follows the last line on it as far as it goes."""
+    """The title broken at blanks into at most so many lines, the last one shortened."""
     words = one_line(name).split()
     lines: list[str] = []
     while words and len(lines) < most - 1:
@@ -213,8 +214,8 @@ def _title_lines(name: str, room: float, most: int) -> list[str]:
 
 
 def rows_of(entries: Sequence[Entry], first: float, room: float) -> list[list[Entry]]:
-    """The entries in rows: the first no wider than `first`, the others than `room`; the first
-    one stays empty when there is no room in it."""
+    """The entries in rows: the first row no wider than `first`, the others than `room`; the first
+    row stays empty when no entry fits into it."""
     found: list[list[Entry]] = []
     if entries and _width(entries[0]) - ENTRY_GAP > first:
         found.append([])
@@ -232,8 +233,8 @@ def rows_of(entries: Sequence[Entry], first: float, room: float) -> list[list[En
 def rows_beside(
     entries: Sequence[Entry], bar: float, room: float
 ) -> tuple[list[list[Entry]], int]:
-    """The rows, and which of them ends with something `bar` wide: the first where an entry fits
-    beside it, else the last with room for it, else one of its own."""
+    """The rows, and the one that leaves `bar` free at its end: the first, where an entry fits
+    beside that, else the last one with so much room, else a row of its own."""
     first = room - bar
     if not entries or _width(entries[0]) - ENTRY_GAP <= first:
         return rows_of(entries, first, room), 0
@@ -271,19 +272,19 @@ def colour_bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
 
 
 def colour_bar_width(top_um: float, height: float) -> float:
-    """Room right of the plot that the colour bar needs."""
+    """Width that the colour bar needs right of the plot."""
     widest = max(text.width(name, TICK_CAP) for _, name in colour_bar_labels(top_um, height))
     header = text.width(BAR_TITLE, TICK_CAP)
     return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, header)
 
 
 def colour_bar(top_um: float, box: Box) -> str:
-    """The map with its numbers, as high as the plot, right of it."""
+    """The colour map with its numbers, right of the plot and as high."""
     left = box.right + BAR_GAP
     step = box.height / BINS
     parts = []
     for index, colour in reversed(list(enumerate(bin_colours()))):
-        # Each step reaches down to the foot, and the lower ones cover it: no seams.
+        # Each step reaches down to the foot and is covered by the lower ones: no seams.
         down = round(box.bottom - (index + 1) * step, 2)
         piece: Look = {"x": left, "y": number(down), "width": BAR_WIDTH}
         parts.append(
@@ -316,7 +317,7 @@ def colour_bar(top_um: float, box: Box) -> str:
 
 TICK_CAP = 14.5
 NAME_LIFT = 19.0
-"""Names of axes stand this far above the plot."""
+"""Distance of the names of axes from the plot."""
 
 TICK, MINOR_TICK = 8.0, 4.5
 LABEL_GAP = 7.0
@@ -347,7 +348,7 @@ class Ticks:
 
 
 def ticks_of(view: View) -> Ticks:
-    """Ticks so far apart that their numbers cannot touch."""
+    """Ticks whose numbers cannot touch."""
     spacing = LEAST_SPACING
     while True:
         step = round_step(spacing / view.scale)
@@ -361,7 +362,7 @@ def ticks_of(view: View) -> Ticks:
 
 
 def ground(view: View, ticks: Ticks) -> str:
-    """Ground and grid of the plot: goes below everything."""
+    """Ground and grid of the plot, below everything."""
     box, grid = view.box, PathData()
     for x in ticks.x:
         grid.move(view.page(x, 0.0)[0], box.top)
@@ -380,7 +381,7 @@ def ground(view: View, ticks: Ticks) -> str:
 
 
 def axes_around(view: View, ticks: Ticks) -> str:
-    """Frame, ticks and numbers: goes above the plot."""
+    """Frame, ticks and numbers, above the plot."""
     box, marks, labels = view.box, PathData(), []
     unit = text.width("X (mm)", TICK_CAP)
     base = box.bottom + TICK + LABEL_GAP + TICK_CAP
@@ -416,7 +417,7 @@ def _tick(marks: PathData, at: tuple[float, float], by: tuple[float, float]) -> 
 
 
 def _minor(marks: PathData, view: View, ticks: Ticks) -> None:
-    """Short ticks between: four to a step of 2, else five."""
+    """Short ticks that divide each step: one of 2, 20 … into four, others into five."""
     is_two = f"{ticks.step_mm:.0e}".startswith("2")
     step = ticks.step_mm / (4.0 if is_two else 5.0)
     for x in multiples(*view.x_range, step):
@@ -426,7 +427,7 @@ def _minor(marks: PathData, view: View, ticks: Ticks) -> None:
 
 
 def scale_bar_length(view: View) -> tuple[float, str]:
-    """A round length in mm, and how it is called."""
+    """A round length in mm, and its text."""
     length = round_length(BAR_SHARE * view.box.width / view.scale)
     if length < 1.0:
         return length, f"{number(length * 1000.0, decimals_of(length * 1000.0))} µm"

@@ -19,8 +19,8 @@ from camtool.units import UM_PER_MM
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Picture:
-    """A picture of `scene` (several: beside each other, at one scale), looking as `options` say;
-    the same bytes for the same values."""
+    """A picture of `scene` (several: beside each other, at one scale) with these options; equal
+    values give equal bytes."""
 
     scene: Scene | Overlay | tuple[Scene, ...]
     options: Options = AS_USUAL
@@ -35,8 +35,9 @@ class Picture:
         return draw(self.scene, self.options)
 
     def render(self, name: str) -> bytes:
-        """The bytes of a file of this name: .svg, .png, or .html, which is the viewer (it has no
-        options, and shows one value alone). OutputError or OptionError for any other."""
+        """The bytes of a file of this name: .svg, .png, or .html, the viewer's page of one scene,
+        without options. OutputError for other extensions, OptionError for options that do not
+        fit."""
         if isinstance(self.scene, tuple):
             return render_beside(self.scene, name, self.options)
         if isinstance(self.scene, Overlay):
@@ -57,14 +58,14 @@ class Picture:
 
 
 ERRORS_ACROSS = 16.0
-"""A close-up is so many times the largest error wide: steps show, and what they are a step of."""
+"""Width of a close-up in largest errors: it shows single steps and the line that they follow."""
 
 LEAST_SHARE = 0.02
-"""It is no smaller than this share of the predicted path: its points are not finer."""
+"""Least width of a close-up as a share of the predicted path, whose points are no finer."""
 
 
 def closeups(scene: Scene, options: Options) -> Iterator[tuple[str, Options]]:
-    """Caption and looks of each close-up; none where nothing was predicted. Size and ground are
+    """Caption and options of each close-up; none where nothing was predicted. Size and ground are
     those of `options`, the rest is as usual."""
     plain = Options(size_px=options.size_px, dark=options.dark)
     points, errors = scene.trace_points, scene.trace_error_mm
@@ -80,5 +81,7 @@ def closeups(scene: Scene, options: Options) -> Iterator[tuple[str, Options]]:
     if known:
         worst = max(known)
         number = next(k for k, one in enumerate(scene.rounds, 1) if one.circular_mm == worst)
-        said = f"Circle {number}, that of the largest circular error, {worst * UM_PER_MM:.2f} µm"
-        yield said, replace(plain, polar=number)
+        caption = (
+            f"Circle {number}, that of the largest circular error, {worst * UM_PER_MM:.2f} µm"
+        )
+        yield caption, replace(plain, polar=number)

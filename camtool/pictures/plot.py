@@ -1,4 +1,4 @@
-"""The Plot: lines, marks, arrows and numbers, as the layers of a picture draw them.
+"""The Plot: lines, marks, arrows and texts, as the layers of a picture draw them.
 
 Lines are written in mm (their group flips and scales), marks in units of the page.
 """
@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.pictures import text
+from camtool.pictures.chains import Chain, path_data
 from camtool.pictures.colours import BODY, FEED, PLOT
 from camtool.pictures.content import Place
-from camtool.pictures.strokes import Chain, path_data
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import Style
 from camtool.pictures.trace import Trace, trace_layer
 from camtool.pictures.view import View
 
 MOST_BODIES = 500
-"""The light fill shows what is closed; drawings of more paths go without."""
+"""Drawings of more closed paths have no light fill."""
 
 INK_SHARE = 0.12
 """Lines become thinner once they would cover more than this share of the plot."""
@@ -31,7 +31,7 @@ THINNEST = 0.5
 ARROW_LENGTH, ARROW_WIDTH = 18.0, 6.5
 ARROW_EVERY = 900.0
 ARROWS_APART = 60.0
-"""An arrow nearer than this to another is left out: passes at several depths lie over each
+"""An arrow nearer than this to another one is left out: passes at several depths lie over each
 other."""
 
 SHORTEST_WITH_ARROW = 90.0
@@ -72,8 +72,8 @@ class Plot:
         return max(min(base, room), THINNEST)
 
     def _length_shown(self, chain: Chain) -> float:
-        """mm of a chain in view, about: moves whose ends have the window between them count whole,
-        none for more than its diagonal."""
+        """About how many mm of a chain are in view: of each move whose box touches the window its
+        length, but no more than the window's diagonal."""
         low, high = np.array([self.view.x_range, self.view.y_range]).T
         begin, end = chain.points[:-1], chain.points[1:]
         near = (np.minimum(begin, end) <= high) & (np.maximum(begin, end) >= low)
@@ -94,7 +94,7 @@ class Plot:
         return element("path", {"d": path_data(chains)})
 
     def lines(self, name: str, chains: Sequence[Chain], look: Look) -> str:
-        """The same in a group of its own, drawn so; empty without any."""
+        """Lines and arcs of one look as a group; empty without any."""
         return element("g", {"id": name, **look}, self.path(chains)) if chains else ""
 
     def body(self, chains: Sequence[Chain]) -> str:
@@ -106,7 +106,7 @@ class Plot:
         return element("g", {"id": "body"}, element("path", fill))
 
     def frame(self, name: str, size_mm: tuple[float, float], colour: str) -> str:
-        """A rectangle from part zero."""
+        """A rectangle whose lower left corner is part zero."""
         sides: Look = {"x": 0.0, "y": 0.0, "width": size_mm[0], "height": size_mm[1]}
         line: Look = {"fill": "none", "stroke": colour, "stroke-width": self.view.mm(2.0)}
         return element("g", {"id": name}, element("rect", {**sides, **line}))
@@ -133,7 +133,7 @@ class Plot:
         return element("g", {"id": name, **line}, *marks)
 
     def arrows(self, chains: Sequence[Chain]) -> str:
-        """Few arrows, in the direction of travel: none on short chains, four at most on one."""
+        """Arrows in the direction of travel: none on a short chain, four at most on any."""
         view = self.view
         lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
         long = [index for index, length in enumerate(lengths) if length >= SHORTEST_WITH_ARROW]
@@ -167,8 +167,8 @@ class Plot:
 
 
 def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], float]:
-    """Point and heading in the middle of the longest piece of a move between two shares of the
-    chain's length: on a straight or a smooth arc, away from corners."""
+    """Point and heading in the middle of the longest move or part of a move between two shares of
+    the chain's length: away from corners."""
     ends = np.cumsum(chain.lengths())
     begins = np.concatenate([[0.0], ends[:-1]])
     first = np.maximum(begins, low * ends[-1])

@@ -1,5 +1,6 @@
-"""The polar plot of a circle: its radial error, magnified, about the programmed circle; both ways
-round in one plot where the path goes both, as a ball-bar does.
+"""The polar plot of a circle: its radial error, magnified, about the programmed circle.
+
+Where the path follows the circle in both directions, as in a ball-bar test, one plot shows both.
 """
 
 from __future__ import annotations
@@ -26,19 +27,19 @@ from camtool.units import UM_PER_MM
 
 @dataclass(frozen=True, eq=False)
 class CircleErrors:
-    """A circle of the plot: its number, and its errors (B, 3) µm."""
+    """A circle of the plot: its number `which`, and its errors (B, 3) µm."""
 
     which: int
     one: Round
     errors_um: Floats
 
     @property
-    def way(self) -> str:
+    def direction(self) -> str:
         return "counterclockwise" if self.one.ccw else "clockwise"
 
 
 def shown(scene: Scene, which: int) -> tuple[CircleErrors, ...]:
-    """The `which`-th circle of the scene, from 1, and the same one gone round the other way where
+    """The `which`-th circle of the scene, from 1, with the same one in the other direction where
     there is that, counterclockwise first; OptionError when there is no such circle."""
     if not 1 <= which <= len(scene.rounds):
         many = len(scene.rounds)
@@ -55,7 +56,8 @@ def shown(scene: Scene, which: int) -> tuple[CircleErrors, ...]:
 
 
 def draw_polar(scene: Scene, which: int, options: Options) -> str:
-    """SVG text of the `which`-th circle of the scene, from 1; OptionError when there is none."""
+    """SVG text of the plot of the `which`-th circle of the scene, from 1; OptionError when there
+    is none."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     circles = shown(scene, which)
     errors = [circle.errors_um for circle in circles]
@@ -68,7 +70,7 @@ def draw_polar(scene: Scene, which: int, options: Options) -> str:
 
 
 def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[str, float]:
-    """The legend below `top` on a page so wide, and the height of that page."""
+    """The legend below `top` on a page of this width, and the height of that page."""
     if not entries:
         return "", round(top + MARGIN)
     room = width - 2.0 * MARGIN
@@ -78,17 +80,17 @@ def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[st
 
 
 def entries(circles: Sequence[CircleErrors]) -> list[Entry]:
-    """Which way is which, where there are two."""
+    """The legend: the direction of each circle, where there are two."""
     if len(circles) < 2:
         return []
     return [
-        Entry(line_swatch(line, 2.4), f"{circle.way} (circle {circle.which})")
+        Entry(line_swatch(line, 2.4), f"{circle.direction} (circle {circle.which})")
         for circle, (line, _) in zip(circles, PENS, strict=False)
     ]
 
 
 def notes(circles: Sequence[CircleErrors], dial: Dial) -> tuple[str, ...]:
-    """The circle, its figures, and how much its errors are magnified."""
+    """The circle, its figures, and the magnification of its errors."""
     first = circles[0].one
     x, y = first.centre_mm
     magnified = dial.per_um * UM_PER_MM * first.radius_mm / dial.base
@@ -96,15 +98,16 @@ def notes(circles: Sequence[CircleErrors], dial: Dial) -> tuple[str, ...]:
     scale = f"radial error × {times}; from ring to ring {dial.step_um:g} µm"
     place = f"radius {first.radius_mm:.4g} mm about ({x:.4g}, {y:.4g}) mm"
     if len(circles) == 1:
-        about = f"circle {circles[0].which}: {place}, {circles[0].way}"
+        about = f"circle {circles[0].which}: {place}, {circles[0].direction}"
         figures = f"{_iso(first)} (µm)", f"reversal values {_reversal(first)} (µm)"
         return (about, *figures, scale)
-    told = [
-        f"{circle.way}: {_iso(circle.one)}, {_reversal(circle.one)} (µm)" for circle in circles
+    each = [
+        f"{circle.direction}: {_iso(circle.one)}, {_reversal(circle.one)} (µm)"
+        for circle in circles
     ]
     both = f"both ways together: G(b) {_um(first.both_circular_mm).lstrip('+')} (µm)"
     names = " and ".join(str(circle.which) for circle in circles)
-    return (f"circles {names}: {place}, both ways round", *told, both, scale)
+    return (f"circles {names}: {place}, both ways round", *each, both, scale)
 
 
 def _iso(one: Round) -> str:
@@ -123,8 +126,8 @@ def _um(length_mm: float) -> str:
 
 # The dial of a polar plot: rings, the ends of the axes, and the errors of one circle or of two.
 #
-# A ring stands for each round number of µm; the thick one is the programmed circle. The band lies
-# between the least and the largest radius of each half degree, the line is their mean.
+# Each round number of µm has a ring; the thick one is the programmed circle. The band lies between
+# the least and the largest radius of each half degree, the line is their mean.
 
 CAP, LABEL_CAP = 14.5, 12.3
 HALO = 2.5
@@ -132,21 +135,21 @@ ROOM = 62.0
 """Between the outermost ring and the edges of the page, for the names of the axes."""
 
 BASE_SHARE = 0.62
-"""The programmed circle lies at this share of the outermost radius, or farther in."""
+"""Radius of the programmed circle as a share of the outermost one, at most."""
 
 FEWEST_RINGS = 3
-"""At least so many rings fit between the programmed circle and the largest error."""
+"""Least number of rings between the programmed circle and the largest error."""
 
 LEAST_UM = 1e-3
-"""Errors smaller than this are not magnified further."""
+"""The magnification grows no further for errors smaller than this."""
 
 LABELS_DEG = (22.5, 67.5, 112.5, 157.5, 202.5, 247.5, 292.5, 337.5)
-"""The rings have their numbers along one of these directions, where they hide least."""
+"""The rings are numbered along that of these directions where the numbers hide least."""
 
 FEWEST_LABELS = 2
 
 FIRST_LABEL = 40.0
-"""Rings smaller than this have no number: it would lie on the middle."""
+"""Rings of a smaller radius have no number: it would lie on the middle."""
 
 AXES = ("X+", "Y+", "X−", "Y−")
 
@@ -172,13 +175,13 @@ class Dial:
         return x + radius * math.cos(angle), y - radius * math.sin(angle)
 
     def placed(self, top: float, width: float) -> Dial:
-        """The same below `top`, in the middle of the width."""
+        """The dial below `top`, in the middle of the width."""
         return replace(self, middle=(0.5 * width, top + ROOM + self.outer))
 
 
 def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
-    """The dial of errors (B, 3) of circles on a plot so wide, its middle at (0, 0): scaled so
-    that the largest error of all, out or in, just fits."""
+    """The dial of errors (B, 3) µm of circles on a plot of this width, its middle at (0, 0); the
+    largest error of all, outward or inward, just fits."""
     outer = 0.5 * width - MARGIN - ROOM
     errors = np.concatenate([each.ravel() for each in errors_um])
     seen = errors[np.isfinite(errors)]
@@ -193,7 +196,8 @@ def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
 
 
 def plot(errors_um: Sequence[Floats], dial: Dial) -> list[str]:
-    """Rings, the ends of the axes, and the errors (B, 3) of each circle; bands lie below lines."""
+    """The SVG of rings, the ends of the axes, and the errors (B, 3) µm of each circle; bands lie
+    below lines."""
     bands, lines = [], []
     for errors, (line, pale) in zip(errors_um, PENS, strict=False):
         band, mean = _band(errors, dial, line, pale)
@@ -222,7 +226,7 @@ def _rings(dial: Dial) -> str:
 
 
 def _quadrants(dial: Dial) -> str:
-    """A line where each axis turns, with the name of its end."""
+    """A line to each end of an axis, where that axis reverses, with its name."""
     data, labels = PathData(), []
     (x, y), outer, style = dial.middle, dial.outer, Style(CAP, INK, "middle")
     for index, name in enumerate(AXES):
@@ -236,7 +240,8 @@ def _quadrants(dial: Dial) -> str:
 
 
 def _band(errors: Floats, dial: Dial, colour: str, pale: str) -> tuple[str, str]:
-    """Least to largest as a filled band, the mean as a line; open where nothing was seen."""
+    """A band from the least to the largest error, and a line of the mean; open where the slides
+    never were."""
     step = 2.0 * math.pi / len(errors)
     band, line = PathData(), PathData()
     for run in _runs(np.isfinite(errors[:, 1])):
@@ -263,7 +268,7 @@ def _stroke(data: PathData, points: list[tuple[float, float]]) -> None:
 
 
 def _runs(seen: np.ndarray) -> list[list[int]]:
-    """Runs of bins in a row, once round; a whole circle ends where it begins."""
+    """Runs of consecutive bins, once round; a whole circle ends where it begins."""
     count = len(seen)
     if seen.all():
         return [list(range(count + 1))]
@@ -279,8 +284,8 @@ def _runs(seen: np.ndarray) -> list[list[int]]:
 
 
 def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
-    """µm at the rings, as many as have room, along the direction where they hide least; what
-    would hide an error is left out while others tell the scale."""
+    """The numbers of the rings, µm, along the direction where they hide least. A number that would
+    hide an error is left out where at least `FEWEST_LABELS` remain."""
     places = np.array([_places(errors, dial) for errors in errors_um]).reshape(-1, 2)
     clear, numbers = [], []
     for degrees in LABELS_DEG:
@@ -297,7 +302,8 @@ def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
 
 
 def _places(errors_um: Floats, dial: Dial) -> Floats:
-    """(3 B, 2) page places of the least, mean and largest errors; NaN where nothing was seen."""
+    """(3 B, 2) places on the page of the least, mean and largest errors; NaN where the slides
+    never were."""
     angle = (np.arange(len(errors_um)) + 0.5) * (2.0 * np.pi / len(errors_um))
     radius = dial.base + errors_um * dial.per_um
     x = dial.middle[0] + radius * np.cos(angle)[:, None]

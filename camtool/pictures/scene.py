@@ -1,7 +1,7 @@
-"""The Scene: everything that one picture shows, in one frame (the work frame, mm).
+"""The Scene: all that one picture shows, in the work frame, mm.
 
-`scene_of` makes it of whatever is known of a part: its drawing, its toolpath, the verdict on its
-program. The viewer asks for its `Playback` besides: seconds, errors, the program's lines, tables.
+`scene_of` makes it of what is known of a part: its drawing, its toolpath, the verification of its
+program. The viewer also asks for its `Playback`: seconds, errors, the program's lines, tables.
 """
 
 from __future__ import annotations
@@ -28,31 +28,30 @@ if TYPE_CHECKING:
 
 
 LINES_SHOWN = 200
-"""A table of the viewer has no more lines than this; the JSON report has them all."""
+"""Most lines of a table of the viewer; the JSON report has all of them."""
 
 POINTS_OF_A_PAGE = 400_000
-"""The viewer is given so many points of the slides' path: enough for the ends of 200,000 moves and
+"""Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and
 the largest error within each."""
 
 NAME_WIDTH = 11
-"""Characters of the report's text before the figures of a line."""
+"""Width of the names at the left of the report's text, in characters."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What to draw; whatever is None or empty is left out.
+    """What to draw; what is None or empty is left out.
 
-    `wanted` are the lines and arcs that the trace was held against, `worst` the places of the
-    largest errors, mm, the largest first; `tool_mm` is the diameter of the one tool,
-    `rounds` are full circles with what became of them.
+    The drawing is in the work frame. trace_points (T, 2) mm is the predicted path of the slides,
+    trace_error_mm (T,) its distance from the wanted path, trace_cutting (T,) whether the tool cuts
+    between the point before and this one (None: always); errors count only there. travel_mm is the
+    size of the table's travel from (0, 0). `wanted` are the lines and arcs with which the trace
+    was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
+    diameter of the tool, if there is only one; `rounds` are full circles with their errors.
+    `playback` gives how the toolpath runs; only the viewer calls it.
 
-    trace_points (T, 2) mm is the path of the slides, trace_error_mm (T,) its distance to what was
-    wanted, trace_cutting (T,) whether the tool cut on the way to each point (always when None);
-    other errors do not count. travel_mm is the size of the table's travel from (0, 0). `playback`
-    gives how the toolpath runs, for the viewer; it is called only there.
-    The drawing is in the work frame. With a trace the picture is one of the
-    part: rapids and plunges are left out, feeds are pale. ValueError when the trace is incomplete
-    or not finite.
+    With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
+    trace is incomplete or not finite.
     """
 
     title: str = ""
@@ -90,8 +89,8 @@ class Scene:
 class Round:
     """A circle (x, y) mm of this radius mm and direction, with its bins (B, 9) as
     `camtool.kernels.circle_bins` fills them; circular error G, radial errors F max, F min and
-    their mean D, and the reversal values B of X and Y, mm, NaN where nobody knows. `partner` is
-    the number, from 1, of the same circle gone round the other way, `both_circular_mm` the
+    their mean D, and the reversal values B of X and Y, mm, NaN where unknown. `partner` is the
+    number, from 1, of the same circle in the other direction, `both_circular_mm` the
     bi-directional circular error G(b) of the two."""
 
     centre_mm: tuple[float, float]
@@ -105,7 +104,8 @@ class Round:
     both_circular_mm: float = math.nan
 
     def errors(self) -> Floats:
-        """(B, 3) mm: least, mean and largest radial error of each bin; NaN where nothing was."""
+        """(B, 3) mm: least, mean and largest radial error of each bin; NaN where the slides never
+        were."""
         seen = self.bins[:, 0] > 0.0
         found = np.full((len(self.bins), 3), np.nan)
         bins = self.bins[seen]
@@ -120,7 +120,7 @@ class Round:
 
 @dataclass(frozen=True)
 class Line:
-    """A line of a table: its cells, and the row of the toolpath that it speaks of."""
+    """A line of a table: its cells, and the row of the toolpath that it is about."""
 
     cells: tuple[str, ...]
     move: int | None = None
@@ -128,7 +128,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the report; `columns` may be empty."""
+    """A table of the report; `columns` are its headings, which may be missing."""
 
     title: str
     columns: tuple[str, ...]
@@ -137,11 +137,11 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """How N rows of a toolpath run: `seconds` (N,); `error_mm` (N,), NaN where not known;
+    """How N rows of a toolpath run: `seconds` (N,); `error_mm` (N,), NaN where unknown;
     `trace_row` (T,) the row of each point of the scene's trace.
 
-    `blocks` are the program's lines, one per block, or None without a program; `binary` tells
-    that they are bytes in hex. ValueError when the columns do not fit.
+    `blocks` are the program's lines, one per block, None without a program; `binary`: they are
+    bytes in hex. ValueError when the lengths of the columns differ, and for impossible seconds.
     """
 
     seconds: Floats
@@ -159,15 +159,15 @@ class Playback:
 
 
 def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
-    """The run of a toolpath that nothing simulates: each move at its feed, rapids at
-    `rapid_mm_min` (inf: in no time), dwells as long as they say."""
+    """How a toolpath runs without a simulation: each move at its feed, rapids at `rapid_mm_min`
+    (inf: in no time), dwells for their seconds."""
     seconds = np.zeros(len(toolpath))
     if len(toolpath):
         away = toolpath.end - toolpath.starts
         flat = np.hypot(away[:, 0], away[:, 1])
         spoke = toolpath.starts[:, :2] - toolpath.centre
-        bow = np.abs(toolpath.sweeps()) * np.hypot(spoke[:, 0], spoke[:, 1])
-        length = np.hypot(np.where(toolpath.is_arc, bow, flat), away[:, 2])
+        along = np.abs(toolpath.sweeps()) * np.hypot(spoke[:, 0], spoke[:, 1])
+        length = np.hypot(np.where(toolpath.is_arc, along, flat), away[:, 2])
         feed = np.where(toolpath.kind == Kind.RAPID, rapid_mm_min, toolpath.feed)
         known = toolpath.is_motion & np.isfinite(feed) & (feed > 0.0)
         seconds[known] = length[known] / feed[known] * 60.0
@@ -177,7 +177,7 @@ def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
 
 
 def scene_of_drawing(drawing: Drawing, title: str = "") -> Scene:
-    """A drawing alone, with its size; the title is its file unless another one is given."""
+    """The scene of a drawing alone, with its size; the title is its file unless one is given."""
     note = f"{len(drawing.marks)} points" if drawing.marks else "nothing drawn"
     if len(drawing.paths):
         (left, right), (bottom, top) = extents(drawing.paths).tolist()
@@ -195,10 +195,9 @@ def scene_of(
     machine: Machine | None = None,
     listing: Callable[[], Listing | None] | None = None,
 ) -> Scene:
-    """The scene of whatever is there; with a verification, the slides' path by its error.
+    """The scene of what is given; with a verification, of the predicted path as well.
 
-    `job` tells where it places the drawing in the work frame; `listing` gives the program's lines
-    to the viewer.
+    `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer.
     """
     from camtool.verification.case import cone_of, tool_mm
 
@@ -210,7 +209,7 @@ def scene_of(
         drawing = place(drawing, job)
     trace = verification.trace if verification is not None else None
     worst = () if verification is None else verification.report.worst
-    # A V bit is as wide as it is deep: one width for all of its path would be false.
+    # A V bit is as wide as it is deep: its path has no single width.
     even = job is not None and cone_of(job) is None
     return Scene(
         title=title,
@@ -230,13 +229,13 @@ def scene_of(
 
 
 def points_for(picture: str | None) -> int | None:
-    """How many points of the slides' path a picture of this name wants; None: as usual."""
+    """How many points of the slides' path a picture of this name needs; None: as usual."""
     return POINTS_OF_A_PAGE if (picture or "").lower().endswith(".html") else None
 
 
 def rounds_of(verification: Verification) -> tuple[Round, ...]:
-    """The full circles as polar plots show them, each with the same one gone round the other way
-    where there is that."""
+    """The full circles as polar plots show them, each with the number of the same circle in the
+    other direction."""
     from camtool.verification.circles import Pairs, both_ways
 
     seen = verification.circles
@@ -265,8 +264,8 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
-    """The table's travel, mm, if the path lies in it with part zero at its lower-left corner:
-    only then is there a place where the frame can honestly be drawn."""
+    """The table's travel, mm, if the path lies in it with part zero at its lower left corner; None
+    otherwise: where the travel lies is not known then."""
     if toolpath is None or machine is None:
         return None
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
@@ -282,8 +281,8 @@ def _playback(
     machine: Machine | None,
     listing: Callable[[], Listing | None] | None,
 ) -> Callable[[], Playback] | None:
-    """What gives, when the viewer asks, how the toolpath runs: as simulated where there is a
-    verification, else by its feeds."""
+    """The function that gives how the toolpath runs: as simulated where there is a verification,
+    otherwise by its feeds."""
     if toolpath is None or machine is None:
         return None
 
@@ -304,7 +303,8 @@ def _playback(
 
 
 def _tables(report: Report) -> Iterator[Table]:
-    """The report's figures; tables without a line are left out."""
+    """The tables of a report: its figures, findings, worst moves and contours, none without a
+    line."""
     lines = report.to_text(findings=False).splitlines()
     facts = [(line[:NAME_WIDTH].strip(), line[NAME_WIDTH:].strip()) for line in lines]
     yield Table("Report", (), tuple(map(Line, facts)))
@@ -321,7 +321,7 @@ def _findings(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
 
 
 def _worst(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
-    """The worst moves; the report counts them from 1."""
+    """The worst moves, which the report numbers from 1."""
     lines = [
         Line(
             (

@@ -1,6 +1,6 @@
-"""Primitives of SVG text: numbers, escaping, elements and path data.
+"""SVG text: numbers, escaping, elements and path data.
 
-Everything is written in one way only, so that equal input gives equal bytes: fixed decimals
+There is one form of everything, so that equal input gives equal bytes: fixed decimals
 without trailing zeros, attributes in the order given, one element a line.
 """
 
@@ -90,17 +90,17 @@ class PathData:
         return bool(self._parts)
 
     def move(self, x: float, y: float) -> None:
-        """Begin a new stroke."""
+        """Begin a new subpath."""
         self._add("M", x, y)
 
     def line(self, x: float, y: float) -> None:
-        """Straight to here."""
+        """A straight line to here."""
         self._add("L", x, y)
 
     def arc(self, x: float, y: float, *, radius: float, sweep_rad: float) -> None:
-        """Circular arc to here, |sweep| < 2π; a positive sweep turns from +X towards +Y.
+        """A circular arc to here, |sweep| < 2π; a positive sweep turns from +X towards +Y.
 
-        In SVG, large-arc says |sweep| > π, and sweep-flag 1 means growing angles.
+        In SVG, large-arc is 1 for |sweep| > π, and sweep-flag is 1 for growing angles.
         """
         size = number(radius, self._decimals)
         large, growing = int(abs(sweep_rad) > math.pi), int(sweep_rad > 0.0)
@@ -108,7 +108,7 @@ class PathData:
         self._parts.append(f"A{size} {size} 0 {large} {growing} {end}")
 
     def close(self) -> None:
-        """Back to the beginning of the stroke."""
+        """A straight line to the beginning of the subpath."""
         self._parts.append("Z")
 
     def _add(self, command: str, x: float, y: float) -> None:

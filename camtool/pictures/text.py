@@ -1,7 +1,7 @@
-"""Labels as single strokes, so that a picture needs no font and looks alike everywhere.
+"""Labels drawn with single strokes, so that a picture needs no font and looks the same everywhere.
 
-The letters are those of `camtool.geometry.hershey`; what that font lacks is shown as an empty box.
-The true text always stays in the label's `<title>` and `aria-label`.
+The letters are those of `camtool.geometry.hershey`; a letter that the font lacks is an empty box.
+The text itself stands in the label's `<title>` and `aria-label`.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from camtool.pictures.colours import INK
 from camtool.pictures.svg import Look, PathData, element, one_line, title
 
 _UNIT = re.compile(r" (?!\(?(?:µm|mm|h)\b)")
-"""Blanks to break at: not those between a number and its unit."""
+"""Blanks where a line may break: not those between a number and its unit."""
 
 
 @dataclass(frozen=True)
 class Style:
-    """`cap` is the height of a capital on the page; `weight` the stroke as a share of it."""
+    """`cap` is the height of a capital on the page; `weight` is the width of its strokes as a
+    share of `cap`."""
 
     cap: float = 13.0
     colour: str = INK
@@ -42,7 +43,7 @@ def shortened(text: str, cap: float, limit: float) -> str:
     text = one_line(text)
     if width(text, cap) <= limit:
         return text
-    # Names of many thousand letters come too: each letter is looked at once.
+    # A name may have many thousand letters: each is measured once.
     advances = accumulate((_drawn(letter).advance for letter in text), initial=_drawn("…").advance)
     kept = sum(advance * cap / CAP_UNITS <= limit for advance in advances)
     return text[: max(kept - 1, 0)].rstrip() + "…"

@@ -1,8 +1,8 @@
-"""The path of the slides, coloured by its error.
+"""The predicted path of the slides, coloured by its error.
 
-Points in a row that fall into the same step of the colour map become one stroke, and all strokes
-of one step become one path, so that 20,000 points stay well below a megabyte. Larger errors are
-drawn later: what is worst lies on top.
+Consecutive points in the same step of the colour map become one line, and all lines of one step
+become one path of the SVG, so that 20,000 points stay well below a megabyte. Larger errors are
+drawn later: the largest lie on top.
 """
 
 from __future__ import annotations
@@ -22,19 +22,20 @@ from camtool.pictures.view import View
 from camtool.units import UM_PER_MM
 
 LEAST_TOP_UM = 1e-3
-"""The colour map ends here when no error is larger."""
+"""The colour map ends here where all errors are smaller."""
 
 FINEST_SHARE = 1e-5
-"""Coordinates of the trace are written to this share of the window, a 25th pixel of 4000."""
+"""Coordinates of the path are rounded to this share of the window: 1/25 of a pixel of 4000."""
 
 MERGED_SHARE = 1.25e-4
-"""Points nearer than this share of the window, half a pixel of 4000, may become one."""
+"""Points nearer than this share of the window, half a pixel of 4000, may be left out."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Points (T, 2) mm, |error| (T,) µm, whether the tool cut on the way there (T,); the map's
-    end; how many times as far from the wanted path the points are drawn as they are."""
+    """Points (T, 2) mm, as drawn; |error| (T,) µm; whether the tool cuts between the point before
+    and this one (T,); the end of the colour map, µm; `times`, by which the distances of the points
+    from the wanted path have been multiplied."""
 
     points: Floats
     error_um: Floats
@@ -44,7 +45,7 @@ class Trace:
 
 
 def trace_of(scene: Scene, times: float = 1.0) -> Trace | None:
-    """The trace of a scene, its errors drawn so many `times` as large where the wanted path is
+    """The predicted path of a scene, its errors drawn `times` as large where the wanted path is
     known; None when there is none or it never cuts."""
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or not cutting.any():
@@ -61,17 +62,15 @@ def trace_of(scene: Scene, times: float = 1.0) -> Trace | None:
 
 
 def bins_of(trace: Trace) -> Ints:
-    """(T−1,) the step of the map for each piece of the path, by its worse end; −1: not cutting.
-
-    Whether a piece cuts is said by the point that it leads to.
-    """
+    """(T−1,) the step of the map for each piece of the path, by the larger error of its ends; −1
+    where the tool does not cut."""
     worse = np.maximum(trace.error_um[:-1], trace.error_um[1:])
     step = np.minimum((worse / trace.top_um * BINS).astype(np.int64), BINS - 1)
     return np.where(trace.cutting[1:], step, -1)
 
 
-def strokes(trace: Trace, window_mm: float) -> list[list[Floats]]:
-    """For each step of the map, its strokes: arrays (n, 2) of points, n ≥ 2."""
+def lines_by_step(trace: Trace, window_mm: float) -> list[list[Floats]]:
+    """For each step of the map, its lines: arrays (n, 2) of points, n ≥ 2."""
     keep = _kept(trace, MERGED_SHARE * window_mm)
     chosen = Trace(
         trace.points[keep], _worst_between(trace, keep), trace.cutting[keep], trace.top_um
@@ -88,7 +87,8 @@ def strokes(trace: Trace, window_mm: float) -> list[list[Floats]]:
 
 
 def _kept(trace: Trace, apart_mm: float) -> Ints:
-    """Points to draw: those at least `apart_mm` from the one before, and all ends of cuts."""
+    """Rows of the points to draw: those at least `apart_mm` from the one before, and all ends of
+    cuts."""
     cutting = trace.cutting
     ends = np.ones(len(cutting), dtype=np.bool_)
     ends[1:-1] = (cutting[1:-1] != cutting[:-2]) | (cutting[1:-1] != cutting[2:])
@@ -103,7 +103,7 @@ def _kept(trace: Trace, apart_mm: float) -> Ints:
 
 
 def _worst_between(trace: Trace, keep: Ints) -> Floats:
-    """(kept,) the largest error from each kept point up to the next: merging hides none."""
+    """(kept,) the largest error from each kept point up to the next: no error is hidden."""
     return np.maximum.reduceat(trace.error_um, keep)
 
 
@@ -112,7 +112,7 @@ def trace_layer(trace: Trace, view: View, pen: float) -> str:
     (low, high), colours = view.x_range, bin_colours()
     decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
     paths = []
-    for colour, runs in zip(colours, strokes(trace, high - low), strict=True):
+    for colour, runs in zip(colours, lines_by_step(trace, high - low), strict=True):
         data = PathData(decimals)
         for run in runs:
             points = run.tolist()
@@ -130,15 +130,15 @@ def trace_layer(trace: Trace, view: View, pen: float) -> str:
     return element("g", {"id": "slide-path", **pen_of_all}, *paths)
 
 
-# The path of the slides with its deviation from what was wanted, many times as large.
+# The predicted path with its deviation from the wanted one N times as large.
 #
-# With p a point of the slides and q the point of the wanted path that is nearest to it, there is
-# drawn  q + N (p − q).  A factor of 1 changes nothing; where two points of the wanted path are as
-# near, the picture jumps, as the nearest point does.
+# Of a point p of the slides and the point q of the wanted path that is nearest to it,
+# q + N (p − q) is drawn.  A factor of 1 changes nothing; where the nearest point jumps, the drawn
+# path jumps too.
 
 
 def exaggerated(points: Floats, wanted: Segments, times: float) -> Floats:
-    """(T, 2) mm of points (T, 2) mm, `times` as far from the nearest point of `wanted`."""
+    """(T, 2) mm: points (T, 2) mm moved `times` as far from the nearest point of `wanted`."""
     if not len(points) or not len(wanted):
         return points
     foot = nearest_points(points, wanted)
@@ -162,7 +162,7 @@ def nearest_points(points: Floats, wanted: Segments) -> Floats:
 
 
 def _on_arcs(points: Floats, wanted: Segments, row: Ints) -> Floats:
-    """Along the spoke through each point where that meets the arc, else its nearer end."""
+    """Where the ray from the centre through a point meets the arc, else the arc's nearer end."""
     spoke = points - wanted.centre[row]
     length = np.hypot(spoke[:, 0], spoke[:, 1])
     along = spoke / np.where(length > 0.0, length, 1.0)[:, None]

@@ -1,4 +1,4 @@
-"""Where things lie on the page: the window in mm, the box it is shown in, and nice numbers."""
+"""The window in mm, the box of the page that shows it, and round numbers."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ PAGE = 1000.0
 """Width of a picture of ordinary size in its own units, in which lines and letters are given."""
 
 ORDINARY_PX = (1000, 1200)
-"""Pictures so wide have a page of `PAGE` units. Smaller ones have fewer units and larger ones
-more, by the root of the size: letters grow with the picture, but less than it does."""
+"""Pictures between these widths have a page of `PAGE` units. Smaller ones have fewer units and
+larger ones more, by the root of the size: letters grow with the picture, but less than it does."""
 
 LEAST_PAGE = 560.0
-"""No page has fewer units: the head, the legend and the numbers need them."""
+"""No page has fewer units: head, legend and numbers need them."""
 
 MARGIN = 36.0
 
 LOOK_AROUND = 2.0
-"""Part zero and rapids are in the window unless they make it this many times larger."""
+"""Part zero and rapids are in the window unless they make it more than this many times larger."""
 
 PADDING = 0.06
 """Room around the part, as a share of its larger side."""
 
 SMALLEST_WINDOW_MM = 1e-3
-"""A part smaller than this (a mere point) gets a window of this size."""
+"""A part smaller than this, such as a point, gets a window of this size."""
 
 EMPTY_WINDOW_MM = 10.0
 """Width of the window of a picture with nothing in it."""
@@ -38,7 +38,7 @@ WIDEST, TALLEST = 0.34, 0.88
 """Least and greatest height of the plot, as a share of its width."""
 
 CROP_SHAPES = (0.2, 2.0)
-"""The same when a part is asked for: it is shown as it is, unless it is longer or higher."""
+"""The same where a part of the plane is asked for: within these it keeps its own shape."""
 
 ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
 
@@ -115,7 +115,7 @@ def page_width(size_px: int) -> float:
 
 
 def union(boxes: Iterable[Floats | None]) -> Floats | None:
-    """The extents [[xmin, xmax], [ymin, ymax]] of all that are there."""
+    """The extents [[xmin, xmax], [ymin, ymax]] of all boxes that are not None."""
     present = [box for box in boxes if box is not None]
     if not present:
         return None
@@ -131,7 +131,7 @@ def points_box(points: Floats) -> Floats | None:
 
 
 def window(part: Floats | None, around: Floats | None) -> Floats:
-    """What to show, mm: the part, with what is around it unless that is far away."""
+    """The window, mm: the part, with what is around it unless that is far away."""
     both = union([part, around])
     if both is None:
         half = EMPTY_WINDOW_MM / 2.0
@@ -150,15 +150,15 @@ def fit(
     right: float,
     shapes: tuple[float, float] = (WIDEST, TALLEST),
 ) -> View:
-    """The view of this window in a box of that width, as high as its shape asks for; `shapes`
-    are the least and the greatest height, as a share of the width."""
+    """The view of a window in a box from `left` to `right`, of the window's shape; `shapes` are
+    the least and the greatest height, as a share of the width."""
     sizes = shown[:, 1] - shown[:, 0]
     left, top, right = float(math.ceil(left)), float(math.ceil(top)), float(math.floor(right))
     width = right - left
     height = width * min(max(float(sizes[1] / sizes[0]), shapes[0]), shapes[1])
     scale = min(width / float(sizes[0]), height / float(sizes[1]))
     middle = shown.mean(axis=1)
-    # Nine digits are what the matrix is written with.
+    # The matrix is written with nine digits.
     return View(
         Box(left, top, right, top + round(height)),
         float(f"{scale:.9g}"),

@@ -887,10 +887,10 @@ def _markdown_table(sheet: Sheet) -> Iterator[str]:
     yield ""
 
 
-# A page as one HTML file that needs nothing else: no scripts, no network, nothing to fetch.
+# A page as one HTML file without scripts that loads nothing.
 #
-# Its pictures are data addresses, so that whatever an SVG holds can neither run nor load anything,
-# and its policy forbids both besides.
+# Its pictures are data addresses, so that nothing in an SVG can run or load anything; its policy
+# forbids both as well.
 
 HTML_ROWS = 500
 """A page of HTML has at most this many rows of each table and as many findings; JSON has them
@@ -915,7 +915,7 @@ figure { margin: 1rem 0; } figcaption { opacity: .7; }
 
 
 def html(page: Page) -> str:
-    """The page as a whole HTML document."""
+    """The page as an HTML document."""
     return "\n".join(_html_lines(page)) + "\n"
 
 

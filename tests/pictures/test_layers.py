@@ -12,6 +12,7 @@ import pytest
 
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Gap
+from camtool.pictures.chains import reversals_of
 from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw
 from camtool.pictures.layers import chosen, layer_names, layers_in, usual_layers
@@ -19,9 +20,8 @@ from camtool.pictures.options import Options
 from camtool.pictures.page import page_of
 from camtool.pictures.plot import CLEAR, labels_beside
 from camtool.pictures.scene import Scene
-from camtool.pictures.strokes import turns_of
 from camtool.toolpath.builder import ToolpathBuilder
-from tests.oracles import literal_turns, svg_page
+from tests.oracles import literal_reversals, svg_page
 from tests.pictures.conftest import (
     SCENES,
     circle,
@@ -152,18 +152,18 @@ def test_the_worst_places_have_rings_and_ranks() -> None:
 
 def test_an_axis_turns_at_corners_and_at_quarters_of_circles() -> None:
     full = ToolpathBuilder((2.0, 0.0, 0.0)).arc(2.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=1.0)
-    turns = turns_of(full.finish())
+    turns = reversals_of(full.finish())
     # At 0° it begins and ends: nothing goes before and nothing comes after.
     assert turns == pytest.approx(np.array([[0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]]), abs=1e-12)
     tour = ToolpathBuilder()
     for x, y in ((1.0, 1.0), (2.0, 0.0), (3.0, 0.0), (2.0, 0.0)):
         tour.line(x, y, feed=1.0)
-    assert turns_of(tour.finish()).tolist() == [[1.0, 1.0], [3.0, 0.0]]
+    assert reversals_of(tour.finish()).tolist() == [[1.0, 1.0], [3.0, 0.0]]
 
 
 def test_a_turn_counts_when_the_tool_is_fed_after_it() -> None:
     air = ToolpathBuilder().line(1.0, 0.0, feed=1.0).rapid(0.0, 0.0).line(1.0, 0.0, feed=1.0)
-    assert turns_of(air.finish()).tolist() == [[0.0, 0.0]]
+    assert reversals_of(air.finish()).tolist() == [[0.0, 0.0]]
 
 
 @pytest.mark.parametrize("ccw", [False, True])
@@ -180,7 +180,7 @@ def test_turns_are_those_of_a_finely_sampled_path(ccw: bool) -> None:
     for step in np.sign(np.diff(points, axis=0)):
         found += bool((step * last < 0).any())
         last = np.where(step == 0, last, step)
-    assert len(turns_of(toolpath)) == found
+    assert len(reversals_of(toolpath)) == found
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -199,7 +199,9 @@ def test_turns_are_those_of_the_literal_loop(seed: int) -> None:
             x, y = rng.integers(-3, 4, 2).astype(float).tolist()
             path.rapid(x, y) if kind == 0 else path.line(x, y, feed=1.0)
     toolpath = path.finish()
-    assert turns_of(toolpath) == pytest.approx(literal_turns.turns_of(toolpath), abs=1e-12)
+    assert reversals_of(toolpath) == pytest.approx(
+        literal_reversals.reversals_of(toolpath), abs=1e-12
+    )
 
 
 def test_pictures_of_all_layers_are_drawn() -> None:

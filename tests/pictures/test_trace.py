@@ -8,7 +8,7 @@ import pytest
 from camtool.pictures.colours import BINS, bin_colours
 from camtool.pictures.draw import draw
 from camtool.pictures.scene import Scene
-from camtool.pictures.trace import UM_PER_MM, bins_of, strokes, trace_of
+from camtool.pictures.trace import UM_PER_MM, bins_of, lines_by_step, trace_of
 from tests.oracles import svg_page
 from tests.pictures.conftest import ring_trace
 
@@ -35,7 +35,7 @@ def test_only_what_cuts_is_drawn_and_counted() -> None:
     )
     assert trace is not None
     assert trace.top_um == pytest.approx(1.0)
-    runs = [run.tolist() for group in strokes(trace, 10.0) for run in group]
+    runs = [run.tolist() for group in lines_by_step(trace, 10.0) for run in group]
     assert runs == [[[0, 0], [1, 0]], [[5, 5], [6, 5], [7, 5]]]
 
 
@@ -44,7 +44,7 @@ def test_merging_points_hides_no_error() -> None:
     points = [(0.0, 0.0), (1.0, 0.0), (1.0 + 1e-6, 0.0), (1.0 + 2e-6, 0.0), (2.0, 0.0)]
     trace = trace_of(scene_of(points, error, [True] * 5))
     assert trace is not None
-    found = strokes(trace, 10.0)
+    found = lines_by_step(trace, 10.0)
     assert [len(run) for run in found[BINS - 1]] == [3]
     assert sum(len(run) for group in found for run in group) < len(points)
 
@@ -55,7 +55,7 @@ def test_strokes_together_are_the_whole_path() -> None:
     assert trace is not None
     pieces = {
         (tuple(a), tuple(b))
-        for group in strokes(trace, 0.0)
+        for group in lines_by_step(trace, 0.0)
         for run in group
         for a, b in zip(run[:-1].tolist(), run[1:].tolist(), strict=True)
     }

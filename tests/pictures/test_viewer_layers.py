@@ -25,26 +25,26 @@ __all__ = ["browser", "shown"]
 pytestmark = NEEDS_BROWSER
 
 
-def _signs(scene: Scene) -> Scene:
+def _with_table(scene: Scene) -> Scene:
     """The scene with a tool, a table, and a circle that it should have gone round."""
     circles = Polylines.of([circle(2.5, 2.5, 2.0)])
     return replace(scene, tool_mm=0.3, travel_mm=(9.0, 7.0), wanted=Segments.of(circles))
 
 
 def test_every_layer_is_switched_by_its_key(shown: Any) -> None:
-    scene = replace(_signs(busy(SCENES["toolpath"])), trace_points=None)
+    scene = replace(_with_table(busy(SCENES["toolpath"])), trace_points=None)
     view = shown(scene)
-    whole = {name: view.pixels(name) for name in ("ground", "plan", "signs")}
+    whole = {name: view.pixels(name) for name in ("ground", "plan", "marks")}
     on = view.page.locator("#layers input:checked").count()
     assert view.page.locator("#layers input").count() == on + 1  # reversals alone are off
-    for canvas, keys in (("signs", "boazx"), ("ground", "st"), ("plan", "w")):
+    for canvas, keys in (("marks", "boazx"), ("ground", "st"), ("plan", "w")):
         for key in keys:
             view.press(key)
             assert 0 <= view.pixels(canvas) < whole[canvas], key
             view.press(key)
             assert view.pixels(canvas) == whole[canvas], key
     view.press("v")
-    assert view.pixels("signs") > whole["signs"]
+    assert view.pixels("marks") > whole["marks"]
 
 
 ROW = layers.Layer(
@@ -76,15 +76,15 @@ def test_a_row_of_the_table_is_a_layer_of_pictures_and_of_pages(
     look = "(all) => all.map((one) => getComputedStyle(one))"
     borders = swatches.evaluate_all(f"{look}.map((style) => style.borderTopColor)")
     assert borders[:2] == ["rgb(139, 150, 163)", "rgb(255, 255, 255)"]
-    whole = view.pixels("signs")
+    whole = view.pixels("marks")
     view.press("h")
-    assert view.pixels("signs") < whole
+    assert view.pixels("marks") < whole
     label.locator("input").check()
-    assert view.pixels("signs") == whole
+    assert view.pixels("marks") == whole
 
 
-def test_beside_a_predicted_path_signs_are_off(shown: Any) -> None:
-    view = shown(traced(_signs(busy(SCENES["result"]))))
+def test_beside_a_predicted_path_some_layers_are_off(shown: Any) -> None:
+    view = shown(traced(_with_table(busy(SCENES["result"]))))
     names = view.page.locator("#layers label:not(:has(:checked))").all_inner_texts()
     assert [name.split("\n")[0] for name in names] == [
         "starts", "order of contours", "directions", "reversal",
@@ -92,7 +92,7 @@ def test_beside_a_predicted_path_signs_are_off(shown: Any) -> None:
 
 
 def test_what_the_tool_covers_grows_with_the_time(shown: Any) -> None:
-    view = shown(_signs(busy(SCENES["toolpath"])))
+    view = shown(_with_table(busy(SCENES["toolpath"])))
     view.press("t")
     whole = view.pixels("ground")
     view.page.locator("#slider").fill("6000")
@@ -102,7 +102,7 @@ def test_what_the_tool_covers_grows_with_the_time(shown: Any) -> None:
 
 
 def test_deviations_are_drawn_larger_and_the_factor_is_shown(shown: Any) -> None:
-    view = shown(traced(_signs(busy(SCENES["result"]))))
+    view = shown(traced(_with_table(busy(SCENES["result"]))))
     assert view.page.locator("#factor").is_hidden()
     before = view.pixels("done")
     view.press("m", "m", "m", "m")

@@ -1,8 +1,8 @@
 """A scene as columns of numbers, packed for the page.
 
 All columns follow each other in one block of bytes, little-endian, each beginning at a multiple of
-four: f4 (float), u1 (byte), i2 and i4 (integer), d1 (integers as the small steps from each to the
-next, from 0 to the first). Floats of 32 bits hold a place on a table of 8 m to a micrometre.
+four: f4 (float), u1 (byte), i2 and i4 (integer), d1 (integers as differences of a byte from the
+number before, the first from 0). Floats of 32 bits hold a place on a table of 8 m to 1 µm.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ FLOAT, INT, BYTE = np.dtype("<f4"), np.dtype("<i4"), np.dtype("u1")
 SHORT, STEP = np.dtype("<i2"), np.dtype("i1")
 
 ALIGN_BYTES = 4
-"""Every column begins at a multiple of this: browsers refuse others."""
+"""Every column begins at a multiple of this; browsers refuse others."""
 
 
 def columns_of(content: Content, run: Playback | None) -> Columns:
-    """The columns of the page for what its scripts know by name; those of what the scene does not
-    have are empty."""
+    """The columns for which the page's script has functions of its own; those of what the scene
+    does not have are empty."""
     scene = content.scene
     places = {
         "start_at": content.moves.starts,
@@ -92,7 +92,7 @@ def _narrow(column: npt.NDArray[np.generic]) -> tuple[str, npt.NDArray[np.generi
 
 
 def drawing_layers(drawing: Drawing) -> list[str]:
-    """The layers in the order of their first paths, then of their first points."""
+    """The drawing's layers in the order of their first paths, then of their first points."""
     return list(dict.fromkeys((*drawing.layers, *(mark.layer for mark in drawing.marks))))
 
 
@@ -130,7 +130,7 @@ def _moves(toolpath: Toolpath | None, run: Playback | None) -> Columns:
             **{name: none.astype(BYTE) for name in ("move_kind", "move_sort")},
         }
     if len(run.seconds) != len(toolpath):
-        raise ValueError("the run is that of another toolpath")
+        raise ValueError("the playback is that of another toolpath")
     return {
         **_bends("move", toolpath.is_arc, toolpath.centre, toolpath.sweeps()),
         "move_start": toolpath.start.astype(FLOAT),
@@ -146,7 +146,7 @@ def _moves(toolpath: Toolpath | None, run: Playback | None) -> Columns:
 
 
 def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
-    """0 rapids and events, 1 level feeds, 2 feeds that sink or climb."""
+    """0 rapids and events, 1 level feeds, 2 feeds that change Z."""
     if not len(toolpath):
         return np.empty(0, dtype=BYTE)
     rise = np.abs(toolpath.end[:, 2] - toolpath.starts[:, 2]) > POSITION_EPS_MM
@@ -155,8 +155,8 @@ def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
 
 
 def _wanted(wanted: Segments | None) -> Columns:
-    """The wanted path: where each line or arc ends, and where those begin that do not go on from
-    the one before."""
+    """The wanted path: where each line or arc ends, and where those begin that do not begin at the
+    end of the one before."""
     if wanted is None or not len(wanted):
         none = np.empty(0)
         return {
@@ -187,20 +187,19 @@ def _bends(
     return {f"{name}_arc": rows.astype(INT), f"{name}_bend": bends.astype(FLOAT)}
 
 
-# The predicted path for the page: its points, their colours, and how far they are off.
+# The predicted path for the page: its points, their colours and their deviations.
 #
-# With p a point of the slides and q the nearest point of the wanted path, the page holds p and p −
-# q and draws p + (N − 1)(p − q) for a deviation N times as large (see
-# `camtool.pictures.trace`).
+# Of a point p of the slides and the nearest point q of the wanted path, the page holds p and p −
+# q, and draws p + (N − 1)(p − q) for a deviation N times as large (see `camtool.pictures.trace`).
 
 MOST_COUNTS = 32_000
-"""Deviations are whole counts, this many for the largest of them."""
+"""Deviations are whole numbers of counts, this many for the largest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """The columns of the predicted path, the length of a count of their deviations (0: nobody
-    knows the wanted path), and the deviations (W, 2) mm of the worst places."""
+    """The columns of the predicted path, the length of a count of their deviations (0 where the
+    wanted path is unknown), and the deviations (W, 2) mm of the worst places."""
 
     columns: Columns
     count_mm: float
@@ -208,8 +207,8 @@ class Traced:
 
 
 def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
-    """The path of a scene, in colours that end at `top_um`. ValueError when the rows of the run's
-    trace are not those of its points."""
+    """The predicted path of a scene, in colours of a map that ends at `top_um`. ValueError when
+    the playback does not have a row for each of its points."""
     worst = np.array(scene.worst, dtype=np.float64).reshape(-1, 2)
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
@@ -217,12 +216,12 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
         nothing = _columns(none.reshape(0, 2), none.astype(np.int64), none, none)
         return Traced(nothing, 0.0, np.zeros_like(worst))
     if len(run.trace_row) != len(points):
-        raise ValueError("the trace's rows are not those of its points")
+        raise ValueError("the playback does not have a row for each point of the trace")
     error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
     steps = bins_of(Trace(points, error_um, cutting, top_um))
     bins = np.concatenate([[BINS], np.where(steps < 0, BINS, steps)])
     kept = thinned(points, bins, float(error_um.max(initial=0.0)) / UM_PER_MM)
-    # The point before a cut is where the cut begins.
+    # A cut begins at the point before its first one.
     drawn = (cutting | np.append(cutting[1:], False))[kept]
     points, bins, row = points[kept], bins[kept], run.trace_row[kept]
     off = _off(points, drawn, scene.wanted)
@@ -234,7 +233,8 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
 
 
 def _off(points: Floats, chosen: np.ndarray, wanted: Segments | None) -> Floats:
-    """(T, 2) mm from the nearest point of the wanted path to each that is chosen, else 0."""
+    """(T, 2) mm: the vector from the nearest point of the wanted path to each chosen point, else
+    0."""
     off = np.zeros_like(points)
     if wanted is not None and len(wanted) and chosen.any():
         off[chosen] = points[chosen] - nearest_points(points[chosen], wanted)
@@ -250,28 +250,28 @@ def _columns(points: Floats, bins: Ints, row: Ints | Floats, counts: Floats) -> 
     }
 
 
-# Fewer points of the predicted path, where nobody could see the difference.
+# Fewer points of the predicted path, where the difference is too small to be seen.
 #
-# Of points in a row every second one goes, if it lies near the chord of its neighbours and has
-# their colour; then every second one of what is left, and so on. A point that stays is where it
-# was, and one that goes leaves the path by at most the tolerance each time.
+# Every second point is left out if it lies near the chord of its neighbours and has their colour;
+# then every second one of those that are left, and so on. Points that stay are not moved, and each
+# round moves the path by the tolerance at most.
 
 MOST_POINTS = 200_000
-"""A page has no more points of the predicted path than this."""
+"""Most points of the predicted path in a page."""
 
 FINEST_MM = 1e-4
-"""Points this near to the chord of their neighbours may go ..."""
+"""Points this near to the chord of their neighbours may be left out ..."""
 
 FINEST_SHARE = 0.01
-"""... or this share of the largest error, where that is less ..."""
+"""... or within this share of the largest error, where that is less ..."""
 
 COARSER = 4.0
-"""... or so many times as far again, while there are too many points."""
+"""... and the distance grows by this factor while there are too many points."""
 
 
 def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MOST_POINTS) -> Ints:
-    """Which points (T, 2) mm with their colours (T,) are kept: ascending rows, the ends of all
-    pieces of a colour among them while that leaves few enough."""
+    """Ascending rows of the points (T, 2) mm, with their colours (T,), that are kept: among them
+    the ends of all pieces of one colour, unless these alone are more than `most`."""
     kept = np.arange(len(points))
     near_mm = min(FINEST_MM, FINEST_SHARE * largest_mm)
     while True:
@@ -287,7 +287,8 @@ def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MOST_POIN
 
 
 def _halved(points: Floats, bins: Ints, kept: Ints, near_mm: float) -> Ints:
-    """Without those of the 2nd, 4th, … points that may go; the first and the last one stay."""
+    """The rows without those of the 2nd, 4th, … points that may be left out; the first and the
+    last one stay."""
     middle = np.arange(1, len(kept) - 1, 2)
     before, at, after = kept[middle - 1], kept[middle], kept[middle + 1]
     # The colour of a piece is that of the point that it leads to.

@@ -2,7 +2,7 @@
 
 const NUMBERS = { u1: Uint8Array, i2: Int16Array, i4: Int32Array, f4: Float32Array, d1: Int8Array };
 
-/** name -> typed array, as the head's `columns` {name: [type, byte offset, count]} say. */
+/** name -> typed array, by the head's `columns` {name: [type, byte offset, count]}. */
 function readColumns(columns, base64) {
   const text = atob(base64.trim());
   const bytes = new Uint8Array(text.length);
@@ -15,7 +15,7 @@ function readColumns(columns, base64) {
   return named;
 }
 
-/** Numbers from the steps between them. */
+/** Numbers from their differences. */
 function summed(steps) {
   let sum = 0;
   return Int32Array.from(steps, (step) => (sum += step));
@@ -35,7 +35,7 @@ function movesTrack(columns) {
   return new Track(from, to, columns.move_arc, columns.move_bend);
 }
 
-/** The wanted path: each piece goes on from the one before but where the path breaks. */
+/** The wanted path: each line or arc begins at the end of the one before, except at a break. */
 function wantedTrack(columns) {
   const { wanted_to: to, wanted_begin: begins, wanted_break: breaks } = columns;
   const from = new Float64Array(to.length);
@@ -52,7 +52,7 @@ function drawingTrack(columns) {
   );
 }
 
-// Lines and arcs in columns: where they are, and how far from a point.
+// Lines and arcs in columns, their boxes, and their distances from a point.
 
 /** `from`, `to` (2 N) mm; `arcs` rows that are arcs, `bends` their centre x, y and sweep. */
 class Track {
@@ -88,7 +88,7 @@ class Track {
     const x1 = to[2 * row], y1 = to[2 * row + 1];
     let box = [Math.min(x0, x1), Math.min(y0, y1), Math.max(x0, x1), Math.max(y0, y1)];
     const arc = this.arc(row);
-    // Each quarter that the arc passes may be its outermost point.
+    // An arc is outermost at its ends or at a multiple of 90°.
     if (arc) {
       const low = Math.min(arc.angle, arc.angle + arc.sweep), high = low + Math.abs(arc.sweep);
       for (let quarter = Math.ceil(low / QUARTER); quarter * QUARTER <= high; quarter++) {
@@ -100,7 +100,7 @@ class Track {
     boxes.set(box, 4 * row);
   }
 
-  /** [x, y] mm at a share 0 … 1 of the way. */
+  /** [x, y] mm at a share 0 … 1 of a row's length. */
   at(row, share) {
     const { from, to } = this, arc = this.arc(row);
     if (arc && share < 1) {
@@ -114,8 +114,8 @@ class Track {
   distance(row, x, y) {
     const arc = this.arc(row), { from, to } = this;
     if (arc) {
-      const angle = Math.atan2(y - arc.y, x - arc.x), way = Math.sign(arc.sweep) || 1;
-      const turned = (((angle - arc.angle) * way) % TURN + TURN) % TURN;
+      const angle = Math.atan2(y - arc.y, x - arc.x), sense = Math.sign(arc.sweep) || 1;
+      const turned = (((angle - arc.angle) * sense) % TURN + TURN) % TURN;
       if (turned <= Math.abs(arc.sweep)) return Math.abs(Math.hypot(x - arc.x, y - arc.y) - arc.radius);
       const ends = [[from[2 * row], from[2 * row + 1]], [to[2 * row], to[2 * row + 1]]];
       return Math.min(...ends.map(([u, v]) => Math.hypot(x - u, y - v)));
@@ -142,9 +142,9 @@ class Track {
 
 const QUARTER = Math.PI / 2, TURN = 2 * Math.PI;
 
-// What lies near a point: the rows of a track by the cells of a grid that their boxes touch.
+// The rows of a track near a point, by the cells of a grid that their boxes touch.
 
-/** Rows whose boxes touch more cells than this are kept aside and always looked at. */
+/** A row whose box touches more cells than this is in none of them, and always examined. */
 const WIDE_CELLS = 64;
 const MOST_CELLS_ACROSS = 256;
 
@@ -188,8 +188,8 @@ class Grid {
     this.wide = wide;
   }
 
-  /** The row nearest to a point within `reach` mm of those that `counts`; −1 for none. Of rows
-   * that lie on each other the one is taken for which `rank` is highest. */
+  /** Of the rows for which `counts` is true, the one nearest to a point within `reach` mm; −1 for
+   * none. Of rows that lie on each other, the one with the highest `rank`. */
   nearest(x, y, reach, counts, rank) {
     let best = -1, least = reach;
     const look = (row) => {

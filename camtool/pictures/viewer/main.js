@@ -21,7 +21,7 @@ class Player {
     this.show();
   }
 
-  /** Seconds of the machine for one of ours. */
+  /** Seconds of the machine per second of the viewer. */
   get speed() {
     const chosen = find("speed").value;
     return chosen === "whole" ? this.run.total / WHOLE_SECONDS : Number(chosen);
@@ -52,7 +52,7 @@ class Player {
 
   step(now) {
     if (!this.playing) return;
-    // A page that slept goes on from where it was.
+    // A page that was in the background continues where it was.
     const passed = Math.min(WAITED_MS, Math.max(0, now - this.then)) / 1000;
     this.then = now;
     const time = this.run.time + passed * this.speed;
@@ -76,8 +76,8 @@ class Player {
     this.show();
   }
 
-  faster(way) {
-    const speed = find("speed"), next = speed.selectedIndex + way;
+  faster(step) {
+    const speed = find("speed"), next = speed.selectedIndex + step;
     speed.selectedIndex = Math.min(speed.options.length - 1, Math.max(0, next));
   }
 
@@ -98,8 +98,8 @@ const WHEEL_RATE = 0.0015;
 const KEY_ZOOM = 1.4;
 const KEY_PAN_PX = 60;
 
-/** Drag to move, wheel or two fingers to zoom, hover to ask, click to go there. */
-class Hand {
+/** Drag to move, wheel or two fingers to zoom, hover for facts, click to go to a move. */
+class Pointer {
   constructor(stage, hovered, clicked) {
     this.stage = stage;
     this.hovered = hovered;
@@ -148,7 +148,7 @@ class Hand {
   hover(px, py) {
     const { view, layers, grids, run } = this.stage, reach = REACH_PX / view.scale;
     const x = view.mmX(px), y = view.mmY(py);
-    // What has been done counts before what is still to come.
+    // Moves that are done come before those that are not.
     const rank = (row) => (run.row < row ? -row : row);
     const move = grids.moves().nearest(x, y, reach, (row) => layers.shows(row), rank);
     const { drawn_layer: of } = layers.columns, shown = (row) => layers.on.get(`drawing ${of[row]}`);
@@ -157,15 +157,15 @@ class Hand {
   }
 }
 
-/** What each key does; false for a key that means nothing here. */
+/** Do what a key means; false for a key without a meaning. */
 function pressed(event, { stage, player, panel }) {
   const { view } = stage, middle = [view.width / 2, view.height / 2];
   const pan = (dx, dy) => { view.pan(dx * KEY_PAN_PX, dy * KEY_PAN_PX); stage.changed(); };
   const zoom = (factor) => { view.zoom(factor, ...middle); stage.changed(); };
-  const step = (way) => player && player.toRow(player.run.row + way);
+  const step = (rows) => player && player.toRow(player.run.row + rows);
   const arrows = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   if (event.shiftKey && arrows[event.key]) { pan(...arrows[event.key]); return true; }
-  const deeds = {
+  const actions = {
     " ": () => player && player.toggle(),
     ArrowLeft: () => step(-1),
     ArrowRight: () => step(1),
@@ -186,12 +186,12 @@ function pressed(event, { stage, player, panel }) {
     "?": () => showHelp(find("help").hidden),
     Escape: () => showHelp(false),
   };
-  if (deeds[event.key]) deeds[event.key]();
+  if (actions[event.key]) actions[event.key]();
   else return panel.toggle(event.key);
   return true;
 }
 
-// Put together what the page holds.
+// Start: read the data of the page and connect all parts.
 
 function begin() {
   const head = JSON.parse(find("head").textContent);
@@ -226,12 +226,12 @@ function begin() {
   const clicked = () => {
     if (player && stage.hover.moves >= 0) player.toRow(stage.hover.moves);
   };
-  new Hand(stage, hovered, clicked);
+  new Pointer(stage, hovered, clicked);
   listen({ stage, player, panel });
   document.body.dataset.ready = "yes";
 }
 
-/** Grids are made when first asked for: a page opens sooner. */
+/** Grids are made when they are first needed: so the page opens sooner. */
 function lazyGrids(tracks) {
   const made = {};
   const grid = (name) => () => (made[name] = made[name] || new Grid(tracks[name]));
@@ -273,12 +273,12 @@ function centre(stage, moves, row) {
   stage.place.scrollIntoView({ block: "nearest" });
 }
 
-/** The move under way, beside the picture. */
+/** The current move, beside the picture. */
 function showMove(head, columns, run) {
   find("now").replaceChildren(factTable(moveFacts(head, columns, run, run.row)));
 }
 
-/** What lies under the cursor, beside it. */
+/** The facts of what lies under the cursor, beside the cursor. */
 function showTip({ head, columns, run, listing }, hover, px, py) {
   const tip = find("tip"), block = hover.moves >= 0 ? columns.move_block[hover.moves] : -1;
   tip.hidden = hover.moves < 0 && hover.drawing < 0;

@@ -1,10 +1,9 @@
-"""The page: template, styles, script and data put together, the same bytes for the same scene.
+"""The viewer's page: template, styles, script and data in one file; equal scenes give equal bytes.
 
-Whatever comes from drawings and programs stands in the page as data only. The head is JSON in
-which `<`, `>` and `&` are written as escapes, and the script sets it as text; title and notes are
-escaped for HTML. Should something slip through all the same, the page's own policy lets the
-browser run no script but the one whose digest it names, and load nothing from anywhere.
-"""
+Texts of drawings and programs stand in the page as data only. The head is JSON in which `<`, `>`
+and `&` are escaped, and the script shows it as text; title and notes are escaped for HTML.
+Besides, the page's policy lets the browser run no script but the one whose digest it names, and
+load nothing from anywhere."""
 
 from __future__ import annotations
 
@@ -53,23 +52,23 @@ from camtool.pictures.viewer.columns import (
 from camtool.units import UM_PER_MM
 
 SCRIPTS = ("data.js", "paint.js", "stage.js", "panel.js", "main.js")
-"""The files of the script in their order; the last one begins."""
+"""The files of the script in their order; the last one starts it."""
 
 SCRIPTED = frozenset(
     ("drawing", "swept", "travel", "rapids", "feeds", "plunges", "starts", "order", "arrows")
 ) | {"path", "worst", "zero", "doubts"}
-"""The layers that the script knows by name, since they change with the time, the zoom or the other
-switches. It draws all others by their parts."""
+"""The layers for which the script has functions of its own, since they change with time, zoom or
+other switches. It draws all others by their parts."""
 
 LEAST_TOP_UM = 1e-3
-"""The colour map ends here when no error is larger."""
+"""The colour map ends here where all errors are smaller."""
 
 _SLOT = re.compile(r"\{([a-z]+)\}")
 
 
 def viewer_page(scene: Scene) -> bytes:
-    """The HTML file of a scene, UTF-8. Where the scene does not tell how its toolpath runs, every
-    move takes as long as its feed says. ValueError when that is the run of another toolpath."""
+    """The HTML file of a scene, UTF-8. Without a playback in the scene every move runs at its
+    feed. ValueError when the playback is that of another toolpath."""
     run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
     rows, columns = _rows(content)
@@ -88,7 +87,7 @@ def viewer_page(scene: Scene) -> bytes:
         "head": _json({"columns": named, **_head(scene, run, traced), "rows": rows}),
         "columns": base64.b64encode(data).decode("ascii"),
     }
-    # One pass: what stands in a slot is never looked through for slots.
+    # One pass: the contents of a slot are not searched for slots.
     page = _SLOT.sub(lambda found: slots[found[1]], _file("viewer.html"))
     return page.encode("utf-8")
 
@@ -122,7 +121,7 @@ def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, objec
             for place, off in zip(scene.worst, traced.worst_off.tolist(), strict=True)
         ],
         "travel_mm": scene.travel_mm,
-        "doubts": [] if drawing is None else _doubts(drawing),
+        "ambiguous": [] if drawing is None else _ambiguous(drawing),
     }
 
 
@@ -161,8 +160,8 @@ def _tones(colour: str | float) -> dict[str, str] | None:
     return None if paint == "none" else {"light": paint, "dark": on_dark(paint)}
 
 
-def _doubts(drawing: Drawing) -> list[tuple[float, float]]:
-    """Open ends, crossings and branches."""
+def _ambiguous(drawing: Drawing) -> list[tuple[float, float]]:
+    """Open ends, crossings and branches, (x, y) mm."""
     healing = drawing.healing
     places = [gap.at_mm for gap in drawing.gaps]
     places += [one.at_mm for one in healing.crossings] + [one.at_mm for one in healing.branches]
@@ -178,7 +177,7 @@ def _table(table: Table) -> dict[str, object]:
 
 
 def _top_um(scene: Scene, run: Playback | None) -> float:
-    """Where the map of errors ends: at the largest that is known, of moves and of the trace."""
+    """The end of the map of errors, µm: the largest error of the moves and of the trace."""
     errors = [LEAST_TOP_UM / UM_PER_MM]
     if run is not None:
         errors += [float(error) for error in run.error_mm[np.isfinite(run.error_mm)]]
@@ -198,18 +197,18 @@ def _policy(script: str, style: str) -> str:
 
 
 def _json(value: Mapping[str, object]) -> str:
-    """JSON in ASCII without any sign that means something to HTML."""
+    """JSON in ASCII without any character that has a meaning in HTML."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
 def _one_line(words: str) -> str:
-    """Lines are told apart by line feeds, so a line has none."""
+    """Words without line breaks: these separate the lines of the program."""
     return words.replace("\r", " ").replace("\n", " ")
 
 
 def _printable(words: str) -> str:
-    return "".join(sign if sign.isprintable() else " " for sign in words)
+    return "".join(letter if letter.isprintable() else " " for letter in words)
 
 
 def _file(name: str) -> str:
@@ -219,13 +218,13 @@ def _file(name: str) -> str:
 # The polar plots of full circles below the report: SVG within the page, in the page's colours.
 
 MOST_PLOTS = 16
-"""A page has no more plots than this: those of the largest circular errors."""
+"""Most plots of a page: those of the largest circular errors."""
 
 BINS_SHOWN = 120
-"""Errors are joined until a plot has no more of them than this, every 3°."""
+"""Errors are joined until a plot has no more than this, one every 3°."""
 
 WIDTH = 520.0
-"""Of a plot, in its own units; letters are some 14 high."""
+"""Width of a plot in its own units; letters are about 14 high."""
 
 NAMES = {
     FEED: "feed",
@@ -238,7 +237,7 @@ NAMES = {
     PLOT: "paper",
     QUIET: "quiet",
 }
-"""The page's own name of each colour of a plot, which is light or dark as the page is."""
+"""The page's name of each colour of a plot, so that it is light or dark as the page is."""
 
 _PAINT = re.compile('(fill|stroke)="(#[0-9a-f]{6})"')
 _SHAPE = re.compile(' d="[^"]*"')
@@ -247,8 +246,8 @@ _ID = re.compile(' id="[^"]*"')
 
 
 def circles_of(scene: Scene) -> str:
-    """HTML of the plots in the order of the report; empty without a full circle."""
-    # The same circle gone round the other way is in the plot of the first.
+    """The HTML of the plots in the order of the report; empty without a full circle."""
+    # The same circle in the other direction is in the plot of the first one.
     first = [
         which
         for which, one in enumerate(scene.rounds, 1)
@@ -257,11 +256,11 @@ def circles_of(scene: Scene) -> str:
     chosen = sorted(sorted(first, key=lambda which: -_size(scene, which))[:MOST_PLOTS])
     if not chosen:
         return ""
-    said = "Full circles"
+    heading = "Full circles"
     if len(chosen) < len(first):
-        said += f": the {len(chosen)} of {len(first)} with the largest circular error"
+        heading += f": the {len(chosen)} of {len(first)} with the largest circular error"
     figures = "\n".join(_figure(scene, which) for which in chosen)
-    return f'<h2>{said}</h2>\n<div class="plots">\n{figures}\n</div>\n'
+    return f'<h2>{heading}</h2>\n<div class="plots">\n{figures}\n</div>\n'
 
 
 def _size(scene: Scene, which: int) -> float:
@@ -286,7 +285,7 @@ def _figure(scene: Scene, which: int) -> str:
 
 
 def _joined(errors_um: Floats) -> Floats:
-    """(B, 3) least, mean and largest of neighbours; those of nothing but NaN stay so."""
+    """(B, 3) least, mean and largest error of neighbours joined; NaN where all of them are."""
     together = max(1, math.ceil(len(errors_um) / BINS_SHOWN))
     if len(errors_um) % together:
         return errors_um

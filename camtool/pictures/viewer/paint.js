@@ -49,7 +49,7 @@ class View {
 
   copy() { return Object.assign(new View(), this); }
 
-  /** [left, low, right, high] mm, and so many mm more on each side. */
+  /** [left, low, right, high] mm, with `more` mm on each side. */
   box(more = 0) {
     const { width, height } = this;
     return [this.mmX(0) - more, this.mmY(height) - more, this.mmX(width) + more, this.mmY(0) + more];
@@ -61,19 +61,19 @@ class View {
     return beyond(x0, x1, this.width) || beyond(y0, y1, this.height);
   }
 
-  /** Whether a place on the canvas is to be seen, or not far from that. */
+  /** Whether a place lies on the canvas, or at most `NEAR_PX` beside it. */
   shows(px, py) {
     return px > -NEAR_PX && py > -NEAR_PX && px < this.width + NEAR_PX && py < this.height + NEAR_PX;
   }
 }
 
-// Moves on a canvas: all of one style as one path, and what is smaller than a pixel as one line.
+// Moves on a canvas: all of one style as one path, without points nearer than a pixel.
 
 const MERGED_PX = 0.7;
-/** The same as a share of a wide line's width: its edge stays true to half a hundredth of that. */
+/** The same for wide lines, as a share of their width: their edges move by 0.5 % of it at most. */
 const MERGED_SHARE = 0.1;
 
-/** One growing path of one style, which leaves out points nearer than a pixel to the last. */
+/** A path of one style, without points nearer than a pixel to the last one. */
 class Pen {
   constructor(width) {
     this.path = new Path2D();
@@ -82,7 +82,7 @@ class Pen {
     this.waiting = false;
   }
 
-  /** Go on from the row before, or begin anew. */
+  /** Continue the row before, or begin a new line. */
   begin(row, x, y) {
     if (row !== this.row + 1 || x !== this.lastX || y !== this.lastY) {
       this.flush();
@@ -124,7 +124,7 @@ class Pen {
 }
 
 /** Stroke the rows from … to−1 of a track; `styles[styleOf[row]]` is {colour, width, dash}, or
- * null where the row is not to be seen. */
+ * null for rows that are not shown. */
 function paintTrack(ctx, view, track, rows, styleOf, styles) {
   const reach = Math.max(...styles.map((style) => (style ? style.width : 0))) / 2 / view.scale;
   const [left, low, right, high] = view.box(reach), { boxes } = track;
@@ -231,7 +231,7 @@ function paintTravel(ctx, view, [width, height], colours) {
 }
 
 /** Single points of the drawing. */
-function paintMarks(ctx, view, layers, colours) {
+function paintDrills(ctx, view, layers, colours) {
   const { mark_at: at, mark_layer: of } = layers.columns;
   ctx.fillStyle = colours.feed;
   for (let index = 0; index < of.length; index++) {
@@ -271,18 +271,19 @@ function paintTool(ctx, view, moves, run, toolMm, colours) {
   ctx.stroke();
 }
 
-// Signs of one size at places in mm: starts, plunges, reversals, arrows, numbers, worst places.
+// Marks of one size at places in mm: starts, plunges, arrows, numbers, worst places, and the layers
+// that the page describes by their parts.
 
 const FULL_SIZE_UP_TO = 120;
-const SMALLEST_SIGN = 0.3;
+const SMALLEST_MARK = 0.3;
 const ARROW_PX = 13;
 const ARROW_EVERY_PX = 240;
 const MOST_ARROWS = 150;
 const MOST_NUMBERS = 400;
 const NUMBER_PX = 13;
 
-/** All signs of a picture, from the ground up. */
-function paintSigns(ctx, view, moves, layers, colours) {
+/** All marks of a picture, from the ground up. */
+function paintMarks(ctx, view, moves, layers, colours) {
   const { columns, head, on } = layers, ring = { fill: colours.paper, line: colours.feed, width: 2 };
   const disc = (fill) => ({ fill, line: colours.paper, width: 1.2 });
   ctx.setLineDash([]);
@@ -297,7 +298,7 @@ function paintSigns(ctx, view, moves, layers, colours) {
   if (on.get("order")) paintNumbers(ctx, view, columns.start_at, colours.ink, colours);
   if (on.get("zero")) paintZero(ctx, view, colours);
   const red = { line: colours.tool, width: 2 };
-  if (on.get("doubt")) paintDots(ctx, view, head.doubts.flat(), 7, red);
+  if (on.get("ambiguous")) paintDots(ctx, view, head.ambiguous.flat(), 7, red);
   if (!on.get("worst")) return;
   const worst = head.worst.flatMap(({ at, off }) => at.map((mm, k) => mm + (layers.times - 1) * off[k]));
   paintDots(ctx, view, worst, 8, red);
@@ -319,7 +320,7 @@ function paintPart(ctx, view, part, layers, colours) {
   } else paintDots(ctx, view, columns[`${name}_at`], radius, { fill: layers.tone(part.fill), line, width });
 }
 
-/** Round signs at `places` (2 P) mm, smaller where there are very many; one for each pixel. */
+/** Round marks at `places` (2 P) mm, smaller where there are very many; at most one per pixel. */
 function paintDots(ctx, view, places, radius, { fill, line, width }) {
   const seen = new Set(), shown = [];
   for (let at = 0; at < places.length; at += 2) {
@@ -328,7 +329,7 @@ function paintDots(ctx, view, places, radius, { fill, line, width }) {
     seen.add(pixel);
     shown.push([x, y]);
   }
-  const size = radius * Math.max(Math.sqrt(Math.min(1, FULL_SIZE_UP_TO / shown.length)), SMALLEST_SIGN);
+  const size = radius * Math.max(Math.sqrt(Math.min(1, FULL_SIZE_UP_TO / shown.length)), SMALLEST_MARK);
   const path = new Path2D();
   for (const [x, y] of shown) {
     path.moveTo(x + size, y);
@@ -344,20 +345,20 @@ function paintDots(ctx, view, places, radius, { fill, line, width }) {
   ctx.fill(path);
 }
 
-/** Arrows along level feeds, so far apart that they stay few. */
+/** Arrows along level feeds, at most about `MOST_ARROWS`. */
 function paintArrows(ctx, view, moves, sortOf, colours) {
   const [left, low, right, high] = view.box(), { boxes } = moves;
   const isSeen = (row) => sortOf[row] === 1 && boxes[4 * row] <= right && boxes[4 * row + 2] >= left
     && boxes[4 * row + 1] <= high && boxes[4 * row + 3] >= low;
-  let whole = 0, way = 0;
+  let whole = 0, since = 0;
   for (let row = 0; row < moves.count; row++) if (isSeen(row)) whole += moves.length(row) * view.scale;
   const every = Math.max(ARROW_EVERY_PX, whole / MOST_ARROWS), path = new Path2D();
   for (let row = 0; row < moves.count; row++) {
-    if (sortOf[row] !== 1) way = every / 2;
+    if (sortOf[row] !== 1) since = every / 2;
     if (!isSeen(row)) continue;
-    way += moves.length(row) * view.scale;
-    if (way < every) continue;
-    way = 0;
+    since += moves.length(row) * view.scale;
+    if (since < every) continue;
+    since = 0;
     const share = [0.5, 0.25, 0.75, 0.1, 0.9].find((part) => {
       const [x, y] = moves.at(row, part);
       return x > left && x < right && y > low && y < high;
@@ -386,7 +387,7 @@ function paintNumbers(ctx, view, places, colour, colours) {
   paintTexts(ctx, view, texts, places, colour, colours);
 }
 
-/** Texts beside places (2 P) mm; one that finds no room is left out. */
+/** Texts beside places (2 P) mm; a text without room is left out. */
 function paintTexts(ctx, view, texts, places, colour, colours) {
   ctx.font = `bold ${NUMBER_PX}px system-ui, sans-serif`;
   ctx.lineJoin = "round";

@@ -47,7 +47,7 @@ function factTable(facts) {
   return list;
 }
 
-// Beside the picture: layers, colours with their scale, the move under way, the program's lines.
+// Beside the picture: layers, colours with their scale, and the program's lines.
 
 const LINES_AROUND = 5;
 
@@ -86,22 +86,22 @@ class LayerPanel {
     return label;
   }
 
-  /** How many times as large deviations of the predicted path are drawn. */
+  /** The choice of the factor by which deviations of the predicted path are drawn larger. */
   timesChoice() {
     const choice = find("times");
     find("exaggeration").hidden = !this.layers.head.off_mm;
     choice.addEventListener("change", () => {
-      const times = Number(choice.value), said = find("factor");
+      const times = Number(choice.value), factor = find("factor");
       this.layers.exaggerate(times);
-      said.hidden = times === 1;
-      said.textContent = `predicted path: deviation × ${times}`;
+      factor.hidden = times === 1;
+      factor.textContent = `predicted path: deviation × ${times}`;
       this.changed();
     });
   }
 
-  nextTimes(way) {
+  nextTimes(by) {
     if (find("exaggeration").hidden) return;
-    step(find("times"), way);
+    step(find("times"), by);
   }
 
   colourChoice() {
@@ -134,7 +134,7 @@ class LayerPanel {
     if (choice.options.length) step(choice, choice.selectedIndex === choice.options.length - 1 ? -choice.selectedIndex : 1);
   }
 
-  /** A drawing alone has the colours of its layers, and parts of other layers their own. */
+  /** Colour the swatches of a drawing's layers and of parts. */
   swatches() {
     const { layers } = this;
     for (const [{ texts, dash, line, fill }, { style }] of this.swatchOf) {
@@ -149,7 +149,7 @@ class LayerPanel {
     });
   }
 
-  /** The map's colours with the numbers that they stand for. */
+  /** The colours of the map with the numbers at its ends. */
   scale() {
     this.swatches();
     const { layers } = this, { by, heights, columns } = layers, place = find("scale");
@@ -168,13 +168,13 @@ class LayerPanel {
   }
 }
 
-/** Choose another one of a list, not beyond its ends. */
-function step(choice, way) {
-  choice.selectedIndex = Math.min(choice.options.length - 1, Math.max(0, choice.selectedIndex + way));
+/** Choose another option of a list, at most its first or last one. */
+function step(choice, by) {
+  choice.selectedIndex = Math.min(choice.options.length - 1, Math.max(0, choice.selectedIndex + by));
   choice.dispatchEvent(new Event("change"));
 }
 
-/** The program's lines around one of them; a click goes there. */
+/** The program's lines around the current one; a click on one goes to its first move. */
 class Listing {
   constructor(head, columns, go) {
     this.head = head;
@@ -188,12 +188,12 @@ class Listing {
       this.show(this.middle + Math.sign(event.deltaY) * 3, this.current);
     }, { passive: false });
     this.place.addEventListener("keydown", (event) => {
-      const way = { ArrowUp: -1, ArrowDown: 1 }[event.key];
-      if (!way || event.shiftKey) return;
+      const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+      if (!step || event.shiftKey) return;
       event.preventDefault();
       event.stopPropagation();
-      let block = this.current + way;
-      while (this.rows[block] === -1) block += way;
+      let block = this.current + step;
+      while (this.rows[block] === -1) block += step;
       if (this.rows[block] >= 0) this.go(this.rows[block]);
     });
     this.lines = Array.from({ length: 2 * LINES_AROUND + 1 }, () => this.line());
@@ -235,7 +235,7 @@ function firstRows(blockOf, count) {
   return rows;
 }
 
-/** The report's tables below the picture; rows that name a move go there. */
+/** The report's tables below the picture; a row about a move has a button that shows it. */
 function showTables(head, go) {
   for (const table of head.tables) {
     const made = element("table"), body = element("tbody");

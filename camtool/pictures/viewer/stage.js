@@ -51,7 +51,7 @@ function clock(seconds) {
   return `${hours}:${two(minutes)}:${two(whole % 60)}.${tenths % 10}`;
 }
 
-// What is to be seen and in which colour: the layers, the ways to colour moves, their styles.
+// The layers: which are on, how moves are coloured, and the styles in which all are drawn.
 
 const SORTS = ["rapid", "feed", "plunge"];
 const COLOURS = [
@@ -59,7 +59,7 @@ const COLOURS = [
   "swept", "travel", "wanted",
 ];
 
-/** The colours of the page as they are now: the system's preference, or paper. */
+/** The page's colours of now: light or dark as the system prefers, light on paper. */
 function palette() {
   const style = getComputedStyle(document.documentElement);
   return Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
@@ -79,7 +79,8 @@ class Layers {
     this.binOf = this.bins();
   }
 
-  /** What there is, from the ground up; with a predicted path little beside it is on at first. */
+  /** The layers that the page has, from the ground up. With a predicted path, starts, order and
+   * directions are off at first. */
   listAll() {
     const { head, columns } = this, plain = !columns.trace_row.length;
     head.layers.forEach((layer, index) => {
@@ -104,7 +105,7 @@ class Layers {
     }
     for (const { name, key, on, parts } of head.rows) this.add(`row ${name}`, name, key, on, parts);
     if (head.worst.length) this.add("worst", "worst places", "x");
-    if (head.doubts.length) this.add("doubt", "open ends, crossings", "u");
+    if (head.ambiguous.length) this.add("ambiguous", "open ends, crossings", "u");
     this.add("zero", "part zero", "z");
   }
 
@@ -113,14 +114,14 @@ class Layers {
     this.on.set(key, isOn);
   }
 
-  /** From now on deviations are drawn so many times as large. */
+  /** Draw deviations `times` as large from now on. */
   exaggerate(times) {
     this.times = times;
     const { trace_point: points, trace_off: off } = this.columns, more = (times - 1) * this.head.off_mm;
     this.points = times === 1 ? points : points.map((at, k) => at + more * off[k]);
   }
 
-  /** [left, low, right, high] mm of the predicted path where it cuts; null without one. */
+  /** [left, low, right, high] mm of the predicted path while it cuts; null without one. */
   traced() {
     const { points } = this, bins = this.columns.trace_bin, none = this.head.map.light.length;
     const box = [Infinity, Infinity, -Infinity, -Infinity];
@@ -141,7 +142,7 @@ class Layers {
     return Math.min(count - 1, Math.floor((um / this.head.top_um) * count));
   }
 
-  /** Per move: the step of the map for each way to colour; behind the map where unknown. */
+  /** The step of the map of each move, by error and by height; one beyond the last where unknown. */
   bins() {
     const { move_error: errors, move_kind: kinds, move_end: ends } = this.columns;
     const count = this.head.map.light.length, rows = kinds.length;
@@ -167,7 +168,7 @@ class Layers {
 
   mapColours() { return this.isDark ? this.head.map.dark : this.head.map.light; }
 
-  /** The move's style: its sort while coloured by kind, else its step of the map. */
+  /** The style of each move: by its sort while moves are coloured by kind, else by the map. */
   moveStyles(colours) {
     const drawn = (sort, style) => (this.on.get(sort) ? style : null);
     const rapid = drawn("rapid", { colour: colours.rapid, width: 1, dash: [5, 4] });
@@ -204,7 +205,7 @@ class Layers {
     return [...this.mapColours().map((colour) => ({ colour, width: 2 })), null];
   }
 
-  /** The tool's true width, of what is cut. */
+  /** Cuts at the true width of the tool. */
   sweptStyles(colours, scale) {
     if (!this.on.get("swept")) return [null, null, null];
     const wide = { colour: colours.swept, width: this.head.tool_mm * scale };
@@ -225,18 +226,18 @@ class Layers {
     return this.head.layers.length > 1 ? layer[this.isDark ? "dark" : "light"] : colours.feed;
   }
 
-  /** Whether a move is to be seen. */
+  /** Whether the layer of a move is on. */
   shows(row) { return this.on.get(SORTS[this.sortOf[row]]); }
 }
 
-// The canvases on top of each other: what stays, what is done, and what moves.
+// The canvases on top of each other: the plan, what is done, and what moves.
 
-/** Painting that takes longer than this waits until the hand rests. */
+/** Painting that takes longer than this waits until the view rests for `REST_MS`. */
 const SLOW_MS = 40;
 const REST_MS = 120;
 
-/** From the ground up: travel and what the tool covers, the plan, what is done, signs, the tool. */
-const CANVASES = ["ground", "plan", "done", "signs", "over"];
+/** From the ground up: travel and what the tool covers, the plan, what is done, marks, the tool. */
+const CANVASES = ["ground", "plan", "done", "marks", "over"];
 
 class Stage {
   constructor(place, tracks, layers, run) {
@@ -267,7 +268,7 @@ class Stage {
       ctx.canvas.height = Math.round(height * ratio);
       ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     }
-    // Canvases of another size are empty: no waiting here.
+    // A resized canvas is empty: paint without waiting.
     if (view.isFitted) this.fit();
     this.paintNow();
   }
@@ -280,7 +281,7 @@ class Stage {
     this.changed();
   }
 
-  /** The view or a style has changed: everything anew, at once where that is quick. */
+  /** After a change of the view or of a style: paint everything, at once where that is quick. */
   changed() {
     this.rest();
     if (this.painted && this.slowest > SLOW_MS) {
@@ -295,7 +296,7 @@ class Stage {
     this.resting = 0;
   }
 
-  /** Show the old picture where it belongs in the new view. */
+  /** Move and scale the old picture to its place in the new view. */
   slide() {
     const { painted: old, view } = this, factor = view.scale / old.scale;
     const x = view.px(old.mmX(0)), y = view.py(old.mmY(0));
@@ -304,7 +305,7 @@ class Stage {
     }
   }
 
-  /** Paint in the next frame: "all", or what has moved. */
+  /** Paint in the next frame: "all", or only what has moved. */
   soon(what) {
     if (what === "all") {
       this.wantsAll = true;
@@ -327,8 +328,8 @@ class Stage {
       for (const ctx of Object.values(this.contexts)) ctx.canvas.style.transform = "";
       this.painted = this.view.copy();
       this.paintDone(colours);
-      this.clear("signs");
-      paintSigns(this.contexts.signs, this.view, this.moves, this.layers, colours);
+      this.clear("marks");
+      paintMarks(this.contexts.marks, this.view, this.moves, this.layers, colours);
       this.slowest = performance.now() - begin;
     } else this.paintDone(colours);
     this.paintOver(colours);
@@ -341,7 +342,7 @@ class Stage {
     this.contexts[name].clearRect(0, 0, this.view.width, this.view.height);
   }
 
-  /** Nothing is done yet. */
+  /** Clear what is done, to begin again at the start. */
   clearDone(colours) {
     this.done = { row: 0, trace: 0 };
     this.clear("done");
@@ -356,7 +357,7 @@ class Stage {
     paintGrid(ctx, view, colours);
     const rows = { from: 0, to: drawing.count }, of = layers.columns.drawn_layer;
     paintTrack(ctx, view, drawing, rows, of, layers.drawingStyles(colours));
-    paintMarks(ctx, view, layers, colours);
+    paintDrills(ctx, view, layers, colours);
     if (!moves.count) return;
     const pale = layers.paleStyles(colours);
     paintTrack(ctx, view, moves, { from: 0, to: moves.count }, pale.of, pale.styles);
@@ -365,7 +366,7 @@ class Stage {
     paintTrack(ctx, view, this.wanted, { from: 0, to: every.length }, every, [line]);
   }
 
-  /** What has been done since the last time; all of it when time went back. */
+  /** What has been done since the last time; everything after a step back in time. */
   paintDone(colours) {
     if (!this.moves.count) return;
     const ctx = this.contexts.done, { view, moves, layers, run } = this;
@@ -403,14 +404,13 @@ class Stage {
     if (moves.count) paintTool(ctx, view, moves, run, this.layers.head.tool_mm, colours);
   }
 
-  /** Everything on the lowest canvas: on paper, what is cleared on one canvas would hide those
-   * below it. */
+  /** Copy everything to the lowest canvas: printed, an empty canvas would hide those below it. */
   join() {
     const { width, height } = this.view, [lowest, ...others] = Object.values(this.contexts);
     for (const ctx of others) lowest.drawImage(ctx.canvas, 0, 0, width, height);
   }
 
-  /** All anew, and now. */
+  /** Paint everything now. */
   paintNow() {
     this.rest();
     this.wantsAll = true;

@@ -1,7 +1,7 @@
-"""What a toolpath and its drawing look like from above: chains of lines and true arcs.
+"""Toolpaths and drawings seen from above: chains of lines and arcs, places, and path data.
 
-A chain is an unbroken run of moves of one sort. Arcs stay arcs all the way into the SVG; one of
-more than 3/4 turn is written as two, since a nearly full circle is ill-defined by its end points.
+A chain is an unbroken run of moves of one kind. Arcs stay arcs in the SVG; one of more than 3/4
+turn is written as two, since a nearly full circle is ill-defined by its end points.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from camtool.pictures.svg import MM_DECIMALS, PathData
 from camtool.toolpath.moves import Kind, Toolpath
 
 LONGEST_ARC_RAD = 1.5 * math.pi
-"""An arc of more is written as two."""
+"""A longer arc is written as two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +58,11 @@ class Chain:
 
 
 @dataclass(frozen=True, eq=False)
-class Strokes:
-    """A toolpath from above: `feeds` (level), `ramps` (sinking or climbing on their way) and
-    `rapids` as chains; `plunges` (P, 2) mm, where the tool goes straight down that did not come
-    there at a feed, `starts` (S, 2) mm, where feeds in XY begin, each place once; `begin` (2,) mm
-    where the tool stands at first. What is cut at several depths is drawn once."""
+class Moves:
+    """A toolpath from above: `feeds` (level), `ramps` (that change Z as well) and `rapids` as
+    chains; `plunges` (P, 2) mm, where the tool goes straight down, but not from cut to cut;
+    `starts` (S, 2) mm, where feeds in XY begin; each place once; `begin` (2,) mm, where the tool
+    stands at first. What is cut at several depths is drawn once."""
 
     feeds: tuple[Chain, ...]
     ramps: tuple[Chain, ...]
@@ -72,44 +72,45 @@ class Strokes:
     begin: Floats
 
 
-def strokes_of(toolpath: Toolpath) -> Strokes:
-    """Sort the moves of a toolpath by how they are drawn."""
+def moves_of(toolpath: Toolpath) -> Moves:
+    """The moves of a toolpath, sorted by how they are drawn."""
     starts, ends = toolpath.starts, toolpath.end
     step = ends - starts
     across = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
     cuts = toolpath.is_feed & (across | toolpath.is_arc)
     slopes = cuts & (np.abs(step[:, 2]) > POSITION_EPS_MM)
     rapid = (toolpath.kind == Kind.RAPID) & across
-    # Steps straight down within a cut, as from one pass to the next, are no plunges to look at.
-    goes_on = _after(toolpath, cuts, cuts | (toolpath.kind == Kind.RAPID))
+    # A step straight down within a cut, as from one pass to the next, is not drawn as a plunge.
+    continues = _follows(toolpath, cuts, cuts | (toolpath.kind == Kind.RAPID))
     down = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
-    return Strokes(
+    return Moves(
         feeds=_chains(toolpath, cuts & ~slopes),
         ramps=_chains(toolpath, slopes),
         rapids=_once(starts[rapid, :2], ends[rapid, :2]),
-        plunges=_places(ends[down & ~goes_on, :2]),
-        starts=_places(starts[cuts & ~goes_on, :2]),
+        plunges=_places(ends[down & ~continues, :2]),
+        starts=_places(starts[cuts & ~continues, :2]),
         begin=toolpath.start[:2],
     )
 
 
-def _after(toolpath: Toolpath, cuts: Bools, counts: Bools) -> Bools:
-    """(N,) true where the last row that `counts` before a row is one of the `cuts`."""
+def _follows(toolpath: Toolpath, cuts: Bools, counted: Bools) -> Bools:
+    """(N,) true where, of the rows that are `counted`, the last one before a row is one of the
+    `cuts`."""
     rows = np.arange(len(toolpath))
-    latest = np.maximum.accumulate(np.where(counts, rows, -1))
+    latest = np.maximum.accumulate(np.where(counted, rows, -1))
     before = np.concatenate([[-1], latest])[: len(rows)]
     return np.asarray((before >= 0) & cuts[before]) if len(rows) else cuts
 
 
 def _places(points: Floats) -> Floats:
-    """Each place once, in their order."""
+    """Each place once, in the order of their first occurrence."""
     _, first = np.unique(points, axis=0, return_index=True)
     return points[np.sort(first)]
 
 
 def _chains(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
-    """Runs of the chosen rows, each way once: passes at several depths, and back along a line,
-    look the same. Nothing that moves in XY lies between the rows of a run."""
+    """Runs of the chosen rows, each line or arc once: passes at several depths, and a line there
+    and back, look the same. No move in XY lies between the rows of a run."""
     rows = np.flatnonzero(chosen)
     if not len(rows):
         return ()
@@ -125,7 +126,8 @@ def _chains(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
 
 
 def _first_times(begin: Floats, end: Floats, sweep: Floats) -> Ints:
-    """Which of J moves are the first on their way, there or back, ascending."""
+    """Rows, ascending, of those of J moves that are the first along their line or arc, in either
+    direction."""
     back = (begin[:, 0] > end[:, 0]) | ((begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1]))
     low, high = np.where(back[:, None], end, begin), np.where(back[:, None], begin, end)
     full = (begin == end).all(axis=1)
@@ -135,7 +137,7 @@ def _first_times(begin: Floats, end: Floats, sweep: Floats) -> Ints:
 
 
 def _once(begin: Floats, end: Floats) -> tuple[Chain, ...]:
-    """Straight moves, each once, there or back: dashes over dashes would look like a line."""
+    """Straight moves, each once in either direction: dashes over dashes would look like a line."""
     found: dict[tuple[tuple[float, ...], ...], Chain] = {}
     for a, b in zip(begin, end, strict=True):
         chain = Chain(np.array([a, b]), np.full((1, 2), np.nan), np.zeros(1))
@@ -144,7 +146,7 @@ def _once(begin: Floats, end: Floats) -> tuple[Chain, ...]:
 
 
 def chains_of(lines: Polylines) -> tuple[Chain, ...]:
-    """Every path of the columns as a chain."""
+    """Each of the polylines as a chain."""
     all_segments = Segments.of(lines)
     cuts = np.searchsorted(all_segments.path, np.arange(len(lines) + 1))
     chains = []
@@ -158,7 +160,7 @@ def chains_of(lines: Polylines) -> tuple[Chain, ...]:
 
 
 def chains_between(segments: Segments) -> tuple[Chain, ...]:
-    """Lines and arcs as chains: one goes on while the next piece begins where the last ended."""
+    """Lines and arcs as chains: a chain goes on while each begins where the one before ended."""
     if not len(segments):
         return ()
     apart = np.hypot(*(segments.start[1:] - segments.end[:-1]).T) > POSITION_EPS_MM
@@ -191,9 +193,9 @@ def path_data(chains: Iterable[Chain]) -> str:
 
 
 def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
-    """Whether an arc leaves its chord by less than what tells two positions apart.
+    """Whether an arc lies nearer to its chord than `POSITION_EPS_MM`.
 
-    height = chord/2 · tan(sweep/4); renderers lose their way in circles of kilometres.
+    height = chord/2 · tan(sweep/4); renderers are inexact for radii of kilometres.
     """
     chord = math.dist(chain.points[index], chain.points[index + 1])
     return abs(sweep) < math.pi and 0.5 * chord * math.tan(abs(sweep) / 4.0) < POSITION_EPS_MM
@@ -217,7 +219,7 @@ def chains_box(chains: Sequence[Chain]) -> Floats | None:
 
 
 def _halved(chains: Sequence[Chain]) -> Segments:
-    """All moves as segments, each arc as two: a full circle has no bulge of its own."""
+    """All moves as segments, each arc as two: a full circle has no bulge."""
     begin = np.concatenate([chain.points[:-1] for chain in chains])
     end = np.concatenate([chain.points[1:] for chain in chains])
     centre = np.concatenate([chain.centre for chain in chains])
@@ -236,38 +238,38 @@ def _halved(chains: Sequence[Chain]) -> Segments:
     )
 
 
-# Where an axis turns back while the tool is fed: there its play shows.
+# Reversals: where X or Y turns back while the tool is fed, so that its backlash shows.
 #
-# An arc goes one way in X and in Y between the multiples of 90°; each such piece, and each line,
-# has a sign per axis. An axis turns where its sign is another than the last one that was not 0,
-# rapids included; a turn counts where the piece behind it is a feed.
+# Between the multiples of 90° an arc has one direction in X and one in Y; each such piece, and
+# each line, has a sign per axis. An axis reverses where its sign differs from its last sign that
+# was not 0, rapids included; a reversal counts where the piece after it is a feed.
 
 
 QUARTER_RAD = 0.5 * np.pi
 
 LEAST_PIECE_RAD = 1e-9
-"""Of an arc that begins or ends at a multiple of 90°, no shorter piece is taken for its own."""
+"""Of an arc that begins or ends at a multiple of 90°, a shorter piece is not counted."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """Where P pieces begin, (P, 2) mm, and the signs of X and Y on each, (P, 2); `row` (P,) of
-    the toolpath."""
+    """Where P pieces begin, (P, 2) mm; the signs of X and Y on each, (P, 2); its row of the
+    toolpath, (P,)."""
 
     begin: Floats
     signs: Ints
     row: Ints
 
 
-def turns_of(toolpath: Toolpath) -> Floats:
-    """(R, 2) mm: the places, in order; both axes may turn at one."""
+def reversals_of(toolpath: Toolpath) -> Floats:
+    """(R, 2) mm: the places of reversals, in order; both axes may reverse at one."""
     pieces = _pieces(toolpath)
     turned = _turned(pieces.signs[:, 0]) | _turned(pieces.signs[:, 1])
     return np.asarray(pieces.begin[turned & toolpath.is_feed[pieces.row]])
 
 
 def _turned(signs: Ints) -> Bools:
-    """(P,) whether the sign is another than the last one before it that was not 0."""
+    """(P,) whether the sign differs from the last one before it that was not 0."""
     found: Bools = np.zeros(len(signs), dtype=np.bool_)
     moving = np.flatnonzero(signs)
     found[moving[1:]] = signs[moving[1:]] != signs[moving[:-1]]
@@ -286,15 +288,15 @@ def _pieces(toolpath: Toolpath) -> _Pieces:
     # A row of n inner quarters has the pieces 0 … n; piece k > 0 begins at the k-th of them.
     of = np.repeat(np.arange(len(rows)), inside + 1)
     k = np.arange(len(of)) - np.repeat(np.cumsum(inside + 1) - (inside + 1), inside + 1)
-    way = np.where(sweep[of] < 0.0, -1.0, 1.0)
-    quarter = (first[of] + way * (k - 1)) * QUARTER_RAD
+    sense = np.where(sweep[of] < 0.0, -1.0, 1.0)
+    quarter = (first[of] + sense * (k - 1)) * QUARTER_RAD
     low = np.where(k == 0, angle[of], quarter)
-    high = np.where(k == inside[of], (angle + sweep)[of], quarter + way * QUARTER_RAD)
+    high = np.where(k == inside[of], (angle + sweep)[of], quarter + sense * QUARTER_RAD)
     radius = np.hypot(spoke[:, 0], spoke[:, 1])[of]
     turned = np.where(is_arc, toolpath.centre[rows].T, 0.0).T[of]
     turned = turned + radius[:, None] * np.column_stack([np.cos(low), np.sin(low)])
     middle = 0.5 * (low + high)
-    bent = np.column_stack([-way * np.sin(middle), way * np.cos(middle)])
+    bent = np.column_stack([-sense * np.sin(middle), sense * np.cos(middle)])
     straight = (ends - starts)[rows][of]
     arcs = is_arc[of, None]
     return _Pieces(

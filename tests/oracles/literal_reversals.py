@@ -1,8 +1,8 @@
-"""The literal twin of `camtool.pictures.strokes`: piece by piece, each axis with its last sign.
+"""The oracle of `reversals_of` of pictures: piece by piece, each axis with its last sign.
 
-An arc goes one way in X and in Y between the multiples of 90°; each such piece, and each line, has
-a sign per axis. An axis turns where its sign is another than the last one that was not 0, rapids
-included; a turn counts where the piece behind it is a feed.
+Between the multiples of 90° an arc has one direction in X and one in Y; each such piece, and each
+line, has a sign per axis. An axis reverses where its sign differs from its last sign that was not
+0, rapids included; a reversal counts where the piece after it is a feed.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from camtool.toolpath.moves import Toolpath
 Piece = tuple[tuple[float, float], tuple[int, int]]
 
 LEAST_PIECE_RAD = 1e-9
-"""Of an arc that begins or ends at a multiple of 90°, no shorter piece is taken for its own."""
+"""Of an arc that begins or ends at a multiple of 90°, a shorter piece is not counted."""
 
 
-def turns_of(toolpath: Toolpath) -> Floats:
-    """(R, 2) mm: the places, in order; both axes may turn at one."""
+def reversals_of(toolpath: Toolpath) -> Floats:
+    """(R, 2) mm: the places of reversals, in order; both axes may reverse at one."""
     last = [0, 0]
     places = []
     is_feed = toolpath.is_feed.tolist()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import sample
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rotated
-from camtool.pictures.strokes import Chain, chains_box, chains_of, path_data, strokes_of
+from camtool.pictures.chains import Chain, chains_box, chains_of, moves_of, path_data
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.svg_page import Arc, Line, pieces
 from tests.paths import mirrored
@@ -30,7 +30,7 @@ def toolpath_arc(sweep: float, radius: float = 2.0, first: float = 0.3) -> Chain
     end = begin if abs(sweep) == FULL else end
     builder = ToolpathBuilder((*begin, 0.0))
     path = builder.arc(*end, centre=(1.0, -1.0), ccw=sweep > 0.0, feed=1.0).finish()
-    (chain,) = strokes_of(path).feeds
+    (chain,) = moves_of(path).feeds
     return chain
 
 
@@ -149,13 +149,13 @@ def test_moves_are_sorted_by_how_they_are_drawn() -> None:
         .rapid(3.0, 2.0)
         .finish()
     )
-    strokes = strokes_of(path)
-    assert [len(chain.sweep) for chain in strokes.feeds] == [2]
-    assert [chain.points.tolist() for chain in strokes.ramps] == [[[2.0, 2.0], [3.0, 2.0]]]
-    assert strokes.plunges.tolist() == [[1.0, 0.0]]
-    assert strokes.starts.tolist() == [[1.0, 0.0]]
+    moves = moves_of(path)
+    assert [len(chain.sweep) for chain in moves.feeds] == [2]
+    assert [chain.points.tolist() for chain in moves.ramps] == [[[2.0, 2.0], [3.0, 2.0]]]
+    assert moves.plunges.tolist() == [[1.0, 0.0]]
+    assert moves.starts.tolist() == [[1.0, 0.0]]
     # There and back is drawn once.
-    assert [chain.points.tolist() for chain in strokes.rapids] == [
+    assert [chain.points.tolist() for chain in moves.rapids] == [
         [[0.0, 0.0], [1.0, 0.0]],
         [[3.0, 2.0], [1.0, 0.0]],
     ]
@@ -165,8 +165,8 @@ def test_passes_at_several_depths_are_drawn_once() -> None:
     builder = ToolpathBuilder()
     for depth in (-0.1, -0.2, -0.3):
         builder.rapid(0.0, 0.0).line(z=depth, feed=5.0).line(1.0, 0.0, feed=5.0).rapid(z=1.0)
-    strokes = strokes_of(builder.finish())
-    assert len(strokes.feeds) == len(strokes.plunges) == 1
+    moves = moves_of(builder.finish())
+    assert len(moves.feeds) == len(moves.plunges) == 1
 
 
 def test_headings_are_those_of_travel() -> None:
@@ -182,9 +182,9 @@ def test_passes_of_one_stay_are_drawn_once() -> None:
     for level in (-1.0, -2.0, -3.0):
         builder.line(z=level, feed=5.0).line(2.0, 0.0, feed=5.0)
         builder.arc(2.0, 2.0, centre=(2.0, 1.0), ccw=True, feed=5.0).line(1.0, 0.0, feed=5.0)
-    strokes = strokes_of(builder.rapid(z=1.0).finish())
-    assert [len(chain.sweep) for chain in strokes.feeds] == [3]
-    assert strokes.plunges.tolist() == [[1.0, 0.0]]
+    moves = moves_of(builder.rapid(z=1.0).finish())
+    assert [len(chain.sweep) for chain in moves.feeds] == [3]
+    assert moves.plunges.tolist() == [[1.0, 0.0]]
 
 
 def test_there_and_back_is_drawn_once() -> None:
@@ -193,30 +193,30 @@ def test_there_and_back_is_drawn_once() -> None:
         builder.line(z=level, feed=5.0).line(3.0, 0.0, feed=5.0)
         builder.arc(5.0, 0.0, centre=(4.0, 0.0), ccw=True, feed=5.0).line(z=level - 0.5, feed=5.0)
         builder.arc(3.0, 0.0, centre=(4.0, 0.0), ccw=False, feed=5.0).line(2.0, 0.0, feed=5.0)
-    strokes = strokes_of(builder.finish())
-    assert [chain.sweep.tolist() for chain in strokes.feeds] == [[0.0, pytest.approx(math.pi)]]
+    moves = moves_of(builder.finish())
+    assert [chain.sweep.tolist() for chain in moves.feeds] == [[0.0, pytest.approx(math.pi)]]
     other = ToolpathBuilder().arc(2.0, 0.0, centre=(1.0, 0.0), ccw=True, feed=5.0)
     other.arc(0.0, 0.0, centre=(1.0, 0.0), ccw=True, feed=5.0)  # the other half
-    assert [len(chain.sweep) for chain in strokes_of(other.finish()).feeds] == [2]
+    assert [len(chain.sweep) for chain in moves_of(other.finish()).feeds] == [2]
 
 
 def test_slopes_and_helices_are_no_level_cuts() -> None:
     builder = ToolpathBuilder().rapid(z=1.0).rapid(1.0, 0.0).line(z=0.0, feed=5.0)
     builder.arc(1.0, 0.0, -1.0, centre=(0.0, 0.0), ccw=True, feed=5.0)
     builder.arc(1.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=5.0).line(2.0, 0.0, -0.5, feed=5.0)
-    strokes = strokes_of(builder.finish())
-    assert [chain.sweep.tolist() for chain in strokes.feeds] == [[pytest.approx(FULL)]]
-    assert [len(chain.sweep) for chain in strokes.ramps] == [1, 1]
-    assert strokes.starts.tolist() == [[1.0, 0.0]]
+    moves = moves_of(builder.finish())
+    assert [chain.sweep.tolist() for chain in moves.feeds] == [[pytest.approx(FULL)]]
+    assert [len(chain.sweep) for chain in moves.ramps] == [1, 1]
+    assert moves.starts.tolist() == [[1.0, 0.0]]
 
 
 def test_small_steps_of_a_slope_are_neither_plunges_nor_starts() -> None:
     builder = ToolpathBuilder().rapid(z=1.0).rapid(1.0, 0.0).line(z=0.0, feed=5.0)
     for number in range(1, 50):
         builder.line(1.0 + 0.1 * number, 0.0, feed=5.0).line(z=-0.01 * number, feed=5.0)
-    strokes = strokes_of(builder.finish())
-    assert strokes.plunges.tolist() == strokes.starts.tolist() == [[1.0, 0.0]]
-    assert [len(chain.sweep) for chain in strokes.feeds] == [49]
+    moves = moves_of(builder.finish())
+    assert moves.plunges.tolist() == moves.starts.tolist() == [[1.0, 0.0]]
+    assert [len(chain.sweep) for chain in moves.feeds] == [49]
 
 
 def test_drilled_holes_are_plunges() -> None:
@@ -224,6 +224,6 @@ def test_drilled_holes_are_plunges() -> None:
     for x in (1.0, 2.0):
         builder.rapid(x, 0.0).line(z=-1.0, feed=5.0).rapid(z=1.0).rapid(z=-0.9)
         builder.line(z=-2.0, feed=5.0).rapid(z=1.0)
-    strokes = strokes_of(builder.finish())
-    assert strokes.plunges.tolist() == [[1.0, 0.0], [2.0, 0.0]]
-    assert (strokes.feeds, strokes.ramps, len(strokes.starts)) == ((), (), 0)
+    moves = moves_of(builder.finish())
+    assert moves.plunges.tolist() == [[1.0, 0.0], [2.0, 0.0]]
+    assert (moves.feeds, moves.ramps, len(moves.starts)) == ((), (), 0)
