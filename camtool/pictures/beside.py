@@ -62,7 +62,7 @@ def render_beside(scenes: Sequence[Scene], name: str, options: Options = AS_USUA
     OptionError for .html and for what a scene does not have."""
     if PurePath(name).suffix.lower() == ".html":
         raise OptionError(
-            "a page shows one alone", file=name, mend="pictures side by side are .svg or .png"
+            "an .html page shows one scene", file=name, mend="side by side, use .svg or .png"
         )
     return rendered(lambda sized: draw_beside(scenes, sized), name, options)
 

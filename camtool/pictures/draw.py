@@ -121,7 +121,7 @@ def rendered(drawn: Callable[[Options], str], name: str, options: Options) -> by
     OutputError for other extensions."""
     suffix = PurePath(name).suffix.lower()
     if suffix not in (".svg", ".png"):
-        raise OutputError("is no kind of picture that we make", file=name, mend="use .svg or .png")
+        raise OutputError("is not a picture file", file=name, mend="use .svg or .png")
     usual = SVG_WIDTH_PX if suffix == ".svg" else PNG_WIDTH_PX
     width = options.size_px or usual
     svg = drawn(replace(options, size_px=width))

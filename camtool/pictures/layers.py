@@ -510,8 +510,8 @@ def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
     for name in sorted(shown | left_out):
         if name not in known:
             raise OptionError(
-                f"{name!r} is no layer",
-                mend=f"{guess(name, known)}There are {', '.join(known)}",
+                f"there is no layer {name!r}",
+                mend=f"{guess(name, known)}The layers are {', '.join(known)}",
             )
     left = frozenset(shown or usual_layers()) - left_out
     if not left:

@@ -53,7 +53,7 @@ class Options:
             )
         if self.polar is not None and (crop, self.exaggerate, self.layers) != (None, 1.0, None):
             raise OptionError(
-                "a circle is plotted alone: it has no part, no layers, and a factor of its own",
+                "a circle is plotted alone: without crop and layers, and with a factor of its own",
                 mend="drop polar, or crop_mm, exaggerate and layers",
             )
 

@@ -185,7 +185,7 @@ def test_kinds_of_files() -> None:
     assert decode(render_beside([BEFORE], "x.png", Options(size_px=300))).shape[1] == 300
     with pytest.raises(OptionError, match=r"x\.html"):
         render_beside([BEFORE, AFTER], "x.html")
-    with pytest.raises(OutputError, match="no kind of picture"):
+    with pytest.raises(OutputError, match="not a picture file"):
         render_beside([BEFORE, AFTER], "x.bmp")
     with pytest.raises(ValueError, match="no scene"):
         draw_beside([])

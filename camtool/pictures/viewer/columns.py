@@ -189,8 +189,8 @@ def _bends(
 
 # The predicted path for the page: its points, their colours and their deviations.
 #
-# Of a point p of the slides and the nearest point q of the wanted path, the page holds p and p −
-# q, and draws p + (N − 1)(p − q) for a deviation N times as large (see `camtool.pictures.trace`).
+# Of a point p of the slides and the nearest point q of the wanted path, the page holds p and p−q,
+# and draws p + (N − 1)(p − q) for a deviation N times as large (see `camtool.pictures.trace`).
 
 MOST_COUNTS = 32_000
 """Deviations are whole numbers of counts, this many for the largest."""
