@@ -1,4 +1,4 @@
-"""DXF of the sample drawings, in full: it depends on no library's version, date or GUID."""
+"""Writes the sample drawings as DXF, without a library: no version, date or GUID changes them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from shapes import (
 
 
 def dxf(sheet: Sheet) -> str:
-    """The sheet as DXF R2000 (AC1015) with handles and the tables that readers ask for."""
+    """The sheet as DXF R2000 (AC1015) with handles and the tables that readers require."""
     return _DxfWriter(sheet).text()
 
 
@@ -37,7 +37,7 @@ class _DxfWriter:
         self.owners = self.spaces | {name: self.handle() for name in sheet.blocks}
 
     def text(self) -> str:
-        """All sections; the header comes last into being, since it names the next handle."""
+        """All sections; the header is made last, since it contains the next handle."""
         self.section("TABLES", self.tables)
         self.section("BLOCKS", self.blocks)
         self.section("ENTITIES", self.entities)
@@ -155,7 +155,7 @@ class _DxfWriter:
 
 
 def _dxf_entity(shape: Shape) -> tuple[str, list[tuple[int, object]]]:
-    """The kind of an entity, and its group codes behind the layer."""
+    """The kind of an entity, and its group codes after the layer."""
     match shape:
         case Line(start, end):
             return "LINE", [(100, "AcDbLine"), *_xyz(10, start), *_xyz(11, end)]

@@ -1,10 +1,9 @@
-"""Writes the pieces that the theses measured, as far as their text says how large they were.
+"""Writes drawings of the parts that the theses measured, as far as their text gives the sizes.
 
     python samples/make_pieces.py [FOLDER]
 
-Each is a drawing of a few lines; its name begins with the target that it was cut on, and where
-the numbers come from is said in docs/validation.md. Where a piece lay on the table is ours. All
-lengths are mm.
+Each has a few lines; its name begins with the target of its machine. docs/validation.md gives the
+sources of the numbers. The positions on the table are our choice. All lengths are mm.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from make_samples import rounded, straight
 from shapes import Layer, Line, Polyline, Shape, Sheet
 
 APART = 0.2
-"""Between two parallel lines: the theses do not say."""
+"""Distance of two parallel lines, which the theses do not give."""
 
 OUTLINES = {
     "puma-5": (4.86, 4.96),
@@ -26,7 +25,7 @@ OUTLINES = {
     "gmm-5": (5.0, 4.997),
     "gmm-1.2": (1.21, 1.08),
 }
-"""Overall sizes of logos whose shapes are in lost figures: rounded rectangles stand for them."""
+"""Overall sizes of logos whose shapes are in lost figures: rounded rectangles replace them."""
 
 
 def two_lines(length: float, axis: int) -> Shape:
@@ -36,28 +35,28 @@ def two_lines(length: float, axis: int) -> Shape:
 
 
 def clockwise(centre: tuple[float, float], radius: float) -> Shape:
-    """A circle from its left end over the top."""
+    """A clockwise circle that begins at its left end."""
     (x, y), half = centre, -1.0
     return Polyline([(x - radius, y, half), (x + radius, y, half)])
 
 
 def rectangle(width: float, height: float) -> Shape:
-    """From (0, 0) counter-clockwise; of negative sizes, first along -X and -Y: so all four edges
-    are come to across the play."""
+    """A rectangle from (0, 0) counter-clockwise. With negative sizes it first goes along -X
+    and -Y, so that all four edges are approached across the backlash."""
     return straight([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
 
 
 def outline(width: float, height: float) -> Shape:
-    """A rectangle with corners of a quarter of its shorter side."""
+    """A rectangle whose corners have a radius of a quarter of its shorter side."""
     return rounded(0.0, 0.0, width, height, 0.25 * min(width, height))
 
 
 DIAGONALS: list[Shape] = [Line((0.0, 0.0), (10.0, 5.0)), Line((10.0, 0.0), (0.0, 5.0))]
-"""Of the rectangle: cut more slowly, on a layer of their own."""
+"""Diagonals of the rectangle, on a layer of their own, because they are cut more slowly."""
 
 
 def pieces() -> dict[str, list[Shape]]:
-    """Name, shapes."""
+    """The shapes of each drawing, by name."""
     middle = (3.0, 3.0)
     found: dict[str, list[Shape]] = {
         "pic-mmh-lines-x": [two_lines(2.5, 0)],

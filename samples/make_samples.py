@@ -3,7 +3,7 @@ plate.dxf.
 
     python samples/make_samples.py [FOLDER]
 
-Run it as often as you like: the same files come out, byte for byte. All lengths are mm.
+Every run writes the same files, byte for byte. All lengths are mm.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ MIDDLE = 2.5 + 2.5j
 
 
 TILT_DEG = 30.0
-"""The emblem's inner ellipse and wave are turned by this."""
+"""Rotation of the emblem's inner ellipse and wave."""
 
 
 def gear(teeth: int, tip: float, root: float, shares: tuple[float, float]) -> Polyline:
-    """A gear about the middle: straight flanks between arcs on the tip and the root circle.
+    """A gear about the centre: straight flanks between arcs on the tip and the root circle.
 
-    `shares`: the part of the pitch that the tip and the foot of a tooth take.
+    `shares`: the parts of the pitch that the tip and the foot of a tooth occupy.
     """
     pitch = 2.0 * math.pi / teeth
     head, foot = shares[0] * pitch, shares[1] * pitch
@@ -65,7 +65,7 @@ def slot(radius: float, half_width: float, half_angle: float) -> Polyline:
 
 
 def edge() -> list[Shape]:
-    """The corner of a plate, lower left."""
+    """The lower left corner of a plate."""
     return [
         Line((0.06, 1.1), (0.06, 0.32)),
         Arc((0.32, 0.32), 0.26, 180.0, 270.0),
@@ -81,14 +81,14 @@ def bracket() -> list[Shape]:
 
 
 def around(count: int, radius: float, first: float) -> list[complex]:
-    """Points on a circle about the middle."""
+    """Points on a circle about the centre."""
     return [
         MIDDLE + cmath.rect(radius, math.radians(first + 360.0 * k / count)) for k in range(count)
     ]
 
 
 def corners(block: str) -> list[Insert]:
-    """A block at all four corners: as it is, turned, turned twice, and mirrored."""
+    """A block at all four corners: unchanged, rotated, rotated twice, and mirrored."""
     return [
         Insert(block, (0.0, 0.0)),
         Insert(block, (5.0, 0.0), 90.0),
@@ -132,9 +132,9 @@ def logo() -> Sheet:
 
 
 def coupon() -> Sheet:
-    """Two parallel lines per axis, joined at one end: their distance shows the play of the axis.
+    """Two parallel lines per axis, joined at one end: their distance shows the axis's backlash.
 
-    2.5 mm across X and 1.2 mm across Y, as the PIC machine was measured.
+    They are 2.5 mm apart in X and 1.2 mm in Y, as on the coupon of the PIC machine.
     """
     across_x = Polyline(
         [(1.0, 1.0, 0.0), (1.0, 6.0, 0.0), (3.5, 6.0, 0.0), (3.5, 1.0, 0.0)], False
@@ -147,7 +147,7 @@ def coupon() -> Sheet:
 
 
 def rounded(left: float, low: float, right: float, high: float, radius: float) -> Polyline:
-    """A rectangle with round corners, CCW."""
+    """A rectangle with round corners, counter-clockwise."""
     quarter = math.tan(math.pi / 8.0)
     corners_of = [
         (right, low, -1.0, 0.0, 0.0, 1.0),
@@ -168,7 +168,7 @@ def straight(points: list[tuple[float, float]], closed: bool = True) -> Polyline
 
 
 def plate() -> Sheet:
-    """A front plate, 80 by 50 mm, with everything that a mill does: a layer for each operation."""
+    """A front plate, 80 by 50 mm, with a layer for each kind of milling operation."""
     star_points = [
         cmath.rect(6.0 if k % 2 == 0 else 2.6, math.radians(90.0 + 36.0 * k)) + (66.0 + 35.0j)
         for k in range(10)

@@ -1,4 +1,4 @@
-"""The shapes of the sample drawings, written alike as DXF and as SVG.
+"""The shapes of the sample drawings, which are written both as DXF and as SVG.
 
 All lengths are mm, Y up; numbers are rounded to a picometre, which hides the last digits of sines.
 """
@@ -13,7 +13,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Line:
-    """From `start` to `end`."""
+    """A line from `start` to `end`."""
 
     start: Point
     end: Point
@@ -29,7 +29,7 @@ class Circle:
 
 @dataclass(frozen=True)
 class Arc:
-    """CCW from `start` to `end`, degrees."""
+    """An arc, counter-clockwise from `start` to `end`, degrees."""
 
     centre: Point
     radius: float
@@ -39,7 +39,7 @@ class Arc:
 
 @dataclass(frozen=True)
 class Ellipse:
-    """A full ellipse: half axes, and the turn of the longer one in degrees."""
+    """A full ellipse: half axes, and the rotation of the longer one in degrees."""
 
     centre: Point
     longer: float
@@ -49,7 +49,7 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Polyline:
-    """Vertices x, y, bulge."""
+    """A polyline of vertices x, y, bulge."""
 
     vertices: Sequence[tuple[float, float, float]]
     closed: bool = True
@@ -57,14 +57,14 @@ class Polyline:
 
 @dataclass(frozen=True)
 class Spline:
-    """Cubic Béziers end to end: 3n + 1 control points."""
+    """A chain of n cubic Béziers: 3n + 1 control points."""
 
     control: Sequence[Point]
 
 
 @dataclass(frozen=True)
 class Insert:
-    """A block at a place, scaled, then turned by degrees."""
+    """A block at a place, scaled, then rotated by degrees."""
 
     block: str
     at: Point
@@ -96,6 +96,6 @@ class Sheet:
 
 
 def number(value: float) -> str:
-    """Nine decimals without trailing zeros, and never "-0"."""
+    """The number with nine decimals, without trailing zeros, and never "-0"."""
     text = f"{value:.9f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

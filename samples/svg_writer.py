@@ -1,4 +1,4 @@
-"""SVG of the sample drawings: mm, arcs as `A`, splines as `C`, layers as Inkscape has them."""
+"""Writes the sample drawings as SVG: mm, arcs as `A`, splines as `C`, layers as in Inkscape."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from shapes import (
 
 
 def svg(sheet: Sheet) -> str:
-    """The sheet as SVG: mm, arcs as `A`, splines as `C`, layers as Inkscape has them.
+    """The sheet as SVG.
 
-    Y points down in SVG: each layer turns the sheet over, so its numbers are those of the DXF.
+    Y points down in SVG, so each layer is mirrored and its numbers are those of the DXF.
     """
     width, height = (number(side) for side in sheet.size)
     rows = [
@@ -50,7 +50,7 @@ def svg(sheet: Sheet) -> str:
 
 
 def _svg(shape: Shape) -> str:
-    """One element; its numbers are in the DXF's frame."""
+    """One element; its numbers are in the frame of the DXF."""
     match shape:
         case Line((x1, y1), (x2, y2)):
             a, b, c, d = (number(value) for value in (x1, y1, x2, y2))
