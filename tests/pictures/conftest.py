@@ -56,7 +56,7 @@ def followed(drawing: Drawing) -> Toolpath:
 
 
 def ring_trace(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A way to a circle about (2.5, 2.5) and round it, with errors that wander quickly."""
+    """A path to a circle about (2.5, 2.5) and round it, with errors that change quickly."""
     turn = np.linspace(0.0, 2.0 * math.pi, count)
     wave = 0.01 + 0.009 * np.sin(1.7 * np.arange(count))
     radius = 2.0 + 0.5 * wave

@@ -15,7 +15,7 @@ LENGTH_MM = 10.0
 
 
 def bent(error_mm: float) -> Scene:
-    """A way along X that is off at (4, 0), and farther off where nothing is cut."""
+    """A path along X with an error at (4, 0), and a larger one where nothing is cut."""
     x = np.linspace(0.0, LENGTH_MM, 101)
     error = np.zeros(101)
     error[40], error[80] = error_mm, 5.0

@@ -57,7 +57,7 @@ def test_without_a_wanted_path_nothing_moves() -> None:
 
 
 def result() -> Scene:
-    """A ring with errors, held against the true ring."""
+    """A circle with errors, compared with the true circle."""
     return replace(SCENES["result"], wanted=RING)
 
 

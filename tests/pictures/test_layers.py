@@ -52,8 +52,8 @@ def ids(scene: Scene, *layers: str) -> set[str]:
     return {g.attrib["id"] for g in svg_page.parse(svg).iter() if "id" in g.attrib}
 
 
-def held(scene: Scene, *layers: str) -> set[str]:
-    """The layers, of these or of all, that hold something."""
+def present(scene: Scene, *layers: str) -> set[str]:
+    """The layers, of these or of all, that have something to show."""
     return set(layers_in(content_of(scene, Options(layers=frozenset(layers or LAYERS)))))
 
 
@@ -92,14 +92,14 @@ def test_names_of_layers_are_checked() -> None:
         chosen(["feeds"], ["feeds"])
 
 
-def test_layers_that_hold_nothing_are_known() -> None:
+def test_layers_with_nothing_to_show_are_known() -> None:
     empty = {"travel", "starts", "path", "worst", "doubts"}  # each contour begins with a plunge
-    assert held(MILLED) == set(LAYERS) - empty
-    assert "swept" not in held(replace(MILLED, tool_mm=None))
-    below = held(JUDGED)
+    assert present(MILLED) == set(LAYERS) - empty
+    assert "swept" not in present(replace(MILLED, tool_mm=None))
+    below = present(JUDGED)
     assert not {"rapids", "plunges", "starts", "order", "arrows"} & below
     assert {"path", "worst", "feeds", "zero"} <= below
-    assert held(JUDGED, "order", "arrows") == {"order", "arrows"}  # without the path
+    assert present(JUDGED, "order", "arrows") == {"order", "arrows"}  # without the path
     groups = {g for name in LAYERS if name not in empty for g in GROUPS.get(name, ())}
     assert groups <= ids(MILLED, *LAYERS)
 
@@ -150,7 +150,7 @@ def test_the_worst_places_have_rings_and_ranks() -> None:
     assert len([circle for circle in layer if circle.tag.endswith("circle")]) == 3
 
 
-def test_an_axis_turns_at_corners_and_at_quarters_of_circles() -> None:
+def test_an_axis_reverses_at_corners_and_at_quarters_of_circles() -> None:
     full = ToolpathBuilder((2.0, 0.0, 0.0)).arc(2.0, 0.0, centre=(0.0, 0.0), ccw=True, feed=1.0)
     turns = reversals_of(full.finish())
     # At 0° it begins and ends: nothing goes before and nothing comes after.
@@ -161,13 +161,13 @@ def test_an_axis_turns_at_corners_and_at_quarters_of_circles() -> None:
     assert reversals_of(tour.finish()).tolist() == [[1.0, 1.0], [3.0, 0.0]]
 
 
-def test_a_turn_counts_when_the_tool_is_fed_after_it() -> None:
+def test_a_reversal_counts_when_the_tool_is_fed_after_it() -> None:
     air = ToolpathBuilder().line(1.0, 0.0, feed=1.0).rapid(0.0, 0.0).line(1.0, 0.0, feed=1.0)
     assert reversals_of(air.finish()).tolist() == [[0.0, 0.0]]
 
 
 @pytest.mark.parametrize("ccw", [False, True])
-def test_turns_are_those_of_a_finely_sampled_path(ccw: bool) -> None:
+def test_reversals_are_those_of_a_finely_sampled_path(ccw: bool) -> None:
     path = ToolpathBuilder((1.0, 0.0, 0.0))
     path.arc(math.cos(2.0), math.sin(2.0), centre=(0.0, 0.0), ccw=ccw, feed=1.0)
     path.line(-2.0, 0.3, feed=1.0).line(-1.0, 2.0, feed=1.0)
@@ -184,7 +184,7 @@ def test_turns_are_those_of_a_finely_sampled_path(ccw: bool) -> None:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_turns_are_those_of_the_literal_loop(seed: int) -> None:
+def test_reversals_are_those_of_the_literal_loop(seed: int) -> None:
     rng = np.random.default_rng(seed)
     path, (x, y) = ToolpathBuilder(), (0.0, 0.0)
     for kind in rng.integers(0, 5, 40).tolist():

@@ -25,7 +25,7 @@ def test_a_piece_has_the_colour_of_its_worse_end() -> None:
 
 
 def test_only_what_cuts_is_drawn_and_counted() -> None:
-    # A cut from (0, 0), a way through the air with a wild error, another cut.
+    # A cut from (0, 0), a move through the air with a large error, another cut.
     trace = trace_of(
         scene_of(
             [(0, 0), (1, 0), (5, 5), (6, 5), (7, 5)],

@@ -96,8 +96,8 @@ def test_the_script_makes_no_markup_of_text() -> None:
     folder = resources.files("camtool.pictures.viewer")
     for name in SCRIPTS:
         text = folder.joinpath(name).read_text(encoding="utf-8")
-        for way in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("):
-            assert way not in text, name
+        for call in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("):
+            assert call not in text, name
         assert "</" not in text
 
 
@@ -206,7 +206,7 @@ def test_full_circles_are_plotted_in_the_colours_of_the_page() -> None:
     assert "<figure>" not in text_of(SCENES["toolpath"])
 
 
-def test_a_circle_gone_round_both_ways_is_plotted_once() -> None:
+def test_a_circle_in_both_directions_is_plotted_once() -> None:
     both = (replace(lobed(0.01), partner=2), replace(lobed(0.01), ccw=True, partner=1))
     assert text_of(Scene("t", rounds=both)).count("<figure>") == 1
 
@@ -223,7 +223,7 @@ def lobed(size_mm: float) -> Round:
     return Round((0.0, 0.0), 2.0, False, bins, error, (size_mm, -size_mm, 0.0), (0.0, 0.0))
 
 
-def test_a_run_by_feeds_takes_the_time_of_the_way() -> None:
+def test_a_run_by_feeds_takes_the_time_of_its_path() -> None:
     path = ToolpathBuilder().rapid(3.0, 4.0).line(3.0, 4.0, -1.0, feed=30.0)
     path.arc(3.0, 4.0, centre=(3.0, 3.0), ccw=True, feed=60.0).event(Kind.DWELL, 2.5)
     run = by_feed(path.finish(), 300.0)

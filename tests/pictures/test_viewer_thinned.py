@@ -1,4 +1,4 @@
-"""Fewer points of the predicted path: what goes is not missed."""
+"""Fewer points of the predicted path: the path stays within the tolerance."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from camtool.pictures.viewer.columns import FINEST_MM, FINEST_SHARE, thinned
 
 
 def wandering(seed: int, count: int) -> np.ndarray:
-    """A path of straight and bent stretches with steps of some µm."""
+    """A path of straight and bent segments with steps of some µm."""
     rng = np.random.default_rng(seed)
     turn = np.where(rng.random(count) < 0.1, rng.normal(0.0, 1.0, count), 0.0).cumsum()
     turn += np.where(rng.random(count) < 0.5, 1e-3, 0.0).cumsum()
@@ -19,7 +19,9 @@ def wandering(seed: int, count: int) -> np.ndarray:
 
 
 @given(st.integers(0, 1000), st.integers(2, 120))
-def test_what_goes_lies_near_and_has_the_colour_of_what_stays(seed: int, count: int) -> None:
+def test_points_left_out_lie_near_and_have_the_colour_of_those_that_stay(
+    seed: int, count: int
+) -> None:
     points = wandering(seed, count)
     bins = np.random.default_rng(seed).integers(0, 3, count) // 2
     kept = thinned(points, bins, 0.005)
