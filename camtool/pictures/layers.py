@@ -2,11 +2,10 @@
 legend calls it.
 
 `LAYERS` is the table. Whatever lists, checks, draws or explains layers reads it, the viewer's page
-too: one row adds a layer. Most rows name the parts of their layer: lines, dots or
-texts, which pictures and pages draw and explain alike. For a row with a function
-of its own that draws, the viewer's script needs one as well
-(`camtool.pictures.viewer.page.SCRIPTED`). Nothing here loads numpy: help and completion ask for
-the names.
+too: one row adds a layer. A row names the parts of its layer, lines, dots or texts, which pictures
+and pages draw and explain alike; or it has functions of its own for pictures, and then the
+viewer's script needs one as well (`camtool.pictures.viewer.page.SCRIPTED`). Nothing here loads
+numpy: help and completion ask for the names.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ SWATCH = 34.0
 """Width of the swatch before a line of the legend."""
 
 MOST_LAYERS_NAMED = 7
-"""The legend names so many layers of a drawing, and counts the others."""
+"""The legend names at most this many layers of a drawing, and counts the others."""
 
 TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 RING = 8.0

@@ -199,7 +199,7 @@ def title_and_notes(
 
 
 def _title_lines(name: str, room: float, most: int) -> list[str]:
-    """The title broken at blanks into at most so many lines, the last one shortened."""
+    """The title broken at blanks into at most `most` lines, the last one shortened."""
     words = one_line(name).split()
     lines: list[str] = []
     while words and len(lines) < most - 1:
