@@ -211,7 +211,7 @@ class Nodes:
         return len(self.t)
 
 
-def curve_nodes(curve: Curve, tolerance_mm: float, steps: int = MIN_STEPS) -> Nodes:
+def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
     """Nodes of the curve, begun with at least `steps` steps; one node when the curve is a point.
 
     Raises GeometryError when the breaks do not rise or the curve is not finite.

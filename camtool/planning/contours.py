@@ -55,7 +55,7 @@ class CutContour:
     bridges: tuple[Bridge, ...]
 
 
-def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut | None = None) -> CutContour:
+def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut) -> CutContour:
     """How a contour is cut.
 
     `path` is the contour's path from the chosen start in the chosen direction. On its leads
@@ -78,7 +78,7 @@ def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut | None = None) -
 
 
 def _round(
-    contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut | None
+    contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[Floats], Leads]:
     """The runs (n, 4) round a closed contour."""
     angle, tabs = heights
@@ -131,7 +131,7 @@ def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
 
 
 def _along(
-    contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut | None
+    contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[Floats], Leads]:
     """The runs (n, 4) along an open contour."""
     angle, tabs = heights
@@ -169,7 +169,7 @@ def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Fi
 
 
 def with_starts(
-    path: Polyline, rule: str | tuple[float, float], tool_radius_mm: float = 0.0
+    path: Polyline, rule: str | tuple[float, float], tool_radius_mm: float
 ) -> tuple[Polyline, Ints]:
     """The path, perhaps with one more vertex, and the vertices at which it may begin.
 

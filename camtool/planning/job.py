@@ -356,7 +356,7 @@ class Operation:
                 mend='use "ramp" or "plunge"',
             )
 
-    def takes(self, layer: str, colour: str = "") -> bool:
+    def takes(self, layer: str, colour: str) -> bool:
         """Whether the paths of this layer and colour are cut."""
         return (not self.layers or matches(self.layers, layer)) and (
             not self.colours or matches(self.colours, colour)
@@ -486,7 +486,7 @@ class Job:
         every = (pattern for operation in self.operations for pattern in operation.layers)
         return tuple(dict.fromkeys(every))
 
-    def takes(self, layer: str, colour: str = "") -> bool:
+    def takes(self, layer: str, colour: str) -> bool:
         """Whether any operation cuts the paths of this layer and colour."""
         return any(operation.takes(layer, colour) for operation in self.operations)
 

@@ -46,11 +46,6 @@ class KeepOut:
     lines: Polylines
     own: Bools
 
-    @classmethod
-    def none(cls) -> KeepOut:
-        """Nothing to keep away from."""
-        return cls(Polylines.of([]), np.empty(0, dtype=np.bool_))
-
 
 @dataclass(frozen=True, eq=False)
 class Border:
@@ -65,7 +60,7 @@ class Border:
     allowance_mm: float
 
     @classmethod
-    def of(cls, contour: Contour, keep_out: KeepOut | None) -> Border:
+    def of(cls, contour: Contour, keep_out: KeepOut) -> Border:
         """The border of a contour."""
         line, left = contour.path, contour.material_left
         if contour.outline is not None:
@@ -75,7 +70,7 @@ class Border:
         return cls(
             line,
             None if left is None else not left,
-            KeepOut.none() if keep_out is None else keep_out,
+            keep_out,
             operation.tool.radius_mm,
             operation.allowance_mm,
         )
@@ -119,7 +114,7 @@ class Leads:
 
 
 def leads_of(
-    contour: Contour, along: MeasuredPath, ends: tuple[float, float], keep_out: KeepOut | None
+    contour: Contour, along: MeasuredPath, ends: tuple[float, float], keep_out: KeepOut
 ) -> Leads:
     """The leads of a contour that is cut as `along` from one length to another, its `ends`."""
     operation = contour.setting.operation

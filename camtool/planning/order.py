@@ -219,12 +219,7 @@ def _places(choices: Choices) -> tuple[Floats, Ints]:
     return places[by_owner], owner[by_owner]
 
 
-def travel_mm(
-    choices: Choices,
-    rows: Ints,
-    from_point: Point = (0.0, 0.0),
-    to_point: Point | None = (0.0, 0.0),
-) -> float:
+def travel_mm(choices: Choices, rows: Ints, from_point: Point, to_point: Point | None) -> float:
     """How far the tool travels between items cut in this order, and from and to the points, mm."""
     leave = np.concatenate([np.array([from_point]), choices.exit[rows]])
     arrive = choices.entry[rows]

@@ -68,18 +68,16 @@ def opened(region: Polylines, tool_radius_mm: float) -> Polylines:
     return offset_shape(offset_shape(region, tool_radius_mm), -tool_radius_mm)
 
 
-def unreached(
-    region: Polylines, tool_radius_mm: float, *, least_foot: float = LEAST_FOOT
-) -> list[Unreached]:
+def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
     """The pieces of a region that a disc within it does not cover, the largest first.
 
     The region is on the left of its closed paths, which may also be the holes of an endless one.
-    Pieces smaller than `least_foot` of the disc's area are left out. GeometryError for open paths.
+    Pieces smaller than LEAST_FOOT of the disc's area are left out. GeometryError for open paths.
     """
     if tool_radius_mm <= POSITION_EPS_MM or len(region) == 0:
         return []
     reached = opened(region, tool_radius_mm)
-    least = least_foot * np.pi * tool_radius_mm**2
+    least = LEAST_FOOT * np.pi * tool_radius_mm**2
     found = []
     parting = PARTING * math.sqrt(2.0 * tool_radius_mm * TOGETHER_MM)
     for piece in regions(_without(region, reached, least, parting)):

@@ -21,11 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.errors import OptionError
 from camtool.geometry.distance import paired_distances, points_to_segments
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.planning.job import CORNERS
 from camtool.planning.paths import MeasuredPath
 
 RELIEF_LEAST_MM = 1e-3
@@ -51,27 +49,17 @@ class Relieved:
 
 
 def relieved(
-    path: Polyline,
-    original: Polyline | None,
-    tool_radius_mm: float,
-    kind: str,
-    keep_out: Polylines | None = None,
+    path: Polyline, original: Polyline, tool_radius_mm: float, kind: str, keep_out: Polylines
 ) -> Relieved:
     """A path of the tool centre with reliefs at the sharp inner corners of the `original`.
 
-    `kind` is one of CORNERS; without an original nothing is known about its corners, and none is
-    relieved. Reliefs come nowhere nearer to the lines of `keep_out`, and to the walls of the
-    original beyond the corner, than the tool's radius. OptionError for an unknown kind.
+    `kind` is "dogbone" or "overcut". Reliefs come nowhere nearer to the lines of `keep_out`, and
+    to the walls of the original beyond the corner, than the tool's radius.
     """
-    if kind not in CORNERS:
-        raise OptionError(f"unknown relief {kind!r}", mend=f"use one of {', '.join(CORNERS)}")
-    nothing = np.empty((0, 2))
-    if kind == "none" or original is None or tool_radius_mm == 0.0:
-        return Relieved(path, nothing)
+    if tool_radius_mm == 0.0:
+        return Relieved(path, np.empty((0, 2)))
     along, walls = MeasuredPath.of(path), MeasuredPath.of(original)
-    others = (
-        walls.segments if keep_out is None else Segments.of(Polylines.of([original, *keep_out]))
-    )
+    others = Segments.of(Polylines.of([original, *keep_out]))
     reliefs: dict[int, list[Floats]] = {}
     left: list[Floats] = []
     for corner, vertex in _stands(along, walls, tool_radius_mm).items():

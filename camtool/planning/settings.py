@@ -113,7 +113,7 @@ def _programmable(highest_mm_min: float, machine: Machine) -> float:
 
 
 def levels(
-    depth_mm: float, step_down_mm: float | None = None, last_pass_mm: float | None = None
+    depth_mm: float, step_down_mm: float | None, last_pass_mm: float | None
 ) -> tuple[float, ...]:
     """The z of all passes, mm, downwards from the first one to −depth.
 
@@ -121,7 +121,7 @@ def levels(
     last one is that, and the others are equal. OptionError for numbers not above 0, a last pass
     above the step down or the depth, and more than MOST_PASSES.
 
-    >>> levels(1.0, 0.4)
+    >>> levels(1.0, 0.4, None)
     (-0.3333333333333333, -0.6666666666666666, -1.0)
     >>> levels(1.0, 0.5, 0.1)
     (-0.45, -0.9, -1.0)
@@ -156,7 +156,7 @@ def levels(
 
 
 def carved_levels(
-    depth_mm: float, step_down_mm: float | None = None, last_pass_mm: float | None = None
+    depth_mm: float, step_down_mm: float | None, last_pass_mm: float | None
 ) -> tuple[float, ...]:
     """The z of all passes of a V bit, which goes inwards from the wall as it goes down.
 
@@ -164,7 +164,7 @@ def carved_levels(
     the bit). Under its tip the earlier one has cut d less deep than its own depth, so that the
     tip takes 2 d: passes after the first are no deeper than half the step down.
 
-    >>> carved_levels(0.9, 0.3)
+    >>> carved_levels(0.9, 0.3, None)
     (-0.3, -0.45, -0.6, -0.75, -0.9)
     """
     whole = levels(depth_mm, step_down_mm, last_pass_mm)

@@ -61,7 +61,7 @@ class ByteFault(Exception):
     The reader of packets or of a hex dump turns it into a ProgramError with its place.
     """
 
-    def __init__(self, offset: int, record: int, message: str, mend: str = "") -> None:
+    def __init__(self, offset: int, record: int, message: str, mend: str) -> None:
         self.offset = offset
         self.record = record
         self.message = message
@@ -439,7 +439,7 @@ class ListingReader:
         mend = "write a point, no comma" if "," in text[: column + SHOWN_AHEAD] else ""
         return self._error(indent + column, f"{quoted(text)}: wanted {wanted}", mend)
 
-    def _error(self, column: int, message: str, mend: str = "") -> ProgramError:
+    def _error(self, column: int, message: str, mend: str) -> ProgramError:
         """ProgramError in the present line at a column from 0."""
         return ProgramError(
             message,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
 from camtool.geometry.curves import BezierCurve, EllipseCurve, FunctionCurve, SplineCurve
-from camtool.geometry.fit import arc_vertices, curve_nodes, fit_curve
+from camtool.geometry.fit import MIN_STEPS, arc_vertices, curve_nodes, fit_curve
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from tests.drawings import drawing_of
 from tests.oracles import arcs
@@ -44,7 +44,7 @@ def _check(curve, fit, tolerance):
 
 def _smooth(fit, curve):
     """All joints away from the curve's own corners turn by nothing."""
-    nodes = curve_nodes(curve, TOLERANCE_MM)
+    nodes = curve_nodes(curve, TOLERANCE_MM, MIN_STEPS)
     sharp = nodes.point[nodes.corner]
     inner = fit.vertices[1:-1, :2]
     away = np.array([np.hypot(*(sharp - p).T).min() > 1e-5 for p in inner], dtype=bool)

@@ -9,7 +9,7 @@ import pytest
 
 from camtool.errors import GeometryError
 from camtool.geometry.curves import BezierCurve, EllipseCurve, FunctionCurve, SplineCurve
-from camtool.geometry.fit import curve_nodes, fit_curve
+from camtool.geometry.fit import MIN_STEPS, curve_nodes, fit_curve
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.kernels.bezier import evaluate, points_at, speed
 from camtool.kernels.fit_limits import MAX_RADIUS_MM, SINGLE_TURN_RAD
@@ -72,7 +72,7 @@ def deviation(curve, fit, count=250):
 
 
 def kinks_away_from_corners(curve, fit, tolerance):
-    nodes = curve_nodes(curve, tolerance)
+    nodes = curve_nodes(curve, tolerance, MIN_STEPS)
     tips = sharp_points(curve, dense_parameters(curve, 250, np.inf), 1e-5)
     sharp = np.concatenate([nodes.point[nodes.corner], tips])
     inner = fit.vertices[1:-1, :2]
@@ -125,7 +125,7 @@ def share_of_fewest(seed, count, tolerance):
     ours, fewest = [], []
     for index in range(count):
         curve = random_curve(rng, KINDS[index % len(KINDS)])
-        nodes = curve_nodes(curve, tolerance / 8.0)
+        nodes = curve_nodes(curve, tolerance / 8.0, MIN_STEPS)
         if not 3 <= len(nodes) <= 400:
             continue
         limits = (tolerance, SINGLE_TURN_RAD)

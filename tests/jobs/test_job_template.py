@@ -96,7 +96,7 @@ def test_layers_that_differ_in_case_are_one(tmp_path: Path) -> None:
     made = drawn((square(5), "Cut", ""), (square(6), "CUT", ""), (stroke(), "cut2", ""))
     job = loaded(job_template(made), tmp_path)
     assert told(job) == [("engrave", "cut2"), ("profile", "Cut")]
-    assert [job.operations[1].takes(layer) for layer in ("Cut", "CUT", "cut2")] == [1, 1, 0]
+    assert [job.operations[1].takes(layer, "") for layer in ("Cut", "CUT", "cut2")] == [1, 1, 0]
 
 
 def test_one_layer_of_several_colours(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_names_of_any_kind_are_text_and_nothing_else(tmp_path: Path) -> None:
         assert set(row) == {"name", "kind", "layers", "tool"}
     job = loaded(text, tmp_path)
     for operation, name in zip(job.operations, NASTY, strict=True):
-        assert [other for other in NASTY if operation.takes(other)] == [name]
+        assert [other for other in NASTY if operation.takes(other, "")] == [name]
 
 
 @given(st.text(st.characters(), max_size=20))

@@ -10,15 +10,16 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.findings import Finding
-from camtool.geometry.polylines import Polyline
+from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.contours import runs_of as cut_of
 from camtool.planning.items import Contour, Run
+from camtool.planning.leads import KeepOut
 from tests.oracles.arcs import FLAT, centre_of
 
 
 def runs_of(contour: Contour, path: Polyline) -> tuple[list[Run], list[Finding]]:
     """The runs that cut a contour that keeps away from nothing else, and what is said of them."""
-    cut = cut_of(contour, path)
+    cut = cut_of(contour, path, KeepOut(Polylines.of([]), np.empty(0, dtype=np.bool_)))
     return list(cut.runs), list(cut.findings)
 
 

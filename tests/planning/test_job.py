@@ -149,8 +149,10 @@ def test_a_contradiction_names_its_operation_and_key() -> None:
     ],
 )
 def test_layers_are_chosen_by_pattern(patterns: tuple[str, ...], layer: str, taken: bool) -> None:
-    assert job_of(layers=patterns).takes(layer) is taken
-    assert Job((Operation(layers=("OTHER",)), Operation(layers=patterns))).takes(layer) is taken
+    assert job_of(layers=patterns).takes(layer, "") is taken
+    assert (
+        Job((Operation(layers=("OTHER",)), Operation(layers=patterns))).takes(layer, "") is taken
+    )
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,8 @@ ARC, LINE = Lead("arc", 2.0), Lead("line", 2.0)
 SQUARE = Polyline(np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0.0]]), True)
 MIDDLE = Polyline(np.array([[5, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0], [0, 0, 0.0]]), True)
 OPEN = Polyline(np.array([[0, 0, 0], [10, 0, 0], [10, 5, 0.0]]))
+NOTHING = KeepOut(Polylines.of([]), np.empty(0, dtype=np.bool_))
+"""Nothing else to keep away from."""
 
 
 def contour(path: Polyline, left: bool | None, radius: float = 0.5, **kind: Any) -> Contour:
@@ -42,11 +45,9 @@ def contour(path: Polyline, left: bool | None, radius: float = 0.5, **kind: Any)
     return Contour(path, setting, "part/LINE 1", 0, material_left=left)
 
 
-def leads(path: Polyline, left: bool | None, keep_out: list[Polyline] | None = None, **kind: Any):
+def leads(path: Polyline, left: bool | None, keep_out: Sequence[Polyline] = (), **kind: Any):
     along = MeasuredPath.of(path)
-    lines = None
-    if keep_out is not None:
-        lines = KeepOut(Polylines.of(keep_out), np.zeros(len(keep_out), dtype=np.bool_))
+    lines = KeepOut(Polylines.of(keep_out), np.zeros(len(keep_out), dtype=np.bool_))
     return leads_of(contour(path, left, **kind), along, (0.0, along.total_mm), lines)
 
 
@@ -282,12 +283,12 @@ def test_a_part_of_a_contour_keeps_to_the_whole_one() -> None:
     whole = Contour(half, alone.setting, "part", 0, material_left=True, outline=SQUARE)
     drawn = Contour(half, alone.setting, "part", 0, material_left=True, outline=reverse(SQUARE))
     ends = (0.0, 15.0)
-    free = leads_of(alone, MeasuredPath.of(half), ends, None)
+    free = leads_of(alone, MeasuredPath.of(half), ends, NOTHING)
     assert free.away == pytest.approx(np.array([[10, 10, 0], [10, 12, 0.0]]))
     inner = Contour(half, alone.setting, "part", 0, material_left=False, outline=SQUARE)
     for each in (whole, drawn):
-        assert leads_of(each, MeasuredPath.of(half), ends, None).findings == ()
-    assert len(leads_of(inner, MeasuredPath.of(half), ends, None).findings) == 1
+        assert leads_of(each, MeasuredPath.of(half), ends, NOTHING).findings == ()
+    assert len(leads_of(inner, MeasuredPath.of(half), ends, NOTHING).findings) == 1
 
 
 def test_leads_are_flat_and_belong_to_the_run() -> None:

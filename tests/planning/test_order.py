@@ -28,6 +28,7 @@ from tests.strategies import coordinates
 
 SETTING = Setting(Operation(), Feeds(60.0, 30.0), (-1.0,), 2.0)
 NONE: Ints = np.empty((0, 2), dtype=np.int64)
+ZERO = (0.0, 0.0)
 QUARTER = float(np.tan(np.pi / 8))
 Way = tuple[float, float, float, float]
 
@@ -100,7 +101,7 @@ def test_an_order_is_better_than_always_the_nearest() -> None:
     choices = choices_of(items)
     rows = best_order(choices, NONE, to_point=None)
     assert {*choices.owner[rows[:3]].tolist()} == {0, 2, 4}
-    assert travel_mm(choices, rows, to_point=None) == 15.75 + 15.75 + 31.75
+    assert travel_mm(choices, rows, ZERO, None) == 15.75 + 15.75 + 31.75
 
 
 def test_what_lies_within_comes_before_what_holds_it() -> None:
@@ -174,8 +175,8 @@ def test_what_is_cut_as_it_is_has_no_path_to_choose() -> None:
 def test_drawn_is_each_item_in_turn_in_its_first_way() -> None:
     choices = choices_of([box(1, 0, 2, 1), line(2, 0, 3, 0)])
     assert drawn(choices).tolist() == [0, 4]
-    assert travel_mm(choices, drawn(choices), to_point=None) == pytest.approx(2.0)
-    assert travel_mm(choices, drawn(choices)) == pytest.approx(5.0)
+    assert travel_mm(choices, drawn(choices), ZERO, None) == pytest.approx(2.0)
+    assert travel_mm(choices, drawn(choices), ZERO, ZERO) == pytest.approx(5.0)
 
 
 def test_nothing_needs_no_order() -> None:
@@ -241,7 +242,7 @@ def test_seven_items_mostly_come_out_as_short_as_can_be() -> None:
         choices, before = random_layout(seed, 7)
         rows = best_order(choices, np.array(before))
         least = tours.shortest(choices, before, (0.0, 0.0), (0.0, 0.0))
-        excess.append(travel_mm(choices, rows) / least - 1.0)
+        excess.append(travel_mm(choices, rows, ZERO, ZERO) / least - 1.0)
     assert max(excess) < 0.05
     assert np.mean(np.array(excess) < 1e-9) >= 0.9
 
@@ -254,7 +255,7 @@ def test_many_items_are_never_cut_before_their_time(seed: int) -> None:
     again = best_order(choices, np.array(before))
     assert rows.tolist() == again.tolist()
     free = best_order(choices, NONE)
-    assert travel_mm(choices, free) < travel_mm(choices, rows)
+    assert travel_mm(choices, free, ZERO, ZERO) < travel_mm(choices, rows, ZERO, ZERO)
 
 
 def test_a_chain_of_pairs_leaves_no_choice() -> None:
@@ -268,7 +269,7 @@ def test_a_chain_of_pairs_leaves_no_choice() -> None:
 def test_places_within_three_percent_of_what_no_tour_can_be_under(seed: int) -> None:
     places = np.random.default_rng(seed).uniform(0, 100, (150, 2))
     choices = Choices(np.arange(150), places, places)
-    found = travel_mm(choices, best_order(choices, NONE))
+    found = travel_mm(choices, best_order(choices, NONE), ZERO, ZERO)
     bound = tours.least_length(np.concatenate([np.zeros((1, 2)), places]), found)
     assert bound - 1e-9 <= found <= 1.03 * bound
 

@@ -61,7 +61,7 @@ PLACES: dict[str, Callable[[], Floats]] = {
 def test_places_against_what_no_tour_can_be_under(name: str) -> None:
     places = PLACES[name]()
     choices = alone(places)
-    found = travel_mm(choices, best_order(choices, NONE))
+    found = travel_mm(choices, best_order(choices, NONE), (0.0, 0.0), (0.0, 0.0))
     bound = tours.least_length(np.concatenate([np.zeros((1, 2)), places]), found, 1500)
     assert bound - 1e-6 <= found <= MOST_EXCESS * bound
 
@@ -121,7 +121,7 @@ WAYS: dict[str, Callable[[], Choices]] = {
 def test_ways_against_a_strong_solver(name: str) -> None:
     pytest.importorskip("ortools")
     choices = WAYS[name]()
-    found = travel_mm(choices, best_order(choices, NONE))
+    found = travel_mm(choices, best_order(choices, NONE), (0.0, 0.0), (0.0, 0.0))
     assert found <= MOST_EXCESS * solved(choices, seconds=20)
 
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from camtool.errors import GeometryError
 from camtool.geometry.measure import signed_areas
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rotated
-from camtool.planning.reach import opened, unreached
+from camtool.planning import reach
+from camtool.planning.reach import Unreached, opened, unreached
 from tests.oracles import swept
 from tests.oracles.contours import (
     CIRCLE,
@@ -37,8 +38,15 @@ FOOT = 1.0 - 0.25 * math.pi
 """Area at the foot of a square corner that a disc of radius 1 leaves."""
 
 
-def total(paths: list[Polyline], radius: float, **options: float) -> float:
-    return sum(piece.area_mm2 for piece in unreached(region_of(paths), radius, **options))
+def total(paths: list[Polyline], radius: float) -> float:
+    return sum(piece.area_mm2 for piece in unreached(region_of(paths), radius))
+
+
+def with_all_feet(region: Polylines, radius: float) -> list[Unreached]:
+    """The pieces, those at the bluntest corners too."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reach, "LEAST_FOOT", 0.0)
+        return unreached(region, radius)
 
 
 def test_feet_of_square_corners() -> None:
@@ -87,12 +95,12 @@ def test_the_outside_of_a_part_is_a_region_too() -> None:
     assert piece.at_mm == pytest.approx((4.0, 4.0))
 
 
-def test_blunt_corners_are_left_out_unless_asked_for() -> None:
+def test_blunt_corners_are_left_out() -> None:
     many = [star(30, 9.0, 10.0)]
     blunt = [closed(*[(10 * math.cos(a), 10 * math.sin(a)) for a in np.arange(0, 6.2, 0.1)])]
     assert len(unreached(region_of(many), 0.5)) == 30
     assert unreached(region_of(blunt), 1.0) == []
-    assert len(unreached(region_of(blunt), 1.0, least_foot=0.0)) >= 60
+    assert len(with_all_feet(region_of(blunt), 1.0)) >= 60
 
 
 def test_a_disc_that_comes_away_beside_a_corner() -> None:
@@ -130,7 +138,7 @@ def test_a_disc_that_comes_away_beside_an_island() -> None:
     )
     region, radius = region_of([plate, first, second]), 1.4189939360740422
     exact = float(signed_areas(region).sum() - signed_areas(opened(region, radius)).sum())
-    found = sum(piece.area_mm2 for piece in unreached(region, radius, least_foot=0.0))
+    found = sum(piece.area_mm2 for piece in with_all_feet(region, radius))
     assert found == pytest.approx(exact, abs=1e-5)
 
 
@@ -148,7 +156,7 @@ def test_open_paths_have_no_inside() -> None:
 def test_pieces_are_the_region_less_the_opened_one(paths: list[Polyline], radius: float) -> None:
     region = region_of(paths)
     exact = float(signed_areas(region).sum() - signed_areas(opened(region, radius)).sum())
-    pieces = unreached(region, radius, least_foot=0.0)
+    pieces = with_all_feet(region, radius)
     # Feet of corners that hardly turn are thinner than the error of two offsets.
     slack = 1e-5 * (len(region.vertices) * radius + 1.0)
     assert sum(piece.area_mm2 for piece in pieces) == pytest.approx(exact, abs=slack)
@@ -160,7 +168,7 @@ def test_pieces_are_where_chords_say(paths: list[Polyline], radius: float) -> No
     region = region_of(paths)
     area = swept.area_of(region)
     left = shapely.difference(area, swept.opened(area, radius, swept.FINE_CHORD_RAD))
-    pieces = unreached(region, radius, least_foot=0.0)
+    pieces = with_all_feet(region, radius)
     ours = shapely.union_all([swept.area_of(piece.outline) for piece in pieces])
     apart = shapely.symmetric_difference(left, ours).area
     assert apart <= 1e-3 * area.area

@@ -95,5 +95,5 @@ def test_a_v_bit_takes_no_more_than_the_step_under_its_tip(
 
 
 def test_a_v_bit_without_a_step_down_makes_the_passes_that_are_asked() -> None:
-    assert carved_levels(1.0) == levels(1.0)
+    assert carved_levels(1.0, None, None) == levels(1.0, None, None)
     assert carved_levels(1.0, None, 0.2) == levels(1.0, None, 0.2)

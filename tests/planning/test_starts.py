@@ -49,7 +49,7 @@ def test_any_vertex_will_do_for_the_nearest_and_for_open_paths() -> None:
         (Polyline(OBLONG.vertices), (3.0, 0.0)),
         (ROUND, "corner"),
     ):
-        made, starts = with_starts(path, rule)
+        made, starts = with_starts(path, rule, 0.0)
         assert made is path
         assert len(starts) == 0
 
@@ -86,7 +86,7 @@ def test_a_place_by_hand_is_the_nearest_one() -> None:
 def test_a_start_very_near_to_a_vertex_is_that_vertex() -> None:
     for off, count in ((0.9 * START_SNAP_MM, 4), (1.1 * START_SNAP_MM, 5)):
         for place in ((9.0 - off, 0.0), (9.0, off), (off, 0.0), (0.0, off)):
-            made, (start,) = with_starts(OBLONG, place)
+            made, (start,) = with_starts(OBLONG, place, 0.0)
             assert len(made) == count
             assert 0 <= start < count
             if count == 4:
@@ -95,7 +95,7 @@ def test_a_start_very_near_to_a_vertex_is_that_vertex() -> None:
 
 @given(contours(), st.floats(-15.0, 15.0), st.floats(-15.0, 15.0))
 def test_one_more_vertex_changes_nothing(path: Polyline, x: float, y: float) -> None:
-    made, (start,) = with_starts(path, (x, y))
+    made, (start,) = with_starts(path, (x, y), 0.0)
     assert len(made) - len(path) in (0, 1)
     assert length(made) == pytest.approx(length(path), rel=1e-9)
     assert signed_area(made) == pytest.approx(signed_area(path), rel=1e-9)
