@@ -73,7 +73,7 @@ class Code(IntEnum):
         104,
         WARNING,
         "an open end lies near another one: perhaps meant closed; place and size are given",
-        "mend the drawing or raise `--gap`",
+        "close it in the drawing, or raise `--gap`",
     )
     FILE_REPAIRED = (
         105,
@@ -99,7 +99,7 @@ class Code(IntEnum):
         "a contour crosses itself: inside and outside are not clear there; places are given; "
         "an error where it is to be carved (`vcarve`), there also for contours that cross each "
         "other",
-        "mend the drawing, or cut it with `--side on`",
+        "correct the drawing, or cut it with `--side on`",
     )
     BRANCHED = (
         109,
@@ -148,7 +148,7 @@ class Code(IntEnum):
     UNIT_GUESSED = (
         116,
         (INFO, WARNING),
-        "the unit was taken from a hint of the file, not from its word for it; a warning where "
+        "the unit was taken from a hint of the file, because it names none; a warning where "
         "a wrong guess would change the size",
         "compare the size that is shown, or give `--units` (`--dpi`)",
     )
@@ -177,8 +177,8 @@ class Code(IntEnum):
         (WARNING, ERROR),
         "the tool beside one contour cuts into another one, or into the allowance that is left "
         "on it, or a pocket clears away what another operation keeps; place and amount are "
-        "given. A warning where nobody cuts the other contour, and, where the job names the "
-        "side, for contours of the same operation and such as cross",
+        "given. A warning where the other contour is not cut, and, where the job names the "
+        "side, for contours of the same operation and contours that cross",
         'use a smaller tool, `side = "auto"`, or the right side; draw islands on a layer of '
         "the pocket",
     )
@@ -186,8 +186,8 @@ class Code(IntEnum):
         204,
         ERROR,
         "the path, part zero included, spans more than an axis can travel",
-        "what the message names, because it helps: `--origin lower-left`, `--rotate 90`, a "
-        "lower `safe_z`, a smaller drawing; or the travel of the machine that you have",
+        "what the message names: `--origin lower-left`, `--rotate 90`, a lower `safe_z` or a "
+        "smaller drawing; or set the travel of your machine (`--set axes.x.travel_mm=…`)",
     )
     UNREACHED = (
         205,
@@ -200,8 +200,8 @@ class Code(IntEnum):
         206,
         (INFO, WARNING, ERROR),
         "info: a cut goes through the stock into what lies below, as far as `spoilboard` in "
-        "`[stock]` lets it; error: farther; warning: something is cut wholly beside the stock",
-        "mend `[stock]`, the origin or the depth",
+        "`[stock]` allows; error: farther; warning: something is cut wholly beside the stock",
+        "correct `[stock]`, the origin or the depth",
     )
     RAPID_IN_STOCK = (
         207,
@@ -219,9 +219,9 @@ class Code(IntEnum):
         209,
         WARNING,
         "a tab does not fit where it should stand, or a hole is drilled through it; or "
-        "(counted, in one) holes, open paths and contours that are too short go without tabs "
-        "beside parts that have them",
-        "fewer or narrower tabs; another operation for holes that are to have some",
+        "(counted, in one) holes, open paths and contours that are too short get no tabs "
+        "although other parts have them",
+        "use fewer or narrower tabs, or another operation for what needs its own",
     )
     LEAD_LEFT_OUT = (
         210,
@@ -264,8 +264,7 @@ class Code(IntEnum):
     NOT_DRILLED = (
         216,
         WARNING,
-        "a path that `drill` takes is no circle, or a circle larger than `max_hole`: it is "
-        "left out",
+        "a path chosen for `drill` is not a circle, or is larger than `max_hole`: it is left out",
         "another operation for it, or a larger `max_hole`",
     )
     HOLE_SIZE = (
@@ -277,23 +276,23 @@ class Code(IntEnum):
     TOOL_NOT_SAID = (
         218,
         ERROR,
-        "an operation has another tool than the one before it, and no number by which the "
-        "program could ask for it",
+        "an operation has another tool than the one before it, and no number of its own by "
+        "which the program could ask for it",
         "number the tools, or write a program for each",
     )
     SIDE_BY_UNCUT = (
         219,
         (WARNING, INFO),
-        "contours are cut inside, or outside, because they lie in a contour that nobody cuts; "
-        "or (info) in spite of one on the layer of a frame",
+        "contours are cut inside, or outside, because they lie in a contour that is not cut; "
+        "or (info) although they lie in one on the layer of a frame",
         "name the layers that are no edges of parts (`--frames`), or give the side "
         "([toolpaths.md](toolpaths.md))",
     )
     CUT_DOUBTFUL = (
         220,
         WARNING,
-        "something of the cut looks forgotten or too bold, and the program does it: no spindle "
-        "speed, a tool of no width on closed contours, a plunge at the feed of the cut (these "
+        "a setting of the cut looks forgotten or too high, but is used: no spindle speed, a "
+        "tool of no width on closed contours, a plunge at the feed of the cut (these "
         "where the program starts the spindle), a pass deeper than the tool is wide",
         "the flag that is named, or none if that is meant",
     )
@@ -302,8 +301,8 @@ class Code(IntEnum):
         (INFO, WARNING),
         "a cut was raised over the bridge of a tab that it would have cut away: round a "
         "neighbour, on the other side of a narrow contour, on a lead; a warning where the "
-        "operation has no tabs itself, for something of it stays there",
-        "none; wider spacing if neighbours should not hold each other",
+        "operation has no tabs itself, because it leaves material there",
+        "none, or a wider spacing of the parts",
     )
     CORNER_FAR = (
         226,
@@ -322,16 +321,16 @@ class Code(IntEnum):
     FEED_ROUNDED = (
         302,
         (INFO, WARNING),
-        "the dialect cannot say the feed; the next lower one is used, or (a warning) the "
+        "the dialect cannot express the feed; the next lower one is used, or (a warning) the "
         "machine's only speed",
-        "none, or choose a feed that it can say",
+        "none, or choose a feed that it can express",
     )
     ARC_MENDED = (
         303,
         INFO,
         "arcs that would not have ended where wanted end on a step that the controller passes, "
-        "and a short line mends the rest; in G-code, arcs that the controller would refuse by "
-        "their rounded numbers are re-centred, split or become lines",
+        "and a short line goes on to the wanted end; in G-code, arcs that the controller would "
+        "refuse by their rounded numbers are re-centred, split or become lines",
         "none",
     )
     MOVE_COLLAPSED = (
@@ -353,7 +352,7 @@ class Code(IntEnum):
         306,
         (ERROR, WARNING),
         "a feed that the machine, its link or (on a slope) its Z axis cannot keep up with; a "
-        "warning in a program whose controller holds the move to what it can do (which is what "
+        "warning in a program whose controller lowers it to what it can do (which is what "
         "is simulated), where `convert` writes the second machine's highest feed, and where a "
         "job asks for more than the rates of the axes: it is lowered to that",
         "lower the feed, or slope less",
@@ -361,14 +360,14 @@ class Code(IntEnum):
     VALUE_ROUNDED = (
         307,
         INFO,
-        "a dwell or a spindle speed was rounded to what the dialect can say",
+        "a dwell or a spindle speed was rounded to what the dialect can express",
         "none",
     )
     EVENT_LEFT_OUT = (
         308,
         (WARNING, INFO),
-        "the machine cannot switch the spindle (or whatever the message names), so the program "
-        "does not say it; a remark where it is a tool or a speed",
+        "the machine cannot switch the spindle (or whatever the message names), so it is not in "
+        "the program; a remark where it is a tool or a speed",
         "do it by hand",
     )
     COORDINATES_SCALED = (
@@ -376,7 +375,7 @@ class Code(IntEnum):
         WARNING,
         "the numbers of the program are millimetres times a scale, because what the machine "
         "makes of a unit is contradictory",
-        "measure a move of known length, then say the scale: `--set dialect.coord_scale=…`",
+        "measure a move of known length, then set the scale: `--set dialect.coord_scale=…`",
     )
     PLACES_SNAPPED = (
         310,
@@ -395,14 +394,14 @@ class Code(IntEnum):
         312,
         INFO,
         "a program switches coolant or waits for the operator (M0, M1): that moves nothing, "
-        "and is written in no other dialect",
+        "and is left out when the program is converted",
         "none",
     )
     ARC_END_UNSURE = (
         316,
         WARNING,
         "arcs of a foreign program stop on their ends by some readings of the controller's "
-        "stop test and not by others; what becomes of them by each is given",
+        "stop test and not by others; where they end by each is given",
         "post the drawing with camtool, whose arcs end by every reading; or try the arc on the "
         "machine and set `controller.arc_end`",
     )
@@ -411,7 +410,7 @@ class Code(IntEnum):
         WARNING,
         "a program starts the spindle (M3, M4) before any S word: controllers take it, and one "
         "that sets the speed turns the spindle at 0",
-        "say S, or set the speed by hand",
+        "write S, or set the speed by hand",
     )
     NEVER_READ = (
         320,
@@ -437,10 +436,10 @@ class Code(IntEnum):
     READ_TWO_WAYS = (
         323,
         WARNING,
-        "a program says something that its machine's thesis allows two readings of, and they "
-        "lead to different places",
-        "post again (what camtool writes means the same in both), or set the option where you "
-        "know",
+        "a program has numbers that can be read in two ways by its machine's thesis, which lead "
+        "to different places",
+        "post again (what camtool writes means the same in both), or set the option if you know "
+        "which is right",
     )
 
     ARC_MISSES_END = (
@@ -453,8 +452,8 @@ class Code(IntEnum):
     CONTOUR_MISSING = (
         402,
         ERROR,
-        "part of what was wanted is not cut by the program; for a contour smaller than a "
-        "dialect can say, a plunge stands",
+        "part of what was wanted is not cut by the program; a contour smaller than a "
+        "dialect can express may be a plunge",
         "post again; give `camtool verify` the flags of the post",
     )
     EXTRA_CUT = (
@@ -516,9 +515,9 @@ class Code(IntEnum):
     OVERCUT = (
         412,
         ERROR,
-        "the tool, as wide as it is at its depth, goes beyond the drawn wall on the planned "
-        "path itself, and no `GOUGE` says so: a fault in camtool, found before anything is cut",
-        "report it, with the drawing; another tool or depth",
+        "on the planned path itself, the tool (as wide as it is at its depth) goes beyond the "
+        "drawn wall, and no `GOUGE` reports it: a fault in camtool, found before anything is cut",
+        "report it with the drawing; try another tool or depth",
     )
     FEED_DIFFERS = (
         414,
@@ -703,7 +702,7 @@ def _and_more(noun: str) -> str:
 
 UNITLESS = Sentence(
     Code.UNITLESS,
-    "the file names no unit ({said}): read as mm; if that is wrong, say it with --units",
+    "the file names no unit ({said}): read as mm; if that is wrong, give --units",
 )
 UNITLESS_PX = Sentence(
     Code.UNITLESS,
@@ -761,12 +760,12 @@ SELF_CROSSING_MORE = Sentence(
 )
 SELF_CROSSING_CARVED = Sentence(
     Code.SELF_CROSSING,
-    "{contour} crosses {other}: what is inside cannot be told; mend the drawing, or carve "
+    "{contour} crosses {other}: it is not clear what is inside; correct the drawing, or carve "
     "without it",
     severity=ERROR,
 )
 SELF_CROSSING_NO_REGION = Sentence(
-    Code.SELF_CROSSING, "{fault}: what is inside cannot be carved; {mend}", severity=ERROR
+    Code.SELF_CROSSING, "{fault}: its inside cannot be carved; {mend}", severity=ERROR
 )
 BRANCHED = Sentence(Code.BRANCHED, "{measured} ends meet; the straightest were joined")
 BRANCHED_MORE = Sentence(
@@ -845,7 +844,7 @@ OPEN_CONTOUR_ON_LINE = Sentence(
 GOUGE = Sentence(Code.GOUGE, "{tool} beside {contour} cuts {amount:.4g} mm into {other}", "mm")
 GOUGE_OF_UNCUT = Sentence(
     Code.GOUGE,
-    "{tool} beside {contour} cuts {amount:.4g} mm into {other}, which nobody cuts",
+    "{tool} beside {contour} cuts {amount:.4g} mm into {other}, which is not cut itself",
     "mm",
 )
 GOUGE_OF_ALLOWANCE = Sentence(
@@ -912,8 +911,8 @@ UNREACHED_BETWEEN_MORE = Sentence(
 OUT_OF_STOCK = Sentence(
     Code.OUT_OF_STOCK,
     "the tool cuts {measured:.4g} mm deep into a stock of {thickness:g} mm, more than "
-    "{allowed:g} mm into what lies below: cut less deep, or say with spoilboard in [stock] how "
-    "far it may",
+    "{allowed:g} mm into what lies below: cut less deep, or allow more with spoilboard in "
+    "[stock]",
     "mm",
     ERROR,
 )
@@ -955,8 +954,8 @@ TAB_LEFT_OUT_DRILLED = Sentence(
 )
 TAB_LEFT_OUT_OF_ALL = Sentence(
     Code.TAB_LEFT_OUT,
-    "{measured:# contour goes|# contours go} without tabs: {kinds}; an operation of their own "
-    "may give them some",
+    "{measured:# contour gets|# contours get} no tabs: {kinds}; cut them in an operation "
+    "of their own if they need tabs",
     "contours",
 )
 LEAD_LEFT_OUT = Sentence(
@@ -973,7 +972,7 @@ LEAD_LEFT_OUT_IN_PART = Sentence(
 )
 ENTRY_CHANGED = Sentence(
     Code.ENTRY_CHANGED,
-    "a ramp of {measured:.4g} mm along a contour of {length:.4g} mm: the tool plunges",
+    "a ramp of {measured:.4g} mm is too long for a contour of {length:.4g} mm: the tool plunges",
     "mm",
 )
 ENTRY_CHANGED_IN_POCKET = Sentence(
@@ -996,15 +995,16 @@ REVERSALS_IN_AIR_NOT = Sentence(
     "{measured:# contour that turns back is|# contours that turn back are} cut in one piece: "
     "{reason}",
 )
-NOT_RELIEVED = Sentence(Code.NOT_RELIEVED, "{tool} finds no room for a relief at this corner")
+NOT_RELIEVED = Sentence(Code.NOT_RELIEVED, "{tool} has no room for a relief at this corner")
 MARKS_NOT_CUT = Sentence(
     Code.MARKS_NOT_CUT,
-    "{measured:# single point is|# single points are} not cut: a profile follows lines",
+    "{measured:# single point is|# single points are} not cut: drill "
+    "them with an operation of the kind drill",
 )
 NOT_DRILLED = Sentence(
     Code.NOT_DRILLED,
     "only full circles and single points are drilled: {measured:# other path is|# other paths "
-    "are} not",
+    "are} left out",
 )
 NOT_DRILLED_TOO_LARGE = Sentence(
     Code.NOT_DRILLED,
@@ -1019,26 +1019,26 @@ HOLE_SIZE = Sentence(
 )
 TOOL_NOT_SAID = Sentence(
     Code.TOOL_NOT_SAID,
-    "it has another tool than the operation before and no number, so the program cannot ask for "
-    "it: number the tools, or write a program for each",
+    "the operation has another tool than the one before it and no number, so the program cannot "
+    "ask for it: number the tools, or write a program for each",
 )
 TOOL_NOT_SAID_APART = Sentence(
     Code.TOOL_NOT_SAID,
-    "it has another tool than the operation before and the same number {number}, so the program "
-    "cannot ask for it: number the tools, or write a program for each",
+    "the operation has another tool than the one before it and the same number {number}, so the "
+    "program cannot ask for it: number the tools, or write a program for each",
 )
 SIDE_BY_UNCUT = Sentence(
     Code.SIDE_BY_UNCUT,
     "{measured:# contour|# contours} would be cut on the other side without {uncut}, which "
-    "nobody cuts: {first} is cut {side}; if that is no edge of a part, give --frames {layer!r}, "
-    "or the side",
+    "is not cut: {first} is cut {side}; if {uncut} is not the edge of a part, give --frames "
+    "{layer!r}, or the side",
     "contours",
     WARNING,
 )
 SIDE_BY_UNCUT_FRAME = Sentence(
     Code.SIDE_BY_UNCUT,
     "{measured:# contour|# contours} would be cut on the other side if {uncut}, on the layer of "
-    "a frame, were the edge of a part: {first} is cut {side}; --frames says which layers are none",
+    "a frame, were the edge of a part: {first} is cut {side}; --frames lists the layers of frames",
     "contours",
     INFO,
 )
@@ -1099,8 +1099,8 @@ FEED_ABOVE_LIMIT_ON_SLOPE = Sentence(
 )
 FEED_ABOVE_LIMIT_IN_JOB = Sentence(
     Code.FEED_ABOVE_LIMIT,
-    "the {feed} of {measured:g} mm/min becomes {lowered:g}, as fast as the axes of {machine} are "
-    "said to be: {mend}",
+    "the {feed} of {measured:g} mm/min becomes {lowered:g}, the rate of the axes in the file of "
+    "{machine}: {mend}",
     "mm_min",
     WARNING,
 )
@@ -1258,7 +1258,7 @@ ABOVE_GATE = Sentence(
 )
 ABOVE_GATE_UNKNOWN = Sentence(
     Code.ABOVE_GATE,
-    "no error is known, since nothing was compared: the limit cannot be kept",
+    "no error is known, because nothing was compared, so the limit is not met",
     "um",
 )
 ABOVE_GATE_REVERSALS = Sentence(
@@ -1304,7 +1304,7 @@ SPINDLE_DIFFERS = Sentence(
 )
 SPINDLE_DIFFERS_UNASKED = Sentence(
     Code.SPINDLE_DIFFERS,
-    "{moves:# move runs|# moves run} with {turning}, where nobody asked for {wanted}",
+    "{moves:# move runs|# moves run} with {turning}, where {wanted} is not asked for",
     "rev_min",
     INFO,
 )
@@ -1330,7 +1330,7 @@ END_DIFFERS = Sentence(
     "mm",
 )
 END_DIFFERS_NO_END = Sentence(
-    Code.END_DIFFERS, "the program has no end: no block says that it is over", severity=ERROR
+    Code.END_DIFFERS, "the program has no block that ends it", severity=ERROR
 )
 END_DIFFERS_PLACE = Sentence(
     Code.END_DIFFERS, "the tool ends at {end}; camtool would end at {wanted}", severity=INFO

@@ -199,7 +199,7 @@ class SplineCurve:
         inner = knots[1:-1]
         repeated = inner[self.degree :] == inner[: len(inner) - self.degree]
         if repeated.any() and self._jumps():
-            raise GeometryError("a knot is repeated so often that the curve falls apart")
+            raise GeometryError("a knot is repeated so often that the curve has a gap")
 
     def _jumps(self) -> bool:
         pieces = self.pieces().control

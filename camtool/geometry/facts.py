@@ -32,7 +32,7 @@ def drawing_extents(drawing: Drawing) -> Floats:
         points = np.array([mark.at_mm for mark in drawing.marks])
         boxes.append(np.column_stack([points.min(axis=0), points.max(axis=0)]))
     if not boxes:
-        raise GeometryError("nothing is drawn: nothing has no extents")
+        raise GeometryError("nothing is drawn, so there are no extents")
     both = np.stack(boxes)
     return np.column_stack([both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)])
 

@@ -125,7 +125,7 @@ def path_extents(lines: Polylines) -> Floats:
 def extents(lines: Polylines) -> Floats:
     """(2, 2) [[xmin, xmax], [ymin, ymax]] of all paths, mm; GeometryError when there are none."""
     if len(lines) == 0:
-        raise GeometryError("no paths: nothing has no extents")
+        raise GeometryError("no paths, so there are no extents")
     each = path_extents(lines)
     return np.stack([each[:, :, 0].min(axis=0), each[:, :, 1].max(axis=0)], axis=1)
 
@@ -150,7 +150,7 @@ def sample(p: Polyline, step_mm: float) -> Floats:
     They lie on the arcs. The first point of a closed path is not repeated at the end.
     """
     if not step_mm > 0.0:
-        raise GeometryError(f"a step of {step_mm} mm leads nowhere")
+        raise GeometryError(f"a step of {step_mm} mm is not above 0")
     segments = Segments.of(p)
     counts = np.ceil(segment_lengths(segments) / step_mm).astype(np.int64).clip(min=1)
     rows = np.repeat(np.arange(len(segments)), counts)

@@ -105,7 +105,7 @@ def offset_shape(
     that do not exist and a mitre limit below 1.
     """
     if joins not in JOINS:
-        raise OptionError(f"no joins are called {joins!r}", mend=f"use one of {', '.join(JOINS)}")
+        raise OptionError(f"unknown joins {joins!r}", mend=f"use one of {', '.join(JOINS)}")
     if joins == "mitre" and not 1.0 <= mitre_limit < math.inf:
         mend = "at 1 corners are cut off where an arc would be, at 2 those sharper than 60°"
         raise OptionError(f"a mitre limit of {mitre_limit} is not 1 or more", mend=mend)

@@ -199,7 +199,9 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
     for mark in marks:
         if not all(math.isfinite(v) and abs(v) <= MAX_COORDINATE_MM for v in mark.at_mm):
             where = f"layer {mark.layer}, {mark.source}"
-            raise DrawingError("a point is no place in a drawing", file=file, where=where)
+            raise DrawingError(
+                "a point has a number that is not finite or too large", file=file, where=where
+            )
         column, row = (round(value / POSITION_EPS_MM) for value in mark.at_mm)
         if (mark.layer, column, row) in seen:
             gone[mark.source.partition(" ")[0]] += 1

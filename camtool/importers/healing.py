@@ -107,7 +107,8 @@ def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
     if not finite[row]:
         raise DrawingError("a number is not finite", file=file, where=where)
     raise DrawingError(
-        f"a point lies {np.abs(vertices[row, :2]).max():.6g} mm away, where micrometres are lost",
+        f"a point lies {np.abs(vertices[row, :2]).max():.6g} mm away, too far to be"
+        " exact to a micrometre",
         file=file,
         where=where,
         mend="move the drawing to its origin, or name its unit with --units",

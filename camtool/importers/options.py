@@ -91,7 +91,7 @@ class ReadOptions:
             )
         if self.text not in TEXTS:
             raise OptionError(
-                f"text is {self.text!r}, which is none of the ways to read it",
+                f"text {self.text!r} is not known",
                 mend=f"use one of {', '.join(TEXTS)}",
             )
         if self.section_z_mm is not None and not math.isfinite(self.section_z_mm):

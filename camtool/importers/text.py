@@ -286,8 +286,8 @@ MAX_CHARACTERS = 20_000
 """Longest text, codes included; CAD programs limit input by hand to 250 in TEXT and about 2000 in
 MTEXT."""
 
-MAX_SIGNS_NAMED = 20
-"""At most this many of the characters that a font lacks are named."""
+MAX_PATH_CHARACTERS_NAMED = 20
+"""So many of the characters that a font lacks are named."""
 
 MAX_NUMBER = 1e60
 """Sizes and places beyond it are refused: products of a few of them would not be finite."""
@@ -300,7 +300,7 @@ def finite(*values: float) -> tuple[float, ...]:
     """The values as floats; Unusable when one is none or beyond all bounds."""
     numbers = tuple(float(value) for value in values)
     if not all(abs(number) <= MAX_NUMBER for number in numbers):
-        raise Unusable("has numbers that are not finite or beyond all bounds")
+        raise Unusable("has numbers that are not finite or too large")
     return numbers
 
 
@@ -312,9 +312,11 @@ def lacking(font: str, substituted: str, missing: str) -> str:
         said.append(f"font {substituted} is not here: drawn with {font}")
     if missing:
         signs = [_visible(sign) for sign in dict.fromkeys(missing)]
-        more = len(signs) - MAX_SIGNS_NAMED
+        more = len(signs) - MAX_PATH_CHARACTERS_NAMED
         tail = f" and {more} more" if more > 0 else ""
-        said.append(f"{font} has no {' '.join(signs[:MAX_SIGNS_NAMED])}{tail}: left blank")
+        said.append(
+            f"{font} has no {' '.join(signs[:MAX_PATH_CHARACTERS_NAMED])}{tail}: left blank"
+        )
     return "; ".join(said)
 
 

@@ -20,7 +20,7 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
     operation = setting.operation
     if operation.direction != "drawn":
         raise OptionError(
-            f"engraving on the line is neither {operation.direction} nor the other way",
+            f"a tool on the line cannot run {operation.direction}: it cuts on both sides",
             where=key_of(operation, "direction"),
             mend='leave it out, or write "drawn"',
         )

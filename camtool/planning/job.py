@@ -154,7 +154,7 @@ def _refuse_fit(fit_mm: tuple[float, float]) -> None:
     _refuse_beyond("fit", fit_mm, 0.0, MOST["mm"])
     if not any(fit_mm):
         raise OptionError(
-            f"nothing fits into {fit_mm[0]:g} by {fit_mm[1]:g} mm",
+            f"fit {fit_mm[0]:g} by {fit_mm[1]:g} mm gives neither a width nor a height",
             where="key fit",
             mend="give a width and a height above 0, or one of them and 0 for any",
         )
@@ -167,7 +167,7 @@ def _refuse_beyond(key: str, lengths: tuple[float, float], least: float, most: f
             raise OptionError(
                 f"{length:g} mm is not between {least:g} and {most:g}",
                 where=f"key {key}",
-                mend="give lengths of a machine",
+                mend=f"give a length from {least:g} to {most:g} mm",
             )
 
 
@@ -195,7 +195,7 @@ class Tool:
             )
         if 0.0 < self.diameter_mm <= self.tip_diameter_mm:
             raise OptionError(
-                f"the tip of {self.tip_diameter_mm:g} mm is as wide as the tool",
+                f"the tip of {self.tip_diameter_mm:g} mm is not smaller than the tool",
                 where="key tip_diameter",
                 mend="give a smaller tip, or a wider tool",
             )
@@ -335,7 +335,7 @@ class Operation:
         if not 0.0 < self.step_over <= 1.0:
             raise OptionError(
                 f"step-over {self.step_over:g} is not above 0 and at most 1",
-                mend="give the part of the tool's diameter that each way takes, such as 0.4",
+                mend="give the step-over as a part of the tool's diameter, such as 0.4",
             )
         self._refuse_contradictions()
 
@@ -351,7 +351,7 @@ class Operation:
             )
         if self.entry.kind == "helix" and self.kind != "pocket":
             raise OptionError(
-                f"a helix goes into pockets, not into what the kind {self.kind} cuts",
+                f"only pockets can be entered by a helix, not the kind {self.kind}",
                 where=f"{named}key entry",
                 mend='use "ramp" or "plunge"',
             )
@@ -412,7 +412,7 @@ class Placement:
                 )
         if self.copies == (1, 1) and any(self.pitch_mm):
             raise OptionError(
-                "a pitch, but no copies",
+                "a pitch is given without copies",
                 where="key pitch",
                 mend="give copies too, such as 3x2, or leave the pitch out",
             )
@@ -435,7 +435,7 @@ class Stock:
             all_above_zero("stock size", self.size_mm, "mm")
         if (self.corner_mm is None) != (self.size_mm is None):
             raise OptionError(
-                "a stock has a corner and a size, or neither",
+                "the stock has only one of corner and size",
                 where="[stock]",
                 mend="give both corner and size, or thickness alone",
             )
@@ -476,7 +476,7 @@ class Job:
         above_zero("safe Z", self.safe_z_mm, "mm")
         one_of("goal", self.minimise, GOALS)
         if not self.operations:
-            raise OptionError("a job without operations", mend="give it at least one")
+            raise OptionError("the job has no operations", mend="give it at least one")
 
     @property
     def layers(self) -> tuple[str, ...]:

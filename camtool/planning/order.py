@@ -242,7 +242,7 @@ def _followers(before: Ints, count: int) -> tuple[Ints, Ints]:
 def _circle(left: set[int]) -> OptionError:
     names = ", ".join(str(item) for item in sorted(left)[:SHOWN_ITEMS])
     return OptionError(
-        f"{len(left)} items wait for each other to be cut, among them {names}",
+        f"{len(left)} items each have to be cut before another of them, among them {names}",
         mend="let one of them be cut before the others",
     )
 

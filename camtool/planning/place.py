@@ -142,7 +142,7 @@ def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -
     """The largest scale at which the box (2, 2) is no larger than `fit_mm`; 0 there is any."""
     if box is None:
         raise OptionError(
-            "the operations take nothing of this drawing, so that nothing can be made to fit",
+            "the operations choose nothing of this drawing, so there is nothing to fit",
             file=file,
             where="key fit",
             mend="choose other layers, or drill its single points (--kind drill)",
@@ -256,7 +256,7 @@ def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
             f"what is cut lies {away:.4g} mm from part zero, more than {MOST_AWAY_MM:g} mm",
             file=placed.file,
             where="key origin",
-            mend="let part zero be a place of what is cut: origin lower-left or centre",
+            mend="use an origin on what is cut: lower-left or centre",
         )
 
 

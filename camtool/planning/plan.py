@@ -242,8 +242,9 @@ def _refuse_endless(items: tuple[Item, ...], setting: Setting) -> None:
         shortest = float(path_lengths(Polylines.of(rings)).min())
         if operation.overlap_mm > MOST_OVERLAPS * shortest:
             raise OptionError(
-                f"{operation.overlap_mm:g} mm goes {operation.overlap_mm / shortest:.3g} times"
-                f" round a contour of {shortest:.4g} mm",
+                f"an overlap of {operation.overlap_mm:g} mm goes"
+                f" {operation.overlap_mm / shortest:.3g} times round a contour of"
+                f" {shortest:.4g} mm",
                 where=key_of(operation, "overlap"),
                 mend=f"give {MOST_OVERLAPS * shortest:.4g} mm or less",
             )

@@ -192,9 +192,9 @@ def _check(chosen: Chosen, operation: Operation) -> None:
         row = int(np.argmin(chosen.lines.closed))
         place = at_place(chosen.names[row], chosen.lines[row].start.tolist())
         raise OptionError(
-            f"a pocket of the open path {place}",
+            f"the path {place} is open, so it cannot be a pocket",
             where=where,
-            mend="close it (perhaps --gap), or take it out by layer or colour",
+            mend="close it (perhaps with --gap), or leave it out by layer or colour",
         )
     segments = Segments.of(chosen.lines)
     found = self_crossings(segments)
@@ -203,10 +203,10 @@ def _check(chosen: Chosen, operation: Operation) -> None:
         first = int(np.argmax(crosses))
         one, other = (int(segments.path[rows[first]]) for rows in (met.row_a, met.row_b))
         raise OptionError(
-            f"a pocket of paths that cross: {chosen.names[one]} and"
+            f"paths of a pocket cross, so that its inside is not clear: {chosen.names[one]} and"
             f" {at_place(chosen.names[other], met.point[first].tolist())}",
             where=where,
-            mend="unite or part them in the drawing: what is inside is not clear",
+            mend="join or separate them in the drawing",
         )
 
 
@@ -216,7 +216,7 @@ def _check_step(chosen: Chosen, operation: Operation) -> None:
     size = float(np.ptp(extents(chosen.lines), axis=1).max()) if len(chosen.lines) else 0.0
     if size > MOST_STEPS * step:
         raise OptionError(
-            f"steps of {step:g} mm go more than {MOST_STEPS} times into {size:g} mm",
+            f"a step-over of {step:g} mm makes more than {MOST_STEPS} rings in {size:g} mm",
             where=key_of(operation, "step_over"),
             mend="give a larger step-over, or a larger tool",
         )

@@ -180,7 +180,7 @@ def _check_last(depth_mm: float, step_down_mm: float | None, last_pass_mm: float
     for name, limit in (("depth", depth_mm), ("step down", step_down_mm)):
         if limit is not None and last_pass_mm > limit * (1.0 + PASS_SLACK):
             raise OptionError(
-                f"a last pass of {last_pass_mm:g} mm is above the {name} of {limit:g} mm",
+                f"a last pass of {last_pass_mm:g} mm is deeper than the {name} of {limit:g} mm",
                 where="key last_pass",
                 mend=f"give {limit:g} mm or less",
             )

@@ -169,10 +169,10 @@ class Sides:
             return "the tool has no width"
         seen = self.seen_by(operation)
         holder = int(seen.holder[row])
-        frame = ", but for what is on the layer of a frame" if seen.by_frames[row] else ""
+        frame = " except what is on the layer of a frame" if seen.by_frames[row] else ""
         if holder < 0:
             return f"nothing is around it{frame}"
-        uncut = ", which nobody cuts" if self.uncut[holder] else ""
+        uncut = ", which is not cut" if self.uncut[holder] else ""
         what = "hole" if seen.rim[row] else "part"
         return f"within the {what} {self.names[holder]}{uncut}{frame}"
 

@@ -226,8 +226,8 @@ def half_periods(toolpath: Toolpath, machine: _Machine, step_mm: float, alone: B
     wanted = half_periods_ms(feed, step_mm, alone, machine.controller)
     slow = wanted >= MOST_LONG
     if slow.any():
-        message = f"a feed of {float(feed[slow][0]):g} mm/min is a step in weeks"
-        refuse(toolpath, slow, message, "give it a higher one (F)")
+        message = f"a feed of {float(feed[slow][0]):g} mm/min is too slow for the timers to count"
+        refuse(toolpath, slow, message, "write a higher F")
     return wanted.astype(np.int64)
 
 

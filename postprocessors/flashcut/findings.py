@@ -7,15 +7,15 @@ from camtool.findings import WARNING, Code, Sentence
 FEED_ABOVE_LIMIT = Sentence(
     Code.FEED_ABOVE_LIMIT,
     "{count:# block has|# blocks have} a feed above what the machine's shortest half period "
-    "gives, up to {measured:g} mm/min where {limit:.4g} is the limit: that half period holds "
-    "them, and so does the simulation",
+    "gives, up to {measured:g} mm/min where {limit:.4g} is the limit: the controller "
+    "runs them at the limit, and so does the simulation",
     "mm_min",
     WARNING,
 )
 VALUE_ROUNDED = Sentence(
     Code.VALUE_ROUNDED,
-    "{speeds:# spindle speed|# spindle speeds} and {tools:# tool number|# tool numbers} have no "
-    "word: the spindle turns with the feed, and M00 waits for the tool",
+    "{speeds:# spindle speed|# spindle speeds} and {tools:# tool number|# tool numbers} cannot "
+    "be written: the spindle turns with the feed, and M00 waits for the tool",
 )
 EVENT_LEFT_OUT_DWELL = Sentence(
     Code.EVENT_LEFT_OUT,
@@ -32,22 +32,23 @@ EXECUTED_OTHERWISE = Sentence(
     Code.EXECUTED_OTHERWISE,
     "{count:# straight move|# straight moves} of both axes {count:makes its|make their} shorter "
     "one too long, by up to {steps:# step|# steps} ({measured:.1f} µm), because each axis has a "
-    "timer of its own{stays:|; it stays in all that follows|}. What lowers it: longer half "
-    "periods (controller.half_period_ms), lines in pieces (dialect.slants=split){rapids:|, "
+    "timer of its own{stays:|; it stays in all that follows|}. To lower it, use longer half "
+    "periods (controller.half_period_ms) or lines in pieces (dialect.slants=split){rapids:|, "
     "rapids along one axis at a time (dialect.rapids=one-axis)|}",
     "um",
 )
 FEED_HELD = Sentence(
     Code.FEED_HELD,
     "{count:# cut is slower than its F|# cuts are slower than their F}: F{limit:g} becomes "
-    "{measured:.3g} mm/min of both axes, by the shortest half period (controller.half_period_ms, "
-    "controller.single_axis_half_period_ms); a shorter one makes slanted lines less exact",
+    "{measured:.3g} mm/min of both axes, because of the shortest half "
+    "period (controller.half_period_ms, controller.single_axis_half_period_ms); a shorter one "
+    "makes slanted lines less exact",
     "mm_min",
 )
 FEED_HELD_ALONE = Sentence(
     Code.FEED_HELD,
     "{count:# cut is slower than its F|# cuts are slower than their F}: F{limit:g} becomes "
-    "{measured:.3g} mm/min along one axis, by the shortest half period "
+    "{measured:.3g} mm/min along one axis, because of the shortest half period "
     "(controller.half_period_ms, controller.single_axis_half_period_ms); a shorter one makes "
     "slanted lines less exact",
     "mm_min",

@@ -143,7 +143,7 @@ class _Reader:
         if form[-1] == "F":
             self._set_feed(block, numbers.pop(), len(form))
         if code != "G00" and math.isnan(self._feed):
-            block.fail(f"{code} before any F", mend="say F in a G01 of X and Y first")
+            block.fail(f"{code} before any F", mend="write F in a G01 of X and Y first")
         if code in ("G02", "G03"):
             self._arc(block, code, numbers)
             return
@@ -185,7 +185,7 @@ class _Reader:
             block.fail(
                 "an arc that ends where it starts: whether it is a circle or nothing is not known",
                 word=1,
-                mend="write two halves, or say --set dialect.full_circles=whole",
+                mend="write two half circles, or use --set dialect.full_circles=whole",
             )
         self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=self._feed)
 
@@ -194,24 +194,22 @@ class _Reader:
         forms = self._templates.get(code)
         if code in NOT_INCHES:
             block.fail(
-                f"{code} is an arc in this controller's list, neither inches nor a return, and is "
-                "not done",
+                f"{code} is an arc in this controller's list, neither a unit nor a return, and "
+                "the controller does not run it",
                 mend="remove it; lengths are mm",
             )
         if forms is None:
             known = " ".join(TEMPLATES)
-            block.fail(f"{code} is not known", mend=f"known, with two digits: {known}")
+            block.fail(f"{code} is not known", mend=f"use one of {known}, with two digits")
         wanted = " or ".join(" ".join([code, *one]) for one in sorted(forms))
         for at, letter in enumerate(form):
             if not any(one.startswith(form[: at + 1]) for one in forms):
-                block.fail(
-                    f"{letter} has no place here", word=at + 1, mend=f"write {wanted}, no more"
-                )
+                block.fail(f"{letter} has no place here", word=at + 1, mend=f"write only {wanted}")
         block.fail(f"{code} lacks a word", word=len(form), mend=f"write {wanted}")
 
 
 def _refuse_spacing(block: Block) -> None:
-    block.fail("one space, no more and no tab, goes between words", mend="as in G00 X1.0 Y1.0")
+    block.fail("words are not parted by exactly one space", mend="write G00 X1.0 Y1.0")
 
 
 # What the machine's timers make of a program's lines and feeds.

@@ -104,7 +104,7 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
         raise PostError(
             f"the program would have more than {MAX_PARTS} blocks",
             where=toolpath.place(int(count.argmax())),
-            mend="say --set dialect.slants=whole",
+            mend="use --set dialect.slants=whole",
         )
     return _cut(toolpath, count.astype(np.int64), steps, q_mm)
 

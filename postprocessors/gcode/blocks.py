@@ -211,7 +211,9 @@ def _comments(raw: str, index: int, line: int, lexing: Lexing) -> tuple[str, ...
     odd = re.search(r"[()]", rest)
     if odd:
         message = "a comment that is nested or not closed"
-        raise _error(message, index, line, odd.start() + 1, "one ( and one ) for each comment")
+        raise _error(
+            message, index, line, odd.start() + 1, "write one ( and one ) for each comment"
+        )
     texts = (one[2] if one[1] is None else one[1] for one in found)
     return tuple(text.encode("latin-1").decode("utf-8", errors="replace") for text in texts)
 

@@ -46,7 +46,7 @@ def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, list[Finding
     refuse(
         toolpath,
         toolpath.is_feed & (units <= 0),
-        lambda row: f"a feed of {toolpath.feed[row]:g} mm/min is 0 in an F word",
+        lambda row: f"a feed of {toolpath.feed[row]:g} mm/min becomes 0 in an F word",
         f"use {1.0 / scale:g} mm/min or more",
     )
     if exact.all():
@@ -66,7 +66,7 @@ def _check_arcs(toolpath: Toolpath) -> None:
     is_arc, spread = toolpath.is_arc, radius_spread(toolpath)
     with np.errstate(invalid="ignore"):
         centred = np.abs(toolpath.centre).max(axis=1, initial=0.0) < np.inf
-        refuse(toolpath, is_arc & ~centred, "an arc without a centre")
+        refuse(toolpath, is_arc & ~centred, "an arc without a centre", "give the arc a centre")
         refuse(
             toolpath,
             is_arc & (spread > ARC_RADIUS_SPREAD_MM),
@@ -89,6 +89,8 @@ def _check_feeds(toolpath: Toolpath, machine: Machine) -> None:
         refuse(
             toolpath,
             is_feed & (feed > limit * (1.0 + FEED_TOLERANCE)),
-            lambda row: f"a feed of {feed[row]:g} mm/min, {limit:g} is the machine's highest",
-            "lower the feed, or say --set limits.max_feed_mm_min=…",
+            lambda row: (
+                f"a feed of {feed[row]:g} mm/min is above the machine's highest, {limit:g}"
+            ),
+            "lower the feed, or use --set limits.max_feed_mm_min=…",
         )

@@ -66,7 +66,7 @@ def feed_decimals(machine: Machine) -> int:
     whole = round(digits)
     if abs(digits - whole) > POWER_OF_TEN_TOLERANCE or not 0 <= whole <= MOST_FEED_DECIMALS:
         raise MachineError(
-            f"{machine.feed.unit_mm_min:g} is no unit of an F word",
+            f"{machine.feed.unit_mm_min:g} is not a unit that F words can have",
             file=machine.target.name,
             where="table [feed], key unit_mm_min",
             mend="use 1, 0.1, 0.01 or 0.001",
@@ -84,7 +84,7 @@ def check_unit(machine: Machine, unit_mm: float, arc_spread_mm: float) -> None:
             f"the last decimal is worth {unit_mm:g} mm, more than a step of {step_mm:g} mm",
             file=machine.target.name,
             where="table [dialect], key decimals",
-            mend=f"{math.ceil(math.log10(unit_mm / step_mm) - UNIT_GUARD)} more are needed",
+            mend=f"add {math.ceil(math.log10(unit_mm / step_mm) - UNIT_GUARD)} to decimals",
         )
     if arc_spread_mm <= unit_mm * (1.0 + UNIT_GUARD):
         raise MachineError(

@@ -12,7 +12,7 @@ FEED_ROUNDED = Sentence(
 )
 ARC_MENDED = Sentence(
     Code.ARC_MENDED,
-    "{measured:# arc|# arcs} would not have passed the controller's rule with rounded numbers: "
+    "{measured:# arc|# arcs} would have been refused by the controller after rounding: "
     "{recentred} re-centred, {split} split in two, {lines} written as lines",
     "arcs",
 )
@@ -47,8 +47,8 @@ MOVE_SPLIT = Sentence(
 FEED_ABOVE_LIMIT_IN_WORDS = Sentence(
     Code.FEED_ABOVE_LIMIT,
     "{count:# F word is|# F words are} above the machine's highest feed, up to {measured:g} "
-    "mm/min where {limit:g} is the limit: the controller holds each move to what its axes can "
-    "do, and so does the simulation",
+    "mm/min where {limit:g} is the limit: the controller runs each move as fast as its axes "
+    "can, and so does the simulation",
     "mm_min",
     WARNING,
 )
@@ -68,8 +68,8 @@ WORDS_PASSED_OVER_PAUSE = Sentence(
 )
 SPINDLE_SPEED_NOT_SAID = Sentence(
     Code.SPINDLE_SPEED_NOT_SAID,
-    "the spindle is started and no S word has said its speed: a controller that sets the speed "
-    "turns it at 0",
+    "the spindle is started before any S word: a controller that sets the speed turns it at 0; "
+    "write S",
 )
 NEVER_READ = Sentence(
     Code.NEVER_READ,

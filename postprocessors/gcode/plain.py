@@ -57,7 +57,7 @@ def check_plain(toolpath: Toolpath, machine: Machine) -> None:
             raise PostError(
                 "this machine has no code to go to machine zero",
                 where=toolpath.place(row),
-                mend="leave homing out, do it by hand",
+                mend="leave homing out and do it by hand",
             )
         if kind == Kind.SET_ZERO and toolpath.end[row].any():
             raise PostError(
@@ -66,7 +66,11 @@ def check_plain(toolpath: Toolpath, machine: Machine) -> None:
                 mend="set it first, before any move",
             )
         if kind == Kind.END and row < len(toolpath) - 1:
-            raise PostError("moves follow the end of the program", where=toolpath.place(row + 1))
+            raise PostError(
+                "moves follow the end of the program",
+                where=toolpath.place(row + 1),
+                mend="end the program last",
+            )
 
 
 def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, list[Finding]]:

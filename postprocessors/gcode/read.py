@@ -268,7 +268,7 @@ class ModalReader:
     def _set_frame(self, block: Block, frame: int) -> None:
         """G54 to G59: whichever comes before the first move has its zero at part zero."""
         if self._moved and frame != self._frame:
-            message = "another work frame, whose place only the controller knows"
+            message = "the program changes to a work frame whose place only the controller knows"
             block.fail_at(
                 "G", message, number=f"{frame // 10}", mend="write a program for each frame"
             )
@@ -297,7 +297,7 @@ class ModalReader:
         kind = kinds.get(tuple(said))
         if self._motion != G.RAPID or kind is None or any(said.values()):
             block.fail(
-                "of machine coordinates only homing can be simulated",
+                "G53 moves to another place than machine zero, which is not simulated",
                 mend="write G53 G0 X0 Y0 or G53 G0 Z0",
             )
         x, y, z = self.path.position
@@ -322,20 +322,20 @@ class ModalReader:
         motion = self._motion
         if motion is None or motion == G.NO_MOTION:
             if axes:
-                block.fail("coordinates, and no motion word in force", mend="write G0 or G1")
+                block.fail("coordinates, but no motion word in force", mend="write G0 or G1")
         elif not axes and not self._is_circle(motion, numbers, said=said):
             if said and self._rules.forgets_feed and motion > G.RAPID and self._feed == 0.0:
-                block.fail(NO_FEED, mend="say F first")
+                block.fail(NO_FEED, mend="write F first")
             if motion > G.LINE and said:
-                block.fail("an arc without X or Y", mend="say where it ends")
+                block.fail("an arc without X or Y", mend="write X and Y of its end")
         elif motion == G.RAPID:
             self.path.rapid(*to)
         elif self._feed == 0.0:
-            block.fail(NO_FEED, mend="say F first")
+            block.fail(NO_FEED, mend="write F first")
         elif motion == G.LINE:
             self.path.line(*to, feed=self._feed)
         elif self._rules.ends_in_plane and not flat:
-            block.fail("an arc without X or Y: grbl's error 32", mend="say where it ends in XY")
+            block.fail("an arc without X or Y: grbl's error 32", mend="write X or Y of its end")
         else:
             self._arc(block, motion == G.ARC_CCW, to, numbers)
 
@@ -349,7 +349,7 @@ class ModalReader:
         x, y, _ = self.path.position
         turns = self._turns(block, numbers.pop("P", 1.0)) if self._rules.turns else 1
         if "R" in numbers and ("I" in numbers or "J" in numbers):
-            block.fail_at("R", "an arc by its radius and by its centre at once")
+            block.fail_at("R", "an arc with both R and a centre (I, J)")
         if "R" in numbers:
             radius = numbers.pop("R") * self._mm
             fault = centre_of_radius(
@@ -398,7 +398,7 @@ class ModalReader:
     def _centre(self, block: Block, start: Point, numbers: dict[str, float]) -> Point:
         """The centre that I and J give."""
         if "I" not in numbers and "J" not in numbers:
-            block.fail("an arc without I, J or R", mend="say where its centre is")
+            block.fail("an arc without I, J or R", mend="write I and J of its centre, or R")
         if not self._absolute_centres:
             i, j = numbers.pop("I", 0.0) * self._mm, numbers.pop("J", 0.0) * self._mm
             return start[0] + i, start[1] + j

@@ -10,7 +10,8 @@ What it does with a program, in the order of this file:
    (`camtool.kernels.lookahead`), trapezoids (`speed_plan`). They change times, not positions.
 
 Positions are absolute: a row starts at the step where the one before ended, and no rounding adds
-up. Its numbers, 32-bit floats, are nearer than a hundredth of a step. grbl compensates no play.
+up. Its numbers, 32-bit floats, are nearer than a hundredth of a step. grbl does not compensate
+backlash.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ def _controller(machine: _Machine) -> GrblController:
     for name, axis in zip("xyz", machine.axes, strict=True):
         if axis.compensation_mm > 0.0:
             raise MachineError(
-                "grbl compensates no play",
+                "grbl does not compensate backlash",
                 where=f"table [axes.{name}], key compensation_mm",
                 mend="leave it out",
             )

@@ -6,7 +6,7 @@ from camtool.findings import INFO, Code, Sentence
 
 EVENT_LEFT_OUT = Sentence(
     Code.EVENT_LEFT_OUT,
-    "the program names no tool, since grbl knows no tool change: mount it before the program",
+    "the program names no tool, because grbl has no tool change: mount it before the program",
     severity=INFO,
 )
 FEED_TOO_SLOW = Sentence(

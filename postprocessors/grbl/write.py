@@ -37,12 +37,13 @@ def _words(event: Event, dialect: Dialect) -> str:
                 "write one program for each tool, or use --set dialect.tool_change=pause",
             )
         if tool_number(event) > MOST_TOOL:
-            raise event.refuse(f"grbl's tools end at {MOST_TOOL}")
+            raise event.refuse(f"grbl's highest tool number is {MOST_TOOL}")
         return f"T{tool_number(event)} M0"
     block = common_words(event)
     if event.kind == Kind.DWELL and event.value > dialect.most_dwell_s:
         raise event.refuse(
-            f"a dwell of {event.value:g} s; grbl counts at most {dialect.most_dwell_s:g} s",
+            f"a dwell of {event.value:g} s is too long: grbl counts at most"
+            f" {dialect.most_dwell_s:g} s",
             "use several dwells",
         )
     return block

@@ -65,7 +65,7 @@ READ_TWO_WAYS = Sentence(
     Code.READ_TWO_WAYS,
     "{measured:# run|# runs} of a motor {measured:has|have} more than 255 steps, read by "
     "dialect.high_byte = {high_byte}, and by the other reading (255 or 256) a motor ends up to "
-    "{steps:# step|# steps} elsewhere: post again in shorter runs, or say dialect.long_runs=true "
-    "where it is known",
+    "{steps:# step|# steps} elsewhere: post again in shorter runs, or, if you know the reading, "
+    "use --set dialect.long_runs=true",
     "runs",
 )

@@ -244,7 +244,7 @@ class PacketReader:
         match = self._pattern.match(self._data, self._at)
         if match is None:
             self._walk()
-            raise self._fault(self._at, "no record")
+            raise self._fault(self._at, "bytes that are not a record")
         sense1, high1, low1, sense2, high2, low2, wait1, sense3, high3, low3, wait2 = (
             match.groups()
         )
@@ -265,7 +265,9 @@ class PacketReader:
             return 0
         pulses = high[0] * self._dialect.high_byte_steps + low[0]
         if not pulses:
-            raise self._fault(offset, "a motor turns, but for 0 steps", "say 05H: it stands")
+            raise self._fault(
+                offset, "a motor turns, but for 0 steps", "write 05H for a motor that stands"
+            )
         steps = pulses - self._dialect.lost_pulses
         return steps if sense == b"\x03" else -steps
 
@@ -407,7 +409,7 @@ class ListingReader:
         steps = math.floor(exact + 0.5)
         if steps > self._most:
             raise self._error(
-                column, f"{text} mm is more than {self._most} steps", "say it in two records"
+                column, f"{text} mm is more than {self._most} steps", "write it as two records"
             )
         off = abs(exact - steps)
         if off > WHOLE_STEP_TOLERANCE:
@@ -420,7 +422,7 @@ class ListingReader:
         if seconds > MOST_DWELL_BYTE_S:
             raise self._error(
                 column,
-                f"{seconds} s is more than a byte can say",
+                f"{seconds} s is more than a byte holds",
                 f"use {MOST_DWELL_BYTE_S} s or less, and another record for the rest",
             )
         return seconds

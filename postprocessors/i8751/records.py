@@ -49,7 +49,7 @@ def check_toolpath(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) 
     refuse(
         toolpath,
         bad_feed,
-        lambda row: f"feed {toolpath.feed[row]:g} mm/min is no feed",
+        lambda row: f"a feed of {toolpath.feed[row]:g} mm/min",
         "give a feed above 0; this machine then moves at its own speed",
     )
     # Its chords end at its end, so that its radii may differ by its tolerance.
@@ -74,7 +74,7 @@ def _check_events(toolpath: Toolpath) -> None:
     refuse(
         toolpath,
         (kind == Kind.SET_ZERO) & toolpath.end.any(axis=1),
-        "part zero is where the program starts",
+        "part zero is set away from where the program starts",
         "set it first, before any move",
     )
     with np.errstate(invalid="ignore"):
@@ -82,7 +82,7 @@ def _check_events(toolpath: Toolpath) -> None:
     refuse(
         toolpath,
         bad,
-        lambda row: f"dwell {value[row]:g} s cannot be said",
+        lambda row: f"a dwell of {value[row]:g} s does not fit into the program",
         f"use 0 to {MOST_DWELL_S:g} s",
     )
     ended = np.cumsum(kind == Kind.END) - (kind == Kind.END)
@@ -90,7 +90,7 @@ def _check_events(toolpath: Toolpath) -> None:
         toolpath,
         ended > 0,
         "something follows the end of the program",
-        "end the program once, last of all",
+        "end the program once, in its last row",
     )
 
 
@@ -283,7 +283,10 @@ class _Plain:
         the first record, goes into records of their own that move nothing.
         """
         if not len(self.steps):
-            raise PostError("nothing moves by a whole step: there is no program to write")
+            raise PostError(
+                "nothing moves by a whole step: there is no program to write",
+                mend="scale the drawing up",
+            )
         # A step back at the end belongs to the last row that moved.
         back = np.full(len(self.steps) - len(self.owner), self.owner[-1])
         owner = np.concatenate([self.owner, back])

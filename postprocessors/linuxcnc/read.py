@@ -90,7 +90,7 @@ def read_program(data: bytes, machine: LinuxcncMachine) -> Toolpath:
         raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
     if not (reader.ended or framed):
         raise ProgramError(
-            "the file ends and the program does not, which LinuxCNC takes for a fault",
+            "the file ends without an end of the program, which LinuxCNC reports as an error",
             where=f"line {len(lines) if lines[-1] else max(len(lines) - 1, 1)}",
             mend="end with M2, or put a line of % before and behind the program",
         )

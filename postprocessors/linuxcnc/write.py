@@ -51,6 +51,6 @@ def _words(event: Event) -> str:
     """The block of an event."""
     if event.kind == Kind.TOOL_CHANGE:
         if tool_number(event) > MOST_TOOL:
-            raise event.refuse(f"tools end at {MOST_TOOL}")
+            raise event.refuse(f"the highest tool number is {MOST_TOOL}")
         return f"T{tool_number(event)} M6"
     return common_words(event)

@@ -271,7 +271,7 @@ def _check(path: Toolpath, rows: int) -> None:
         no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
     away = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
     for bad, message in (
-        (no_feed, "a move at a feed without a feed above 0"),
+        (no_feed, "a cutting move without a feed above 0"),
         (no_time, "a dwell without its seconds"),
         (away, "part zero is set away from part zero"),
     ):
@@ -430,7 +430,7 @@ def program_of(orders: Ints, pauses_s: Floats, machine: _Machine) -> Program:
         raise MachineError(
             "the gains of the listing are whole thousandths",
             where="table [controller], keys kid and kpd",
-            mend='round them, or say slaves = "text"',
+            mend='round them, or write slaves = "text"',
         )
     share = np.arange(TABLE_COUNTS + 1) / TABLE_COUNTS
     table = np.rint(router.table_counts * np.sqrt(share)).astype(np.int64)

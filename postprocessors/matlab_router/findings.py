@@ -94,14 +94,14 @@ PLACES_SNAPPED = Sentence(
 PLACES_SNAPPED_AND_STARTS = Sentence(
     Code.PLACES_SNAPPED,
     "vertices were moved to the grid of {limit:g} mm, by {moved_um:.0f} µm at most; {starts:# "
-    "stroke begins|# strokes begin} at least {limit:g} mm from home, because the way to a first "
-    "point of 0 would never end",
+    "stroke begins|# strokes begin} at least {limit:g} mm from home, because the slave never "
+    "ends a distance of 0",
     "mm",
 )
 PLACES_SNAPPED_FROM_ONE = Sentence(
     Code.PLACES_SNAPPED,
-    "{measured:# vertex was|# vertices were} moved by 0.1 mm, because a distance of 0.1 mm would "
-    "never end",
+    "{measured:# vertex was|# vertices were} moved by 0.1 mm, because the slave never ends a "
+    "distance of 0.1 mm",
 )
 EXECUTED_OTHERWISE_ODD = Sentence(
     Code.EXECUTED_OTHERWISE,
@@ -111,8 +111,8 @@ EXECUTED_OTHERWISE_ODD = Sentence(
 )
 EXECUTED_OTHERWISE_START = Sentence(
     Code.EXECUTED_OTHERWISE,
-    "jobs that begin at Y {start:g} mm, whatever the program says: {count}; for a master that "
-    "obeys: --set dialect.master_y=sent",
+    "jobs that begin at Y {start:g} mm, whatever the program says: {count}; if your master "
+    "starts where the program says, use --set dialect.master_y=sent",
     "mm",
 )
 EXECUTED_OTHERWISE_BENT = Sentence(

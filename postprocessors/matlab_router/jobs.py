@@ -89,12 +89,12 @@ def check_job(job: ReadJob, dialect: Choices) -> None:
     """ProgramError for the first number with which the machine would run away or stop."""
     for name, table in (("lxy", job.length), ("velxy", job.speed)):
         _refuse(job, name, np.abs(table) > MOST_NUMBER, "is beyond an int16")
-    _refuse(job, "lxy", job.length < 0, "is negative: the sign stands in velxy")
+    _refuse(job, "lxy", job.length < 0, "is negative: the sign belongs in velxy")
     runaway = "makes the slave run away"
     if dialect.odd == "truncated":
         _refuse(job, "lxy", job.length == 1, runaway)
     dead = (job.length > 0) & (job.speed == 0)
-    _refuse(job, "velxy", dead, "never ends: there is a distance to go")
+    _refuse(job, "velxy", dead, "never ends, because its distance is not 0")
     for axis, name in enumerate(("first_pointx", "first_pointy")):
         first = int(job.first[axis])
         if axis == 1 and dialect.master_y == "fixed":

@@ -277,8 +277,8 @@ class _Maker:
         usable = (lines.end[first:most] >= CHUNK_UNITS).all(axis=1)
         if not usable.any():
             raise PostError(
-                f"{self._dialect.max_lines} lines on without a vertex at which a job could begin: "
-                "all lie on X 0 or Y 0",
+                f"{self._dialect.max_lines} lines in a row have no vertex at which a job could "
+                "begin: all lie on X 0 or Y 0",
                 where=self._toolpath.place(int(lines.row[first])),
                 mend="move the drawing away from home",
             )

@@ -119,7 +119,7 @@ def _refuse_depths(
             bad,
             f"a cut at Z {wanted:g} mm: this machine always plunges {dialect.plunge_mm:g} mm from"
             f" home, to Z {depth:g} mm",
-            f"place the stock {home:g} mm below the raised tool and say so: "
+            f"place the stock {home:g} mm below the raised tool and use "
             f"--set controller.machine_zero_mm=[{x:g},{y:g},{home:g}]",
             rows=rows,
         )
@@ -140,8 +140,8 @@ def _refuse_holes(toolpath: Toolpath, number: Ints, below: Bools, cut: Bools, ro
 def _events(toolpath: Toolpath) -> list[Finding]:
     """Refuses events that the machine cannot do; findings for those that have no place here."""
     kind = toolpath.kind
-    message = "the tool turns one way only: it can be switched on and off, no more"
-    refuse(toolpath, kind == Kind.SPINDLE_CCW, message)
+    message = "the spindle of this machine turns one way only"
+    refuse(toolpath, kind == Kind.SPINDLE_CCW, message, "turn it clockwise")
     moved = (toolpath.end != 0.0).any(axis=1)
     refuse(
         toolpath,

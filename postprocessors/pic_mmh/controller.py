@@ -159,10 +159,11 @@ class PicMmhRun:
         self._coded_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         if self._coded_mm[0] != self._coded_mm[1]:
             raise MachineError(
-                f"steps of X and Y differ ({self._coded_mm[0]} and {self._coded_mm[1]} mm)",
+                f"the coded steps of X and Y differ"
+                f" ({self._coded_mm[0]} and {self._coded_mm[1]} mm)",
                 where="table [axes], key coded_step_mm",
                 mend="the controller interpolates with one step size; "
-                "say the difference in real_step_mm",
+                "write the difference in real_step_mm",
             )
         self._ends = self._steps(toolpath.end, range(3))
         self._centres = self._arc_centres()
@@ -286,9 +287,9 @@ class PicMmhRun:
         feed = float(self._toolpath.feed[row])
         if not (math.isfinite(feed) and feed > 0.0):
             raise ProgramError(
-                "a move at a feed without a feed above 0",
+                "a cutting move without a feed above 0",
                 where=block_of(self._toolpath, row),
-                mend="give it one (F)",
+                mend="write F in its block",
             )
         return max(60.0 * float(self._coded_mm[axis]) / feed, self._least_period_s)
 

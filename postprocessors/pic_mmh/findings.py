@@ -14,8 +14,8 @@ BLOCK_TOO_LONG = Sentence(
 BLOCK_TOO_LONG_PERHAPS = Sentence(
     Code.BLOCK_TOO_LONG,
     "{count:# block has|# blocks have} more than {limit} characters, up to {measured}: the "
-    "thesis's sample block has 43, its buffer would hold 35; see that the controller's echo of "
-    "the first one is whole, otherwise use --set dialect.form=annex",
+    "thesis's sample block has 43, its buffer would hold 35; check that the controller echoes "
+    "the first one whole, otherwise use --set dialect.form=annex",
     "chars",
     INFO,
 )
@@ -35,7 +35,7 @@ FEED_ROUNDED = Sentence(
 )
 ARC_MENDED = Sentence(
     Code.ARC_MENDED,
-    "{count:# arc ends|# arcs end} on a step that the controller really meets, and a line goes "
+    "{count:# arc ends|# arcs end} on a step that the controller passes, and a line goes "
     "on to the wanted end: at most {measured:.2f} µm ({steps:.1f} steps)",
     "um",
 )
@@ -63,7 +63,7 @@ MOVE_SPLIT = Sentence(
 FEED_ABOVE_LIMIT = Sentence(
     Code.FEED_ABOVE_LIMIT,
     "{count:# block has|# blocks have} a feed above what the link carries, up to {measured:g} "
-    "mm/min: it holds them at {limit:.4g}",
+    "mm/min: they run at {limit:.4g}",
     "mm_min",
     WARNING,
 )
@@ -74,9 +74,9 @@ VALUE_ROUNDED = Sentence(
 )
 ARC_END_UNSURE = Sentence(
     Code.ARC_END_UNSURE,
-    "{measured} of {arcs:# arc does|# arcs do} not stand on the end by every reading of the "
+    "{measured} of {arcs:# arc does|# arcs do} not stop on the end by every reading of the "
     "thesis (controller.arc_end): by equal {missed} run on past it ({missed_rounded} with "
     "initial_error=rounded-radius), by final-quadrant they stop up to {final_quadrant:.1f} steps "
-    "beside it, by nearest up to {nearest:.1f}; simulated is {taken}",
+    "beside it, by nearest up to {nearest:.1f}; the simulation takes {taken}",
     "arcs",
 )

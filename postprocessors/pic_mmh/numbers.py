@@ -225,7 +225,7 @@ def _feed_words(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[list[str], 
     used = toolpath.is_feed
     feed = np.where(used, toolpath.feed, unit)
     highest = min(machine.max_feed_mm_min, MOST_FEED_UNITS * unit)
-    refuse(toolpath, ~(feed > 0.0), lambda row: f"feed {feed[row]:g} mm/min is no feed", mend)
+    refuse(toolpath, ~(feed > 0.0), lambda row: f"a feed of {feed[row]:g} mm/min", mend)
     refuse(
         toolpath,
         feed > highest + FEED_TOLERANCE * unit,
@@ -271,14 +271,14 @@ def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
     }[kind]
     if math.isnan(value) and name == "spindle speed":
         raise PostError(
-            "the spindle is started without a speed, which M03 and M04 must say here",
+            "the spindle is started without a speed, which M03 and M04 need on this machine",
             where=toolpath.place(row),
-            mend="say S in the program",
+            mend="give the speed: --spindle, or S in the program",
         )
     whole = kind != Kind.TOOL_CHANGE or value == math.floor(value)
     if not (0.0 <= value <= most and whole):
         raise PostError(
-            f"{name} {value:g} cannot be said",
+            f"{name} {value:g} does not fit into a block",
             where=toolpath.place(row),
             mend=f"use a whole number from 0 to {most:g}",
         )

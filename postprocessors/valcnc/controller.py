@@ -185,7 +185,7 @@ class _Pieces:
         rises = toolpath.end[rows, 2] != toolpath.starts[rows, 2]
         unequal = np.full(len(rows), self._step_mm[0] != self._step_mm[1])
         for bad, message in (
-            (~countable, "an arc without a centre, or far beyond all that can be counted"),
+            (~countable, "an arc without a centre, or farther than the controller can count"),
             (rises, "Z moves along with an arc"),
             (unequal, "on axes of unequal steps an arc is an ellipse"),
         ):

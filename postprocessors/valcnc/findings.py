@@ -25,7 +25,7 @@ EVENT_LEFT_OUT = Sentence(
 )
 COORDINATES_SCALED = Sentence(
     Code.COORDINATES_SCALED,
-    "the program says {measured:g} for 1 mm; the thesis gives 200 steps a unit and 25 steps a "
+    "the program writes {measured:g} for 1 mm; the thesis gives 200 steps a unit and 25 steps a "
     "mm: measure a move, then set dialect.coord_scale (1 if a unit moves 1 mm) and "
     "dialect.coord_scale_checked=true",
 )

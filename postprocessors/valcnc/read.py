@@ -107,13 +107,17 @@ class _Reader:
         first = "".join(block.words[0])
         if letters[0] != "G" or block.words[0][1] not in CODES:
             known = " ".join(f"G{code}" for code in CODES)
-            block.fail(f"{first} is no code of this controller", mend=f"known: {known}, in front")
+            block.fail(
+                f"{first} is not a code of this controller", mend=f"begin with one of {known}"
+            )
         if "\t" in block.text:
             block.fail("a tab: only spaces are dropped", mend="use spaces")
         for at, letter in enumerate(letters):
             if letter in letters[:at]:
                 block.fail(
-                    f"a second {letter}: only the first counts", word=at, mend="one block a line"
+                    f"a second {letter}, which the controller ignores",
+                    word=at,
+                    mend="write one block a line",
                 )
 
     def findings(self) -> Iterator[Finding]:
@@ -133,8 +137,8 @@ class _Reader:
         missing = [letter for letter in "XYZ" if letter not in values]
         if missing and self._dialect.missing_words == "refused":
             block.fail(
-                f"no {missing[0]}: whether it then stays or becomes 0 is not known",
-                mend="write X, Y and Z, or say --set dialect.missing_words=keep",
+                f"no {missing[0]}: it is not known whether the axis then stays or goes to 0",
+                mend="write X, Y and Z, or use --set dialect.missing_words=keep",
             )
         zero = self._dialect.missing_words == "zero"
         x, y, z = (
@@ -151,7 +155,7 @@ class _Reader:
         """A line; in two where the option puts Z before or after X and Y."""
         if "I" in values or "J" in values:
             at, letter = next((at, one) for at, one in enumerate(values, 1) if one in "IJ")
-            block.fail(f"{letter} in a G{code}", word=at, mend="only arcs have a centre")
+            block.fail(f"{letter} in a G{code}, which is no arc", word=at, mend="remove it")
         first = self._in_order(block, end)
         for point in (first, end) if first else (end,):
             x, y, z = self._mm(*point)
@@ -168,9 +172,9 @@ class _Reader:
         if order == "refused":
             letters = [letter for letter, _ in block.words]
             block.fail(
-                "Z moves along with X or Y: which goes first is not known",
+                "Z moves along with X or Y: it is not known which goes first",
                 word=letters.index("Z") if "Z" in letters else None,
-                mend="move them in two blocks, or say --set dialect.z_order=before",
+                mend="move them in two blocks, or use --set dialect.z_order=before",
             )
         return (*old[:2], end[2]) if order == "before" else (*end[:2], old[2])
 
@@ -217,7 +221,7 @@ class _Reader:
                 block.fail(
                     "an arc that ends where it starts: its angle is 0 by one formula, 360° by the "
                     "other",
-                    mend="write it in parts, or say --set dialect.full_circles=whole",
+                    mend="write it in parts, or use --set dialect.full_circles=whole",
                 )
             return
         ratio = length / (2.0 * radius)

@@ -53,7 +53,7 @@ def test_a_comma_that_parts_is_no_decimal_sign() -> None:
 @pytest.mark.parametrize(
     ("text", "where", "message"),
     [
-        ("1,5 2,5\n3,5 4,5", "line 1", "or two points x,y; part x and y by a semicolon"),
+        ("1,5 2,5\n3,5 4,5", "line 1", "or two points x,y; separate x and y by a semicolon"),
         ("1,5,2,5\n3,5,4,5", "line 1", "4 fields, wanted x and y; if the comma is the decimal"),
         ("1,5;2.5\n3;4", "line 1", "decimal comma (line 1) and a decimal point (line 1)"),
         ("1,5;2\n3;4\n5.5;6", "line 3", "decimal comma (line 1) and a decimal point (line 3)"),

@@ -160,7 +160,7 @@ def test_what_reaches_too_far_is_left_out(body: str) -> None:
     drawing = read_in(svg(LINE + body).encode())
     (item,) = drawing.skipped
     assert item.reason.startswith("cannot be drawn (")
-    assert "where micrometres are lost" in item.reason
+    assert "too far to be exact" in item.reason
     assert len(drawing.paths) == 1
 
 

@@ -187,7 +187,7 @@ def test_nothing_needs_no_order() -> None:
 
 def test_a_circle_of_items_is_refused() -> None:
     choices = choices_of([hole(k, 0) for k in range(5)])
-    with pytest.raises(OptionError, match=r"3 items wait for each other.* 1, 2, 3"):
+    with pytest.raises(OptionError, match=r"3 items each have to be cut before another.* 1, 2, 3"):
         best_order(choices, np.array([[1, 2], [2, 3], [3, 1], [0, 4]]))
     with pytest.raises(ValueError, match="none of 5"):
         best_order(choices, np.array([[0, 5]]))

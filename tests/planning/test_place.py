@@ -364,7 +364,7 @@ def test_paths_that_become_a_point_are_left_out_and_told() -> None:
 def test_what_nothing_is_taken_of_fits_nowhere() -> None:
     """A profile takes no single points: the message says so, and what does."""
     made = replace(drawing_of([]), marks=(_mark(1.0, 2.0), _mark(3.0, 5.0)))
-    with pytest.raises(OptionError, match="take nothing of this drawing") as caught:
+    with pytest.raises(OptionError, match="choose nothing of this drawing") as caught:
         place(made, job_of(fit_mm=(8.0, 6.0)))
     assert caught.value.where == "key fit"
     assert "--kind drill" in caught.value.mend

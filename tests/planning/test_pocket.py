@@ -308,7 +308,11 @@ def test_what_stays_uncut_is_told_in_few_lines() -> None:
             ["PATH 1", "open", "clear", "close"],
         ),
         ([SQUARE], 0.0, ["width", "key tool", "diameter"]),
-        ([SQUARE, moved(SQUARE, 5.0, 5.0)], 1.0, ["cross", "PATH 0", "PATH 1", "unite"]),
+        (
+            [SQUARE, moved(SQUARE, 5.0, 5.0)],
+            1.0,
+            ["cross", "PATH 0", "PATH 1", "join or separate"],
+        ),
         ([closed((0, 0), (10, 10), (10, 0), (0, 10))], 1.0, ["cross", "PATH 0"]),
         ([SQUARE], 1.0, ["step", "key step_over", "larger"]),
     ],

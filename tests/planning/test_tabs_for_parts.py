@@ -52,7 +52,7 @@ def test_holes_open_paths_and_short_contours_go_without() -> None:
     assert tabs == {"0/PATH 0": 4} | {f"0/PATH {k}": 0 for k in (1, 2, 3, 4, 5)} | {"0/PATH 6": 4}
     (finding,) = findings
     assert finding.measured == 5.0
-    assert "5 contours go without tabs: 4 holes, 1 open;" in finding.message
+    assert "5 contours get no tabs: 4 holes, 1 open;" in finding.message
     wide = _job(tabs=Tabs(count=4, width_mm=8.0))
     tabs, (finding,) = _tabbed(wide, *paths)
     assert tabs["0/PATH 0"] == 4

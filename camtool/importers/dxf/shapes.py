@@ -53,7 +53,7 @@ class Plane:
         """From vectors (3,); Unusable when the plane is tilted or has no area."""
         longest = max(math.hypot(*u), math.hypot(*v))
         if not longest <= MAX_COORDINATE_MM:  # nor is NaN
-            raise Unusable("is larger than micrometres can tell")
+            raise Unusable("is too large to be exact to a micrometre")
         if max(abs(u[2]), abs(v[2])) > FLAT_TILT * longest:
             raise Unusable("lies in a tilted plane")
         area = float(u[0] * v[1] - u[1] * v[0])
@@ -184,7 +184,7 @@ def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
     furthest = float(np.abs(size).max())
     if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
         raise DrawingError(
-            f"is {furthest:.6g} mm large or away, where micrometres are lost",
+            f"is {furthest:.6g} mm large or away, too far to be exact to a micrometre",
             mend="move the drawing to its origin, or name its unit with --units",
         )
     return fit_curve(curve, tolerance_mm)

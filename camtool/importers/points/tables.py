@@ -159,7 +159,7 @@ class _Lines:
                 f"{len(fields)} fields, wanted {wanted}",
                 file=self.file,
                 where=f"line {line}",
-                mend="if the comma is the decimal sign too, part x and y by a semicolon"
+                mend="if the comma is the decimal sign too, separate x and y by a semicolon"
                 if self.parted == "," and len(fields) > self.columns
                 else _NAMED_COLUMNS,
             )
@@ -208,7 +208,7 @@ class _Lines:
                 "may be x and y with decimal commas, or two points x,y",
                 file=self.file,
                 where=f"line {self.comma_line}",
-                mend="part x and y by a semicolon, or write decimal points",
+                mend="separate x and y by a semicolon, or write decimal points",
             )
 
     def _names(self, content: str, line: int) -> bool:
@@ -545,7 +545,7 @@ def _check(points: Floats, file: str, name: str) -> None:
     steep = np.abs(points[:, 2:]).max(axis=1, initial=0.0) > 1.0
     if steep.any():
         raise DrawingError(
-            "the third column is above 1: no bulge of an arc up to a half circle",
+            "the third column is above 1, which is more than the bulge of a half circle",
             file=file,
             where=f"{head}row {int(np.argmax(steep))}",
             mend="give two columns when the third one is a height; cut larger arcs in two",

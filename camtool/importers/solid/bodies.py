@@ -271,7 +271,7 @@ def _name(label: Any) -> str:
 RESULTS = ("part", "sketch", "result")
 """Names under which a script may leave its model; the first one that there is counts."""
 
-_MEND = "mend the script"
+_MEND = "correct the script"
 
 
 def run_script(data: bytes, file: str) -> list[Body]:

@@ -46,12 +46,14 @@ def found(request: dict[str, Any]) -> dict[str, Any]:
         result = outlines(bodies, request["height"], request["tolerance"])
         faulty = sum(not _holds(body) for body in bodies)
     except GeometryError as error:
-        raise DrawingError(f"holds a curve that is none: {error.message}", mend=_AGAIN) from error
+        raise DrawingError(
+            f"holds a curve that is not valid: {error.message}", mend=_AGAIN
+        ) from error
     except Exception as error:
         if not _is_of_kernel(error):
             raise
         message = "OpenCASCADE fails on the model" if script else _DAMAGED
-        raise DrawingError(message, mend="mend the script" if script else _AGAIN) from error
+        raise DrawingError(message, mend="correct the script" if script else _AGAIN) from error
     return _plain(result) | {"faulty": faulty, "bodies": len(bodies)}
 
 

@@ -526,7 +526,7 @@ def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
     furthest = float(np.abs(vertices).max())
     if not furthest <= limit_mm:
         raise DrawingError(
-            f"it reaches {furthest:.6g} mm away, where micrometres are lost",
+            f"it reaches {furthest:.6g} mm away, too far to be exact to a micrometre",
             mend="name the unit with --units",
         )
     return vertices

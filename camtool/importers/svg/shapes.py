@@ -118,9 +118,8 @@ def _pair(z: complex) -> Floats:
 # Source: Scalable Vector Graphics 1.1, chapter 8 (paths; 8.3.9 for their grammar) and appendix F.2
 # (drawing up to an error).
 
-MAX_SIGNS = 50_000_000
-"""Longest path data of one element; longer ones would take more than some 3 GB for their
-numbers."""
+MAX_PATH_CHARACTERS = 50_000_000
+"""Path data of one element may be so long; their numbers would take some 3 GB."""
 
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])")
 _GAP = r"[ \t\r\n\f,]*+"
@@ -140,8 +139,8 @@ def parse_path(data: str) -> tuple[list[Subpath], str]:
     DrawingError for data that cannot be drawn at all: too many or too large, or arcs without a
     shape.
     """
-    if len(data) > MAX_SIGNS:
-        raise DrawingError(f"path data have more than {MAX_SIGNS} signs")
+    if len(data) > MAX_PATH_CHARACTERS:
+        raise DrawingError(f"path data have more than {MAX_PATH_CHARACTERS} characters")
     pen = _Pen()
     fault = _drawn(data, pen)
     pen.lift(closed=False)
@@ -233,7 +232,7 @@ class _Pen:
         """One arc; without a radius it is a line, and nothing when it ends where it starts."""
         end = _bounded(to + self.here if relative else to)
         if not max(abs(radii.real), abs(radii.imag), abs(turn)) <= MAX_NUMBER:
-            raise DrawingError("path data have an arc out of all bounds")
+            raise DrawingError("path data have an arc that is too large")
         if radii.real == 0.0 or radii.imag == 0.0 or end == self.here:
             self._to([end])
             return
@@ -324,14 +323,14 @@ def _beziers(text: str) -> list[Bezier]:
 def _floats(words: list[str]) -> list[float]:
     numbers = list(map(float, words))
     if not (max(numbers) <= MAX_NUMBER and min(numbers) >= -MAX_NUMBER):
-        raise DrawingError(f"path data have {max(numbers, key=abs):g}, out of all bounds")
+        raise DrawingError(f"path data have {max(numbers, key=abs):g}, which is too large")
     return numbers
 
 
 def _bounded(place: complex) -> complex:
     """The place itself; relative steps may have added up to one beyond all bounds."""
     if not (abs(place.real) <= MAX_NUMBER and abs(place.imag) <= MAX_NUMBER):
-        raise DrawingError("path data run out of all bounds")
+        raise DrawingError("path data lead to a place that is too far away")
     return place
 
 

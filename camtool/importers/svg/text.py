@@ -153,7 +153,7 @@ class _Flow:
         if len(self.letters) > MAX_CHARACTERS:
             raise Unusable(f"has more than {MAX_CHARACTERS} characters")
         if self._by_letter and self._recounted:
-            raise Unusable("has a place for each letter, and letters that are put together")
+            raise Unusable("has a place for each letter, and letters that are combined")
 
     def _add(self, raw: str, style: Style, keep: bool) -> None:
         """Letters of one style, blanks kept or not."""
@@ -199,7 +199,7 @@ def _check(letter: str) -> None:
     if unicodedata.bidirectional(letter) in _LEFTWARDS:
         raise Unusable("is written from right to left")
     if unicodedata.category(letter) in ("Mn", "Mc", "Me"):
-        raise Unusable(f"has letters that are put together (U+{ord(letter):04X})")
+        raise Unusable(f"has letters that are combined (U+{ord(letter):04X})")
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +228,7 @@ class _Writer:
         if style.odd:
             raise Unusable(f"its {min(style.odd)} cannot be applied: convert it to paths")
         if style.anchor not in _ANCHORS:
-            raise Unusable("has a text-anchor that is none")
+            raise Unusable("has an unknown text-anchor")
         if not style.font_px > 0.0:
             raise Unusable("has no size")
         font, other = self._font(style)
@@ -243,7 +243,7 @@ class _Writer:
         weight = _WEIGHTS.get(style.weight, 0)
         if not weight:
             if not (style.weight.isdecimal() and 1 <= int(style.weight[:5]) <= 1000):
-                raise Unusable("has a font-weight that is none")
+                raise Unusable("has an unknown font-weight")
             weight = int(style.weight)
         if weight not in _WEIGHTS.values() and self.mode != "stroke":
             self.plainer[str(weight)] = None

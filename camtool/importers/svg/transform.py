@@ -76,7 +76,7 @@ class Affine:
     def checked(self) -> Affine:
         """This map; DrawingError when its numbers have run out of all bounds."""
         if not all(abs(v) <= MAX_NUMBER for v in (self.a, self.b, self.c, self.d, self.e, self.f)):
-            raise DrawingError("its transforms multiply beyond all bounds")
+            raise DrawingError("its transforms multiply to numbers that are too large")
         return self
 
 
@@ -93,7 +93,7 @@ def scaling(x: float, y: float) -> Affine:
 def in_bounds(value: float, name: str) -> float:
     """The number itself; DrawingError when it belongs to no drawing."""
     if not abs(value) <= MAX_NUMBER:
-        raise DrawingError(f"{name} {value:g} is out of all bounds")
+        raise DrawingError(f"{name} {value:g} is too large")
     return value
 
 

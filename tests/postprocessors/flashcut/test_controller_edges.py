@@ -75,7 +75,7 @@ BAD = {
     "no feed": (ToolpathBuilder().line(1.0, 0.0, feed=0.0), "without a feed above 0"),
     "nan": (ToolpathBuilder().line(1.0, 0.0, feed=math.nan), "without a feed above 0"),
     "endless feed": (ToolpathBuilder().line(1.0, 0.0, feed=math.inf), "without a feed above 0"),
-    "crawling": (ToolpathBuilder().line(1.0, 0.0, feed=1e-9), "is a step in weeks"),
+    "crawling": (ToolpathBuilder().line(1.0, 0.0, feed=1e-9), "is too slow for the timers"),
     "far": (ToolpathBuilder().rapid(1.1e6, 0.0), "beyond all"),
     "starts far": (ToolpathBuilder((1.1e6, 0.0, 0.0)).rapid(1.0, 0.0), "beyond all"),
     "wide": (

@@ -214,7 +214,7 @@ def test_texts_of_drawings_never_reach_a_program() -> None:
     [
         (["dialect.decimals=0"], "decimals"),
         (["dialect.decimals=5"], "decimals"),
-        (["dialect.decimals=2"], "1 more are needed"),
+        (["dialect.decimals=2"], "add 1 to decimals"),
         (["dialect.arc_spread_mm=0.001"], "rounding alone"),
         (["dialect.feed_words=never"], "feed_words"),
         (["dialect.arc_spread_mm=0"], "arc_spread_mm"),
@@ -229,9 +229,9 @@ def test_wrong_options_are_named(settings: list[str], where: str) -> None:
 
 REFUSED = {
     "start": (ToolpathBuilder((1.0, 0.0, 0.0)).rapid(2.0, 0.0), "starts at"),
-    "too fast": (ToolpathBuilder().line(1.0, 0.0, feed=14.2), "14.1 is the machine's highest"),
+    "too fast": (ToolpathBuilder().line(1.0, 0.0, feed=14.2), "above the machine's highest, 14.1"),
     "no feed": (ToolpathBuilder().line(1.0, 0.0, feed=0.0), "without a feed"),
-    "a feed of 0": (ToolpathBuilder().line(1.0, 0.0, feed=0.01), "is 0 in an F word"),
+    "a feed of 0": (ToolpathBuilder().line(1.0, 0.0, feed=0.01), "becomes 0 in an F word"),
     "far": (ToolpathBuilder().rapid(1.0, 10000.0), "four digits"),
     "deep": (ToolpathBuilder().rapid(z=-10000.0), "four digits"),
     "homing": (ToolpathBuilder().event(Kind.HOME_Z), "no code to go to machine zero"),

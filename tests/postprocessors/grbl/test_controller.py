@@ -267,7 +267,7 @@ def test_positions_at_the_limit() -> None:
 
 def test_a_compensation_is_refused() -> None:
     path = ToolpathBuilder().rapid(1.0, 0.0, 0.0).finish()
-    with pytest.raises(MachineError, match="compensates no play"):
+    with pytest.raises(MachineError, match="does not compensate backlash"):
         simulate(path, grbl_machine("axes.y.compensation_mm=0.01"))
 
 

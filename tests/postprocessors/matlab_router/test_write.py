@@ -105,7 +105,7 @@ def test_no_job_begins_on_an_axis() -> None:
     jobs = arrays(program(strokes(up)))
     assert all(job["xy"][0][0] >= 2 and job["xy"][1][0] >= 2 for job in jobs)
     wall = [(5.0, 5.0)] + [(0.0, 5.0 + 0.2 * index) for index in range(400)]
-    with pytest.raises(PostError, match="without a vertex at which a job could begin"):
+    with pytest.raises(PostError, match="have no vertex at which a job could begin"):
         program(strokes(wall))
 
 

@@ -127,7 +127,7 @@ def test_slopes_and_helices_become_small_steps() -> None:
 
 def test_errors_name_the_given_move_behind_a_slope() -> None:
     path = ToolpathBuilder().line(1, 0, -0.01, feed=1).rapid(0, 0, 0).event(Kind.DWELL, -1)
-    with pytest.raises(PostError, match="move 2: dwell -1 cannot be said"):
+    with pytest.raises(PostError, match="move 2: dwell -1 does not fit into a block"):
         written(path)
 
 
@@ -181,9 +181,9 @@ def builder() -> ToolpathBuilder:
 
 
 REFUSED = {
-    "feed 0": (builder().line(1, 0, feed=0), "feed 0 mm/min"),
-    "feed not a number": (builder().line(1, 0, feed=math.nan), "is no feed"),
-    "negative feed": (builder().line(1, 0, feed=-1), "is no feed"),
+    "feed 0": (builder().line(1, 0, feed=0), "a feed of 0 mm/min"),
+    "feed not a number": (builder().line(1, 0, feed=math.nan), "a feed of nan mm/min"),
+    "negative feed": (builder().line(1, 0, feed=-1), "a feed of -1 mm/min"),
     "feed below F01": (builder().line(1, 0, feed=0.09), "F00"),
     "feed above the link": (builder().line(1, 0, feed=1.4), "the highest feed is 1.3 mm/min"),
     "feed without bound": (builder().line(1, 0, feed=math.inf), "the highest feed is 1.3"),

@@ -392,7 +392,10 @@ def test_waits_and_rows_that_do_not_move() -> None:
         (lambda b: b.arc(1, 0, centre=(0, 0), ccw=True, feed=9), "an arc about its own start"),
         (lambda b: b.arc(1, 0, centre=(0.4, 0), ccw=True, feed=9), "longer than its diameter"),
         (lambda b: b.arc(1, 0, centre=(math.nan, 0), ccw=True, feed=9), "without a centre"),
-        (lambda b: b.arc(1, 0, centre=(0.5, 1e9), ccw=True, feed=9), "far beyond"),
+        (
+            lambda b: b.arc(1, 0, centre=(0.5, 1e9), ccw=True, feed=9),
+            "farther than the controller can count",
+        ),
         (lambda b: b.arc(1, 0, 1, centre=(0.5, 0), ccw=True, feed=9), "Z moves along"),
         (lambda b: b.event(Kind.HOME_Z), "cannot return to machine zero"),
         (lambda b: b.event(Kind.DWELL, math.nan), "a dwell without its seconds"),
