@@ -206,8 +206,9 @@ def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfil
             floor = max([tab.height(begin) for tab in near if tab.holds(begin)], default=-math.inf)
             result += [(place, max(z, floor)) for place, z in ((begin, z_begin), (end, z_end))]
             continue
-        slope = (z_end - z_begin) / (end - begin)
-        places = {begin, end}
+        slope = (z_end - z_begin) / (end - begin)  # infinite where the lengths hardly differ
+        ends = {begin: z_begin, end: z_end}
+        places = set(ends)
         for tab in near:
             places.update(_breaks(tab, begin, z_begin, slope))
         inside = sorted(p for p in places if min(begin, end) <= p <= max(begin, end))
@@ -216,7 +217,7 @@ def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfil
             # is.
             over = [tab for tab in near if tab.height(0.5 * (p + q)) > -math.inf]
             for place in (p, q):
-                line = z_end if place == end else z_begin + slope * (place - begin)
+                line = ends[place] if place in ends else z_begin + slope * (place - begin)
                 result.append((place, max([line, *(tab.height(place) for tab in over)])))
     return [point for k, point in enumerate(result) if k == 0 or point != result[k - 1]]
 
