@@ -41,8 +41,11 @@ class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     extension: str
 
 
+FEED_TOLERANCE = 1e-9
+"""A feed may exceed its limit by this part of it: by rounding alone."""
+
 AS_CODED = 0.0
-"""The value of `Axis.real_step_mm` before it is set to the coded step; no file can contain it."""
+"""`Axis.real_step_mm` before it becomes the coded step; not allowed in a file."""
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -250,9 +253,9 @@ class Machine(
         return min(self._feed_limits(self.axes.x, self.axes.y))
 
     @property
-    def most_sayable_mm_min(self) -> float:
-        """Highest feed that a program may ask for, mm/min, inf where nothing is said: above the
-        rates of the axes controllers hold a move back by themselves."""
+    def max_programmable_mm_min(self) -> float:
+        """Highest feed that a program may ask for, mm/min, inf where no limit is given: above the
+        rates of the axes, controllers slow a move down by themselves."""
         return min(self._feed_limits())
 
     @property
@@ -308,3 +311,8 @@ def controller_of(machine: Machine, kind: type[_Record]) -> _Record:
             mend=f'write model = "{wanted}"',
         )
     return machine.controller
+
+
+def exceeds(feed_mm_min: float, limit_mm_min: float) -> bool:
+    """Whether a feed is above its limit by more than rounding."""
+    return feed_mm_min > limit_mm_min * (1.0 + FEED_TOLERANCE)

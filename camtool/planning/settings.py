@@ -8,14 +8,10 @@ from itertools import pairwise
 
 from camtool.errors import OptionError
 from camtool.findings import FEED_ABOVE_LIMIT_IN_JOB, Finding
-from camtool.machine.model import Machine
+from camtool.machine.model import FEED_TOLERANCE, Machine, exceeds
 from camtool.planning.items import Feeds, Setting
 from camtool.planning.job import Job, Operation
 from camtool.planning.naming import key_of, operation_name, own_numbers
-
-FEED_TOLERANCE = 1e-9
-"""A feed may exceed the highest one by this part of it, by rounding alone."""
-
 
 PASS_SLACK = 1e-9
 """Steps may exceed the step down by this part of it, by rounding, before a pass is added."""
@@ -57,21 +53,21 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
     cut = operation.feed_mm_min
     cut = machine.feed.default_mm_min if cut is None else cut
     plunge = cut if given is None else given
-    if given is None and _above(cut, machine.max_plunge_mm_min):
+    if given is None and exceeds(cut, machine.max_plunge_mm_min):
         plunge = _programmable(machine.max_plunge_mm_min, machine)
     lowered: dict[str, float] = {}
     for name, flag, feed, highest in (
         ("feed", "--feed", cut, machine.max_feed_mm_min),
         ("plunge feed", "--plunge-feed", plunge, machine.max_plunge_mm_min),
     ):
-        if _above(feed, machine.most_sayable_mm_min):
+        if exceeds(feed, machine.max_programmable_mm_min):
             raise OptionError(
                 f"{name} {feed:g} mm/min is above {highest:.4g} mm/min, the highest of"
                 f" {machine.target.name}",
                 where=key_of(operation, name.replace(" ", "_")),
                 mend=f"use {flag} {_programmable(highest, machine):g} or less",
             )
-        if _above(feed, highest):
+        if exceeds(feed, highest):
             lowered[name] = _programmable(highest, machine)
     return Feeds(lowered.get("feed", cut), lowered.get("plunge feed", plunge))
 
@@ -86,10 +82,10 @@ def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
             ("feed", cut, machine.max_feed_mm_min, "xy"),
             ("plunge feed", operation.plunge_feed_mm_min, machine.max_plunge_mm_min, "z"),
         ):
-            if given is None or not _above(given, highest) or (name, given) in reported:
+            if given is None or not exceeds(given, highest) or (name, given) in reported:
                 continue
             reported.add((name, given))
-            slow = [n for n in which if _above(given, getattr(axes, n).max_rate_mm_min or given)]
+            slow = [n for n in which if exceeds(given, getattr(axes, n).max_rate_mm_min or given)]
             yield FEED_ABOVE_LIMIT_IN_JOB(
                 where=operation_name(operation),
                 measured=given,
@@ -99,10 +95,6 @@ def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
                 machine=machine.target.name,
                 mend=own_numbers(machine, [f"axes.{n}.max_rate_mm_min={given:g}" for n in slow]),
             )
-
-
-def _above(feed: float, highest: float) -> bool:
-    return feed > highest * (1.0 + FEED_TOLERANCE)
 
 
 def _programmable(highest_mm_min: float, machine: Machine) -> float:

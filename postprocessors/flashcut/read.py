@@ -16,6 +16,7 @@ import numpy as np
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity
 from camtool.kernels.lattice import to_steps
+from camtool.machine.model import exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -25,9 +26,6 @@ from .findings import EXECUTED_OTHERWISE, FEED_ABOVE_LIMIT, FEED_HELD, FEED_HELD
 from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
 
 LEXING: Final = Lexing(letters="GMXYZIJF")
-
-FEED_GUARD: Final = 1e-9
-"""Part of a feed: a feed above its limit by less is at the limit."""
 
 LIMITED_GUARD: Final = 0.01
 """Part of a feed: a feed above the highest by more counts as limited; half periods are whole
@@ -161,7 +159,7 @@ class _Reader:
     def _set_feed(self, block: Block, feed: float, word: int) -> None:
         if feed <= 0.0:
             block.fail("a feed must be above 0", word=word, mend="write F3.0")
-        if feed > self._max_feed * (1.0 + FEED_GUARD):
+        if exceeds(feed, self._max_feed):
             self._fast.where = self._fast.where or f"block {block.index + 1}"
             self._fast.count += 1
             self._fast.most = max(self._fast.most, feed)

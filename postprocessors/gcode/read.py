@@ -16,7 +16,7 @@ from functools import partial
 from typing import Final
 
 from camtool.findings import Finding
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
@@ -34,9 +34,6 @@ Point = tuple[float, float]
 
 MM_PER_INCH: Final = 25.4
 """Length of one unit of a coordinate under G20, mm."""
-
-FEED_GUARD: Final = 1e-9
-"""Part of a feed: a feed above its limit by less is at the limit."""
 
 MOTION_GROUP: Final = "motion"
 
@@ -277,7 +274,7 @@ class ModalReader:
     def _set_feed(self, block: Block, feed: float) -> None:
         if feed <= 0.0:
             block.fail_at("F", "a feed that is not above 0")
-        if feed > self._findings.max_feed_mm_min * (1.0 + FEED_GUARD):
+        if exceeds(feed, self._findings.max_feed_mm_min):
             self._findings.fast.append((block.index, feed))
         self._feed = feed
 

@@ -15,6 +15,7 @@ from typing import Final, NoReturn
 
 from camtool.errors import ProgramError
 from camtool.findings import Finding
+from camtool.machine.model import exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -64,9 +65,6 @@ _INTERACTIVE: Final = re.compile(
 Patterns = dict[str, tuple[tuple[str, re.Pattern[str]], ...]]
 
 BLANKS: Final = " \t\r\n"
-
-FEED_GUARD: Final = 1e-9
-"""Part of a feed: a feed above its limit by less is at the limit."""
 
 MOTIONS: Final = frozenset({"G00", "G01", "G02", "G03"})
 EVENTS: Final = {
@@ -208,7 +206,7 @@ class _Reader:
             column = match.start(match.re.groups) + 1
             _fail(index, column, "the controller divides by the feed, F00", "write F01 or more")
         feed = number / self._feeds_per_mm_min
-        if feed > self._max_feed * (1.0 + FEED_GUARD):
+        if exceeds(feed, self._max_feed):
             self._fast.add(index, feed)
         return feed
 
