@@ -633,8 +633,8 @@ class Sentence:
             unit=self.unit,
         )
 
-    def said(self, **values: float | str) -> str:
-        """The sentence alone, where several are said in one finding."""
+    def words(self, **values: float | str) -> str:
+        """The sentence alone, where several make one finding."""
         return _TEXTS.vformat(self.text, (), values)
 
 
@@ -1042,7 +1042,7 @@ SIDE_BY_UNCUT_FRAME = Sentence(
     "contours",
     INFO,
 )
-CUT_DOUBTFUL = Sentence(Code.CUT_DOUBTFUL, "{doubts}")
+CUT_DOUBTFUL = Sentence(Code.CUT_DOUBTFUL, "{reasons}")
 CUT_DOUBTFUL_SPEED = Sentence(
     Code.CUT_DOUBTFUL, "no spindle speed is given, so the spindle stays off (--spindle)"
 )

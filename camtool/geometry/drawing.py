@@ -102,7 +102,7 @@ class FitError:
 @dataclass(frozen=True, eq=False)
 class Unchosen:
     """Closed contours of the file, M of them, that were not chosen (by layer, colour or line
-    type): nobody cuts them, but what is a part and what is a hole depends on them too. `layers`,
+    type): they are not cut, but what is a part and what is a hole depends on them too. `layers`,
     `sources` and `line_types` have one item per path."""
 
     paths: Polylines = field(default_factory=lambda: Polylines.of([]))

@@ -137,7 +137,7 @@ def _left(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
 
 
 def _ranks(of: Intervals, rows: Ints) -> Ints:
-    """(K,) who stays: the longest first, then by place, whatever was drawn first."""
+    """(K,) the rank of each: the longest first, then by place, whatever was drawn first."""
     of_line = of.start + 0.5 * of.length[:, None] * of.direction
     middle = np.where(np.isnan(of.centre), of_line, of.centre)
     low = np.where(np.isnan(of.low), 0.0, np.mod(of.low, 2.0 * math.pi))

@@ -116,8 +116,8 @@ def _unchosen(
 ) -> Unchosen:
     """The closed contours among the pieces that were not chosen.
 
-    They are joined among themselves alone, and nothing is said of them: nobody asked for them.
-    Pieces that are no place in a drawing are left out.
+    They are joined among themselves alone, without findings, because they are not cut. Pieces with
+    coordinates that are not finite or too large are left out.
     """
     kept = set(chosen)
     others = [piece for piece in every if piece not in kept and is_placed(piece)]

@@ -286,7 +286,7 @@ MAX_CHARACTERS = 20_000
 """Longest text, codes included; CAD programs limit input by hand to 250 in TEXT and about 2000 in
 MTEXT."""
 
-MAX_PATH_CHARACTERS_NAMED = 20
+MAX_CHARACTERS_NAMED = 20
 """So many of the characters that a font lacks are named."""
 
 MAX_NUMBER = 1e60
@@ -307,17 +307,15 @@ def finite(*values: float) -> tuple[float, ...]:
 def lacking(font: str, substituted: str, missing: str) -> str:
     """What was wanted and could not be had, "" when nothing: `font` draws in place of the font
     `substituted` ("" when it is the wanted one) and has none of the characters `missing`."""
-    said = []
+    notes = []
     if substituted:
-        said.append(f"font {substituted} is not here: drawn with {font}")
+        notes.append(f"font {substituted} is not installed: drawn with {font}")
     if missing:
         signs = [_visible(sign) for sign in dict.fromkeys(missing)]
-        more = len(signs) - MAX_PATH_CHARACTERS_NAMED
+        more = len(signs) - MAX_CHARACTERS_NAMED
         tail = f" and {more} more" if more > 0 else ""
-        said.append(
-            f"{font} has no {' '.join(signs[:MAX_PATH_CHARACTERS_NAMED])}{tail}: left blank"
-        )
-    return "; ".join(said)
+        notes.append(f"{font} has no {' '.join(signs[:MAX_CHARACTERS_NAMED])}{tail}: left blank")
+    return "; ".join(notes)
 
 
 def _visible(sign: str) -> str:

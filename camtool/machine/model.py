@@ -53,8 +53,8 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     what the slide moves, as coded where left out; `backlash_mm` is the play of the mechanics,
     `compensation_mm` what the controller adds at each reversal; `repeatability_mm` is the standard
     deviation of the places where the slide arrives from one side. `resolution_mm` is the finest
-    difference of places that a program can say, where that is coarser than the step. `travel_mm`,
-    `max_rate_mm_min` and `acceleration_mm_s2` are None when nobody has said."""
+    difference of places in a program, where that is coarser than the step. `travel_mm`,
+    `max_rate_mm_min` and `acceleration_mm_s2` are None when they are not known."""
 
     coded_step_mm: Step
     real_step_mm: Step = AS_CODED
@@ -83,14 +83,14 @@ class Axes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Feed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Feeds in mm/min: the default, and the finest difference that the dialect can say."""
+    """Feeds in mm/min: the default, and the finest difference that the dialect can express."""
 
     default_mm_min: FeedRate
     unit_mm_min: FeedRate
 
 
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What bounds motion; None where nobody has said.
+    """What bounds motion; None where it is not known.
 
     `max_step_rate_hz` bounds feed / coded step, `max_feed_mm_min` the feed itself; rapids run at
     `rapid_step_rate_hz` or `rapid_mm_min`; `max_reversals` is the count above which parts were
@@ -137,7 +137,7 @@ class PathController(SlideStart, frozen=True, tag_field="model", tag="path"):
 class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The line that the program comes down, where it costs time.
 
-    `baud` None: nobody has said, or the program is in the machine before it runs.
+    `baud` None: not known, or the program is in the machine before it runs.
     `bits_per_character` counts start, stop and parity bits. `wait` "sequential": a block is sent
     when the one before has been cut, so that both times add up; "streamed": the next is sent
     meanwhile."""
@@ -240,15 +240,15 @@ class Machine(
     def digest(self) -> str:
         """SHA-256, hex, of all that a file must say to get this machine: equal for equal machines,
         on every computer, wherever their records stand in the code."""
-        said = msgspec.json.encode(_said(self), order="deterministic")
-        return hashlib.sha256(said).hexdigest()
+        given = msgspec.json.encode(_given(self), order="deterministic")
+        return hashlib.sha256(given).hexdigest()
 
     @property
     def max_feed_mm_min(self) -> float:
-        """Highest feed, mm/min: the lowest of what is said; inf where nothing is.
+        """Highest feed, mm/min: the lowest of the limits that are given; inf where none is.
 
-        Said are `max_feed_mm_min`, `max_step_rate_hz` on the finest axis (feed / step), and the
-        highest rates of X and Y.
+        The limits are `max_feed_mm_min`, `max_step_rate_hz` on the finest axis (feed / step), and
+        the highest rates of X and Y.
         """
         return min(self._feed_limits(self.axes.x, self.axes.y))
 
@@ -265,7 +265,7 @@ class Machine(
 
     @property
     def rapid_mm_min(self) -> float:
-        """Speed of a rapid, mm/min: the first of these that is said.
+        """Speed of a rapid, mm/min: the first of these that is given.
 
         `rapid_mm_min`; `rapid_step_rate_hz` on the slower axis of X and Y; the highest rate of
         the slower one; the highest feed. Inf where nothing is: rapids then take no time.
@@ -289,16 +289,18 @@ class Machine(
         yield from (axis.max_rate_mm_min for axis in axes if axis.max_rate_mm_min is not None)
 
 
-def _said(record: msgspec.Struct) -> dict[str, Any]:
-    """The values of a record that are not its defaults, with the tag that tells it from others."""
-    config, said = record.__struct_config__, dict[str, Any]()
+def _given(record: msgspec.Struct) -> dict[str, Any]:
+    """The values of a record that are not its defaults, with its tag."""
+    config, given = record.__struct_config__, dict[str, Any]()
     if config.tag_field is not None:
-        said[config.tag_field] = config.tag
+        given[config.tag_field] = config.tag
     for field in msgspec.structs.fields(record):
         value = getattr(record, field.name)
         if value != field.default:
-            said[field.encode_name] = _said(value) if isinstance(value, msgspec.Struct) else value
-    return said
+            given[field.encode_name] = (
+                _given(value) if isinstance(value, msgspec.Struct) else value
+            )
+    return given
 
 
 def controller_of(machine: Machine, kind: type[_Record]) -> _Record:

@@ -90,7 +90,7 @@ def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
 
 
 def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
-    """What brings a toolpath into the travel of an axis: only what does, and a larger machine."""
+    """How to bring a toolpath into the travel of an axis: what helps here, or a larger machine."""
     axis = AXES.index(name)
     needed = math.ceil(np.ptp(toolpath_extents(toolpath)[axis]))
     yours = own_numbers(machine, [f"axes.{name.lower()}.travel_mm={needed}"])
@@ -265,44 +265,44 @@ def _place(toolpath: Toolpath, row: int) -> str:
 
 
 def doubtful_settings(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
-    """One finding for all that looks forgotten or too bold in the operations that cut something;
-    none when all is well.
+    """One finding for all settings that look forgotten or too high in the operations that cut
+    something; no finding when there are none.
 
-    Only where the program starts the spindle (`starts_spindle`) is a missing speed a doubt, and a
-    point that follows closed contours, and a plunge at the feed of the cut: other machines engrave
-    with points, and their spindles turn by hand.
+    A missing speed, a point that follows closed contours and a plunge at the feed of the cut
+    count only where the program starts the spindle (`starts_spindle`): other machines engrave
+    with points, and their spindles are switched by hand.
     """
     cutting = [step for step in steps if step.runs]
-    said: dict[str, list[Step]] = defaultdict(list)
+    found: dict[str, list[Step]] = defaultdict(list)
     for step in cutting:
-        for doubt in _doubts(step, starts_spindle):
-            said[doubt].append(step)
-    if not said:
+        for reason in _doubtful(step, starts_spindle):
+            found[reason].append(step)
+    if not found:
         return []
     parts = []
-    for doubt, of in said.items():
+    for reason, of in found.items():
         names = ", ".join(operation_name(step.operation) for step in of)
-        parts.append(doubt if len(of) == len(cutting) else f"{names}: {doubt}")
-    return [CUT_DOUBTFUL(doubts="; ".join(parts))]
+        parts.append(reason if len(of) == len(cutting) else f"{names}: {reason}")
+    return [CUT_DOUBTFUL(reasons="; ".join(parts))]
 
 
-def _doubts(step: Step, starts_spindle: bool) -> Iterator[str]:
-    """What is doubtful about an operation, each with the flag that mends it."""
+def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
+    """What is doubtful about an operation, each with the flag that changes it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = tool.radius_mm + operation.allowance_mm > 0.0
     if starts_spindle and operation.spindle_rpm is None:
-        yield CUT_DOUBTFUL_SPEED.said()
+        yield CUT_DOUBTFUL_SPEED.words()
     on_line = operation.kind == "profile" and operation.side != "on" and not wide
     if starts_spindle and on_line and step.chosen.lines.closed.any():
-        yield CUT_DOUBTFUL_WIDTH.said()
+        yield CUT_DOUBTFUL_WIDTH.words()
     deepest = deepest_pass(step.setting)
     mills = operation.kind in IN_PASSES and tool.kind == "flat" and tool.radius_mm > 0.0
     if mills and deepest > tool.diameter_mm + POSITION_EPS_MM:
-        yield CUT_DOUBTFUL_DEPTH.said(depth=deepest, width=tool.diameter_mm)
+        yield CUT_DOUBTFUL_DEPTH.words(depth=deepest, width=tool.diameter_mm)
     plunges = operation.kind in IN_PASSES and operation.entry.kind == "plunge"
     fast = operation.plunge_feed_mm_min is None and feeds.plunge_mm_min >= feeds.cut_mm_min
     if starts_spindle and plunges and fast:
-        yield CUT_DOUBTFUL_PLUNGE.said(feed=feeds.plunge_mm_min)
+        yield CUT_DOUBTFUL_PLUNGE.words(feed=feeds.plunge_mm_min)
 
 
 def deepest_pass(setting: Setting) -> float:

@@ -60,7 +60,7 @@ def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut) -> CutContour:
 
     `path` is the contour's path from the chosen start in the chosen direction. On its leads
     the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
-    OptionError for tabs that cannot be.
+    OptionError for impossible tabs.
     """
     along = MeasuredPath.of(path)
     angle, findings = _slope(contour, along)

@@ -203,9 +203,9 @@ def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
 def left_of(path: Polyline, points: Floats) -> Floats:
     """(J,) distances of points (J, 2) from a path, positive to its left, negative to its right.
 
-    Left of a closed path is its inside when it runs CCW. Beside an open path the nearest point
-    tells: within a line or arc by its side of it, at a vertex by the bisector of the directions
-    there; and beyond its ends, the tangents go on.
+    Left of a closed path is its inside when it runs CCW. Beside an open path the nearest place
+    of it decides: on a line or arc the side of that, at a vertex the side of the bisector of the
+    directions there; beyond its ends, the tangents go on.
     """
     segments = Segments.of(path)
     if path.closed:

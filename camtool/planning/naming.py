@@ -34,11 +34,11 @@ def operation_name(operation: Operation) -> str:
 
 
 def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
-    """How to say what a machine can do, where what is known of it may not be true of it."""
+    """How to give the numbers of the user's own machine, which may differ from the target's."""
     keys = " ".join(f"--set {each}" for each in settings)
     return (
-        f"if yours can do more, say so ({keys}), or begin its own file with camtool targets new"
-        f" NAME --extends {machine.target.dialect} and give it with --machine"
+        f"if your machine can do more, use {keys}, or make its own file with camtool targets new"
+        f" NAME --extends {machine.target.dialect} and use it with --machine"
     )
 
 

@@ -67,11 +67,11 @@ def place(drawing: Drawing, job: Job) -> Drawing:
     """The drawing in the work frame, as the job's placement says; itself when nothing changes.
 
     Copies come one after the other, row by row: all paths and marks of the first, then of the
-    second, whose sources say so ("CIRCLE 2F copy 2"). Fit, lower left and centre take the box
-    around all that the operations take. What was found on reading stays in the drawing's frame.
-    Points that the scale brings together are merged (`collapsed` tells). Raises OptionError for
-    a fit that cannot be, for a scale that leaves no shape at all, and for what is larger than
-    any machine.
+    second, whose sources name the copy ("CIRCLE 2F copy 2"). Fit, lower left and centre take the
+    box around all that the operations take. What was found on reading stays in the drawing's
+    frame. Points that the scale brings together are merged (`collapsed` counts them). Raises
+    OptionError for an impossible fit, for a scale that leaves no shape at all, and for what is
+    larger than any machine.
     """
     placed = drawing if job.placement == Placement() else _placed(drawing, job)
     _refuse_too_large(placed, job.placement)
@@ -93,7 +93,7 @@ def _placed(drawing: Drawing, job: Job) -> Drawing:
 def part_scale(drawing: Drawing, job: Job) -> float:
     """How many times as large as what is drawn the part is, whose size the job's placement says.
 
-    Raises OptionError for a fit that cannot be.
+    Raises OptionError for an impossible fit.
     """
     return _first_map(drawing, job).scale
 

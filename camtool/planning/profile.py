@@ -1,10 +1,10 @@
 """Profiles: the paths of the tool centre beside and on the lines.
 
-`auto` takes all closed paths together: which of them are rims of parts and which of holes, the
-nesting of the whole drawing says (`sides`), and the tool runs a tool's radius (and the allowance)
-away: outside of parts and islands, inside of holes. Where parts lie nearer to each other than the
-tool is wide, one contour runs round both. `outside` and `inside` take each closed path on its
-own. Open paths have no inside: the tool runs on them.
+`auto` takes all closed paths together: the nesting of the whole drawing decides which of them are
+edges of parts and which are edges of holes (`sides`), and the tool runs a tool's radius (and the
+allowance) away: outside of parts and islands, inside of holes. Where parts lie nearer to each
+other than the tool is wide, one contour runs round both. `outside` and `inside` take each closed
+path on its own. Open paths have no inside: the tool runs on them.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ MOST_PASSES = 10_000
 
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     """The operation with the machine's numbers where it gives none; OptionError when too fast,
-    and for passes that cannot be."""
+    and for impossible passes."""
     depth = depth_of(operation, machine)
     try:
         made = carved_levels if operation.kind == "vcarve" else levels

@@ -63,8 +63,8 @@ class Sides:
     """The M contours of a placed drawing, those that were not chosen after those that were, and
     their sides. `names`: layer and source of each. `takes` (K, M): what each of the `operations`
     takes of them. (M,) each: `worked`, what any of them cuts along or clears; `edges`, what is
-    drawn as an edge that is seen; `framed`, what is on the layer of a frame. `unsaid_mm`: the
-    depth of operations that say none."""
+    drawn as an edge that is seen; `framed`, what is on the layer of a frame.
+    `default_depth_mm`: the depth of operations that give none."""
 
     lines: Polylines
     names: tuple[str, ...]
@@ -73,11 +73,11 @@ class Sides:
     worked: Bools
     edges: Bools
     framed: Bools
-    unsaid_mm: float
+    default_depth_mm: float
     _known: dict[bytes, Seen] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, placed: Drawing, job: Job, unsaid_mm: float) -> Sides:
+    def of(cls, placed: Drawing, job: Job, default_depth_mm: float) -> Sides:
         """The sides of a drawing in the work frame, cut by this job."""
         around, lines = placed.unchosen, placed.paths
         takes = np.zeros((len(job.operations), len(lines) + len(around.paths)), dtype=np.bool_)
@@ -101,7 +101,7 @@ class Sides:
             worked=np.asarray(takes[makers].any(axis=0)),
             edges=np.array([kind.casefold() in CONTINUOUS for kind in types], dtype=np.bool_),
             framed=np.array([layer in sheet for layer in layers], dtype=np.bool_),
-            unsaid_mm=unsaid_mm,
+            default_depth_mm=default_depth_mm,
         )
 
     @cached_property
@@ -157,7 +157,7 @@ class Sides:
         return np.asarray(self.lines.closed & self.takes[list(chosen)].any(axis=0))
 
     def _depth(self, operation: Operation) -> float:
-        return self.unsaid_mm if operation.depth_mm is None else operation.depth_mm
+        return self.default_depth_mm if operation.depth_mm is None else operation.depth_mm
 
     def why(self, operation: Operation, row: int) -> str:
         """In a few words why an operation has its tool on this side of a contour."""

@@ -308,7 +308,7 @@ def _arc_extremes(toolpath: Toolpath) -> Floats:
 
 
 def mounted_before(toolpath: Toolpath) -> Bools:
-    """(N,) true for tool changes before the first move at a feed: where a machine cannot be told
-    of tools, the operator mounts this one before the program starts."""
+    """(N,) true for tool changes before the first move at a feed: where a machine has no
+    tool change, the operator mounts this one before the program starts."""
     fed = np.cumsum(toolpath.is_feed) > 0
     return np.asarray((toolpath.kind == Kind.TOOL_CHANGE) & ~fed)

@@ -25,8 +25,8 @@ def refuse(
     """
     if bad.any():
         row = int(np.argmax(bad)) if rows is None else int(rows[np.argmax(bad)])
-        said = message if isinstance(message, str) else message(row)
-        raise PostError(said, where=toolpath.place(row), mend=mend)
+        text = message if isinstance(message, str) else message(row)
+        raise PostError(text, where=toolpath.place(row), mend=mend)
 
 
 def refuse_start(toolpath: Toolpath) -> None:

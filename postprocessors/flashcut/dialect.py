@@ -74,7 +74,7 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
 
 
 FlashcutMachine = Machine[SlideStart, Dialect]
-"""Any machine that speaks this dialect."""
+"""Any machine with this dialect."""
 
 
 def check(machine: FlashcutMachine) -> None:

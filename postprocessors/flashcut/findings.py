@@ -1,4 +1,4 @@
-"""What is said of programs of this machine alone."""
+"""The findings that only programs of this machine have."""
 
 from __future__ import annotations
 

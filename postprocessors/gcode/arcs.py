@@ -95,15 +95,15 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
     huge = ~flat & (radius > dialect.arc_most_radius_mm)
     kind[rows[flat]] = Kind.LINE
     arcs.counts.flat = int(flat.sum())
-    said = ~flat & ~huge
+    written = ~flat & ~huge
     centre = np.zeros((len(rows), 2), dtype=np.int64)
-    centre[said] = units_of(toolpath.centre[rows[said]], dialect.decimals)
+    centre[written] = units_of(toolpath.centre[rows[written]], dialect.decimals)
     begin, stop = start[rows, :2], end[rows, :2]
-    offset[rows[said]] = (centre - begin)[said]
+    offset[rows[written]] = (centre - begin)[written]
     holds = arcs_accepted(np.abs(sweep), (begin, stop, centre), kind[rows], dialect)
     halves = dialect.full_circles == "halves"
-    full = (begin == stop).all(axis=1) & said & holds
-    special = huge | (said & ~holds) | (full & halves)
+    full = (begin == stop).all(axis=1) & written & holds
+    special = huge | (written & ~holds) | (full & halves)
     for at in np.flatnonzero(special).tolist():
         _repair(arcs, toolpath, int(rows[at]), float(sweep[at]), dialect)
     return arcs

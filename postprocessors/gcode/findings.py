@@ -1,4 +1,4 @@
-"""What is said of programs in G-code, whatever the machine."""
+"""The findings of programs in G-code, whatever the machine."""
 
 from __future__ import annotations
 

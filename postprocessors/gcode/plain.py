@@ -236,14 +236,14 @@ def _centres(wanted: WantedArcs) -> tuple[Ints, Bools, Bools]:
     """For each arc its centre (K, 2) in units, whether there is one, and whether it is another
     than the rounded one."""
     count = len(wanted.radius)
-    said = wanted.radius <= wanted.most
+    in_range = wanted.radius <= wanted.most
     centre = np.zeros((count, 2), dtype=np.int64)
-    centre[said] = np.rint(wanted.centre[said]).astype(np.int64)
+    centre[in_range] = np.rint(wanted.centre[in_range]).astype(np.int64)
     every = np.arange(count)
-    found = said.copy()
-    found[said] = wanted.fits(every[said], centre[said].astype(np.float64))
+    found = in_range.copy()
+    found[in_range] = wanted.fits(every[in_range], centre[in_range].astype(np.float64))
     moved = np.zeros(count, dtype=np.bool_)
-    left = every[said & ~found & (wanted.radius >= LEAST_RADIUS_UNITS - SPREAD_UNITS)]
+    left = every[in_range & ~found & (wanted.radius >= LEAST_RADIUS_UNITS - SPREAD_UNITS)]
     if not len(left):
         return centre, found, moved
     reach = np.arange(-RECENTRE_REACH, RECENTRE_REACH + 1)

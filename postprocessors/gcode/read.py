@@ -192,7 +192,7 @@ class ModalReader:
         elif once == G.MACHINE_FRAME:
             self._home(block, numbers)
         elif numbers or MOTION_GROUP in modes:
-            self._move(block, numbers, said=MOTION_GROUP in modes)
+            self._move(block, numbers, has_word=MOTION_GROUP in modes)
 
     def finish(self) -> Toolpath:
         """The rows, with the findings."""
@@ -215,7 +215,7 @@ class ModalReader:
     # Words
 
     def _code(self, letter: str, text: str, block: Block) -> int:
-        """A G or M word's code, tenfold; ProgramError for codes that cannot be."""
+        """A G or M word's code, tenfold; ProgramError for an unknown code."""
         known = self._codes.get((letter, text))
         if known is not None:
             return known
@@ -289,10 +289,10 @@ class ModalReader:
 
     def _home(self, block: Block, numbers: dict[str, float]) -> None:
         """G53 G0 X0 Y0 and G53 G0 Z0: to machine zero."""
-        said = {axis: numbers.pop(axis) for axis in "XYZ" if axis in numbers}
+        axes = {axis: numbers.pop(axis) for axis in "XYZ" if axis in numbers}
         kinds = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}
-        kind = kinds.get(tuple(said))
-        if self._motion != G.RAPID or kind is None or any(said.values()):
+        kind = kinds.get(tuple(axes))
+        if self._motion != G.RAPID or kind is None or any(axes.values()):
             block.fail(
                 "G53 moves to another place than machine zero, which is not simulated",
                 mend="write G53 G0 X0 Y0 or G53 G0 Z0",
@@ -304,8 +304,8 @@ class ModalReader:
 
     # Motion
 
-    def _move(self, block: Block, numbers: dict[str, float], *, said: bool) -> None:
-        """Rapid, line or arc to the block's coordinates; `said`: by a motion word of its own."""
+    def _move(self, block: Block, numbers: dict[str, float], *, has_word: bool) -> None:
+        """Rapid, line or arc to the block's coordinates; `has_word`: it has a motion word."""
         x, y, z = self.path.position
         to = [x, y, z]
         axes = False
@@ -320,10 +320,10 @@ class ModalReader:
         if motion is None or motion == G.NO_MOTION:
             if axes:
                 block.fail("coordinates, but no motion word in force", mend="write G0 or G1")
-        elif not axes and not self._is_circle(motion, numbers, said=said):
-            if said and self._rules.forgets_feed and motion > G.RAPID and self._feed == 0.0:
+        elif not axes and not self._is_circle(motion, numbers, has_word=has_word):
+            if has_word and self._rules.forgets_feed and motion > G.RAPID and self._feed == 0.0:
                 block.fail(NO_FEED, mend="write F first")
-            if motion > G.LINE and said:
+            if motion > G.LINE and has_word:
                 block.fail("an arc without X or Y", mend="write X and Y of its end")
         elif motion == G.RAPID:
             self.path.rapid(*to)
@@ -336,10 +336,10 @@ class ModalReader:
         else:
             self._arc(block, motion == G.ARC_CCW, to, numbers)
 
-    def _is_circle(self, motion: int, numbers: dict[str, float], *, said: bool) -> bool:
+    def _is_circle(self, motion: int, numbers: dict[str, float], *, has_word: bool) -> bool:
         """Whether a block without X, Y and Z is a full circle about its I and J."""
         has_centre = "I" in numbers or "J" in numbers
-        return self._rules.circle_without_end and motion > G.LINE and said and has_centre
+        return self._rules.circle_without_end and motion > G.LINE and has_word and has_centre
 
     def _arc(self, block: Block, ccw: bool, to: list[float], numbers: dict[str, float]) -> None:
         """G2 and G3, by centre or by radius, flat or helical."""
@@ -439,7 +439,7 @@ class MachineWords:
         self._changed = M.CHANGE in codes or pauses
         if self._changed:
             self._change(block)
-        self._turn(block, codes, said=speed is not None)
+        self._turn(block, codes, has_speed=speed is not None)
         if any(M_CODES[code] == "coolant" for code in codes):
             self._findings.coolant.append(block.index)
 
@@ -452,7 +452,7 @@ class MachineWords:
             elif M_CODES[code] == "stop" and not self._changed:
                 self._findings.pauses.append(block.index)
 
-    def _turn(self, block: Block, codes: list[int], *, said: bool) -> None:
+    def _turn(self, block: Block, codes: list[int], *, has_speed: bool) -> None:
         """The spindle's words; a speed alone is for the running spindle."""
         turn = next((SPINDLE[M(code)] for code in codes if code in SPINDLE), None)
         if turn == Kind.SPINDLE_OFF:
@@ -463,13 +463,13 @@ class MachineWords:
                 self._findings.speedless.append(block.index)
             self._spindle = turn
             self._path.event(turn, self._speed)
-        elif said and self._spindle is not None:
+        elif has_speed and self._spindle is not None:
             self._path.event(self._spindle, self._speed)
 
     def _change(self, block: Block) -> None:
         """M6 stops the spindle; after a pause the tool is the one that was asked for."""
         if self._tool is None:
-            block.fail_at("M", "a tool change before a T word was said")
+            block.fail_at("M", "a tool change before any T word")
         self._path.event(Kind.TOOL_CHANGE, float(self._tool))
         if self._rules.tools == "change":
             self._spindle = None

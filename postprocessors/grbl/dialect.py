@@ -45,4 +45,4 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
 
 
 GrblMachine = Machine[SlideStart, Dialect]
-"""Any machine that speaks this dialect."""
+"""Any machine with this dialect."""

@@ -1,4 +1,4 @@
-"""What is said of programs for grbl alone."""
+"""The findings that only programs for grbl have."""
 
 from __future__ import annotations
 

@@ -12,8 +12,8 @@ from .dialect import MOST_TOOL, Dialect, GrblMachine
 from .findings import EVENT_LEFT_OUT
 
 HEADER = ("G17 G21 G90 G94", "G54")
-"""XY plane, mm, absolute, feeds a minute; the first work frame. grbl knows I J as offsets only,
-so it is not told so (G91.1)."""
+"""XY plane, mm, absolute, feeds a minute; the first work frame. In grbl I and J are always
+offsets, so G91.1 is not written."""
 
 
 def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:

@@ -31,7 +31,7 @@ class I8751(Target):
         check(machine)
 
     def write(self, toolpath: Toolpath, machine: I8751Machine) -> Program:
-        """The program; PostError naming the move that cannot be said or done."""
+        """The program; PostError naming the move that cannot be written or done."""
         from .write import write_program
 
         return write_program(toolpath, machine)

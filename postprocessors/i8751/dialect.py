@@ -87,13 +87,13 @@ class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class I8751Controller(SlideStart, frozen=True, tag_field="model", tag="i8751"):
     """The Intel 8751.
 
-    How its firmware counts and times pulses decides what its bytes mean too, so those options are
-    said once, in `[dialect]`: `camtool_postprocessors.i8751.pulses`.
+    How its firmware counts and times pulses decides what its bytes mean too, so those options
+    stand once, in `[dialect]`: `camtool_postprocessors.i8751.pulses`.
     """
 
 
 I8751Machine = Machine[SlideStart, Dialect]
-"""Any machine that speaks this dialect."""
+"""Any machine with this dialect."""
 
 
 def check(machine: I8751Machine) -> None:

@@ -33,7 +33,7 @@ class Linuxcnc(Target):
         feed_decimals(machine)
 
     def write(self, toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
-        """The program; PostError naming the move that cannot be said or done."""
+        """The program; PostError naming the move that cannot be written or done."""
         from .write import write_program
 
         return write_program(toolpath, machine)

@@ -326,7 +326,7 @@ class Moves:
 
 
 def moves_of(path: Toolpath, chain: Ints, machine: _Machine, period_s: float) -> Moves:
-    """The moves of merged rows; MachineError for limits that are not said."""
+    """The moves of merged rows; MachineError for missing limits."""
     rate = axis_limits(machine, "max_rate_mm_min") / 60.0
     acceleration = axis_limits(machine, "acceleration_mm_s2")
     row_length = move_lengths(path)

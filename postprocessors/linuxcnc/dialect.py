@@ -38,4 +38,4 @@ class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxc
 
 
 LinuxcncMachine = Machine[SlideStart, Dialect]
-"""Any machine that speaks this dialect."""
+"""Any machine with this dialect."""

@@ -32,7 +32,7 @@ class MatlabRouter(Target):
         dialect_of(machine)
 
     def write(self, toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
-        """The program; PostError naming the move that cannot be said or done."""
+        """The program; PostError naming the move that cannot be written or done."""
         from .write import write_program
 
         return write_program(toolpath, machine)

@@ -96,7 +96,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, Dialect]):
         law = (
             "slave X's program"
             if router.slaves == "listing"
-            else "the program that the text tells"
+            else "the program that the text describes"
         )
         rub = "no" if not any(router.friction_percent) else "dry"
         return (
@@ -279,13 +279,13 @@ def _check(path: Toolpath, rows: int) -> None:
 
 
 def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
-    """(R,) rows that go home: those that say so, and rapids that end there on all that moves."""
+    """(R,) rows that go home: homing, and rapids that end there on all that moves."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     off = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
     there = ((off <= ON_HOME_COUNTS * coded) | (way_mm == 0.0)).all(axis=1)
     kind = path.kind[: len(way_mm)]
-    said = (kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)
-    return np.asarray(said | ((kind == Kind.RAPID) & there & (way_mm <= 0.0).all(axis=1)))
+    homing = (kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)
+    return np.asarray(homing | ((kind == Kind.RAPID) & there & (way_mm <= 0.0).all(axis=1)))
 
 
 def _tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:

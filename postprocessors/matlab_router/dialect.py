@@ -184,7 +184,7 @@ class MatlabRouterController(SlideStart, frozen=True, tag_field="model", tag="ma
 
 
 MatlabRouterMachine = Machine[SlideStart, Dialect]
-"""Any machine that speaks this dialect."""
+"""Any machine with this dialect."""
 
 
 def dialect_of(machine: MatlabRouterMachine) -> Choices:

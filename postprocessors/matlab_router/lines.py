@@ -156,8 +156,8 @@ class _Maker:
         zero = list(self._machine.controller.machine_zero_mm)
         shift = min(math.ceil(-low * UNIT_MM) + 1.0, (most - high) * UNIT_MM)
         zero[axis] -= shift
-        said = ",".join(f"{value:g}" for value in zero)
-        return f"use --origin lower-left, or --set controller.machine_zero_mm=[{said}]"
+        place = ",".join(f"{value:g}" for value in zero)
+        return f"use --origin lower-left, or --set controller.machine_zero_mm=[{place}]"
 
     def _mended(self, lines: Lines) -> Lines:
         """No distance of 1 and no line of no length."""

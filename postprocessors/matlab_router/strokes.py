@@ -157,9 +157,9 @@ def _events(toolpath: Toolpath) -> list[Finding]:
         "post a program for each tool",
     )
     return [
-        *_unsaid(toolpath, kind == Kind.DWELL, EVENT_LEFT_OUT_DWELL),
-        *_unsaid(toolpath, kind == Kind.TOOL_CHANGE, EVENT_LEFT_OUT_TOOL),
-        *_unsaid(toolpath, _with_speed(toolpath), EVENT_LEFT_OUT_SPEED),
+        *_left_out(toolpath, kind == Kind.DWELL, EVENT_LEFT_OUT_DWELL),
+        *_left_out(toolpath, kind == Kind.TOOL_CHANGE, EVENT_LEFT_OUT_TOOL),
+        *_left_out(toolpath, _with_speed(toolpath), EVENT_LEFT_OUT_SPEED),
     ]
 
 
@@ -167,7 +167,7 @@ def _with_speed(toolpath: Toolpath) -> Bools:
     return np.asarray((toolpath.kind == Kind.SPINDLE_CW) & np.isfinite(toolpath.value))
 
 
-def _unsaid(toolpath: Toolpath, rows: Bools, sentence: Sentence) -> list[Finding]:
+def _left_out(toolpath: Toolpath, rows: Bools, sentence: Sentence) -> list[Finding]:
     count = int(rows.sum())
     if not count:
         return []

@@ -71,14 +71,14 @@ def _numbers_of(jobs: Jobs) -> list[_JobNumbers]:
     lines = jobs.lines
     start, end = lines.start.T.tolist(), lines.end.T.tolist()
     length, speed = np.abs(lines.end - lines.start).T.tolist(), jobs.speed.T.tolist()
-    said = []
+    numbers = []
     for low, high in pairwise(jobs.offsets):
         x, y = start[0][low], start[1][low]
         xy = [x, *end[0][low:high]], [y, *end[1][low:high]]
         lxy = length[0][low:high], length[1][low:high]
         velxy = speed[0][low:high], speed[1][low:high]
-        said.append(_JobNumbers(high - low, (x, y), xy, lxy, velxy))
-    return said
+        numbers.append(_JobNumbers(high - low, (x, y), xy, lxy, velxy))
+    return numbers
 
 
 def _matlab(jobs: list[_JobNumbers], dialect: Choices) -> bytes:

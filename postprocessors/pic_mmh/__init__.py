@@ -29,7 +29,7 @@ class PicMmh(Target):
     interpolators = get_args(Interpolator)
 
     def write(self, toolpath: Toolpath, machine: PicMmhMachine) -> Program:
-        """The program; PostError naming the move that cannot be said or done."""
+        """The program; PostError naming the move that cannot be written or done."""
         from .write import write_program
 
         return write_program(toolpath, machine)

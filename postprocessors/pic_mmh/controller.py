@@ -12,7 +12,7 @@ What it does with a row of the toolpath, in the order of this file:
    pulse costs nothing (annex A.3 loops back at once); "iteration": each pass takes one period.
 4. At each change of an axis's direction the compensation steps are issued, a period each.
 
-What the controller takes for the end of an arc is not said (`controller.arc_end`,
+What the controller takes for the end of an arc is not documented (`controller.arc_end`,
 `camtool.kernels.arc_stops`); it goes on from where the arc stopped. By "equal" an arc that passes
 its end without standing on it goes round again on the real machine, mostly for ever. Here its
 samples stop at the nearest approach to the end in the expected sweep, `ended` is False, and the

@@ -39,4 +39,4 @@ class PicMmhController(SlideStart, frozen=True, tag_field="model", tag="pic-mmh"
 
 
 PicMmhMachine = Machine[SlideStart, Dialect]
-"""Any machine that speaks this dialect."""
+"""Any machine with this dialect."""

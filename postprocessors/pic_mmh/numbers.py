@@ -209,8 +209,8 @@ def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> No
 def far_arcs(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> Bools:
     """(N,) true for arcs whose centre has more than five digits of µm: nearly straight ones."""
     grids = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
-    said = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
-    return np.asarray(toolpath.is_arc & ~(said[0] & said[1]))
+    fits = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
+    return np.asarray(toolpath.is_arc & ~(fits[0] & fits[1]))
 
 
 def _feed_words(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[list[str], Finding | None]:

@@ -61,7 +61,7 @@ class ValcncController(SlideStart, frozen=True, tag_field="model", tag="valcnc")
 
 
 ValcncMachine = Machine[SlideStart, Dialect]
-"""Any machine that speaks this dialect."""
+"""Any machine with this dialect."""
 
 
 def check(machine: ValcncMachine) -> None:

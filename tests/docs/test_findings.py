@@ -143,10 +143,10 @@ def said() -> Iterator[tuple[str, list[Sentence], set[str]]]:
 
 
 def _called(node: ast.expr) -> list[str]:
-    """`A` of `A(...)` and of `A.said(...)`; both of `(A if … else B)(...)`."""
+    """`A` of `A(...)` and of `A.words(...)`; both of `(A if … else B)(...)`."""
     if isinstance(node, ast.IfExp):
         return _called(node.body) + _called(node.orelse)
-    if isinstance(node, ast.Attribute) and node.attr == "said":
+    if isinstance(node, ast.Attribute) and node.attr == "words":
         return _called(node.value)
     return [node.id] if isinstance(node, ast.Name) else []
 

@@ -295,7 +295,7 @@ def test_a_named_font_is_used_and_an_absent_one_named() -> None:
     text.doc.styles.get("plain").dxf.font = "Nowhere.ttf"
     shape = text_strokes(text, "outline")
     assert shape.substituted == "Nowhere.ttf"
-    assert shape.lacks == f"font Nowhere.ttf is not here: drawn with {shape.font}"
+    assert shape.lacks == f"font Nowhere.ttf is not installed: drawn with {shape.font}"
     assert all(contour.closed for contour in shape.contours)
 
 

@@ -291,7 +291,7 @@ def test_weight_slope_and_families() -> None:
     for family in (f"Nowhere Grotesk, {FAMILY}", "Nowhere Grotesk"):
         other = drawn(f'<text y="9" font-family="{family}">O</text>', "outline")
         (told,) = [f.message for f in other.findings if f.code is Code.FONT_SUBSTITUTED]
-        assert told.startswith("1 text: font Nowhere Grotesk is not here: drawn with ")
+        assert told.startswith("1 text: font Nowhere Grotesk is not installed: drawn with ")
 
 
 def test_a_letter_that_the_font_lacks_is_named() -> None:

@@ -211,7 +211,7 @@ def _recovered(tags: Tags, notes: list[str], file: str) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """What ezdxf says on purpose; what merely happened to it would help nobody."""
+    """The message of an error that ezdxf raises on purpose; that of any other would not help."""
     from ezdxf.lldxf.const import DXFStructureError, DXFVersionError
 
     on_purpose = isinstance(error, (DXFStructureError, DXFVersionError))
@@ -221,8 +221,8 @@ def _reason(error: Exception) -> str:
 # The bytes of a DXF file to its tags, and what the tags themselves say is damaged.
 #
 # A *tag* is a group code and a value: two lines of ASCII, or bytes of binary DXF. ezdxf's readers
-# take more for a number than a number ("1_0") and find one in garbage ("x1y"); here whatever is
-# none ends the reading. `frame_of` tells the sections and whether the file is whole.
+# also accept "1_0" as a number, and find one in garbage ("x1y"); here whatever is no number ends
+# the reading. `frame_of` finds the sections, and whether the file is whole.
 
 AGAIN = "export it again from the program that made it, best as DXF R2000 or later"
 
@@ -293,8 +293,8 @@ def binary_tags(data: bytes, file: str) -> Tags:
 
     codes: list[int] = []
     values: list[Any] = []
-    # What the reader makes of bytes that are no tags depends on what they are. What it has read
-    # until then has no end mark, which tells the rest.
+    # The reader raises different errors for bytes that are no tags. What it has read until then
+    # has no end mark, which is how the fault is found.
     with suppress(Exception):
         for tag in binary_tags_loader(data, errors="surrogateescape"):
             codes.append(tag.code)

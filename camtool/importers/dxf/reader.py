@@ -121,7 +121,7 @@ _NO_PART = {
     20: "parsecs",
     24: "US miles",
 }
-"""$INSUNITS in which nobody draws a part."""
+"""$INSUNITS in which no part is drawn."""
 
 _GUESSES = {
     0: ("in", 25.4, "inches", Severity.WARNING),

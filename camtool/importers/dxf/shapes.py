@@ -180,7 +180,7 @@ def straight(points: Floats) -> Floats:
 
 
 def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
-    """Arcs for a curve whose place and size these numbers tell."""
+    """Arcs for a curve whose place and size these numbers give."""
     furthest = float(np.abs(size).max())
     if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
         raise DrawingError(

@@ -289,7 +289,7 @@ def run_script(data: bytes, file: str) -> list[Body]:
     except SyntaxError as error:
         where = f"line {error.lineno}" if error.lineno else None
         raise DrawingError(f"is no Python: {error.msg}", where=where, mend=_MEND) from error
-    # Whatever a stranger's program raises is its own fault.
+    # Whatever the script raises is a fault of the script.
     except Exception as error:
         what = f"{type(error).__name__}: {error}".rstrip(": ")
         raise _failed(f"stopped with {what}", error, file) from error

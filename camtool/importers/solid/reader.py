@@ -170,13 +170,13 @@ def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
             code = _run(asked, _STDERR if script else words.fileno(), seconds, file)
         result = _answer(answer, code, script, file)
         with chatter.open("rb") as words:
-            said = words.read(CHATTER_BYTES).decode("utf-8", errors="replace")
+            output = words.read(CHATTER_BYTES).decode("utf-8", errors="replace")
     if "error" in result:
         error = result["error"]
         raise DrawingError(error["message"], file=file, where=error["where"], mend=error["mend"])
     if "fault" in result:
         raise RuntimeError(result["fault"])
-    return result | {"complaint": _complaint(said)}
+    return result | {"complaint": _complaint(output)}
 
 
 def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
@@ -200,7 +200,7 @@ def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
 
 
 def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
-    """What the worker wrote; a worker that died without a word met a damaged file."""
+    """What the worker wrote; without an answer, the worker died of a damaged file."""
     if answer.exists():
         result: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
         return result
@@ -213,9 +213,9 @@ def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
     )
 
 
-def _complaint(said: str) -> str:
-    """The first line in which OpenCASCADE speaks of an error, without its ornaments; else ""."""
-    for line in _COLOURS.sub("", said).splitlines():
+def _complaint(output: str) -> str:
+    """The first line in which OpenCASCADE reports an error, without its decoration; else ""."""
+    for line in _COLOURS.sub("", output).splitlines():
         if "ERR" in line or "FAIL" in line.upper():
             return "".join(sign for sign in line if sign.isprintable()).strip(" *")
     return ""

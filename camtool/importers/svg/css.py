@@ -18,8 +18,7 @@ from camtool.errors import DrawingError
 from camtool.importers.svg.tree import Node
 
 MAX_MATCHES = 1_000_000
-"""At most this many comparisons of a rule with an element; a file of rules alone could need
-billions."""
+"""So often a rule may be tested on an element; a file of rules alone could ask for billions."""
 
 MAX_COMPOUNDS = 8
 """A selector of more steps than this is no selector of a drawing."""

@@ -1,8 +1,8 @@
 """The page of an SVG: its unit, its size and the map from user units to mm, Y up.
 
 The page's lower left corner is (0, 0). What decides, in this order: the caller's unit; width and
-height with the viewBox; 96 px an inch. Y' = page height − Y, so a page whose height nobody knows
-is turned about its own zero line.
+height with the viewBox; 96 px an inch. Y' = page height − Y, so a page of unknown height is
+mirrored about its own zero line.
 
 Source: Scalable Vector Graphics 1.1, 7.10 to 7.12; CSS 2.1, 4.3.2 for the units.
 """
@@ -32,7 +32,7 @@ from camtool.importers.svg.tree import Node
 @dataclass(frozen=True)
 class Page:
     """`to_mm`: user units of the root to mm; `viewport` (width, height) in user units where
-    known; the unit and what is to be said about it."""
+    known; the unit, and the findings about it."""
 
     to_mm: Affine
     viewport: tuple[float, float] | None
@@ -42,7 +42,7 @@ class Page:
 
 @dataclass(frozen=True)
 class _Side:
-    """Width or height as written: in mm where it says a size, and its unit ("" bare)."""
+    """Width or height as written: in mm where it is a size, and its unit ("" without one)."""
 
     text: str
     size_mm: float | None
@@ -50,13 +50,13 @@ class _Side:
 
 
 Writer = tuple[str, float]
-"""A program that took a px for something else, and its px an inch."""
+"""A program whose px have another size, and how many of them are an inch."""
 
 
 def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> Page:
     """The page of the root element; DrawingError when its size or viewBox makes no sense.
 
-    Where nobody says `dpi` a px is what the program took it for that wrote the file.
+    Without `options.dpi` a px has the size that the program `writer` gives it.
     """
     if writer is not None and options.units is None and options.dpi is None:
         options = replace(options, dpi=writer[1])
@@ -66,15 +66,17 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> P
     box = parse_view_box(root.get("viewBox"))
     if options.units is not None:
         return _asked(width, height, box, options)
-    page = _said(root, (width, height), box, options)
+    page = _by_the_file(root, (width, height), box, options)
     if writer is None or not (box is None or page.units.name == "px"):
         return page
     hint = UNIT_GUESSED_BY_PROGRAM(program=writer[0], px_an_inch=writer[1], usual=DPI)
     return replace(page, findings=(*page.findings, hint))
 
 
-def _said(root: Node, sides: tuple[_Side, _Side], box: Box | None, options: ReadOptions) -> Page:
-    """The page by what the file says."""
+def _by_the_file(
+    root: Node, sides: tuple[_Side, _Side], box: Box | None, options: ReadOptions
+) -> Page:
+    """The page by the sizes in the file."""
     width, height = sides
     named = width if width.size_mm is not None else height
     if named.size_mm is None:
@@ -86,7 +88,7 @@ def _said(root: Node, sides: tuple[_Side, _Side], box: Box | None, options: Read
         px = options.mm_per("px")
         return Page(_flip(height.size_mm or 0.0) @ scaling(px, px), _size(width, height, px),
                     units, findings)  # fmt: skip
-    # A side that is not said follows from the other one.
+    # A missing side follows from the other one.
     if width.size_mm is None:
         width = _Side("", named.size_mm * box.width / box.height, named.unit)
     elif height.size_mm is None:

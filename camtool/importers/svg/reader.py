@@ -503,7 +503,7 @@ class CurveFitter:
         return _with_ends(vertices, ends), off
 
     def _fitted(self, curve: Curve, bounds: Floats) -> Fitted:
-        """Arcs for a curve whose size and place `bounds` (n, 2) tell."""
+        """Arcs for a curve whose size and place `bounds` (n, 2) give."""
         _in_reach(bounds, MAX_CURVE_MM)
         try:
             fit = fit_curve(curve, self.tolerance_mm)

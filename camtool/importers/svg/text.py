@@ -98,9 +98,9 @@ def text_of(
 def _keeps_blanks(node: Node | None) -> bool:
     """xml:space of the element or of the nearest one around it."""
     while node is not None:
-        said = node.get("xml:space")
-        if said:
-            return said == "preserve"
+        given = node.get("xml:space")
+        if given:
+            return given == "preserve"
         node = node.parent
     return False
 
@@ -135,8 +135,8 @@ class _Flow:
                 elif not is_for_us(child):
                     self.unseen["is for another language or program"] = None
                 else:
-                    said = child.get("xml:space")
-                    self.visit(child, inner, said == "preserve" if said else keep)
+                    given = child.get("xml:space")
+                    self.visit(child, inner, given == "preserve" if given else keep)
             elif child.tag not in _LETTERLESS:
                 raise Unusable(f"has a {child.tag[:40]} in it, which is not read")
             self._add(child.tail, style, keep)
@@ -183,10 +183,10 @@ class _Flow:
     def _place(self, node: Node, style: Style, first: int) -> None:
         lengths = self.lengths_of(style)
         for name, axis in _PLACES:
-            said = node.get(name)
-            if not said:
+            given = node.get(name)
+            if not given:
                 continue
-            listed = _BETWEEN.split(said)
+            listed = _BETWEEN.split(given)
             self._by_letter |= len(listed) > 1
             for place, word in enumerate(listed[: max(len(self.letters) - first, 1)], first):
                 value = lengths.length(word, axis, name)

@@ -192,7 +192,7 @@ def parse_css_transform(text: str, length: Length) -> Affine:
 
 
 def parse_origin(text: str, length: Length) -> tuple[float, float]:
-    """transform-origin in user units; DrawingError. What is not said is 0 for an SVG element."""
+    """transform-origin in user units; DrawingError. What is missing is 0 for an SVG element."""
     words = text.lower().split()[:2]
     if len(words) == 1:
         words = ["center", words[0]] if words[0] in _VERTICAL else [words[0], "center"]
