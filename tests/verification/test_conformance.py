@@ -117,7 +117,7 @@ def test_a_setting_that_the_job_names_is_held(target: LoadedTarget, fault: str) 
     damaged = damage(text)
     assert damaged != text
     if code is Code.END_DIFFERS and target.machine.target.name == "linuxcnc":
-        with pytest.raises(ProgramError, match="the file ends and the program does not"):
+        with pytest.raises(ProgramError, match="the file ends without an end of the program"):
             held(damaged, target)
         damaged = f"%\n{damaged}%\n"  # an end, and yet no M2
     found = [each for each in held(damaged, target).findings if each.code is code]

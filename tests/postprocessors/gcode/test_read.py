@@ -257,7 +257,7 @@ def test_refused(name: str, text: str, line: int, column: int, message: str) -> 
         ("G5 X1", "a spline"),
         ("O100 CALL", "the letter O is no word"),
         ("G0 X[1+1]", "no number after X"),
-        ("M6", "before a T word"),
+        ("M6", "before any T word"),
         ("G90.1 F9\nG2 X1 Y1 I1", "needs both I and J"),
         ("F9 G2 X.001 I.0005", "an arc of radius 0.00050 mm is none"),
         ("G0 X1 (" + "a" * 250 + ")", "more than 252 characters"),
