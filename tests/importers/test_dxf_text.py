@@ -353,7 +353,7 @@ def test_a_style_that_is_not_there_is_named() -> None:
         ({"oblique": math.inf}, "finite"),
         ({"rotation": math.nan}, "finite"),
         ({"insert": (math.nan, 0.0)}, "finite"),
-        ({"insert": (1e308, 0.0)}, "bounds"),
+        ({"insert": (1e308, 0.0)}, "not finite or too large"),
         ({"extrusion": (0.0, 0.0, 0.0)}, "extrusion of 0"),
         ({"extrusion": (0.0, math.nan, 0.0)}, "finite"),
         ({"text": ""}, "empty"),
