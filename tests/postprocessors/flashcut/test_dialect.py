@@ -14,8 +14,8 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
 from tests.postprocessors.gcode.plain_parts import FLASHCUT, on_grid, part
+from tests.postprocessors.golden import GOLDEN, compare_golden
 
-GOLDEN = Path(__file__).parents[2] / "golden"
 EXAMPLES = {
     # L1004-1005; the text has a blank before G02, which is read and not written.
     "L1004": (b"G01 X1.0 Y1.0 F3.0\n G02 X3.0 Y3.0 I1.0 J1.0\n", (2.0, 2.0), 3.0),
@@ -54,12 +54,7 @@ def test_their_arcs_are_half_circles(name: str) -> None:
 
 def test_the_golden_program(bless: bool) -> None:
     data = "\n".join([*write(part(3.0, 8.0)), ""]).encode()
-    file = GOLDEN / "flashcut-part.nc"
-    if bless:
-        file.write_bytes(data)
-    if not file.exists():
-        pytest.fail(f"{file.name} is missing: look at the program, then run pytest with --bless")
-    assert data.decode() == file.read_bytes().decode()
+    compare_golden(GOLDEN / "flashcut-part.nc", data, bless=bless)
 
 
 def test_the_worked_example_of_the_page_is_what_is_sent() -> None:

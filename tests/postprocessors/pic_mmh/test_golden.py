@@ -1,15 +1,13 @@
 """A program of every kind of row, byte for byte, in both forms (`--bless` writes it anew)."""
 
 import re
-from pathlib import Path
 
 import pytest
 
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-
-GOLDEN = Path(__file__).parents[2] / "golden"
+from tests.postprocessors.golden import GOLDEN, compare_golden
 
 
 def part() -> Toolpath:
@@ -27,41 +25,11 @@ def part() -> Toolpath:
     return path.event(Kind.END).finish()
 
 
-def compare(file: Path, data: bytes, *, bless: bool) -> None:
-    """`data` must be what the file holds; a missing file is a failure."""
-    if bless:
-        file.write_bytes(data)
-    if not file.exists():
-        pytest.fail(f"{file.name} is missing: look at the program, then run pytest with --bless")
-    assert data.decode("ascii") == file.read_bytes().decode("ascii")
-
-
 @pytest.mark.parametrize("form", ["example", "annex"])
 def test_program(form: str, bless: bool) -> None:
     target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
     data = target.target.write(part(), target.machine).data
-    compare(GOLDEN / f"pic-mmh-{form}.pic", data, bless=bless)
-
-
-def test_a_changed_byte_fails(tmp_path: Path) -> None:
-    file = tmp_path / "program.pic"
-    file.write_bytes(b"G54;\n")
-    compare(file, b"G54;\n", bless=False)
-    with pytest.raises(AssertionError):
-        compare(file, b"G90;\n", bless=False)
-
-
-def test_a_missing_file_fails_and_is_not_made(tmp_path: Path) -> None:
-    file = tmp_path / "program.pic"
-    with pytest.raises(pytest.fail.Exception, match="--bless"):
-        compare(file, b"G54;\n", bless=False)
-    assert not file.exists()
-
-
-def test_blessing_writes_the_file(tmp_path: Path) -> None:
-    file = tmp_path / "program.pic"
-    compare(file, b"G54;\n", bless=True)
-    assert file.read_bytes() == b"G54;\n"
+    compare_golden(GOLDEN / f"pic-mmh-{form}.pic", data, bless=bless)
 
 
 def test_the_worked_example_of_the_page_is_what_is_sent() -> None:

@@ -14,8 +14,8 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
 from tests.postprocessors.gcode.plain_parts import part
+from tests.postprocessors.golden import GOLDEN, compare_golden
 
-GOLDEN = Path(__file__).parents[2] / "golden"
 ONE = ("dialect.coord_scale=1",)
 CALIBRATED = (
     "axes.x.coded_step_mm=0.04038",
@@ -39,12 +39,7 @@ def write(path: Toolpath, *settings: str) -> list[str]:
 @pytest.mark.parametrize(("file", "settings"), [("part", ()), ("part-unscaled", ONE)])
 def test_the_golden_programs(file: str, settings: tuple[str, ...], bless: bool) -> None:
     data = "\n".join([*write(part(14400.0, 14400.0), *settings), ""]).encode()
-    golden = GOLDEN / f"valcnc-{file}.ngc"
-    if bless:
-        golden.write_bytes(data)
-    if not golden.exists():
-        pytest.fail(f"{golden.name} is missing: look at the program, then run with --bless")
-    assert data.decode() == golden.read_bytes().decode()
+    compare_golden(GOLDEN / f"valcnc-{file}.ngc", data, bless=bless)
 
 
 def test_the_worked_example_of_the_page_is_what_is_sent() -> None:
