@@ -348,7 +348,7 @@ class _TakenUp:
 
 
 def _step_mm(axis: Axis) -> float:
-    """The least whole number of steps that a program can say."""
+    """The smallest distance, mm, of whole steps that a program can express."""
     steps = to_steps(axis.resolution_mm or 0.0, axis.coded_step_mm)
     return max(1.0, float(steps)) * axis.coded_step_mm
 
@@ -357,9 +357,9 @@ class _Regions:
     """What backlash and compensation leave over in each region of the table; it is divided by the
     scale, since the path is that of the motors.
 
-    A wanted path is cut at the edges of the regions. They belong to positions of the controller,
-    which are the wanted ones but for the backlash: near an edge that of the neighbour may be
-    taken.
+    A wanted path is cut at the edges of the regions. The regions belong to positions of
+    the controller, which differ from the wanted ones by the backlash: near an edge the neighbour's
+    may be taken.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -413,7 +413,8 @@ class _Regions:
 
 
 def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
-    """Of an axis with this backlash, None: its own; compensation is whole steps."""
+    """What is left over on an axis with this backlash (None: its own); compensation is in whole
+    steps."""
     play = axis.backlash_mm if play_mm is None else play_mm
     whole = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
     at_motor = msgspec.structs.replace(

@@ -1,9 +1,9 @@
-"""The Job: what is to be cut and how, as far as the user says it.
+"""The Job: what is to be cut and how, as far as the user gives it.
 
-A job places the drawing (`Placement`), may say what the stock is (`Stock`), and lists operations
-in the order in which they are cut. An operation takes the paths of its layers and colours, and
-says how: the tool, where it runs, how deep, how it goes in and out. What is None is left to the
-machine. `job_of` makes the job of a single operation from flat settings, as flags give them.
+A job places the drawing (`Placement`), may describe the stock (`Stock`), and lists operations in
+the order in which they are cut. An operation chooses paths by layer and colour, and gives the
+tool, the side, the depth, and how the tool goes in and out. What is None is left to the machine.
+`job_of` makes the job of a single operation from flat settings, as flags give them.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ def _refuse_fit(fit_mm: tuple[float, float]) -> None:
 
 
 def _refuse_beyond(key: str, lengths: tuple[float, float], least: float, most: float) -> None:
-    """Refuse lengths that are none, or not plausible."""
+    """Refuse lengths outside of these limits."""
     for length in lengths:
         if not least <= length <= most:
             raise OptionError(

@@ -725,8 +725,8 @@ def loosest(machine: Machine) -> tuple[Axis, Axis]:
 
 def residuals(machine: Machine) -> tuple[Residual, Residual]:
     """X and Y of a machine, each in the region where compensation leaves most over: where a
-    contour is divided then hangs on its shape alone, not on where it lies, and what is reported
-    as left over is left nowhere else."""
+    contour is divided then depends on its shape alone, not on its place, and no other region
+    leaves more over than is reported."""
     x, y, _ = (
         max(
             (

@@ -1,10 +1,10 @@
 """What an operation takes of a drawing, and its sides: what is part and what is hole.
 
-Sides follow from the nesting of the whole drawing, whatever an operation takes of it.
-A closed contour that an even number of others hold is the rim of a part, which stays; one that an
-odd number hold is the rim of a hole. All closed contours of the file are nested, those of other
+Sides follow from the nesting of the whole drawing, whatever an operation takes of it. A closed
+contour that lies in an even number of others is the rim of a part, which stays; one that lies in
+an odd number is the rim of a hole. All closed contours of the file are nested, those of other
 operations and those that are not cut too, or a window cut by itself would be taken for a part.
-Not every contour bounds material, though. None of these holds anything:
+Not every contour bounds material, though. These do not count:
 
 - what is only engraved or carved, for the part goes on beneath it;
 - the pocket of another operation that is less deep than the cut: what is drawn within it goes
@@ -111,7 +111,7 @@ class Sides:
 
     @cached_property
     def frames(self) -> Bools:
-        """(M,) those that would, were they not on the layer of a frame."""
+        """(M,) the uncut closed contours on layers of frames, which bound nothing for that."""
         return np.asarray(self._idle & self.framed)
 
     @cached_property
@@ -137,11 +137,11 @@ class Sides:
         return self._known[key]
 
     def sided(self) -> Bools:
-        """(M,) the contours that a profile follows on one side, for the other one to stay."""
+        """(M,) the contours that a profile follows on one side, so that the other side stays."""
         return self._taken(map(runs_beside, self.operations))
 
     def kept_from(self, pocket: Operation) -> Bools:
-        """(M,) the contours, no deeper than a pocket, what is within which is to stay."""
+        """(M,) the contours whose inside must stay, by profiles no deeper than a pocket."""
         kept = np.zeros(len(self.lines), dtype=np.bool_)
         for number, each in enumerate(self.operations):
             if runs_beside(each) and self._depth(each) <= self._depth(pocket):
@@ -160,7 +160,7 @@ class Sides:
         return self.default_depth_mm if operation.depth_mm is None else operation.depth_mm
 
     def why(self, operation: Operation, row: int) -> str:
-        """In a few words why an operation has its tool on this side of a contour."""
+        """Why, in a few words, an operation has its tool on this side of a contour."""
         if not self.lines.closed[row]:
             return "it is open"
         if operation.side != "auto":

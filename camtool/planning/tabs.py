@@ -102,16 +102,16 @@ class Tab:
 def with_tabs(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], list[Finding]]:
     """The items of an operation, those without tabs that are to have none; and how many.
 
-    Tabs hold parts: where an operation cuts parts free, its holes and open paths go without, as
-    do contours that are too short. Where it cuts none free, what it cuts has tabs as asked. Where
-    nothing is long enough, `tabs_of` says so.
+    Tabs hold parts: where an operation cuts parts free, its holes and open paths get no tabs, nor
+    do contours that are too short. Where it cuts none free, everything has tabs as asked. Where
+    nothing is long enough, `tabs_of` raises the error.
     """
     asked = [each for each in items if isinstance(each, Contour) and each.setting.operation.tabs]
     if not asked:
         return items, []
     parts = [each for each in asked if each.path.closed and not _is_hole(each)]
-    held = {id(each) for each in parts or asked if _is_long_enough(each)}
-    bare = {id(each): each for each in asked if held and id(each) not in held}
+    tabbed = {id(each) for each in parts or asked if _is_long_enough(each)}
+    bare = {id(each): each for each in asked if tabbed and id(each) not in tabbed}
     if not bare:
         return items, []
     opens = sum(not each.path.closed for each in bare.values())
