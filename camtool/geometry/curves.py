@@ -1,7 +1,7 @@
 """Smooth curves, as something that gives points and tangents for many parameters at once.
 
 `fit` asks no more of a curve than the protocol `Curve`; the classes here are the ones that
-drawings hold. Those that are rational Bézier curves, piece by piece, say so (`Pieced`): they are
+drawings hold. Those that are rational Bézier curves, piece by piece, are `Pieced`: they are
 fitted by compiled kernels, many times faster.
 """
 

@@ -16,7 +16,7 @@ from camtool.geometry.polylines import Polylines, Segments, segment_rows
 
 @dataclass(frozen=True)
 class Units:
-    """The unit of the file: its name, mm per unit, and why we believe it (one phrase)."""
+    """The unit of the file: its name, mm per unit, and where both come from (one phrase)."""
 
     name: str
     mm_per_unit: float
@@ -72,7 +72,7 @@ class SelfCrossing:
 
 @dataclass(frozen=True)
 class Healing:
-    """What was mended on reading, counted, lengths in mm.
+    """What was corrected on reading, counted, lengths in mm.
 
     `duplicates`: pieces drawn twice as a whole and left out; `overlaps`: parts of pieces that
     lie on others and were left out; `tiny_merged`: segments too short to matter that went into

@@ -122,7 +122,7 @@ def _gaps(gaps: Iterable[Gap]) -> list[dict[str, Any]]:
 
 
 def _healing(drawing: Drawing) -> dict[str, Any]:
-    """What was mended, and where the drawing leaves a choice or crosses itself."""
+    """What was corrected, and where the drawing leaves a choice or crosses itself."""
     healed = drawing.healing
     return {
         "duplicates": {"count": healed.duplicates, "length_mm": healed.duplicates_mm},

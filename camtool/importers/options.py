@@ -1,4 +1,4 @@
-"""What a caller may say about how a drawing is read."""
+"""How a drawing is read: the options of a caller."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TEXTS = ("skip", "outline", "stroke")
 """What becomes of text: left out, the outlines of its font, or the lines of an engraving font."""
 
 TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engraving"
-"""What is said of text that is left out."""
+"""Why text is left out."""
 
 TOLERANCE_MM = 0.0005
 """Largest distance between a curve and the arcs that stand for it (docs/numerics.md)."""
@@ -130,4 +130,4 @@ class ReadOptions:
 
 
 DEFAULTS = ReadOptions()
-"""The options of a caller who says nothing."""
+"""The options when none are given."""

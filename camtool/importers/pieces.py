@@ -24,7 +24,7 @@ MAX_COORDINATE_MM = 1e9
 
 
 class Unusable(Exception):
-    """The entity gives no piece; the text says why."""
+    """The entity gives no piece; the text is the reason."""
 
 
 @dataclass(frozen=True, eq=False)

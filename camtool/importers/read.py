@@ -1,4 +1,4 @@
-"""One door for every drawing: which format it is (`formats`), and its reader."""
+"""Reading any drawing: which format it is (`formats`), and its reader."""
 
 from __future__ import annotations
 

@@ -297,7 +297,7 @@ MAX_OBLIQUE_DEG = 85.0
 
 
 def finite(*values: float) -> tuple[float, ...]:
-    """The values as floats; Unusable when one is none or beyond all bounds."""
+    """The values as floats; Unusable when one is not finite or too large."""
     numbers = tuple(float(value) for value in values)
     if not all(abs(number) <= MAX_NUMBER for number in numbers):
         raise Unusable("has numbers that are not finite or too large")
@@ -305,7 +305,7 @@ def finite(*values: float) -> tuple[float, ...]:
 
 
 def lacking(font: str, substituted: str, missing: str) -> str:
-    """What was wanted and could not be had, "" when nothing: `font` draws in place of the font
+    """What a font lacks, in words, "" when nothing: `font` draws in place of the font
     `substituted` ("" when it is the wanted one) and has none of the characters `missing`."""
     notes = []
     if substituted:

@@ -1,8 +1,8 @@
-"""A machine as frozen records: what its TOML file may say, with types, units and ranges.
+"""A machine as frozen records: the keys of its TOML file, with types, units and ranges.
 
 Field names carry their units. `msgspec` checks types and ranges and refuses unknown keys;
-`camtool.tables` turns its complaints into errors that name file, table and key. What
-`[controller]` and `[dialect]` may say its target says: `Machine` is generic over both.
+`camtool.tables` turns its complaints into errors that name file, table and key. The records of
+`[controller]` and `[dialect]` are the target's: `Machine` is generic over both.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What `[dialect]` and `[controller]` of a flashcut machine may say, and what its words share."""
+"""The keys of `[dialect]` and `[controller]` of a flashcut machine, and what its words share."""
 
 from __future__ import annotations
 

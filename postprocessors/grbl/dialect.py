@@ -1,4 +1,4 @@
-"""What `[dialect]` and `[controller]` of a grbl machine may say."""
+"""The keys of `[dialect]` and `[controller]` of a grbl machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `[dialect]` and `[controller]` of an i8751 machine may say.
+"""The keys of `[dialect]` and `[controller]` of an i8751 machine.
 
 Where the thesis contradicts itself or is silent, an option says which reading is meant;
 docs/dialects/i8751.md explains each, with the lines of the thesis.

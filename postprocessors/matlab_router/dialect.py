@@ -1,4 +1,4 @@
-"""What `[dialect]` and `[controller]` of a matlab-router machine may say.
+"""The keys of `[dialect]` and `[controller]` of a matlab-router machine.
 
 The thesis's text, its listing and what is safe to send differ; `profile` chooses between them as
 a whole, and each option of its own overrides its profile. `Lnnnn` are lines of the thesis.

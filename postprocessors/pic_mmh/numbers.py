@@ -170,7 +170,7 @@ def _both(values_mm: Floats, grids: tuple[Grid, Grid, Grid]) -> tuple[Ints, Ints
 
 
 def check_motion(toolpath: Toolpath, machine: PicMmhMachine) -> None:
-    """What hangs on more than one number: where the path starts, and that arcs are arcs."""
+    """What depends on more than one number: where the path starts, and that arcs are arcs."""
     refuse_start(toolpath)
     _check_arcs(toolpath, machine)
 

@@ -233,7 +233,7 @@ class _Reader:
 
 @dataclass(frozen=True)
 class Fault:
-    """Where a block goes wrong (column from 1), how, and what mends it."""
+    """Where a block goes wrong (column from 1), how, and how to fix it."""
 
     column: int
     message: str

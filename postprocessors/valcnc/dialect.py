@@ -1,4 +1,4 @@
-"""What `[dialect]` and `[controller]` of a valcnc machine may say, and its scale."""
+"""The keys of `[dialect]` and `[controller]` of a valcnc machine, and its scale."""
 
 from __future__ import annotations
 

@@ -1,2 +1,2 @@
-"""DXF drawings: `reader` is the door, `load` gives the document, `walk` visits its entities,
+"""DXF drawings: `reader` reads them, `load` gives the document, `walk` visits its entities,
 `shapes` and `text` make paths of them."""

@@ -1,1 +1,1 @@
-"""Points as text, JSON, NumPy files and the arrays of the Matlab router: `reader` is the door."""
+"""Points as text, JSON, NumPy files and the arrays of the Matlab router: `reader` reads them."""

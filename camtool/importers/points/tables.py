@@ -38,7 +38,7 @@ class Stroke:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """All strokes of a file, its unit (None when the file names none), and why we believe it.
+    """All strokes of a file, its unit (None when the file names none), and where that comes from.
 
     `mm_per_unit` is needed for a unit that is none of `camtool.units` alone.
     """
@@ -85,7 +85,7 @@ def parse_lines(text: str, file: str) -> Table:
 
 @dataclass
 class _Lines:
-    """What the lines so far have said: `parted` by which sign ("" for blanks), `columns`, and
+    """What the lines so far have shown: the separator `parted` ("" for blanks), `columns`, and
     where a decimal comma, a decimal point, and a proof of the comma's meaning were first seen."""
 
     file: str
@@ -255,7 +255,7 @@ class _Lines:
 
 
 def _separator(content: str, columns: int) -> str:
-    """What parts the fields of this line; "" for blanks."""
+    """What separates the fields of this line; "" for blanks."""
     content = content.strip()
     bare = _QUOTED.sub("0", content)
     if ";" in bare:
@@ -280,7 +280,7 @@ def _row_pattern(parted: str, columns: int) -> re.Pattern[str]:
 
 
 def _fields(content: str, parted: str) -> list[tuple[str, int]]:
-    """Each field without its blanks, and its column; a sign within quotes parts nothing."""
+    """Each field without its blanks, and its column; a sign within quotes separates nothing."""
     if not parted:
         return [(match[0], match.start() + 1) for match in re.finditer(r"\S+", content)]
     hidden = _QUOTED.sub(lambda match: "0" * len(match[0]), content)
@@ -433,7 +433,7 @@ def parse_npy(data: bytes, file: str) -> Table:
 
 
 def parse_npz(data: bytes, file: str) -> Table:
-    """One stroke per array, on the layer of its name; DrawingError when one is none."""
+    """One stroke per array, on the layer of its name; DrawingError when one is no such array."""
     strokes: list[Stroke] = []
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:

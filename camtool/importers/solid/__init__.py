@@ -1,2 +1,2 @@
-"""Solid models by OpenCASCADE: `reader` is the door, `worker` a process of its own, in which
+"""Solid models by OpenCASCADE: `reader` reads them, `worker` a process of its own, in which
 `bodies` reads the model and `outline` draws it."""

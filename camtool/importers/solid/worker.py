@@ -111,7 +111,7 @@ def _plain(result: Outlines) -> dict[str, Any]:
 
 
 def _limit(memory: int | None) -> None:
-    """Bounds what a damaged file can do; a worker that is brought down leaves no core file."""
+    """Limits the memory of the worker; one that crashes leaves no core file."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 

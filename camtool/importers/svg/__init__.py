@@ -1,2 +1,2 @@
-"""SVG drawings: `reader` is the door and walks the elements that `tree` gives; `style` says what
-they look like, `shapes` and `text` what their outlines are."""
+"""SVG drawings: `reader` walks the elements that `tree` gives; `style` has their looks,
+`shapes` and `text` their outlines."""

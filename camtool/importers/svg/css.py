@@ -113,8 +113,8 @@ class Rules:
                 self._add(selector.strip(), declarations)
 
     def holding(self, node: Node) -> list[Declarations]:
-        """The declarations that hold for an element, the strongest last; DrawingError when the
-        sheets are a bomb."""
+        """The declarations that hold for an element, the strongest last; DrawingError
+        when the sheets would take too long to apply."""
         if not self._count:
             return []
         near = [self._by_tag[""], self._by_tag.get(node.tag, []), self._by_id.get(node.get("id"))]
@@ -130,7 +130,7 @@ class Rules:
         return [rule.declarations for rule in found]
 
     def _blocks(self, text: str) -> Iterable[tuple[str, str]]:
-        """Selectors and body of each rule; @-blocks are passed over, @media counted."""
+        """Selectors and body of each rule; @-blocks are skipped, @media counted."""
         at = 0
         while (begin := text.find("{", at)) >= 0:
             selectors = text[at:begin].rpartition(";")[2].strip()

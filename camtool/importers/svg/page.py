@@ -101,7 +101,7 @@ def _by_the_file(
 
 
 def _asked(width: _Side, height: _Side, box: Box | None, options: ReadOptions) -> Page:
-    """One user unit is the caller's unit; the size that the file says is left aside."""
+    """One user unit is the caller's unit; the size in the file is ignored."""
     unit = str(options.units).lower()
     scale = options.mm_per(unit)
     viewport = _size(width, height, options.mm_per("px"))
@@ -116,7 +116,7 @@ def _asked(width: _Side, height: _Side, box: Box | None, options: ReadOptions) -
 
 
 def _sizeless(box: Box | None, options: ReadOptions) -> Page:
-    """Nothing says how large the page is: user units are taken as px."""
+    """The page has no size: user units are taken as px."""
     px = options.mm_per("px")
     units = Units("px", px, f"no size in the file, taken as {options.px_an_inch:g} px an inch")
     finding = _unitless("the svg has no width and height", options)

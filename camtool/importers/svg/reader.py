@@ -368,7 +368,7 @@ class Walk:
         return Lengths(self.options, scope.viewport, style.font_px)
 
     def _unreadable(self, node: Node, error: DrawingError) -> None:
-        """Leaves out an element for a wrong number, and says how many shapes went with it."""
+        """Leaves out an element for a wrong number, and counts the shapes in it."""
         self.notes.fault(node.tag, "cannot be read", node, error)
         for inner in node.walk():
             if inner is not node and inner.tag in _COUNTED:
@@ -522,7 +522,7 @@ def _straight(to_mm: Affine, points: Floats) -> Floats:
 
 
 def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
-    """The same numbers; DrawingError when one is no place in a drawing."""
+    """The same numbers; DrawingError when one is too far away."""
     furthest = float(np.abs(vertices).max())
     if not furthest <= limit_mm:
         raise DrawingError(

@@ -328,7 +328,7 @@ def _floats(words: list[str]) -> list[float]:
 
 
 def _bounded(place: complex) -> complex:
-    """The place itself; relative steps may have added up to one beyond all bounds."""
+    """The place itself; relative steps may add up to one that is too far away."""
     if not (abs(place.real) <= MAX_NUMBER and abs(place.imag) <= MAX_NUMBER):
         raise DrawingError("path data lead to a place that is too far away")
     return place

@@ -146,7 +146,8 @@ class Sheet:
         return self._rules.left_out
 
     def style(self, node: Node, above: Style) -> Style:
-        """The element's style under its parent's; DrawingError when the sheets are a bomb."""
+        """The element's style under its parent's; DrawingError when the sheets would take too
+        long to apply."""
         attributes = node.attributes
         values = {name: attributes[name] for name in _ATTRIBUTES if name in attributes}
         strong: dict[str, str] = {}
@@ -170,7 +171,7 @@ class Sheet:
 
 
 def _under(above: Style, values: dict[str, str]) -> Style:
-    """The style of these values; what they do not say, or say "inherit", comes from above."""
+    """The style of these values; what is missing or "inherit" comes from above."""
     own: dict[str, Any] = dict(_BLANK)
     for name, written in values.items():
         value = written.strip().lower()

@@ -59,7 +59,7 @@ class Run:
 @dataclass(frozen=True, eq=False)
 class Text:
     """The runs of a text and the count of its letters; `unseen`: why some of them are not drawn;
-    `lacks`: what was wanted of fonts and could not be had; `plainer`: weights that fonts are not
+    `lacks`: what fonts lack; `plainer`: weights that fonts are not
     asked for."""
 
     runs: list[Run]

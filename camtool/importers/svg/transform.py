@@ -74,7 +74,7 @@ class Affine:
         return Affine(a, b, c, d, -(a * self.e + c * self.f), -(b * self.e + d * self.f))
 
     def checked(self) -> Affine:
-        """This map; DrawingError when its numbers have run out of all bounds."""
+        """This map; DrawingError when its numbers are too large."""
         if not all(abs(v) <= MAX_NUMBER for v in (self.a, self.b, self.c, self.d, self.e, self.f)):
             raise DrawingError("its transforms multiply to numbers that are too large")
         return self
@@ -91,14 +91,14 @@ def scaling(x: float, y: float) -> Affine:
 
 
 def in_bounds(value: float, name: str) -> float:
-    """The number itself; DrawingError when it belongs to no drawing."""
+    """The number itself; DrawingError when it is too large."""
     if not abs(value) <= MAX_NUMBER:
         raise DrawingError(f"{name} {value:g} is too large")
     return value
 
 
 def parse_numbers(text: str, name: str) -> list[float]:
-    """Numbers parted by blanks or commas; DrawingError naming what is none."""
+    """Numbers separated by blanks or commas; DrawingError naming what is not a number."""
     rest = NUMBER.sub(" ", text).strip(BETWEEN)
     rest = rest.replace(",", " ").strip()
     if rest:

@@ -1,7 +1,7 @@
 """The bytes of an SVG file to a tree of nodes, each knowing its line and its parent.
 
-The tree is read as a stream over defusedxml. Document types are let pass (old programs write
-one), and so are short entities that stand for plain text (Adobe Illustrator writes them for its
+The tree is read as a stream over defusedxml. Document types are accepted (old programs write one),
+and so are short entities that stand for plain text (Adobe Illustrator writes them for its
 namespaces); entities made of entities or of files are an error, as their expansion can be endless.
 """
 
@@ -114,7 +114,7 @@ def parse_tree(data: bytes) -> Node:
 
 
 def _parser(builder: _Builder, data: bytes) -> Any:
-    """defusedxml's parser, which lets a few entities pass that are short and plain text.
+    """defusedxml's parser, which accepts a few entities that are short and plain text.
 
     It takes all data in one go: expat before 2.6 begins a long attribute anew with each portion.
 
