@@ -11,6 +11,7 @@ from camtool.planning.order import Choices, best_order, drawn, travel_mm
 
 pytestmark = pytest.mark.benchmark
 NONE = np.empty((0, 2), dtype=np.int64)
+ZERO = (0.0, 0.0)
 
 
 def squares(count: int) -> Choices:
@@ -29,6 +30,6 @@ def test_squares(benchmark: Any, what: str) -> None:
         return
     before = np.arange(2_000).reshape(-1, 2) if what == "nested" else NONE
     rows = benchmark.pedantic(lambda: best_order(choices, before), rounds=3, warmup_rounds=1)
-    length = travel_mm(choices, rows)
+    length = travel_mm(choices, rows, ZERO, ZERO)
     benchmark.extra_info["travel_mm"] = length
-    assert length < 0.1 * travel_mm(choices, drawn(choices))
+    assert length < 0.1 * travel_mm(choices, drawn(choices), ZERO, ZERO)
