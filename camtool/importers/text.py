@@ -287,7 +287,7 @@ MAX_CHARACTERS = 20_000
 MTEXT."""
 
 MAX_CHARACTERS_NAMED = 20
-"""So many of the characters that a font lacks are named."""
+"""At most this many of the characters that a font lacks are named."""
 
 MAX_NUMBER = 1e60
 """Sizes and places beyond it are refused: products of a few of them would not be finite."""

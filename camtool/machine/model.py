@@ -42,10 +42,10 @@ class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 FEED_TOLERANCE = 1e-9
-"""A feed may exceed its limit by this part of it: by rounding alone."""
+"""A feed may exceed its limit by this part of it, by rounding alone."""
 
 AS_CODED = 0.0
-"""`Axis.real_step_mm` before it becomes the coded step; not allowed in a file."""
+"""The value of `Axis.real_step_mm` before it is set to the coded step; no file can contain it."""
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -18,7 +18,8 @@ from camtool.errors import DrawingError
 from camtool.importers.svg.tree import Node
 
 MAX_MATCHES = 1_000_000
-"""So often a rule may be tested on an element; a file of rules alone could ask for billions."""
+"""At most this many comparisons of a rule with an element; a file of rules alone could need
+billions."""
 
 MAX_COMPOUNDS = 8
 """A selector of more steps than this is no selector of a drawing."""

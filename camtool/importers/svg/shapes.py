@@ -119,7 +119,8 @@ def _pair(z: complex) -> Floats:
 # (drawing up to an error).
 
 MAX_PATH_CHARACTERS = 50_000_000
-"""Path data of one element may be so long; their numbers would take some 3 GB."""
+"""Longest path data of one element; longer ones would take more than some 3 GB for their
+numbers."""
 
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])")
 _GAP = r"[ \t\r\n\f,]*+"
