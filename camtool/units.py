@@ -1,4 +1,4 @@
-"""Lengths, angles, feeds and times with their units, turned into plain floats at the door.
+"""Lengths, angles, feeds and times with their units, converted to plain floats on input.
 
 Inside camtool everything is mm, seconds and radians; feeds are mm/min in toolpaths.
 """
@@ -28,13 +28,13 @@ MM_PER_UNIT: dict[str, float] = {
     "q": 0.25,
     "px": 25.4 / 96.0,
 }
-"""Length units that a user may write, as mm (CSS 2.1 for pt, pc, q and px at 96 dpi)."""
+"""Units of lengths that a user may write, in mm (pt, pc, q, and px at 96 dpi as in CSS 2.1)."""
 
 RAD_PER_UNIT: dict[str, float] = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
-"""Units of angles that a user may write, as rad."""
+"""Units of angles that a user may write, in rad."""
 
 S_PER_UNIT: dict[str, float] = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
-"""Units of times that a user may write, as s."""
+"""Units of times that a user may write, in s."""
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^\d\s,]*)\s*")
@@ -51,7 +51,7 @@ def parse_length(text: str, *, name: str = "length") -> float:
     """
     value, unit = _split(text, name)
     if not unit and "/" in text:
-        # Fractions are inches, bare numbers millimetres: nobody can know which is meant.
+        # A fraction suggests inches, a bare number is mm: either may be meant.
         bare = text.strip()
         raise OptionError(
             f"{name} {text!r} has no unit", mend=f"write {bare}in, or {bare}mm if that is meant"
@@ -63,48 +63,49 @@ def parse_length(text: str, *, name: str = "length") -> float:
     return value * factor
 
 
-def parse_feed(text: str, *, name: str = "feed") -> float:
+def parse_feed(text: str) -> float:
     """`"0.8"`, `"0.8mm/min"`, `"2 in/min"` or `"0.01mm/s"` as mm/min.
 
     >>> parse_feed("0.8mm/min"), parse_feed("0.01 mm/s")
     (0.8, 0.6)
     """
-    value, unit = _split(text, name)
+    value, unit = _split(text, "feed")
     length, _, per = (unit or "mm/min").partition("/")
     minutes = {"min": 1.0, "s": 60.0}.get(per.strip())
     factor = MM_PER_UNIT.get(length.strip().lower())
     if minutes is None or factor is None:
-        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use mm/min or mm/s")
+        raise OptionError(f"unknown unit {unit!r} in feed {text!r}", mend="use mm/min or mm/s")
     return value * factor * minutes
 
 
-def parse_angle(text: str, *, name: str = "angle") -> float:
+def parse_angle(text: str) -> float:
     """`"30"`, `"30deg"`, `"30°"` or `"0.5rad"` as rad: a bare number is degrees.
 
     >>> parse_angle("180deg"), parse_angle("0.5 rad")
     (3.141592653589793, 0.5)
     """
-    value, unit = _split(text, name)
+    value, unit = _split(text, "angle")
     factor = RAD_PER_UNIT.get(unit.lower() or "deg")
     if factor is None:
-        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use deg or rad")
+        raise OptionError(f"unknown unit {unit!r} in angle {text!r}", mend="use deg or rad")
     return value * factor
 
 
-def parse_time(text: str, *, name: str = "time") -> float:
+def parse_time(text: str) -> float:
     """`"0.5"`, `"0.5s"`, `"200ms"`, `"1min"` or `"1h"` as s: a bare number is seconds.
 
     >>> parse_time("0.5"), parse_time("200 ms")
     (0.5, 0.2)
     """
-    value, unit = _split(text, name)
+    value, unit = _split(text, "time")
     factor = S_PER_UNIT.get(unit.lower() or "s")
     if factor is None:
-        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend="use s, ms, min or h")
+        raise OptionError(f"unknown unit {unit!r} in time {text!r}", mend="use s, ms, min or h")
     return value * factor
 
 
 def _split(text: str, name: str) -> tuple[float, str]:
+    """The number and the unit of a text; OptionError, with the `name` of the quantity, without."""
     comma = _COMMA.fullmatch(text)
     if comma is not None:
         raise OptionError(

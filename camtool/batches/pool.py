@@ -30,20 +30,23 @@ TICK_S = 0.2
 END_S = 2.0
 """How long a worker may take to end before it is killed."""
 
+RECYCLE_AFTER = 200
+"""After how many drawings a new worker takes the place of an old one."""
+
+RECYCLE_MIB = 1024.0
+"""A worker that has taken more memory than this, MiB, is replaced too."""
+
 FAILED_STARTS = 3
 """The run ends when this many workers in a row die before they are ready."""
 
 
 @dataclass(frozen=True)
 class PoolOptions:
-    """`jobs` processes, each drawing in at most `timeout_s` (None: no limit). A worker is replaced
-    after `recycle_after` drawings, or when it has taken more than `recycle_mib` MiB. With
-    `first_alone` the others start when the first one is ready: it compiles what they all load."""
+    """`jobs` processes, each drawing in at most `timeout_s` (None: no limit). With `first_alone`,
+    the others start when the first one is ready: it compiles what they all load."""
 
     jobs: int = 1
     timeout_s: float | None = None
-    recycle_after: int = 200
-    recycle_mib: float = 1024.0
     first_alone: bool = False
 
 
@@ -131,7 +134,7 @@ class LocalPool:
         made, peak_mib = message
         task, worker.task = worker.task, None
         worker.done += 1
-        if worker.done >= self._options.recycle_after or peak_mib > self._options.recycle_mib:
+        if worker.done >= RECYCLE_AFTER or peak_mib > RECYCLE_MIB:
             self._drop(worker)
         return None if task is None else (task, made)
 

@@ -1,18 +1,18 @@
-"""Tool tables of LinuxCNC: the tools that a machine holds, by number.
+"""Tool tables of LinuxCNC: the tools of a machine by number.
 
     T1 P1 Z0.511 D0.125 ;1/8 end mill
 
 A line holds words, a letter and a number each, in any order; T (the tool) and P (its pocket) must
-be there, each tool once. Behind `;` stands a remark. A line without words is passed over. Format:
-LinuxCNC's manual, "Tool Table Format". Lengths are in the machine's units, which the file does
-not say; the diameter is what is used here.
+be there, each tool once. A remark follows `;`. Lines without words are skipped. Format: LinuxCNC's
+manual, "Tool Table Format". Lengths are in the machine's units, which the file does not name. Of
+the words, only the tool's number and its diameter are used here.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from camtool.errors import OptionError
@@ -27,13 +27,11 @@ _WHOLE = re.compile(r"\d+")
 
 @dataclass(frozen=True)
 class TableTool:
-    """One line: `number` and `pocket`; `diameter` in the table's unit, None when it has no D;
-    the other words by letter in `offsets`; the `remark` as it stands."""
+    """One line: the tool's `number`; its `diameter` in the table's unit, None without a D; the
+    `remark` as it stands; the number of the `line`."""
 
     number: int
-    pocket: int
     diameter: float | None
-    offsets: Mapping[str, float]
     remark: str
     line: int
 
@@ -79,12 +77,11 @@ def _words(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _tool(words: dict[str, str], remark: str, line: int) -> TableTool:
-    number, pocket = (_whole(words, letter) for letter in "TP")
-    diameter = float(words.pop("D")) if "D" in words else None
+    number, _ = (_whole(words, letter) for letter in "TP")
+    diameter = float(words["D"]) if "D" in words else None
     if diameter is not None and not 0.0 <= diameter < math.inf:
         raise OptionError(f"D{diameter:g} is no diameter", mend="give a D of 0 or more")
-    offsets = {letter: float(value) for letter, value in words.items()}
-    return TableTool(number, pocket, diameter, offsets, remark, line)
+    return TableTool(number, diameter, remark, line)
 
 
 def _whole(words: dict[str, str], letter: str) -> int:
@@ -93,7 +90,7 @@ def _whole(words: dict[str, str], letter: str) -> int:
         raise OptionError(
             f"the word {letter} is missing", mend=f"give every tool a T and a P, such as {letter}1"
         )
-    text = words.pop(letter)
+    text = words[letter]
     if not _WHOLE.fullmatch(text):
         raise OptionError(f"{letter}{text} is no whole number", mend=f"write it like {letter}1")
     return int(text)

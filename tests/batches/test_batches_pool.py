@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from camtool.batches import pool
 from camtool.batches.pool import LocalPool, PoolOptions
 from camtool.batches.run import Made, Task
 from camtool.errors import CamtoolError
@@ -20,8 +21,8 @@ def tasks_of(folder: Path, *contents: str) -> list[Task]:
 
 
 def run(tasks: list[Task], work: Obedient | None = None, **options: object) -> dict[str, Made]:
-    pool = LocalPool(work or Obedient(), PoolOptions(**options))  # type: ignore[arg-type]
-    results = [each for each in pool.results(tasks) if each is not None]
+    workers = LocalPool(work or Obedient(), PoolOptions(**options))  # type: ignore[arg-type]
+    results = [each for each in workers.results(tasks) if each is not None]
     assert not multiprocessing.active_children()
     made = {task.stem: made for task, made in results}
     assert len(made) == len(results)
@@ -54,16 +55,24 @@ def test_one_that_takes_too_long_is_killed(tmp_path: Path) -> None:
     assert made["1"].error is None
 
 
-def test_workers_are_replaced_before_they_grow(tmp_path: Path) -> None:
-    for options in ({"recycle_after": 2}, {"recycle_mib": 0.001, "recycle_after": 99}):
-        made = run(tasks_of(tmp_path, *["pid"] * 4), jobs=1, **options)
-        assert len({made[n].files[".out"] for n in "0123"}) == 2 + 2 * ("recycle_mib" in options)
+@pytest.mark.parametrize(
+    ("bound", "value", "workers"), [("RECYCLE_AFTER", 2, 2), ("RECYCLE_MIB", 0.001, 4)]
+)
+def test_workers_are_replaced_before_they_grow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bound: str, value: float, workers: int
+) -> None:
+    monkeypatch.setattr(pool, bound, value)
+    made = run(tasks_of(tmp_path, *["pid"] * 4), jobs=1)
+    assert len({made[n].files[".out"] for n in "0123"}) == workers
 
 
-def test_the_memory_of_the_parent_is_not_the_worker_s(tmp_path: Path) -> None:
+def test_the_memory_of_the_parent_is_not_the_worker_s(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pool, "RECYCLE_MIB", 600.0)
     much = bytearray(700 << 20)
     much[:: 1 << 12] = b"x" * len(much[:: 1 << 12])  # every page is really there
-    made = run(tasks_of(tmp_path, *["pid"] * 3), jobs=1, recycle_mib=600.0)
+    made = run(tasks_of(tmp_path, *["pid"] * 3), jobs=1)
     assert len(much) == 700 << 20
     assert len({made[n].files[".out"] for n in "012"}) == 1
 
