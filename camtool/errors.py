@@ -4,16 +4,16 @@
     ├── InputError               a file cannot be used (also ValueError)
     │   ├── DrawingError         a drawing; `where` names layer, entity or line
     │   └── ProgramError         a machine program; `where` names block and column
-    ├── GeometryError            numbers that are no polyline (also ValueError)
+    ├── GeometryError            numbers that form no polyline (also ValueError)
     ├── OptionError              a flag or a job setting out of its range (also ValueError)
     ├── MachineError             a machine file: file, table, key (also ValueError)
     │   └── UnknownTargetError   no such target
     ├── PostError                what this machine cannot do (also ValueError)
     └── OutputError              a file that cannot be written (also OSError)
 
-Every message is one line: what is wrong, where, and how to mend it. Findings of severity
-error are no exceptions: they are collected (see `camtool.findings`) and give exit code 1.
-Anything else that escapes is a fault of camtool itself: exit code 3.
+Every message is one line: what is wrong, where, and how to fix it. Findings of severity
+error are not exceptions: they are collected (see `camtool.findings`) and give exit code 1.
+Any other exception is a fault of camtool itself: exit code 3.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ class CamtoolError(Exception):
     def __str__(self) -> str:
         head = "".join(f"{part}: " for part in (self.file, self.where) if part)
         message, mend = (" ".join(words.split()) for words in (self.message, self.mend))
-        # One line that can be seen whatever a file name or a layer name holds.
+        # One line, whatever characters the name of a file or a layer has.
         return one_line(f"{head}{message}{f'; {mend}' if mend else ''}")
 
 
 class InputError(CamtoolError, ValueError):
-    """A file cannot be used as what it was given for."""
+    """A file cannot be used for what it was given."""
 
 
 class DrawingError(InputError):

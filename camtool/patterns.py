@@ -1,5 +1,5 @@
-"""Patterns of names: `*`, `?` and `[…]`, the same in any case, as names are in CAD; and guesses
-which name was meant."""
+"""Patterns of names: `*`, `?` and `[…]`, in any case, as CAD has names; and guesses which name was
+meant."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from fnmatch import translate
 
 
 def matches(patterns: Iterable[str], name: str) -> bool:
-    """Whether any of the patterns is the whole name."""
+    """Whether any of the patterns matches the whole name."""
     folded = name.casefold()
     return any(re.fullmatch(translate(pattern.casefold()), folded) for pattern in patterns)
 
 
 def guess(word: str, known: Iterable[str]) -> str:
-    """ "did you mean NAME? " for the known name that is most like the word; "" when none is."""
+    """ "did you mean NAME? " with the known name that is most similar; "" when none is similar."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

@@ -1,9 +1,9 @@
-"""Words that come from anywhere, made fit to be shown: names of drawings, layers, files, machines.
+"""Text from files (names of drawings, layers, files, machines), made safe to show.
 
-A terminal obeys what it is shown: an escape sequence in a layer's name may move the cursor, rename
-the window or write to the clipboard (ECMA-48), and an override of the writing direction makes a
-name read as another one (Unicode Standard Annex 9). What cannot be seen is shown as an escape. A
-JSON text says the same by JSON's own escapes, so that who reads it has the very name.
+A terminal obeys control characters: an escape sequence in a layer's name may move the cursor,
+rename the window or write to the clipboard (ECMA-48), and an override of the writing direction
+makes a name look like another one (Unicode Standard Annex 9). Characters that cannot be seen are
+shown as escapes. JSON text has JSON's own escapes instead, so that its reader gets the exact name.
 """
 
 from __future__ import annotations
@@ -21,22 +21,23 @@ LONGEST_LINE = 2000
 
 _LONG = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 _BYTES_FROM = 0xDC00
-"""Python's stand-in for the byte 00 of a file name that is not of the system's encoding."""
+"""The surrogate by which Python stands for byte 0 of a file name in another encoding."""
 
-_UNSEEN = re.compile(
+_INVISIBLE = re.compile(
     "[\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
     "\ud800-\udfff\U0001d173-\U0001d17a\U000e0000-\U000e0fff]"
 )
-"""What JSON leaves as it is, and nobody sees: controls, formats, halves of surrogate pairs."""
+"""Invisible characters that JSON leaves as they are: control and format characters, halves of
+surrogate pairs."""
 
 
 def one_line(text: str) -> str:
-    r"""The text as one line that can be seen, long names and long lines shortened.
+    r"""The text as one line without invisible characters, long words and long lines shortened.
 
     >>> print(one_line("a\x1b[2Jb\nc"), one_line("x" * 1000)[118:124])
     a\x1b[2Jb\nc xx…xxx
     """
-    shown = text if text.isprintable() else "".join(map(_seen, text))
+    shown = text if text.isprintable() else "".join(map(_visible, text))
     if len(shown) > LONGEST_WORD:
         shown = _LONG.sub(lambda found: _shortened(found[0], LONGEST_WORD), shown)
     return shown if len(shown) <= LONGEST_LINE else _shortened(shown, LONGEST_LINE)
@@ -44,23 +45,23 @@ def one_line(text: str) -> str:
 
 def to_json(value: Any, indent: int = 2) -> str:
     """Records, lists, tables and plain values as a JSON text that ends with a line break, on one
-    line where `indent` is 0; names that are no text keep their bytes as \\udcXX."""
+    line where `indent` is 0; bytes of names that are not text appear as \\udcXX."""
     import msgspec
 
     try:
         text = msgspec.json.format(msgspec.json.encode(value), indent=indent).decode()
     except UnicodeEncodeError:
         text = json.dumps(msgspec.to_builtins(value), indent=indent or None, ensure_ascii=False)
-    return _UNSEEN.sub(lambda found: json.dumps(found[0])[1:-1], text) + "\n"
+    return _INVISIBLE.sub(lambda found: json.dumps(found[0])[1:-1], text) + "\n"
 
 
-def _seen(sign: str) -> str:
-    if sign.isprintable() or category(sign) == "Zs":
-        return sign
-    number = ord(sign)
+def _visible(char: str) -> str:
+    if char.isprintable() or category(char) == "Zs":
+        return char
+    number = ord(char)
     if _BYTES_FROM + 0x80 <= number <= _BYTES_FROM + 0xFF:
         return f"\\x{number - _BYTES_FROM:02x}"
-    return sign.encode("unicode_escape", "surrogatepass").decode()
+    return char.encode("unicode_escape", "surrogatepass").decode()
 
 
 def _shortened(text: str, length: int) -> str:

@@ -1,8 +1,8 @@
-"""TOML in, a frozen record out, strictly: every fault is named by file, table and key.
+"""TOML files as frozen records, read strictly: every error names file, table and key.
 
 Machine files, job files and measurements come through here. `read_table` reads a file, `convert`
-makes the record of it: an unknown key, a wrong type or a number out of its range is an error that
-says what may stand there.
+makes a record of it: an unknown key, a wrong type or a number out of range is an error that says
+which values are allowed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DEEPEST = 50
 """Deepest nesting of tables and lists; those of machines and jobs are five deep at most."""
 
 _PARTS = re.compile(r"[=,{}\[\]\n]")
-"""Between these a TOML text holds one key or one value."""
+"""The characters between keys and values of TOML text."""
 
 MOST_SHOWN = 40
 """Messages do not repeat numbers of more characters."""
@@ -34,7 +34,7 @@ _T = TypeVar("_T")
 
 
 def read_table(path: Path) -> Table:
-    """A TOML file as nested dicts; MachineError with line and column when it is none."""
+    """A TOML file as nested dicts; MachineError with line and column for a syntax error."""
     try:
         data = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
@@ -46,14 +46,14 @@ def read_table(path: Path) -> Table:
         return parsed_table(data.decode())
     except UnicodeDecodeError as error:
         raise MachineError("is not UTF-8 text", file=str(path)) from error
-    except ValueError as error:  # TOMLDecodeError, or a whole number of too many digits
+    except ValueError as error:  # TOMLDecodeError, or an integer of too many digits
         raise MachineError(f"is no TOML: {error}", file=str(path)) from error
 
 
 def parsed_table(text: str) -> Table:
-    """TOML text as nested dicts; TOMLDecodeError for what is none or nested deeper than DEEPEST,
-    ValueError for a whole number of too many digits."""
-    # Of a key of n parts tomllib keeps all n beginnings: n²/2 parts.
+    """TOML text as nested dicts; TOMLDecodeError for a syntax error and for nesting deeper than
+    DEEPEST, ValueError for an integer of too many digits."""
+    # For a key of n parts tomllib keeps all its n beginnings, n²/2 parts.
     if any(part.count(".") > DEEPEST for part in _PARTS.split(text)):
         raise tomllib.TOMLDecodeError(f"a key has more than {DEEPEST} parts")
     try:
@@ -111,12 +111,12 @@ _OUT_OF_RANGE = (
     *(f"Expected `{of}` {than}" for of in ("int", "float") for than in "<>"),
     "Number out of range",  # a whole one that is no float
 )
-"""How msgspec begins to say that a number is outside of its range."""
+"""How messages of msgspec about a number out of range begin."""
 
 
 def _outside(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
-    """What is wrong with the number at `keys` ("axes", "x", "travel_mm"; "play_mm[0][1]"); ""
-    where its range has not both ends."""
+    """The message for a number out of range at `keys` ("axes", "x", "travel_mm";
+    "play_mm[0][1]"); "" where the range lacks an end."""
     *_, (about, value) = _down(kind, table, keys)
     about = _fitting(about, value)
     if about.ge is None or about.le is None:
@@ -129,7 +129,7 @@ def _outside(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
 
 
 def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
-    """The words that may stand at `keys`, and the one that was meant; "" where any may."""
+    """Which words are allowed at `keys`, and a guess which was meant; "" where any word is."""
     *above, (about, value) = _down(kind, table, keys)
     words = [
         word
@@ -137,7 +137,7 @@ def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
         if isinstance(one, msgspec.inspect.LiteralType)
         for word in one.values
     ]
-    if above:  # the key that says which of several models a table is of
+    if above:  # the key that names the model of a table
         key = re.findall(r"[^.\[\]]+", ".".join(keys))[-1]
         words += [
             one.tag
@@ -149,7 +149,7 @@ def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
 
 
 def _down(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator[tuple[Any, Any]]:
-    """(what is known, value) of a table, and of what lies within it on the way along `keys`."""
+    """Type information and value of a table, and of each part of it along `keys`."""
     about: Any = msgspec.inspect.type_info(kind)
     value: Any = table
     yield about, value
@@ -160,19 +160,19 @@ def _down(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator
 
 
 def _part(about: Any, value: Any, key: int | str) -> Any:
-    """What is known of the part `key` of a table or a list of which `about` is known."""
+    """Type information of the part `key` of a table or a list with the type `about`."""
     about = _fitting(about, value)
     if isinstance(about, msgspec.inspect.StructType):
         found = (field.type for field in about.fields if field.encode_name == key)
-        return next(found, None)  # none is the key that names the model
+        return next(found, None)  # None for the key that names the model
     if isinstance(about, msgspec.inspect.TupleType):
         return about.item_types[int(key)]
-    return getattr(about, "item_type", None)  # nothing is known of a table of no known model
+    return getattr(about, "item_type", None)  # None for a table of an unknown model
 
 
 def _fitting(about: Any, value: Any) -> Any:
-    """Of what may stand in one place, that which such a value means: the table of its model, the
-    number where there may be none."""
+    """Of the types that are allowed in one place, the one for this value: the table of its model,
+    or the type beside None."""
     for one in getattr(about, "types", (about,)):
         if isinstance(one, msgspec.inspect.StructType):
             if one.tag is None or value.get(one.tag_field) == one.tag:
@@ -183,8 +183,8 @@ def _fitting(about: Any, value: Any) -> Any:
 
 
 def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
-    """The key that was meant, and those that a table knows; where models have tables of their
-    own, that of its model."""
+    """A guess which key was meant, and the keys of the table; where each model has a table of its
+    own, the keys of that."""
     record: Any = kind
     for name in tables:
         fields = {f.name: f.type for f in msgspec.structs.fields(record)}
@@ -201,7 +201,7 @@ def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
 
 
 def _finite(value: object, file: str, at: str) -> None:
-    """TOML knows inf and nan; no machine does."""
+    """MachineError for inf and nan, which TOML allows and no machine has."""
     if isinstance(value, float) and not math.isfinite(value):
         raise MachineError("is not finite", file=file, where=f"key {at}")
     items: Callable[[], Any] | None = getattr(value, "items", None)

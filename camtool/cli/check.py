@@ -207,7 +207,7 @@ def _layers(facts: dict[str, Any], most: int | None) -> _Rows:
 
 
 def _entities(facts: dict[str, Any]) -> _Rows:
-    """What of the file was used, what was not, and what was mended."""
+    """What of the file was used, what was not, and what was repaired."""
     used = ", ".join(f"{count} {kind}" for kind, count in facts["entities_used"].items())
     yield "entities", used or "none"
     for item in facts["entities_not_used"]:

@@ -1,7 +1,7 @@
 """The command `camtool`: the group, and the one place where errors become exit codes.
 
 0 fine · 1 the job has findings of severity error · 2 wrong use or bad input · 3 a fault of ours ·
-130 interrupted · 141 the reader of stdout is gone.
+130 interrupted · 141 the reader of stdout has gone.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ EXIT_PIPE = 128 + 13
 it."""
 
 AGAIN_S = 0.01
-"""After this, an interruption that was lost is repeated."""
+"""After this time an interruption that was lost is repeated."""
 
 _FULL = (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG)
 """Errors of a full or closed stream, which name no file."""
 
 GARBAGE_AFTER = 50_000
-"""How many more objects are made than freed before Python looks for rings of garbage; its own 700
-is for programs that live long. Loading the libraries makes half a million that stay."""
+"""How many more objects are made than freed before Python looks for cycles of garbage. Its default
+of 700 suits programs that run long; loading the libraries makes half a million lasting objects."""
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -68,7 +68,7 @@ def cli() -> None:
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool filter  logo.dxf                    LinuxCNC opens the drawing
-    camtool stale   drawings/ -t pic-mmh        programs that are not of their drawings now
+    camtool stale   drawings/ -t pic-mmh        programs that are out of date
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure
@@ -88,16 +88,16 @@ cli.add_command(completion)
 def main() -> NoReturn:
     """Run the command line; never returns. One line on stderr for every error."""
     _keep_streams()
-    _seldom_collected()
-    sys.unraisablehook = _once_more
+    _collect_seldom()
+    sys.unraisablehook = _repeat_interrupt
     if VARIABLE in os.environ:
         answer_shells(cli)
     code = _code(debug="--debug" in sys.argv[1:])
-    # All is done: an interruption now would only print a traceback of Python's own end.
+    # All is done: an interruption now would only show a traceback while Python ends.
     with suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _let_go(sys.stdout)
-    _let_go(sys.stderr)
+    _flush(sys.stdout)
+    _flush(sys.stderr)
     sys.exit(code)
 
 
@@ -119,7 +119,7 @@ def _code(*, debug: bool) -> int:
         _trace(debug)
         say_error(error)
         return error.exit_code
-    except BrokenPipeError:  # the reader of our stdout has seen enough: as other tools, no word
+    except BrokenPipeError:  # the reader of our stdout has gone: no message, as with other tools
         return EXIT_PIPE
     except Exception as error:
         _trace(debug)
@@ -149,7 +149,7 @@ def _run() -> int:
             raise OutputError(f"cannot be written ({error.strerror})", file="<stdout>") from error
         if error.filename is None or isinstance(error, CamtoolError):
             raise
-        # A name that the system does not take, wherever it was asked: too long, a loop of links.
+        # A name that the system refuses, in any place: too long, a loop of links.
         name = os.fsdecode(error.filename)
         raise InputError(f"cannot be used ({error.strerror})", file=name) from error
     return code if isinstance(code, int) else 0
@@ -162,20 +162,19 @@ def _trace(debug: bool) -> None:
 
 
 def _keep_streams() -> None:
-    """Take the numbers of streams that were closed, so that no file that is opened gets one and is
-    written to by whoever means the stream; Python itself says None for such a stream. Let what the
-    terminal's encoding lacks be shown as an escape."""
+    """Open /dev/null in place of standard streams that are closed, so that no file gets their
+    numbers and the messages with them. Show characters that the terminal lacks as escapes."""
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # the least number that is free: this one
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free number, which is this one
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-def _let_go(stream: TextIO | None) -> None:
-    """Flush a stream; what it does not take is dropped, so that Python does not try again."""
+def _flush(stream: TextIO | None) -> None:
+    """Flush a stream; drop what it does not take, so that Python does not try again."""
     if stream is None:
         return
     try:
@@ -184,7 +183,7 @@ def _let_go(stream: TextIO | None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _once_more(lost: sys.UnraisableHookArgs) -> None:
+def _repeat_interrupt(lost: sys.UnraisableHookArgs) -> None:
     """Repeat a Ctrl-C that came where Python can raise nothing (while an object is deleted)."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         # Not in here: it would be lost as well.
@@ -193,7 +192,7 @@ def _once_more(lost: sys.UnraisableHookArgs) -> None:
         sys.__unraisablehook__(lost)
 
 
-def _seldom_collected() -> None:
+def _collect_seldom() -> None:
     """Spare a short run the search for garbage: seldom during it, and never at its end."""
     gc.set_threshold(GARBAGE_AFTER)
     atexit.register(gc.freeze)

@@ -1,4 +1,4 @@
-"""What a command shows to people: messages and findings, summaries in colour, signs of life.
+"""What a command shows to people: messages and findings, summaries in colour, elapsed seconds.
 
 Messages always go to stderr, so that stdout stays for machines. Streams that are no terminal get
 the same words without colours. Colours are click's and not rich's: loading rich takes a tenth of
@@ -66,7 +66,7 @@ def in_colour(stream: TextIO | None) -> bool:
 
 
 def say_error(error: CamtoolError) -> None:
-    """Show an error on one line; how to mend it is bold on a terminal."""
+    """Show an error on one line; how to fix it is bold on a terminal."""
     text, mend = one_line(f"camtool: error: {error}"), one_line(" ".join(error.mend.split()))
     if mend and text.endswith(mend) and in_colour(sys.stderr):
         text = text.removesuffix(mend) + click.style(mend, bold=True)

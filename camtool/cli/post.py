@@ -216,8 +216,8 @@ ANY_MACHINE = "travel, rates and backlash are placeholders: camtool targets new 
 
 @dataclass(frozen=True)
 class Asked:
-    """What the user wants written; `source` names what it is made of, and `output` the program.
-    `reads` are all files that are read for it."""
+    """What the user wants written: `source` names the drawing or program that is read, `output`
+    the program that is written; `reads` are all files that are read."""
 
     source: str
     output: str | None
@@ -241,9 +241,9 @@ class Asked:
 
 
 def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bool) -> int:
-    """Writes what was made and says so; the exit code. `picture` draws the ones that were asked.
+    """Write what was asked for, and say so; the exit code. `picture` draws the pictures.
 
-    Where something is wrong only the page that was asked for is written: it says what.
+    With an error, only the page of `--report` is written: it shows what is wrong.
     """
     outputs = asked.outputs
     say_findings(run.findings, quiet=quiet, verbose=verbose)
@@ -251,7 +251,7 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
         write_all(_page_alone(run, outputs, picture))
         no = "nothing" if outputs.page is None else "no program"
         say(
-            f"camtool: error: {asked.source}: {no} was written; mend the errors above",
+            f"camtool: error: {asked.source}: {no} was written; fix the errors above",
             quiet=False,
         )
         return 1
@@ -275,15 +275,15 @@ def _page_alone(run: Run, outputs: Outputs, picture: Painter) -> dict[str, bytes
     return files if linked is None or linked in files else {**files, linked: picture(linked)}
 
 
-# `--watch`: the same again whenever one of its files has changed. Files are looked at by their
-# content, so that a save without a change does nothing and no clock of a network drive matters. A
-# change counts when it has settled: an editor may write in several goes.
+# `--watch`: posts again whenever one of the files has changed. The content counts, not the time: a
+# save without a change does nothing, and the clock of a network drive does not matter. A change
+# counts when the content stays the same for a while: an editor may write in several steps.
 
 POLL_S = 0.4
-"""Files are looked at so often."""
+"""How often files are looked at."""
 
 SETTLED_S = 0.2
-"""A change counts when the files are the same after so long."""
+"""For how long the files must stay the same before a change counts."""
 
 Files = Callable[[], Sequence[str]]
 Digests = dict[str, bytes | None]
@@ -296,10 +296,10 @@ def watch(
     quiet: bool,
     wait: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Calls `again` now and after each change of the `files`, until Ctrl-C; then 0.
+    """Call `again` now and after each change of the `files`, until Ctrl-C; then 0.
 
-    Which files these are may change with what they hold: a job file names a tool table.
-    An error is shown on one line, and watching goes on: the next save may mend it.
+    The list of files may change with their content: a job file names a tool table.
+    An error is shown on one line, and watching goes on: the next save may fix it.
     """
     try:
         seen = _digests(files)
@@ -326,7 +326,7 @@ def _tried(again: Callable[[], int]) -> None:
 
 
 def _settled(files: Files, seen: Digests, wait: Callable[[float], None]) -> Digests:
-    """What the files hold; where that has changed, once it stays the same."""
+    """The content of the files as digests; after a change, once it stays the same."""
     now = _digests(files)
     while now != seen:
         wait(SETTLED_S)
@@ -337,7 +337,7 @@ def _settled(files: Files, seen: Digests, wait: Callable[[float], None]) -> Dige
 
 
 def _digests(files: Files) -> Digests:
-    """The content of each file as a digest; None for what cannot be read just now."""
+    """The content of each file as a digest; None when it cannot be read just now."""
     return {file: _digest(Path(file)) for file in files()}
 
 

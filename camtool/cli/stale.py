@@ -1,4 +1,4 @@
-"""`camtool stale`: are the programs of drawings what camtool would write of them now?"""
+"""`camtool stale`: which programs differ from what camtool would write now?"""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Program
 
 
-@click.command(cls=SectionedCommand, short_help="Programs that are not of their drawings now.")
+@click.command(cls=SectionedCommand, short_help="Programs that are out of date.")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @posting_options
 @click.option(
@@ -41,12 +41,12 @@ def stale(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Compare programs with what camtool would write now of their drawings.
+    """Compare programs with what camtool would write now for their drawings.
 
     Each FILE is a drawing, its program or its job file (part.dxf, part.nc, part.toml), or a folder
     to search for drawings; with --programs a drawing or folder. Give the flags that the programs
-    were posted with. Nothing is written; exit code 1 when a program is not byte for byte what it
-    should be.
+    were posted with. Nothing is written; exit code 1 when a program is not byte for byte what
+    camtool writes now.
     """
     target = posting.load()
     posting = replace(posting, no_verify=not posting.gates.given)
@@ -61,7 +61,7 @@ def stale(
             expected = _posted(drawing, posting, target, quiet=quiet)
             fault = _fault(drawing, name, expected, missing=missing)
             faults += [] if fault is None else [fault]
-            if fault is None:  # of several drawings of one name the program is of one
+            if fault is None:  # of several drawings of one name, the program needs to match one
                 break
         else:
             say(f"camtool: error: {faults[0].words}", quiet=False)
@@ -71,14 +71,14 @@ def stale(
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a program is not what it should be, and the exit code of that."""
+    """Why a program is out of date, and the exit code for it."""
 
     code: int
     words: str
 
 
 def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
-    """The drawings that these files are, belong to or contain, by their names without suffix.
+    """The drawings among these files, beside them or in them, by their names without suffix.
 
     A picture of a program may lie beside its drawing as an SVG of the same name, so that one name
     may have several; the likeliest is first. InputError for what is not there.
@@ -136,7 +136,7 @@ def _has_program(name: Path) -> bool:
 def _posted(
     drawing: Path, posting: Posting, target: LoadedTarget, *, quiet: bool
 ) -> Program | Fault:
-    """The program that would be written of a drawing now, or why there is none."""
+    """The program that camtool writes for a drawing now, or why there is none."""
     try:
         run = posting.of(str(drawing)).make(str(drawing), target, quiet=quiet)
     except CamtoolError as error:
@@ -149,7 +149,7 @@ def _posted(
 
 
 def _fault(drawing: Path, name: Path, expected: Program | Fault, *, missing: bool) -> Fault | None:
-    """What is wrong with a drawing's program; None when it is as it should be."""
+    """Why the program of a drawing is out of date; None when it is not."""
     if isinstance(expected, Fault):
         return expected
     place = Path(f"{name}{expected.extension}")

@@ -160,7 +160,7 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
             show_text("\n" + "\n".join(_backlash_table(name, cells, loaded.machine)), err=True)
     for code in loaded.target.codes:
         grave = " or ".join(severity.name.lower() for severity in code.severities)
-        show_text(f"\n{code.name} ({grave}): {code.means}; mend: {code.mend}", err=True)
+        show_text(f"\n{code.name} ({grave}): {code.means}; to fix it: {code.mend}", err=True)
     show_text(
         f"\nhighest feed {_speed(loaded.machine.max_feed_mm_min)}, "
         f"rapids {_speed(loaded.machine.rapid_mm_min)}; "

@@ -1,7 +1,7 @@
-"""The job that a job file and the flags say together.
+"""The job that a job file and the flags give together.
 
     safe_z = "0.5mm"                # the job as a whole
-    depth = "0.1mm"                 # keys of operations up here hold for all that know them
+    depth = "0.1mm"                 # keys of operations up here hold for all that have them
     [place]                         # the drawing in the work frame
     [stock]
     [tools.finish]
@@ -76,7 +76,7 @@ class JobTables:
 
 
 def read_job_file(path: Path) -> JobTables:
-    """The tables of a job file; OptionError names file, table, key and mend."""
+    """The tables of a job file; OptionError names file, table and key, and says how to fix it."""
     try:
         values = read_table(path)
     except MachineError as error:
@@ -159,7 +159,8 @@ def _tool_tables(values: dict[str, Any], file: str) -> dict[str, Table]:
 
 def build_job(file: JobTables, flags: JobTables, chosen: tuple[str, ...] = ()) -> Job:
     """The job of a file with the flags over it, of the operations that are `chosen` by name or
-    number (none: all). OptionError names file, table and key, or the flag, and the mend."""
+    number (none: all). OptionError names file, table and key, or the flag, and says how to
+    fix it."""
     whole = flags.whole.over(file.whole)
     tools = _tools(file, whole)
     tables = file.operations or (Table(),)
@@ -233,7 +234,7 @@ def _operation(
 
 
 def _unknown(name: str, kind: str) -> tuple[str, str]:
-    """What is wrong with a key that a kind of operation does not know, and the mend."""
+    """What is wrong with a key that a kind of operation does not know, and how to fix it."""
     known = [key for key in OPERATION if kind in OPERATION[key].kinds]
     return f"means nothing to the kind {kind}", f"it has: {', '.join(known)}, tool"
 

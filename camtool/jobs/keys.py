@@ -6,7 +6,7 @@
     WHOLE, PLACE, STOCK, TOOL, OPERATION: every key, table by table; FLAGS: those that are flags
 
 Whatever is wrong is an OptionError that names the file, the table and the key (or the flag), and
-the mend. docs/jobs.md explains the keys; a test keeps the page and these tables equal.
+says how to fix it. docs/jobs.md explains the keys; a test keeps the page and these tables equal.
 """
 
 from __future__ import annotations
