@@ -1,9 +1,9 @@
-"""The house from Python: what the commands do, as functions on values.
+"""The Python API: what the commands do, as functions on values.
 
-`import camtool` gives all of it. Values go from one call to the next; none of these calls writes
-a file. Lengths are mm, angles rad, feeds mm/min, errors of reports µm. Whatever a user can do
-wrong raises a CamtoolError with one line that says what, where, and how to mend it; what is wrong
-with a part is no exception but a finding in the result.
+`import camtool` provides all of it. The result of one call is passed to the next; none of these
+calls writes a file. Lengths are mm, angles rad, feeds mm/min, errors of reports µm. A mistake of
+the caller raises a CamtoolError with one line that says what is wrong, where, and how to correct
+it; what is wrong with a part is a finding in the result, not an exception.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from camtool.calibration.calibrate import Calibration, to_text
 from camtool.calibration.calibrate import calibrate as calibrated
-from camtool.comparison import Comparison, Way, compare_program, ways_of
+from camtool.comparison import Comparison, Variant, compare_program, variants_of
 from camtool.errors import CamtoolError, OptionError, ProgramError
 from camtool.geometry.drawing import Drawing
 from camtool.jobs.keys import field_value
@@ -78,15 +78,15 @@ __all__ = [
 ]
 
 
-# What is read from files: drawings, jobs, programs.
+# Drawings, jobs and programs from files.
 
 BYTES = "<bytes>"
 """What messages call a program that was given as bytes."""
 
 
 class Reading(TypedDict, total=False):
-    """How a drawing is read: the fields of `camtool.importers.ReadOptions`, and of its
-    `Selection` (patterns of layers, colours and line types; none takes all)."""
+    """How a drawing is read: the fields of `camtool.importers.options.ReadOptions`, and of its
+    `Selection` (patterns of layers, colours and line types; without patterns, all)."""
 
     units: str | None
     tolerance_mm: float
@@ -113,7 +113,7 @@ _LENGTHS = ("tolerance_mm", "gap_mm", "section_z_mm")
 
 
 def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
-    """Several patterns, or one as it is."""
+    """The patterns; a single one may be given as it is."""
     return (given,) if isinstance(given, str) else tuple(given)
 
 
@@ -124,9 +124,9 @@ def read_drawing(
 
     `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
     `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines
-    and arcs are exact, other curves become arcs within `tolerance_mm`: that of the `target` if
-    one is given. Tolerances are of the part: give its `scale` where a job scales it. Raises
-    DrawingError, and OptionError for a way of reading that cannot be. Source: docs/formats.md.
+    and arcs are exact; other curves become arcs within `tolerance_mm`, by default that of the
+    `target` if one is given. Tolerances apply to the part: give its `scale` where a job scales it.
+    Raises DrawingError, and OptionError for options that cannot be. Source: docs/formats.md.
     """
     from camtool.importers.read import read_drawing as read
 
@@ -134,7 +134,7 @@ def read_drawing(
 
 
 def _read_options(target: str | LoadedTarget | None, reading: Reading) -> ReadOptions:
-    """How a drawing is read; tolerances that are not given are those of the `target`."""
+    """The options of reading a drawing; by default tolerances are those of the `target`."""
     from camtool.importers.options import ReadOptions, Selection
     from camtool.importers.pieces import colour_named
 
@@ -158,12 +158,11 @@ def read_job(
     drawing: Drawing | str | Path | None = None,
     target: str | LoadedTarget | None = None,
 ) -> Job:
-    """The job that a TOML file says: tools, operations in order, placement, stock; mm, rad, s,
-    mm/min.
+    """The job in a TOML file: tools, operations in order, placement, stock; mm, rad, s, mm/min.
 
-    `operations`: only those, by name or number. Layers and colours that the `drawing` has not are
-    refused, where one is given; its file is read as finely as the `target` needs. Raises
-    OptionError, which names file, table, key and mend. Source: docs/jobs.md.
+    `operations`: only those, by name or number. With a `drawing`, layers and colours that it lacks
+    are refused; its file is read as finely as the `target` needs. Raises OptionError, which names
+    file, table, key and the correction. Source: docs/jobs.md.
     """
     from camtool.jobs.build import job_of_file
     from camtool.jobs.drawing import refuse_unmatched
@@ -179,7 +178,7 @@ def read_job(
 def as_drawing(
     drawing: Drawing | str | Path, target: str | LoadedTarget | None, job: Job
 ) -> Drawing:
-    """The drawing, or what is in its file on the layers that the job's operations take."""
+    """The drawing, or the contents of its file on the layers of the job's operations."""
     from camtool.importers.read import content
     from camtool.jobs.drawing import read_for_job
 
@@ -190,7 +189,7 @@ def as_drawing(
 
 
 def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
-    """The program and what messages call it; ProgramError when its file cannot be read."""
+    """The program and its name in messages; ProgramError when its file cannot be read."""
     if isinstance(program, bytes):
         return program, BYTES
     if isinstance(program, Program):
@@ -207,23 +206,23 @@ def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
 
 
 def job_of(**settings: Any) -> Job:
-    """The job of one operation: fields of Operation, Job and Placement by name, those of its
-    Tool with `tool_` before them (`tool_diameter_mm=0.2`).
+    """The job of one operation: fields of Operation, Job and Placement by name, and those of its
+    Tool with the prefix `tool_` (`tool_diameter_mm=0.2`).
 
-    A text or a list is read as a job file reads it: `depth_mm="1/8in"`, `tabs="4:3mm:1mm"`,
-    `layers="CUT"` (one layer; commas part several); so are the numbers of `tabs`, `lead_in` and
-    the like. Other numbers are mm, rad, s and mm/min. TypeError for a name that none of them has,
-    OptionError that names the field for a value that it cannot have.
+    Texts and lists are read as in a job file: `depth_mm="1/8in"`, `tabs="4:3mm:1mm"`,
+    `layers="CUT"` (one layer; several are separated by commas); so are the numbers of `tabs`,
+    `lead_in` and the like. Other numbers are mm, rad, s and mm/min. Raises TypeError for an
+    unknown name, and OptionError, which names the field, for a value that it cannot have.
     """
     return made(**{name: field_value(name, value) for name, value in settings.items()})
 
 
-# The machines that camtool knows.
+# Machines.
 
 
 def targets() -> list[ListedTarget]:
-    """The machines that camtool knows, by name: title, extension, and what a machine file must
-    still say of them. A plug-in that cannot be loaded is left out with a warning."""
+    """The installed machines, sorted by name: title, extension, and the keys that the user's
+    machine file must give. A plug-in that cannot be loaded is left out with a warning."""
     broken: list[CamtoolError] = []
     found = [listed for _, listed in each_target(list_target, broken=broken)]
     for error in broken:
@@ -237,11 +236,11 @@ def load_target(
     machine: str | Path | None = None,
     settings: Mapping[str, Any] | Sequence[str] = (),
 ) -> LoadedTarget:
-    """The target `name`, with a user's `machine` file and `settings` over it; without a name, the
-    one that this file extends.
+    """The target `name` with the values of a user's `machine` file and of `settings`; without a
+    name, the target that the file extends.
 
-    `settings`: {"axes.x.backlash_mm": 0.2}, or as `--set` takes them. Units are those that the
-    keys end on. Raises UnknownTargetError (with the nearest names) and MachineError.
+    `settings`: {"axes.x.backlash_mm": 0.2}, or a list as for `--set`. The suffix of a key says its
+    unit. Raises UnknownTargetError (with the nearest names) and MachineError.
     """
     from camtool.target.registry import load_target as loaded
 
@@ -256,7 +255,7 @@ def load_target(
 
 
 def as_target(target: str | LoadedTarget) -> LoadedTarget:
-    """The target, loaded if only its name is given."""
+    """The target, loaded where its name is given."""
     return load_target(target) if isinstance(target, str) else target
 
 
@@ -267,7 +266,7 @@ def _as_toml(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-# Drawings and programs as programs.
+# Toolpaths and programs.
 
 
 def plan(
@@ -275,10 +274,10 @@ def plan(
 ) -> ShownToolpath:
     """The moves that cut the drawing: work frame, mm, mm/min, in order of execution.
 
-    N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, all
-    lines are followed with a tool of no width; `job_of(tool_diameter_mm=0.2, side="auto")` makes
-    a simple one. Raises OptionError for what the job asks and the drawing or the machine cannot
-    give. Of a file only the layers that the operations name are cut. Source: docs/toolpaths.md.
+    N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, a
+    tool of no width follows all lines; `job_of(tool_diameter_mm=0.2, side="auto")` makes a simple
+    one. Of a file, only the layers that the operations name are cut. Raises OptionError where the
+    drawing or the machine does not allow what the job asks. Source: docs/toolpaths.md.
     """
     from camtool.planning.plan import plan as planned
 
@@ -299,10 +298,10 @@ def post(
 ) -> Run:
     """The drawing as a program of the target, read back, simulated and judged.
 
-    `data` are the program's bytes, `verification` the verdict (None with `check=False`),
-    `findings` those of all stages. `compensate` bends the path against play, scale and
-    squareness; `gates` are limits whose excess is a finding. Raises OptionError, and PostError
-    for what the machine or its dialect cannot do. Source: docs/verifying.md.
+    `data` are the bytes of the program, `verification` its figures (None with `check=False`),
+    `findings` those of all stages. `compensate` corrects the path for backlash, scale and
+    squareness; exceeding one of the `gates` is a finding. Raises OptionError, and PostError for
+    what the machine or its dialect cannot do. Source: docs/verifying.md.
     """
     loaded, wanted = as_target(target), job or Job()
     read = as_drawing(drawing, loaded, wanted)
@@ -317,20 +316,20 @@ def convert(
     feed_mm_min: float | None = None,
     check: bool = True,
 ) -> Run:
-    """A program of the machine `from_` as one of the machine `to`, read back, simulated and held
-    against the first one's moves.
+    """A program of the machine `from_` as one of the machine `to`, read back, simulated and
+    compared with the moves of the first program.
 
-    `program`: its bytes, or the file they are in. `feed_mm_min` takes the place of all feeds.
-    `data` are the new bytes, `verification` the verdict (None with `check=False`). Raises
-    ProgramError with block and column, and PostError for what the second machine cannot do.
-    Source: docs/verifying.md, docs/dialects.
+    `program`: its bytes or its file. `feed_mm_min` replaces all feeds. Of the result, `data` are
+    the new bytes and `verification` the figures (None with `check=False`). Raises ProgramError
+    with block and column, and PostError for what the second machine cannot do. Source:
+    docs/verifying.md, docs/dialects.
     """
     before, after = as_target(from_), as_target(to)
     data, source = as_bytes(program)
     return convert_program(data, before, after, file=source, feed_mm_min=feed_mm_min, check=check)
 
 
-# Programs judged, one way or several, and machines measured.
+# Verification of programs, comparison of variants, and calibration of machines.
 
 
 def verify(
@@ -341,13 +340,12 @@ def verify(
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Run:
-    """Any program of the target, run by a model of its controller and mechanics, and judged.
+    """Any program of the target, simulated with its controller and mechanics, and judged.
 
-    `program`: its bytes, or the file they are in. With `against`, the slides' path is compared
-    with that drawing, planned with `job`, and the program with what that job asks for: places,
-    direction, feeds, spindle, tool, clearance, end. `report` holds errors in µm, sizes in mm,
-    times in s. Raises ProgramError with block and column, and OptionError. Source:
-    docs/verifying.md.
+    `program`: its bytes or its file. With `against`, the path of the slides is compared with that
+    drawing, planned with `job`, and the program with what the job asks for: cuts, direction,
+    feeds, spindle, tool, clearance, end. `report` holds errors in µm, sizes in mm, times in s.
+    Raises ProgramError with block and column, and OptionError. Source: docs/verifying.md.
     """
     loaded, wanted = as_target(target), job or Job()
     data, source = as_bytes(program)
@@ -364,20 +362,21 @@ def compare(
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Comparison:
-    """A program of the target, run and judged several ways, side by side.
+    """A program of the target, simulated and judged as several variants, side by side.
 
-    `ways`: "interpolators", "mechanics", values of a key such as "backlash=0,0.1,0.2" (mm), or
-    targets by names of your own. `rows` holds errors in µm, times in s; `verdicts` the whole
-    verdict on each way. Raises ProgramError with block and column, OptionError for ways that are
-    none, and MachineError for values that the machine cannot have. Source: docs/verifying.md.
+    `ways` are the variants: "interpolators", "mechanics", values of a key such as
+    "backlash=0,0.1,0.2" (mm), or targets by names of your own. `rows` holds errors in µm and times
+    in s, `verdicts` the verification of each variant. Raises ProgramError with block and column,
+    OptionError for unknown variants, and MachineError for values that the machine cannot have.
+    Source: docs/verifying.md.
     """
     loaded, wanted, how = as_target(target), job or Job(), judging or Judging()
     data, source = as_bytes(program)
     read = None if against is None else as_drawing(against, loaded, wanted)
     if isinstance(ways, str):
-        chosen = ways_of(ways, lambda settings: loaded.with_settings(settings), how)
+        chosen = variants_of(ways, lambda settings: loaded.with_settings(settings), how)
     else:
-        chosen = [Way(name, as_target(each), how) for name, each in ways.items()]
+        chosen = [Variant(name, as_target(each), how) for name, each in ways.items()]
     if not chosen:
         raise OptionError("there is nothing to compare", mend="give a target for each way")
     return compare_program(data, chosen, source=source, drawing=read, job=wanted)
@@ -385,9 +384,9 @@ def compare(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Calibrated(Calibration):
-    """The numbers of `machine` that `measurements` say
-    (`camtool.calibration.calibrate.Calibration`): estimates with uncertainties, mm and rad.
-    `extends` is the user's machine file, as a table, that `machine_file` carries on."""
+    """Estimates of the values of `machine` from `measurements`
+    (`camtool.calibration.calibrate.Calibration`), with uncertainties, mm and rad. `extends` is the
+    table of the user's machine file, on which `machine_file` builds."""
 
     measurements: Measurements
     machine: Machine
@@ -395,8 +394,8 @@ class Calibrated(Calibration):
 
     @property
     def machine_file(self) -> str:
-        """TOML text that `load_target(..., machine=FILE)` reads: the numbers that were found over
-        what was known, each with its uncertainty and its source behind it."""
+        """TOML text for `load_target(..., machine=FILE)`: the estimates replace earlier values,
+        each with its uncertainty and source in a comment."""
         from camtool.calibration.machine_file import machine_file
 
         return machine_file(self, self.measurements, self.machine, dict(self.extends))
@@ -415,11 +414,11 @@ def calibrate(
     *,
     machine: str | Path | None = None,
 ) -> Calibrated:
-    """The machine's steps, play (mm) and squareness (rad) from measured coupons, each with its
-    standard uncertainty.
+    """The machine's steps, backlash (mm) and squareness (rad) from measured coupons, with standard
+    uncertainties.
 
-    `measurements`: the TOML file that `camtool coupon --measurements` begins; it names its target
-    unless one is given. `machine`: what is known so far, a file that extends the target.
+    `measurements`: the TOML file that `camtool coupon --measurements` begins; it names the target
+    unless one is given. `machine`: a file that extends the target with what is known so far.
     `machine_file` of the result is the text of a new one. Raises InputError, which names file,
     table and key, OptionError and MachineError. Source: docs/calibration.md.
     """
@@ -427,29 +426,30 @@ def calibrate(
     from camtool.tables import read_table
 
     own = None if machine is None else Path(machine)
-    said = measurements
-    if not isinstance(said, Measurements):
-        said = read_measurements(Path(said))
-    name = target or (said.target if own is None else extended_by(own))
+    if not isinstance(measurements, Measurements):
+        measurements = read_measurements(Path(measurements))
+    name = target or (measurements.target if own is None else extended_by(own))
     if not name:
         raise OptionError(
-            "no machine is named", file=said.file, mend="give target, or name it in the file"
+            "no machine is named",
+            file=measurements.file,
+            mend="give target, or name it in the file",
         )
     known = load_target(name, machine=own).machine
-    found = calibrated(said, known)
+    found = calibrated(measurements, known)
     values = {each.name: getattr(found, each.name) for each in fields(found)}
     extends = {"extends": name} if own is None else read_table(own)
-    return Calibrated(**values, measurements=said, machine=known, extends=extends)
+    return Calibrated(**values, measurements=measurements, machine=known, extends=extends)
 
 
-# Pictures of what the other calls give.
+# Pictures of the results of the other calls.
 
 
 class Looks(TypedDict, total=False):
     """How a picture looks: the fields of `camtool.pictures.options.Options`. `size_px` is its
-    width, `crop_mm` the part (x, y, width, height) that it shows, `exaggerate` how many times as
-    far from the wanted path the predicted one is drawn, `layers` the names of those to show,
-    `polar` the circle, from 1, of which the radial errors are plotted instead."""
+    width, `crop_mm` the rectangle (x, y, width, height) that it shows, `exaggerate` the factor by
+    which deviations from the wanted path are enlarged, `layers` the names of the layers to show,
+    `polar` the number (from 1) of the circle whose radial errors are plotted instead."""
 
     size_px: int | None
     crop_mm: tuple[float, float, float, float] | None
@@ -465,12 +465,12 @@ def preview(
     titles: Sequence[str] = (),
     **looks: Unpack[Looks],
 ) -> Picture:
-    """The picture of what any of these calls gave: the drawing, its toolpath, the path that the
-    slides are predicted to take, coloured by its error (µm, with scale), or several such paths.
+    """The picture of the result of another call: a drawing, a toolpath, the predicted path of the
+    slides in colours of its error (µm, with a scale), or several such paths.
 
-    Of several values: `beside` each other, at one scale, by one map of errors. `titles` take the
-    place of their own, in order. Raises OptionError for looks that make no picture. Source:
-    docs/pictures.md, docs/viewer.md.
+    Several values are drawn `beside` each other, at one scale and with one scale of errors;
+    `titles` replace their own, in order. Raises OptionError for looks that make no picture.
+    Source: docs/pictures.md, docs/viewer.md.
     """
     scenes = [_shown(each).scene() for each in (what, *beside)]
     if len(titles) > len(scenes):
@@ -487,7 +487,7 @@ def preview(
 
 
 def _shown(what: Any) -> Shown:
-    """The value, as one that has a picture."""
+    """The value as one with a picture."""
     if isinstance(what, Shown):
         return what
     if isinstance(what, Drawing):

@@ -1,5 +1,5 @@
-"""A Comparison: one program, run as several variants: other interpolators, other backlash, or
-without a part of the mechanics.
+"""A Comparison: one program run as several variants, such as with other interpolators, with other
+backlash, or without a part of the mechanics.
 """
 
 from __future__ import annotations
@@ -28,32 +28,30 @@ if TYPE_CHECKING:
     from camtool.verification.verify import Verification
 
 WINDOW_STEPS = 30.0
-"""The picture shows this many steps of the coarser axis to each side of the worst place ..."""
+"""The picture shows so many steps of the coarser axis on each side of the largest error ..."""
 
 WINDOW_ERRORS = 1.5
-"""... or this many times the largest error, if that is more ..."""
+"""... or so many times that error, whichever is more ..."""
 
 WHOLE = 2.0
-"""... or the whole path, unless it is this many times larger than that."""
-
+"""... or the whole path, unless it is so many times larger than that."""
 
 ROOM = 0.25
-"""Paths are taken from a window that is larger by this share to each side, because the page may
-show more."""
+"""Paths are drawn in a window wider by this share on each side: the page may show more."""
 
 EFFECTS = ("play", "compensation", "scale", "squareness", "repeatability")
 """The parts of the mechanics that can be left out."""
 
 AXES_OF = {"backlash": "backlash_mm", "compensation": "compensation_mm", "step": "real_step_mm"}
-"""Short names for a key of both X and Y."""
+"""Short names of a key for both X and Y."""
 
 Load = Callable[[Sequence[str]], "LoadedTarget"]
-"""The target, with more settings such as "axes.x.backlash_mm=0.2" over it."""
+"""Loads the target with more settings, such as "axes.x.backlash_mm=0.2"."""
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """One way to run a program: its name, the target with its settings, how it is judged."""
+class Variant:
+    """A variant of a program's run: its name, the target with its settings, how it is judged."""
 
     name: str
     target: LoadedTarget
@@ -62,37 +60,37 @@ class Way:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Shown):
-    """One program, run several ways: `ways` says which, `runs` what came of each, in the same
-    order. Its picture shows the paths about the place of the largest error."""
+    """One program run as several variants: `ways` are the variants, `runs` their results, in the
+    same order. The picture shows the paths around the largest error."""
 
     source: str
-    ways: tuple[Way, ...]
+    ways: tuple[Variant, ...]
     runs: tuple[Run, ...]
 
     @property
     def verdicts(self) -> Mapping[str, Verification]:
-        """The verdict on each way, by its name."""
+        """The verification of each variant, by its name."""
         judged = zip(self.ways, self.runs, strict=True)
-        return {way.name: run.verification for way, run in judged if run.verification is not None}
+        return {each.name: run.verification for each, run in judged if run.verification}
 
     @property
     def rows(self) -> tuple[ContrastRow, ...]:
-        """A line for each way: errors µm, time s, counts."""
+        """A row for each variant: errors µm, time s, counts."""
         from camtool.verification.contrast import row_of
 
         return tuple(row_of(name, each.report) for name, each in self.verdicts.items())
 
     def scene(self) -> Overlay:
-        """The paths laid over each other about the place of the largest error: slides, or
-        commanded positions where only the interpolator differs."""
+        """The paths of all variants around the largest error: of the slides, or of the commanded
+        positions where only the interpolator differs."""
         import numpy as np
 
         from camtool.pictures.overlay import Overlay
         from camtool.simulation.motion import ALL, Options
-        from camtool.verification.contrast import strokes_within, worst_place
+        from camtool.verification.contrast import paths_within, worst_place
         from camtool.verification.cuts import cut_moves
 
-        commanded = all(way.judging.interpolator is not None for way in self.ways)
+        commanded = all(each.judging.interpolator is not None for each in self.ways)
         first, decoded = self.ways[0].target, self.runs[0].decoded
         assert decoded is not None
         wanted = first.model.quantised(decoded, first.machine)
@@ -101,25 +99,25 @@ class Comparison(Shown):
         room = ROOM * (window[:, 1] - window[:, 0]).max()
         around = window + np.array([-room, room])
         lines = []
-        for way, run in zip(self.ways, self.runs, strict=True):
-            moves = run.decoded
+        for variant, run in zip(self.ways, self.runs, strict=True):
+            moves, how = run.decoded, variant.judging
             assert moves is not None
-            options = Options(way.judging.interpolator, way.judging.effects or ALL)
             cutting = cut_moves(moves, flat_cuts=True).is_cut
-            chunks = way.target.simulate(moves, options)
-            lines.append((way.name, strokes_within(chunks, cutting, around, commanded=commanded)))
+            chunks = variant.target.simulate(moves, Options(how.interpolator, how.effects or ALL))
+            paths = paths_within(chunks, cutting, around, commanded=commanded)
+            lines.append((variant.name, paths))
         what = "commanded positions" if commanded else "paths of the slides"
         x, y = place
         note = f"{what}; the largest error of all is near ({x:.3f}, {y:.3f}) mm"
         return Overlay(PurePath(self.source).name, window, wanted, lines, (note,))
 
     def _window(self, wanted: Toolpath, place: tuple[float, float]) -> Floats:
-        """[[xmin, xmax], [ymin, ymax]] mm: what the picture shows."""
+        """[[xmin, xmax], [ymin, ymax]] mm that the picture shows."""
         import numpy as np
 
         from camtool.toolpath.moves import toolpath_extents
 
-        machines = [way.target.machine for way in self.ways]
+        machines = [each.target.machine for each in self.ways]
         step = max(max(each.axes.x.coded_step_mm, each.axes.y.coded_step_mm) for each in machines)
         error_um = max(row.total_max_um or 0.0 for row in self.rows)
         half = max(WINDOW_STEPS * step, WINDOW_ERRORS * error_um / UM_PER_MM)
@@ -137,29 +135,29 @@ class Comparison(Shown):
         return table(self.rows)
 
     def __repr__(self) -> str:
-        return f"<Comparison of {self.source}: {', '.join(way.name for way in self.ways)}>"
+        return f"<Comparison of {self.source}: {', '.join(each.name for each in self.ways)}>"
 
 
 def compare_program(
     data: bytes,
-    ways: Sequence[Way],
+    variants: Sequence[Variant],
     *,
     source: str,
     drawing: Drawing | None = None,
     job: Job | None = None,
 ) -> Comparison:
-    """The program read and judged each way; raises as `verify_program` does."""
+    """The program read and judged as each variant; raises as `verify_program` does."""
     runs = [
         verify_program(
-            data, way.target, source=source, drawing=drawing, job=job, judging=way.judging
+            data, each.target, source=source, drawing=drawing, job=job, judging=each.judging
         )
-        for way in ways
+        for each in variants
     ]
-    return Comparison(source, tuple(ways), tuple(runs))
+    return Comparison(source, tuple(variants), tuple(runs))
 
 
-def ways_of(what: str, load: Load, judging: Judging) -> list[Way]:
-    """What `what` stands for: `interpolators`, `mechanics`, or KEY=VALUE,VALUE,...
+def variants_of(what: str, load: Load, judging: Judging) -> list[Variant]:
+    """The variants that `what` names: `interpolators`, `mechanics`, or KEY=VALUE,VALUE,...
 
     OptionError for anything else, and MachineError for values that the machine cannot have.
     """
@@ -175,13 +173,13 @@ def ways_of(what: str, load: Load, judging: Judging) -> list[Way]:
             mend="write interpolators, mechanics, backlash=0,0.1,0.2 or KEY=VALUE,VALUE,...",
         )
     return [
-        Way(f"{key}={value.strip()}", load(_settings(key.strip(), value.strip())), judging)
+        Variant(f"{key}={value.strip()}", load(_settings(key.strip(), value.strip())), judging)
         for value in values.split(",")
     ]
 
 
-def left_out(names: Sequence[str]) -> Effects:
-    """The mechanics without these effects; OptionError for others."""
+def effects_without(names: Sequence[str]) -> Effects:
+    """All effects of the mechanics but these; OptionError for names that are none of them."""
     from camtool.simulation.motion import ALL
 
     unknown = [name for name in names if name not in EFFECTS]
@@ -194,28 +192,28 @@ def left_out(names: Sequence[str]) -> Effects:
     return replace(ALL, **dict.fromkeys(names, False))
 
 
-def _interpolators(target: LoadedTarget, judging: Judging) -> list[Way]:
+def _interpolators(target: LoadedTarget, judging: Judging) -> list[Variant]:
     names = target.interpolators
-    return [Way(name, target, replace(judging, interpolator=name)) for name in names]
+    return [Variant(name, target, replace(judging, interpolator=name)) for name in names]
 
 
-def _mechanics(target: LoadedTarget, judging: Judging) -> list[Way]:
-    """With all of it, without each part that acts, and without any."""
+def _mechanics(target: LoadedTarget, judging: Judging) -> list[Variant]:
+    """All of the mechanics, without each part that acts, and without all of them."""
     from camtool.simulation.motion import IDEAL
 
     return [
-        Way("as it is", target, judging),
+        Variant("as it is", target, judging),
         *(
-            Way(f"without {name}", target, replace(judging, effects=left_out((name,))))
+            Variant(f"without {name}", target, replace(judging, effects=effects_without((name,))))
             for name in EFFECTS
             if _matters(name, target.machine)
         ),
-        Way("ideal", target, replace(judging, effects=IDEAL)),
+        Variant("ideal", target, replace(judging, effects=IDEAL)),
     ]
 
 
 def _matters(effect: str, machine: Machine) -> bool:
-    """Whether leaving out this part of the mechanics can change anything."""
+    """Whether this part of the mechanics acts on the machine."""
     axes = list(machine.axes)
     return {
         "play": any(axis.backlash_mm for axis in axes) or any(machine.play_map.used),
@@ -227,7 +225,7 @@ def _matters(effect: str, machine: Machine) -> bool:
 
 
 def _settings(key: str, value: str) -> tuple[str, ...]:
-    """The setting of a key of the machine, or of a short name of both X and Y."""
+    """The settings of a key of the machine, or of a short name for X and Y."""
     if key in AXES_OF:
         return tuple(f"axes.{axis}.{AXES_OF[key]}={value}" for axis in "xy")
     return (f"{key}={value}",)

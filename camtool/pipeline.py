@@ -1,8 +1,8 @@
-"""The rooms joined: drawings and programs become Runs.
+"""The steps from a drawing or a program to a Run.
 
     post_drawing     Drawing + Job + target → program, read back, simulated and judged
-    verify_program   bytes of a program (anybody's) → judged, against a drawing if there is one
-    convert_program  bytes of one target's program → the program of another, judged as above
+    verify_program   bytes of any program → judged, against a drawing if there is one
+    convert_program  bytes of a program of one target → the program of another, judged as above
     read_program     bytes of a program → decoded, not judged
 
 Nothing here reads or writes a file.
@@ -36,10 +36,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Judging:
-    """How a program is judged: the interpolator in place of the controller's own, the parts of
-    the mechanics that act (None: all), the limits that make findings (None: none), and whether
-    it was posted bent against the mechanics; how many of the worst moves are listed, and how many
-    points of the slides' path are kept (None: as usual)."""
+    """How a program is judged.
+
+    `interpolator` takes the place of the controller's own; `effects` are the parts of the
+    mechanics that act (None: all); exceeding `gates` is a finding; `compensated`: the program was
+    posted with compensation against the mechanics. `worst` moves are listed, and `trace_points` of
+    the slides' path are kept (None: the default numbers).
+    """
 
     interpolator: str | None = None
     effects: Effects | None = None
@@ -51,15 +54,15 @@ class Judging:
 
 @dataclass(frozen=True, eq=False)
 class _Goal:
-    """What a program is held against: the wanted toolpath, the drawing in its frame, what was
-    sent where that was bent, what else the job asks for, and what it was written from; None where
-    there is none."""
+    """What a program is compared with: the wanted toolpath, the drawing in its frame, the toolpath
+    compensated against the mechanics, what else the job asks for, and the moves from which the
+    program was written; None for what there is not."""
 
     wanted: Toolpath | None = None
     drawing: Drawing | None = None
-    sent: Compensated | None = None
+    compensated: Compensated | None = None
     asked: Asked | None = None
-    said: Toolpath | None = None
+    written_from: Toolpath | None = None
 
 
 def post_drawing(
@@ -72,9 +75,12 @@ def post_drawing(
     gates: Gates | None = None,
     trace_points: int | None = None,
 ) -> Run:
-    """Plan, write, read back, simulate and judge; `check=False` leaves out the last two;
-    `compensate` bends what is written against the machine's mechanics; `trace_points` of the
-    slides' path are kept at most (None: as usual)."""
+    """Plan, write, read back, simulate and judge.
+
+    `check=False` leaves out the last two; `compensate` compensates what is written against the
+    machine's mechanics; at most `trace_points` of the slides' path are kept (None: the default).
+    Raises OptionError, MachineError, and PostError for what the target cannot write.
+    """
     from camtool.planning.checks import doubtful_settings
     from camtool.planning.plan import planned
 
@@ -85,13 +91,11 @@ def post_drawing(
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
-    sent = _bent(wanted, target.machine) if compensate else None
-    written = wanted if sent is None else sent.toolpath
+    compensation = _compensated(wanted, target.machine) if compensate else None
+    written = wanted if compensation is None else compensation.toolpath
     program = target.target.write(written, target.machine)
     decoded = target.target.read(program.data, target.machine)
-    # What the writer said of its blocks, the reader need not say again in other words.
-    said = {finding.code for finding in program.findings}
-    repeated = {finding for finding in decoded.findings if finding.code in said}
+    repeated = _repeated(program, decoded)
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
         return replace(run, program=program, decoded=decoded, findings=findings)
@@ -100,16 +104,16 @@ def post_drawing(
     from camtool.verification.report import Planned, certain
     from camtool.verification.verify import VerifyOptions
 
-    plain = _plainly(drawing, job, target, compensate=compensate)
-    # Runs that never turn back are judged by the whole contours that they are parts of.
+    plain = _plain_run(drawing, job, target, compensate=compensate)
+    # Contours that are divided at reversals are judged as the whole contours of the drawing.
     whole = plan
-    if _plain(job) != job and sent is None:
+    if _plain(job) != job and compensation is None:
         whole = planned(drawing, job, target.machine, undivided=True)
     verification = _judged(
         program.data,
         decoded,
         target,
-        _Goal(whole.toolpath, plan.placed, sent, said=written),
+        _Goal(whole.toolpath, plan.placed, compensation, written_from=written),
         VerifyOptions(
             source=drawing.file,
             tool_diameter_mm=tool_mm(job),
@@ -147,8 +151,8 @@ def verify_program(
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Run:
-    """Any program of the target, simulated and judged; against `drawing` planned with `job` when
-    there is one. ProgramError names file, block and column."""
+    """Any program of the target, simulated and judged, against `drawing` planned with `job` if it
+    is given. ProgramError names file, block and column."""
     from camtool.planning.job import Job
     from camtool.simulation.motion import ALL
     from camtool.verification.case import TRACE_POINTS, WORST_LISTED, cone_of, tool_mm
@@ -166,11 +170,12 @@ def verify_program(
 
         wanted, machine = job or Job(), target.machine
         plan = planned(drawing, wanted, machine)
-        sent = _bent(plan.toolpath, machine) if judging.compensated else None
-        asked = _asked(wanted, target, plan.toolpath, sent)
-        if sent is None and _plain(wanted) != wanted:
+        compensation = _compensated(plan.toolpath, machine) if judging.compensated else None
+        asked = _asked(wanted, target, plan.toolpath, compensation)
+        if compensation is None and _plain(wanted) != wanted:
             plan = planned(drawing, wanted, machine, undivided=True)
-        goal, kept = _Goal(plan.toolpath, plan.placed, sent, asked), kept_of(plan.steps)
+        goal = _Goal(plan.toolpath, plan.placed, compensation, asked)
+        kept = kept_of(plan.steps)
     options = VerifyOptions(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
@@ -206,10 +211,10 @@ def convert_program(
 ) -> Run:
     """A program of one target as the program of another, read back and judged against the first.
 
-    What the first controller decodes is what the second one shall do; where its part zero was set
-    is left out, since a program begins there. Cuts that are too fast for the second machine get
-    its highest feed; `feed_mm_min` takes the place of all feeds. ProgramError names file, block
-    and column.
+    The second program shall make the moves that the first controller decodes. Setting part zero
+    is left out, since a program begins there. Feeds that are too fast for the second machine
+    become its highest feed; `feed_mm_min` replaces all feeds. ProgramError names file, block and
+    column.
     """
     from camtool.toolpath.lower import at_feed, carried_over, within_feeds
     from camtool.verification.verify import VerifyOptions
@@ -226,13 +231,12 @@ def convert_program(
         return replace(run, findings=wanted.findings)
     program = target.target.write(wanted, target.machine)
     again = target.target.read(program.data, target.machine)
-    said = {finding.code for finding in program.findings}
-    repeated = {finding for finding in again.findings if finding.code in said}
+    repeated = _repeated(program, again)
     findings = _merged(wanted.findings, program.findings, again.findings, without=repeated)
     if not check:
         return replace(run, program=program, decoded=again, findings=findings)
     options = VerifyOptions(source=file)
-    judged = _judged(program.data, again, target, _Goal(wanted, said=wanted), options)
+    judged = _judged(program.data, again, target, _Goal(wanted, written_from=wanted), options)
     findings = _merged(findings, judged.findings, without=repeated)
     return replace(
         run,
@@ -266,6 +270,12 @@ def _decoded(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     return toolpath
 
 
+def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
+    """The findings of the reader that the writer has made too, if in other words."""
+    codes = {finding.code for finding in program.findings}
+    return {finding for finding in decoded.findings if finding.code in codes}
+
+
 def _reported(step: Step) -> PlannedOperation:
     """How an operation cuts, for the report."""
     from camtool.planning.checks import IN_PASSES, deepest_pass
@@ -287,7 +297,7 @@ def _reported(step: Step) -> PlannedOperation:
 
 
 def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, ...]:
-    """What exceeds the limits."""
+    """A finding for each of the limits that is exceeded."""
     if gates is None:
         return ()
     from camtool.verification.report import gate_findings
@@ -295,26 +305,28 @@ def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, .
     return tuple(gate_findings(verification.report, gates))
 
 
-def _bent(wanted: Toolpath, machine: Machine) -> Compensated:
-    """What the controller must be told for its slides to come out on `wanted`."""
+def _compensated(wanted: Toolpath, machine: Machine) -> Compensated:
+    """The moves with which the slides follow `wanted`."""
     from camtool.planning.compensating import compensated
 
     return compensated(wanted, machine)
 
 
 def _plain(job: Job) -> Job:
-    """The job without what it does against reversals."""
+    """The job without its measures against reversals."""
     return replace(job, minimise="rapids", approach=False)
 
 
-def _plainly(drawing: Drawing, job: Job, target: LoadedTarget, *, compensate: bool) -> Run | None:
-    """The job made without what is done against reversals and play; None when nothing is."""
+def _plain_run(
+    drawing: Drawing, job: Job, target: LoadedTarget, *, compensate: bool
+) -> Run | None:
+    """The run of the job without measures against reversals and backlash; None without any."""
     plain = _plain(job)
     return None if plain == job and not compensate else post_drawing(drawing, plain, target)
 
 
 def _before(plain: Run | None) -> Before | None:
-    """Its figures, for the report."""
+    """The figures of the plain run, for the report."""
     from camtool.verification.report import Before
 
     if plain is None:
@@ -329,36 +341,36 @@ def _before(plain: Run | None) -> Before | None:
 def _judged(
     data: bytes, decoded: Toolpath, target: LoadedTarget, goal: _Goal, options: VerifyOptions
 ) -> Verification:
-    """Simulated, and compared with what was wanted and drawn."""
+    """The program simulated and compared with its goal."""
     from camtool.verification.verify import verify
 
-    sent = target.target.line_bytes(data, target.machine)
-    stray = target.target.stray_mm(target.machine)
-    sized = replace(options, size_bytes=len(data), line_bytes=sent, stray_mm=stray)
+    line_bytes = target.target.line_bytes(data, target.machine)
+    stray_mm = target.target.stray_mm(target.machine)
+    sized = replace(options, size_bytes=len(data), line_bytes=line_bytes, stray_mm=stray_mm)
     return verify(
         decoded,
         target,
         wanted=goal.wanted,
         drawing=goal.drawing,
         options=sized,
-        sent=goal.sent,
+        compensated=goal.compensated,
         asked=goal.asked,
-        said=goal.said,
+        written_from=goal.written_from,
     )
 
 
 def _asked(
-    job: Job, target: LoadedTarget, planned: Toolpath, sent: Compensated | None
+    job: Job, target: LoadedTarget, planned: Toolpath, compensation: Compensated | None
 ) -> Asked | None:
-    """What the job asks for, in moves as the dialect would say them; None where it asks for what
-    cannot be made, which is said already. `sent` is `planned` bent against the mechanics."""
+    """What the job asks for, as moves of the dialect; None where planning found an error, which
+    is a finding already. `compensation` is `planned` compensated against the mechanics."""
     from camtool.planning.settings import safe_z_of
     from camtool.verification.conformance import Asked
 
     if worst(planned.findings) >= Severity.ERROR:
         return None
     machine = target.machine
-    wanted = planned if sent is None else sent.toolpath
+    wanted = planned if compensation is None else compensation.toolpath
     program = target.target.write(wanted, machine)
     units = [target.target.unit_mm(machine, axis) for axis in machine.axes]
     written, blocks = target.target.read(program.data, machine), len(program.row_of_block)
@@ -367,34 +379,34 @@ def _asked(
         wanted=wanted,
         unit_mm=max(units[:2]),
         unit_z_mm=units[2],
-        feed_said=_feed_said(job, machine, wanted, program)[written.block.clip(max=blocks)],
+        feed_named=_feed_named(job, machine, wanted, program)[written.block.clip(max=blocks)],
         feed_unit_mm_min=machine.feed.unit_mm_min,
         safe_z_mm=safe_z_of(job, machine),
-        safe_z_said=job.safe_z_mm is not None,
+        safe_z_named=job.safe_z_mm is not None,
     )
 
 
-def _feed_said(job: Job, machine: Machine, wanted: Toolpath, program: Program) -> Bools:
-    """(B + 1,) the blocks of a program whose feed the job names, or derives from what it names;
-    the last is False, for rows of no block."""
+def _feed_named(job: Job, machine: Machine, wanted: Toolpath, program: Program) -> Bools:
+    """(B + 1,) true for the blocks whose feed the job names, or which follows from one that it
+    names; the last item is False, for rows of no block."""
     import numpy as np
 
     from camtool.planning.settings import feeds_of
 
-    said: list[float] = []
+    named: list[float] = []
     for operation in job.operations:
         feeds = feeds_of(operation, machine)
         if operation.feed_mm_min is not None:
-            said += [feeds.cut_mm_min, feeds.plunge_mm_min]
+            named += [feeds.cut_mm_min, feeds.plunge_mm_min]
         elif operation.plunge_feed_mm_min is not None:
-            said.append(feeds.plunge_mm_min)
+            named.append(feeds.plunge_mm_min)
     row = np.append(program.row_of_block, -1)
-    return np.asarray(np.isin(wanted.feed[row], said) & (row >= 0))
+    return np.asarray(np.isin(wanted.feed[row], named) & (row >= 0))
 
 
 def _merged(
     *groups: tuple[Finding, ...], without: Collection[Finding] = ()
 ) -> tuple[Finding, ...]:
-    """All findings once, in order, but for those `without`."""
+    """All findings in order, each once, except those `without`."""
     every = dict.fromkeys(finding for group in groups for finding in group)
     return tuple(finding for finding in every if finding not in without)

@@ -1,7 +1,7 @@
-"""The Run: one program, what it was made from, what its controller makes of it, and the verdict.
+"""The Run: one program, its source, its motion, and its verification.
 
-`camtool.pipeline` makes Runs; commands, batches and `import camtool` pass them on. Drawings and
-toolpaths that `import camtool` gives are here too: what has a picture shows it in a notebook.
+`camtool.pipeline` makes Runs; commands, batches and `import camtool` pass them on. The drawings
+and toolpaths that `import camtool` returns are here too: they show a picture in a notebook.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 
 class Shown(ABC):
-    """A value that has a picture, and shows it in a notebook."""
+    """A value with a picture, which a notebook shows."""
 
     @abstractmethod
     def scene(self) -> Scene | Overlay:
-        """What its picture is of."""
+        """What its picture shows."""
 
     def _repr_svg_(self) -> str:
         from camtool.pictures.picture import Picture
@@ -42,14 +42,14 @@ class Shown(ABC):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Run(Shown):
-    """One program of `target`, and all that is known of it; None is what there is not.
+    """One program of `target`, and all that is known of it; None for what there is not.
 
-    `source` names what it was made from, or the program's own file where others made it. `wanted`
-    are the moves that `drawing` and `job` ask for, `program` the bytes, `decoded` the moves that
-    the controller makes of them, `verification` the verdict on where the slides go. `program` is
-    None when planning found an error; `verification` is None then, and when it was not asked for.
-    `findings` are those of all stages. `before` is the same job without what it does against
-    reversals and play, where it does any of that.
+    `source` names the drawing, or the file of the program where there is no drawing. `wanted` are
+    the moves that `drawing` and `job` ask for, `program` holds the bytes, `decoded` the moves that
+    the controller reads from them, `verification` the figures of the slides' path. `program` is
+    None when planning found an error; `verification` is None then, and when none was asked for.
+    `findings` are those of all stages. `before` is the run of the same job without its measures
+    against reversals and backlash, if it takes any.
     """
 
     source: str
@@ -81,13 +81,13 @@ class Run(Shown):
 
     @property
     def report(self) -> Report | None:
-        """The figures of the verdict: errors in µm, sizes in mm, times in s."""
+        """The figures of the verification: errors in µm, sizes in mm, times in s."""
         return None if self.verification is None else self.verification.report
 
     @property
     def listing(self) -> Callable[[], Listing | None] | None:
-        """What gives the program block by block, when asked: None where its dialect cannot say
-        which bytes are which. None without a program."""
+        """A function that returns the program block by block, or None where its dialect has no
+        listing; None without a program."""
         program, decoded, target = self.program, self.decoded, self.target
         if program is None or decoded is None:
             return None
@@ -100,9 +100,8 @@ class Run(Shown):
         return listing
 
     def scene(self, title: str | None = None) -> Scene:
-        """The program's moves, or those that were planned where there is none, over the drawing,
-        with the slides' path where it was judged. The title is the source's name unless another
-        one is given."""
+        """The moves of the program (without one, the planned moves) over the drawing, with the
+        slides' path where it was judged. The title is the name of the source by default."""
         from camtool.pictures.scene import scene_of
 
         return scene_of(
@@ -132,7 +131,7 @@ class ShownDrawing(Shown, Drawing):
 
     @classmethod
     def of(cls, drawing: Drawing) -> ShownDrawing:
-        """The drawing as one that shows itself."""
+        """The drawing as a value with a picture."""
         return _shown(cls, drawing)
 
     def scene(self) -> Scene:
@@ -150,7 +149,7 @@ class ShownDrawing(Shown, Drawing):
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ShownToolpath(Shown, Toolpath):
     """Moves in the work frame, mm and mm/min (`camtool.toolpath.moves.Toolpath`); `drawing`,
-    `job` and `target` are what it was planned from."""
+    `job` and `target` are those from which it was planned."""
 
     drawing: Drawing | None = None
     job: Job | None = None
@@ -164,7 +163,7 @@ class ShownToolpath(Shown, Toolpath):
         job: Job | None = None,
         target: LoadedTarget | None = None,
     ) -> ShownToolpath:
-        """The toolpath as one that shows itself, with what it was planned from."""
+        """The toolpath as a value with a picture, and that from which it was planned."""
         return _shown(cls, toolpath, drawing=drawing, job=job, target=target)
 
     def scene(self) -> Scene:
@@ -189,7 +188,7 @@ _Kind = TypeVar("_Kind", ShownDrawing, ShownToolpath)
 
 
 def _shown(kind: type[_Kind], record: Drawing | Toolpath, **more: object) -> _Kind:
-    """The record as one of its kind that shows itself, with `more` fields."""
+    """The record as one of this `kind`, with `more` fields."""
     values = {each.name: getattr(record, each.name) for each in fields(record)}
     return kind(**(values | more))
 

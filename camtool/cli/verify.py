@@ -43,7 +43,7 @@ from camtool.cli.picture_options import (
 from camtool.cli.report import Outputs, report_option
 
 if TYPE_CHECKING:
-    from camtool.comparison import Way
+    from camtool.comparison import Variant
     from camtool.geometry.drawing import Drawing
     from camtool.pictures.scene import Scene
     from camtool.pipeline import Judging
@@ -136,13 +136,13 @@ def verify(
     wishes.check(comparing=compare is not None, gated=gates.given)
     wishes.outputs.check([program, against, beside, *machine.files(), *job.files()])
 
-    from camtool.comparison import left_out
+    from camtool.comparison import effects_without
     from camtool.pictures.scene import points_for
     from camtool.pipeline import Judging
 
     judging = Judging(
         interpolator=interpolator,
-        effects=left_out(without) if without else None,
+        effects=effects_without(without) if without else None,
         gates=gates.gates(),
         compensated=compensated,
         worst=worst,
@@ -155,18 +155,18 @@ def verify(
     case = Case(target, judging, read, wanted)
     with job.blamed():
         if compare is not None:
-            return _compare(program, _ways(compare, machine, judging), case, wishes)
+            return _compare(program, _variants(compare, machine, judging), case, wishes)
         return _judge(program, case, wishes)
 
 
-def _ways(spec: str, machine: MachineFlags, judging: Judging) -> list[Way]:
+def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[Variant]:
     """The variants that `--compare SPEC` names; OptionError when it names none."""
-    from camtool.comparison import ways_of
+    from camtool.comparison import variants_of
 
     def load(more: Sequence[str]) -> LoadedTarget:
         return replace(machine, settings=(*machine.settings, *more)).load()
 
-    return ways_of(spec, load, judging)
+    return variants_of(spec, load, judging)
 
 
 @dataclass(frozen=True)
@@ -242,13 +242,13 @@ def _judge(file: str, case: Case, wishes: Wishes) -> int:
     return 1
 
 
-def _compare(file: str, ways: list[Way], case: Case, wishes: Wishes) -> int:
+def _compare(file: str, variants: list[Variant], case: Case, wishes: Wishes) -> int:
     """The table of all variants, and their picture; the exit code."""
     from camtool.comparison import compare_program
     from camtool.verification.contrast import to_json
 
     found = compare_program(
-        read_bytes(file), ways, source=shown(file), drawing=case.drawing, job=case.job
+        read_bytes(file), variants, source=shown(file), drawing=case.drawing, job=case.job
     )
     files: dict[str, bytes] = {}
     if wishes.outputs.preview is not None:

@@ -1,4 +1,4 @@
-"""What is to be judged, how, and with which tolerances."""
+"""A case: the program to judge, the options, and the tolerances that follow from the machine."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ COVERAGE_MM = 0.005
 """A move is missing, or extra, when farther than this from all moves of the other side ..."""
 
 COVERAGE_STEPS = 4.0
-"""... or than this many steps of the coarser axis, if that is more ..."""
+"""... or than so many steps of the coarser axis, whichever is more ..."""
 
 COVERAGE_RESOLUTIONS = 1.5
-"""... or than this many resolutions of a dialect that is coarser than the steps: vertices are off
-by up to 0.71 of them, and starts that a machine cannot reach by up to 1.41."""
+"""... or than so many units of a dialect that is coarser than the steps: rounding moves vertices
+by up to 0.71 of a unit, and starts that a machine cannot reach by up to 1.41."""
 
 DEPTH_FITS = 2.0
-"""Heights may differ by as much as coverage allows, by this many steps of Z, or by this many fit
-tolerances, whichever is most: slopes of machines without slopes are steps that high."""
+"""Heights may differ by the tolerance of coverage, by that of Z, or by so many fit tolerances,
+whichever is most: machines without slopes make slopes in steps of that height."""
 
 SAMPLE_MM = 0.01
 """Spacing of the points on decoded and wanted moves that are compared with each other."""
@@ -34,21 +34,20 @@ SAMPLE_MM = 0.01
 TRACE_POINTS = 20_000
 """Points of the slides' path that are kept for pictures."""
 
-
 WORST_LISTED = 10
-"""Number of moves with the largest errors in a report, unless more are asked for."""
+"""So many moves with the largest errors are in a report, unless another number is given."""
 
 
 @dataclass(frozen=True)
 class Cone:
-    """The shape of a V bit: the radius of its flat tip, mm, and the tangent of half its angle."""
+    """The shape of a V bit: radius of its flat tip, mm, and tangent of half its angle."""
 
     tip_mm: float
     slope: float
 
 
 def cone_of(job: Job) -> Cone | None:
-    """The shape of the V bit that all operations cut with; None for other tools, and several."""
+    """The shape of the V bit with which all operations cut; None for other or several tools."""
     tools = [operation.tool for operation in job.operations]
     shapes = {(tool.kind, tool.tip_angle_rad, tool.tip_diameter_mm) for tool in tools}
     if len(shapes) != 1:
@@ -58,7 +57,7 @@ def cone_of(job: Job) -> Cone | None:
 
 
 def tool_mm(job: Job) -> float | None:
-    """The diameter of the one tool that all operations cut with, mm; None for several or none."""
+    """The diameter of the tool with which all operations cut, mm; None for several or none."""
     diameters = {operation.tool.diameter_mm for operation in job.operations}
     return (diameters.pop() or None) if len(diameters) == 1 else None
 
@@ -67,15 +66,13 @@ def tool_mm(job: Job) -> float | None:
 class VerifyOptions:
     """How to judge, and what the report says of the program.
 
-    `interpolator` None: as the machine does. `effects`: the parts of the mechanics that act.
-    `worst`: so many moves with the largest errors are listed. `size_bytes` is that of the file,
-    `line_bytes` of what goes over the line to the machine. `blocks` None: counted from the decoded
-    toolpath where it was read. `coverage_mm` None: `COVERAGE_MM`, `COVERAGE_STEPS` or
-    `COVERAGE_RESOLUTIONS`, and `stray_mm`, by which the dialect may leave the wanted path on
-    purpose. `tool_diameter_mm`: rapids below the stock top may run where the tool
-    has cleared the way before; None, when nobody knows it: nowhere. `cone`: the tool is a V bit,
-    that is so wide at its top only. `kept`: what is cut by whom, and what must stay; () where
-    nobody knows.
+    `interpolator` None: that of the machine. `effects`: the parts of the mechanics that act.
+    `tool_diameter_mm`: the tool clears the way for rapids below the stock top; None: not known,
+    nothing is cleared. `cone`: the tool is a V bit, which has that diameter only at its top.
+    `kept`: which runs cut, and what must stay; () where that is not known. `size_bytes`: size of
+    the file; `line_bytes`: what is sent over the line to the machine. `stray_mm`: how far the
+    dialect may leave the wanted path on purpose. `trace_points`: points of the slides' path for
+    pictures. `worst`: so many moves with the largest errors are listed.
     """
 
     interpolator: str | None = None
@@ -86,38 +83,35 @@ class VerifyOptions:
     source: str = ""
     size_bytes: int | None = None
     line_bytes: int | None = None
-    blocks: int | None = None
-    coverage_mm: float | None = None
     stray_mm: float = 0.0
-    sample_mm: float = SAMPLE_MM
     trace_points: int = TRACE_POINTS
     worst: int = WORST_LISTED
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is to be judged. `sent`: what the program should say, where it is not `wanted` itself
-    but bent against the mechanics. `asked`: what the job asks for besides, and how the dialect
-    would say it. `said`: what the program was written from, where that is known: its contours
-    must run the same way round."""
+    """A program to judge. `compensated`: what the program should say where `wanted` is compensated
+    against the mechanics. `asked`: what the job asks for besides, as the dialect would say it.
+    `written_from`: the moves from which the program was written, where they are known: contours
+    must have the same direction."""
 
     decoded: Toolpath
     target: LoadedTarget
     wanted: Toolpath | None
     drawing: Drawing | None
     options: VerifyOptions
-    sent: Compensated | None = None
+    compensated: Compensated | None = None
     asked: Asked | None = None
-    said: Toolpath | None = None
+    written_from: Toolpath | None = None
 
     @property
     def machine(self) -> Machine:
-        """The machine that runs it."""
+        """The machine that runs the program."""
         return self.target.machine
 
     @property
     def simulation(self) -> Options:
-        """How to simulate it."""
+        """The options of the simulation."""
         return Options(interpolator=self.options.interpolator, effects=self.options.effects)
 
     @property
@@ -127,23 +121,21 @@ class Case:
 
     @property
     def spacing_mm(self) -> float:
-        """How far apart the samples of the motion are, about."""
+        """Distance between samples of the motion, mm, approximately."""
         return self.target.model.spacing_mm(self.decoded, self.machine)
 
     @property
     def coverage_mm(self) -> float:
-        """How far moves of one side may be from those of the other."""
-        if self.options.coverage_mm is not None:
-            return self.options.coverage_mm
+        """How far moves of one side may be from those of the other, mm."""
         axes = (self.machine.axes.x, self.machine.axes.y)
         coarse = max(axis.coded_step_mm for axis in axes)
-        said = max(axis.resolution_mm or 0.0 for axis in axes)
-        least = max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * said)
+        unit = max(axis.resolution_mm or 0.0 for axis in axes)
+        least = max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * unit)
         return least + self.options.stray_mm
 
     @property
     def depth_mm(self) -> float:
-        """How far heights of one side may be from those of the other."""
+        """How far heights of one side may be from those of the other, mm."""
         z, fit_mm = self.machine.axes.z, self.machine.defaults.fit_tolerance_mm
         steps = max(
             COVERAGE_STEPS * z.coded_step_mm, COVERAGE_RESOLUTIONS * (z.resolution_mm or 0)

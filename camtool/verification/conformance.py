@@ -1,13 +1,14 @@
-"""Is a program what its job asks for? Moves as programmed, before any controller or mechanics.
+"""Whether a program does what its job asks for: its moves as programmed, before any controller.
 
-    drawing, job, flags ─plan, write, read─▶ written     the moves that camtool would ask for
-    program ─read─▶ decoded                              the moves that it asks for
+    drawing, job, flags ─plan, write, read─▶ written     the moves that camtool would program
+    program ─read─▶ decoded                              the moves that the program holds
 
-A move that both hold, number for number, is as asked. Any other one must lie where `written` or
-the wanted toolpath cuts, and the other way round, within the resolution of the dialect: what a
-dialect makes of the wanted path (chords, ends on its grid, stairs) is in `written`, so no room is
-left for it. Order and starts are free. Where moves of both lie on each other, the way round, the
-feed, the spindle and the tool must be the same too.
+A move that is in both with the same numbers is as asked. Every other decoded move must lie where
+`written` or the wanted toolpath cuts, and every other written move where `decoded` cuts, within
+the resolution of the dialect. What the dialect makes of the wanted path (chords, ends on its grid,
+stairs) is in `written` already, so the tolerance does not allow for it. The order of contours and
+their starts are free. Where moves of both lie on each other, their direction, feed, spindle and
+tool must be the same.
 """
 
 from __future__ import annotations
@@ -56,27 +57,27 @@ from camtool.verification.coverage import (
     Compared,
     Holes,
     Limits,
-    and_more,
     at_point,
     block_name,
     compared,
     contours_drilled,
     hole_findings,
     holes_of,
+    listed,
     other_way,
     round_trips,
     turned,
 )
 from camtool.verification.cuts import CutMoves, cut_moves, is_flat
 from camtool.verification.matching import nearest_at_height
-from camtool.verification.nearest import Target
+from camtool.verification.nearest import MoveIndex
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """What came of it: findings of `place` and of the other `settings`; of how many `moves`
-    (those that cut) so many `alike` are those of `written`; the farthest `off_mm` of the rest
-    from what was asked (0 where there is no rest)."""
+class Conformance:
+    """The result: findings on where is cut (`place`) and on feeds, spindle and the like
+    (`settings`); the number of cutting `moves`, how many of them are `alike` in `written`, and the
+    largest distance `off_mm` of the others from what was asked (0 where there are none)."""
 
     place: tuple[Finding, ...] = ()
     settings: tuple[Finding, ...] = ()
@@ -85,18 +86,20 @@ class Held:
     off_mm: float = 0.0
 
 
-def hold(decoded: Toolpath, asked: Asked, *, flat_cuts: bool, sample_mm: float) -> Held:
-    """Hold the moves of a program against those that were asked for."""
+def conformance_of(
+    decoded: Toolpath, asked: Asked, *, flat_cuts: bool, sample_mm: float
+) -> Conformance:
+    """Compare the moves of a program with those that the job asks for."""
     mine = Side.of(decoded, flat_cuts=flat_cuts)
     count = len(mine.cuts.rows)
     if _same(decoded, asked.written):
-        return Held(moves=count, alike=count)
+        return Conformance(moves=count, alike=count)
     other = Side.of(asked.written, flat_cuts=flat_cuts)
     wanted = Side.of(asked.wanted, flat_cuts=flat_cuts)
     alike = Alike.of(mine.toolpath, other.toolpath)
-    place = hold_place(mine, other, wanted, alike, asked, sample_mm)
-    settings = hold_settings(mine, other, alike, place.pairs, asked)
-    return Held(
+    place = compare_places(mine, other, wanted, alike, asked, sample_mm)
+    settings = compare_settings(mine, other, alike, place.pairs, asked)
+    return Conformance(
         place=place.findings,
         settings=settings,
         moves=count,
@@ -113,42 +116,42 @@ def _same(one: Toolpath, other: Toolpath) -> bool:
     )
 
 
-# What a job asks of a program, and the two sides that are compared: decoded and written.
+# What a job asks of a program, and the sides that are compared: decoded, written and wanted.
 
 LIMIT_UNITS = 1.5
-"""Moves may be this many units of the dialect apart: ends are rounded by up to 0.71 of them, and
-centres of arcs add to that."""
+"""Moves may be so many units of the dialect apart: rounding moves ends by up to 0.71 of a unit,
+and the centres of arcs as well."""
 
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What a program is held against.
+    """What a job asks of its program.
 
     `written`: the moves of the program that camtool would write, as its dialect decodes them;
-    `wanted`: what that was written from. `unit_mm`, `unit_z_mm`: the finest difference of places
-    that the dialect can say. `feed_said` (M,): the written rows whose feed the job names; a feed
-    is the same within half of `feed_unit_mm_min`. `safe_z_mm`: the height of rapids,
-    `safe_z_said` where the job names it.
+    `wanted`: the moves from which that is written. `unit_mm`, `unit_z_mm`: the resolution of the
+    dialect in XY and in Z. `feed_named` (M,): the written rows whose feed the job names; feeds are
+    equal within half of `feed_unit_mm_min`. `safe_z_mm`: the height of rapids; `safe_z_named`:
+    the job names it.
     """
 
     written: Toolpath
     wanted: Toolpath
     unit_mm: float
     unit_z_mm: float
-    feed_said: Bools
+    feed_named: Bools
     feed_unit_mm_min: float
     safe_z_mm: float
-    safe_z_said: bool
+    safe_z_named: bool
 
     @property
     def limits_mm(self) -> tuple[float, float]:
-        """How far apart moves may be in XY, and in height."""
+        """The tolerance in XY and in height, mm."""
         return LIMIT_UNITS * self.unit_mm, LIMIT_UNITS * self.unit_z_mm
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of the toolpaths that are compared, with what is asked of it again and again."""
+    """One of the toolpaths that are compared, with what is derived from it."""
 
     toolpath: Toolpath
     cuts: CutMoves
@@ -160,18 +163,18 @@ class Side:
         return cls(running, cut_moves(running, flat_cuts=flat_cuts))
 
     @cached_property
-    def target(self) -> Target:
-        """The cutting moves, to be searched."""
-        return Target(self.cuts)
+    def moves(self) -> MoveIndex:
+        """The cutting moves, indexed by place."""
+        return MoveIndex(self.cuts)
 
     @cached_property
     def holes(self) -> Holes:
-        """What it drills."""
+        """The drilled holes."""
         return holes_of(self.toolpath)
 
     @cached_property
     def plunges(self) -> Bools:
-        """(N,) feeds straight down that end below the stock top."""
+        """(N,) true for feeds straight down that end below the stock top."""
         start, end = self.toolpath.starts, self.toolpath.end
         still = (start[:, :2] == end[:, :2]).all(axis=1) & ~self.toolpath.is_arc
         deep = (end[:, 2] < start[:, 2]) & (end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
@@ -180,31 +183,32 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Alike:
-    """Numbers (N,) of the moves of two sides: the same where kind, start, end and centre are."""
+    """A number (N,) for each move of two sides, equal for moves of the same kind, start, end and
+    centre."""
 
     decoded: Ints
     written: Ints
 
     @classmethod
     def of(cls, decoded: Toolpath, written: Toolpath) -> Alike:
-        """Places are the same when they are within rounding (POSITION_EPS_MM)."""
+        """Points are the same within rounding (POSITION_EPS_MM)."""
         both = np.concatenate([_numbers(decoded), _numbers(written)])
         number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
         return cls(number[: len(decoded)], number[len(decoded) :])
 
     @property
     def in_written(self) -> Bools:
-        """(N,) decoded moves that `written` holds too."""
+        """(N,) true for decoded moves that are in `written`."""
         return np.isin(self.decoded, self.written)
 
     @property
     def in_decoded(self) -> Bools:
-        """(M,) written moves that `decoded` holds too."""
+        """(M,) true for written moves that are in `decoded`."""
         return np.isin(self.written, self.decoded)
 
 
 def _numbers(toolpath: Toolpath) -> Ints:
-    """(N, 9) kind and places, in whole numbers."""
+    """(N, 9) kind and coordinates as whole numbers."""
     centre = np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0)
     places = np.concatenate([toolpath.starts, toolpath.end, centre], axis=1)
     whole = np.rint(places / POSITION_EPS_MM).astype(np.int64)
@@ -213,57 +217,59 @@ def _numbers(toolpath: Toolpath) -> Ints:
 
 # Where a program cuts, against where it was asked to cut, at the resolution of its dialect.
 #
-# Moves that both sides hold need no looking at. All others are sampled. A sample of the program
-# must lie near a written or a wanted move at its height; a sample of the written program near a
-# decoded move, or what it was written from must. The way round is compared wherever moves of both
-# sides lie on each other.
+# Moves that are in both sides are skipped; all others are sampled. A sample of the program must
+# lie near a written or a wanted move at its height. For a sample of the written program, a decoded
+# move must lie near it or near the wanted move from which it was written. Directions are compared
+# wherever moves of both sides lie on each other.
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """Findings; the farthest that any cut is from what was asked, mm; `pairs` (P, 2): decoded
-    rows that are not alike, each with a written row that it lies on and runs along."""
+class PlaceComparison:
+    """Findings; the largest distance of a cut from what was asked, mm; `pairs` (P, 2): decoded
+    rows that are not in `written`, each with a written row on which it lies, in its direction."""
 
     findings: tuple[Finding, ...]
     off_mm: float
     pairs: Ints
 
 
-def hold_place(
+def compare_places(
     mine: Side, other: Side, wanted: Side, alike: Alike, asked: Asked, sample_mm: float
-) -> Place:
-    """Compare `mine`, the decoded side, with `other`, the written one, both ways."""
+) -> PlaceComparison:
+    """Compare `mine`, the decoded side, with `other`, the written side, and the reverse."""
     limits = asked.limits_mm
     drilled, other_stand = contours_drilled(mine.cuts, other.holes, limits)
     undrilled, mine_stand = contours_drilled(other.cuts, mine.holes, limits)
-    there = compared(mine.cuts, ~alike.in_written, other.target, limits, sample_mm)
-    back = compared(other.cuts, ~alike.in_decoded, mine.target, limits, sample_mm)
-    _also_near(there, wanted.target, limits)
-    _also_behind(back, wanted.target, mine.target, limits)
+    there = compared(mine.cuts, ~alike.in_written, other.moves, limits, sample_mm)
+    back = compared(other.cuts, ~alike.in_decoded, mine.moves, limits, sample_mm)
+    _near_wanted(there, wanted.moves, limits)
+    _written_from_cut(back, wanted.moves, mine.moves, limits)
     trips = round_trips(other.cuts, limits[0])
-    written = other.target.contour
+    written = other.moves.contour
     turns = turned(there, trips[written[there.move]], limits)
     turns_back = turned(back, trips[written[back.samples.segment[back.point]]], limits)
     findings = (
-        *_beside(back, undrilled, limits, Code.CONTOUR_MISSING),
-        *_beside(there, drilled, limits, Code.EXTRA_CUT),
+        *_place_findings(back, undrilled, limits, Code.CONTOUR_MISSING),
+        *_place_findings(there, drilled, limits, Code.EXTRA_CUT),
         *hole_findings(mine.holes, other.holes, limits, (mine_stand, other_stand)),
         *_plunges(mine, (other, wanted), alike, limits),
-        *_again(mine, other, alike, limits),
+        *_repeated_cuts(mine, other, alike, limits),
         *(other_way(there, turns) if len(turns) else other_way(back, turns_back)),
     )
-    return Place(findings, max(there.off_mm, back.off_mm), there.rows_along())
+    return PlaceComparison(findings, max(there.off_mm, back.off_mm), there.rows_along())
 
 
-def _also_near(there: Compared, wanted: Target, limits: Limits) -> None:
-    """What is near a wanted move is as asked, though the writer would have said it otherwise."""
+def _near_wanted(there: Compared, wanted: MoveIndex, limits: Limits) -> None:
+    """Mark samples near a wanted move as near, even where the writer would move otherwise."""
     rest = np.flatnonzero(np.isinf(there.distance))
     point, _, distance = wanted.within(there.samples.points[rest], there.samples.z[rest], limits)
     np.minimum.at(there.distance, rest[point], distance)
 
 
-def _also_behind(back: Compared, wanted: Target, decoded: Target, limits: Limits) -> None:
-    """What was written is there as well where the program cuts what it was written from."""
+def _written_from_cut(
+    back: Compared, wanted: MoveIndex, decoded: MoveIndex, limits: Limits
+) -> None:
+    """Mark written samples as near where the program cuts the wanted move behind them."""
     rest = np.flatnonzero(np.isinf(back.distance))
     part = back.samples.of(rest)
     found, wrong_depth = nearest_at_height(part, None, wanted, limits)
@@ -276,23 +282,25 @@ def _also_behind(back: Compared, wanted: Target, decoded: Target, limits: Limits
     np.minimum.at(back.distance, rest[point], distance)
 
 
-def _beside(found: Compared, drilled: Bools, limits: Limits, code: Code) -> Iterator[Finding]:
-    """One finding for each contour of which a part lies where the other side cuts nothing; but
-    for contours that a hole stands for, and slopes that are hardly below the stock top."""
+def _place_findings(
+    found: Compared, drilled: Bools, limits: Limits, code: Code
+) -> Iterator[Finding]:
+    """One finding for each contour of which a part lies where the other side does not cut, except
+    contours that are holes there (`drilled`) and slopes within the tolerance of the stock top."""
     cuts, samples = found.cuts, found.samples
     contour = cuts.contour[found.rows]
     judged = ~cuts.slopes[samples.segment] | (samples.z < STOCK_TOP_MM - limits[1])
     bad = np.flatnonzero(np.isinf(found.distance) & judged & ~drilled[contour])
     if len(bad) == 0:
         return
-    near, wrong_depth = nearest_at_height(samples.of(bad), None, Target(found.others), limits)
+    near, wrong_depth = nearest_at_height(samples.of(bad), None, MoveIndex(found.others), limits)
     order = np.lexsort((bad, -near.distance, contour[bad]))
-    listed = order[np.flatnonzero(np.diff(contour[bad][order], prepend=-1))]
-    for number, worst in enumerate(listed.tolist()):
+    first = order[np.flatnonzero(np.diff(contour[bad][order], prepend=-1))]
+    for worst, more in listed(first.tolist()):
         sample, nearest = int(bad[worst]), int(near.segment[worst])
         extra, known = code == Code.EXTRA_CUT, nearest >= 0
         one, which = (cuts, samples.segment[sample]) if extra else (found.others, nearest)
-        at, more = at_point(samples.points[sample]), and_more(number, len(listed))
+        at = at_point(samples.points[sample])
         block = block_name(one.toolpath, int(one.segments.path[which])) if extra or known else ""
         yield _away(near.distance[worst], bool(wrong_depth[worst]), code)(
             where=f"{block} near {at}".strip(),
@@ -300,8 +308,6 @@ def _beside(found: Compared, drilled: Bools, limits: Limits, code: Code) -> Iter
             limit=limits[0],
             more=more,
         )
-        if more:
-            return
 
 
 def _away(distance: float, wrong_depth: bool, code: Code) -> Sentence:
@@ -316,39 +322,36 @@ def _away(distance: float, wrong_depth: bool, code: Code) -> Sentence:
 def _plunges(
     mine: Side, others: tuple[Side, Side], alike: Alike, limits: Limits
 ) -> Iterator[Finding]:
-    """EXTRA_CUT for feeds straight down to where nothing was asked to be cut; holes, which are
-    compared as such, are left out."""
+    """EXTRA_CUT for feeds straight down to where no cut was asked for, except holes, which are
+    compared by `hole_findings`."""
     toolpath = mine.toolpath
     rows = np.flatnonzero(mine.plunges & ~alike.in_written)
     rows = rows[~_on(toolpath.end[rows, :2], mine.holes.at)]
     fine = np.zeros(len(rows), dtype=np.bool_)
     for other in others:
         ends = toolpath.end[rows]
-        fine[other.target.within(ends[:, :2], ends[:, 2], limits)[0]] = True
+        fine[other.moves.within(ends[:, :2], ends[:, 2], limits)[0]] = True
         deep = other.toolpath.end[other.plunges]
         one, plunge = near_points(ends[:, :2], deep[:, :2], limits[0])
         fine[one[deep[plunge, 2] <= ends[one, 2] + limits[1]]] = True
     bad = rows[~fine]
-    for number, row in enumerate(bad.tolist()):
-        more = and_more(number, len(bad))
+    for row, more in listed(bad.tolist()):
         yield EXTRA_CUT_PLUNGE(
             where=f"{block_name(toolpath, row)} at {at_point(toolpath.end[row])}",
             measured=toolpath.end[row, 2],
             more=more,
         )
-        if more:
-            return
 
 
 def _on(points: Floats, places: Floats) -> Bools:
-    """(J,) which points (J, 2) are one of the places (K, 2)."""
+    """(J,) true for points (J, 2) that are one of the places (K, 2)."""
     known = {tuple(place) for place in np.rint(places / POSITION_EPS_MM).astype(int).tolist()}
     mine = np.rint(points / POSITION_EPS_MM).astype(int).tolist()
     return np.array([tuple(point) in known for point in mine], dtype=np.bool_)
 
 
-def _again(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Finding]:
-    """EXTRA_CUT for whole moves that are cut more often than was asked."""
+def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Finding]:
+    """EXTRA_CUT for whole moves that are cut more often than asked."""
     cutting = np.flatnonzero(mine.cuts.is_cut)
     number, first, counts = np.unique(
         alike.decoded[cutting], return_index=True, return_counts=True
@@ -362,12 +365,12 @@ def _again(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Fi
     half = np.full(len(rows), 0.5)
     middle = point_at(mine.cuts.segments, segment, half)
     z = mine.cuts.ends_z[segment].mean(axis=1)
-    point, move, _ = other.target.within(middle, z, limits)
+    point, move, _ = other.moves.within(middle, z, limits)
     moves = np.column_stack([point, other.cuts.segments.path[move]])
     lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
     bad = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
-    for rank, place in enumerate(bad.tolist()):
-        row, more = int(rows[place]), and_more(rank, len(bad))
+    for place, more in listed(bad.tolist()):
+        row = int(rows[place])
         times, limit = int(counts[more_often][place]), max(int(lie[place]), 1)
         yield EXTRA_CUT_AGAIN(
             where=f"{block_name(mine.toolpath, row)} near {at_point(middle[place])}",
@@ -375,27 +378,25 @@ def _again(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Fi
             limit=limit,
             more=more,
         )
-        if more:
-            return
 
 
-# Feeds, spindle, tool, dwells, clearance and end of a program, against what was asked for.
+# Feeds, spindle, tool, dwells, clearance and end of a program, against what the job asks for.
 
 FEED_SHARE = 0.5
-"""A feed differs when it is off by more than this part of the dialect's unit of feeds."""
+"""Feeds differ when they are more than this part of the dialect's unit of feed apart."""
 
 DWELL_S = 0.0005
-"""A dwell that is shorter by less counts as equal."""
+"""A dwell is too short when it is shorter by more than this."""
 
 OFF = 0.0
-"""Stands for a spindle that does not turn, and for no tool."""
+"""The value of a spindle that is off, and of no tool."""
 
 
-def hold_settings(
+def compare_settings(
     mine: Side, other: Side, alike: Alike, pairs: Ints, asked: Asked
 ) -> tuple[Finding, ...]:
-    """Compare how moves are made; `pairs` (P, 2) are rows of both sides that lie on each other
-    besides those that are alike."""
+    """Compare feeds, spindle, tool, corners, dwells, clearance and end; `pairs` (P, 2) are rows of
+    both sides that lie on each other, besides those that are alike."""
     both = _Both.of(mine, other, alike, pairs)
     return (
         *_feeds(both, asked),
@@ -410,8 +411,8 @@ def hold_settings(
 
 @dataclass(frozen=True, eq=False)
 class _Both:
-    """Rows (R,) of the decoded side that feed into the stock, and pairs (P, 2) of such a row with
-    a written row that it may be compared with."""
+    """Decoded rows (R,) that cut or plunge, and pairs (P, 2) of such a row with a written row to
+    compare it with."""
 
     decoded: Toolpath
     written: Toolpath
@@ -420,11 +421,11 @@ class _Both:
 
     @classmethod
     def of(cls, mine: Side, other: Side, alike: Alike, pairs: Ints) -> _Both:
-        """The pairs that are given, all rows that are alike, and plunges that are not with every
+        """The given pairs, all rows that are alike, and each plunge that is not alike with every
         written plunge."""
         at_work, there = mine.cuts.is_cut | mine.plunges, other.cuts.is_cut | other.plunges
         rows, written = np.flatnonzero(at_work), np.flatnonzero(there)
-        # Of written rows that are alike in every way one is enough.
+        # One of several written rows that are alike, with the same settings, is enough.
         states = np.column_stack([alike.written, *_settings(other.toolpath)])[written]
         written = written[np.unique(states, axis=0, return_index=True)[1]]
         order = written[np.argsort(alike.written[written], kind="stable")]
@@ -441,7 +442,7 @@ class _Both:
         return cls(mine.toolpath, other.toolpath, rows, np.concatenate([same, pairs, entered]))
 
     def unlike(self, same: Bools) -> tuple[Ints, Ints]:
-        """Rows none of whose pairs is the `same` (P,), and for each the written row of one."""
+        """Rows without a pair that is the `same` (P,), each with the written row of one pair."""
         fine = np.zeros(len(self.decoded), dtype=np.bool_)
         fine[self.pairs[same, 0]] = True
         rows, first = np.unique(self.pairs[:, 0], return_index=True)
@@ -450,27 +451,28 @@ class _Both:
 
 
 def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats]:
-    """(N,) each: feed, turns of the spindle (CCW negative, OFF where it does not turn), tool."""
+    """(N,) each: feed, spindle speed in rev/min (CCW negative, OFF when it is off), tool."""
     kind = toolpath.kind
     turning = np.where(kind == Kind.SPINDLE_CCW, -toolpath.value, toolpath.value)
     spindle = (kind >= Kind.SPINDLE_CW) & (kind <= Kind.SPINDLE_OFF)
-    turns = _since(spindle, np.where(kind == Kind.SPINDLE_OFF, OFF, turning))
-    return toolpath.feed, turns, _since(kind == Kind.TOOL_CHANGE, toolpath.value)
+    turns = _last_value(spindle, np.where(kind == Kind.SPINDLE_OFF, OFF, turning))
+    return toolpath.feed, turns, _last_value(kind == Kind.TOOL_CHANGE, toolpath.value)
 
 
-def _since(said: Bools, values: Floats) -> Floats:
-    """(N,) the last value that was said up to each row, OFF before the first."""
-    last = np.maximum.accumulate(np.where(said, np.arange(len(said)), -1))
+def _last_value(given: Bools, values: Floats) -> Floats:
+    """(N,) the last `given` value up to each row, OFF before the first."""
+    last = np.maximum.accumulate(np.where(given, np.arange(len(given)), -1))
     return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), OFF)
 
 
 def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
-    """FEED_DIFFERS: an error for feeds that the job names; those that it leaves to the machine
-    are told.
+    """FEED_DIFFERS: an error for feeds that the job names, a remark for those it leaves to the
+    machine.
 
-    A machine that keeps the feed on its faster axis runs as much faster along a line as the line
-    is longer than its run on that axis. Places on a coarse grid turn short lines, so what the
-    directions explain of a difference is left out; both speeds were rounded then, each on its own.
+    On a machine that applies the feed to its faster axis, the speed along a line is higher by the
+    ratio of its length to its run on that axis. A coarse grid changes the direction of short
+    lines: the difference that follows from the directions is allowed, and twice the rounding, as
+    both feeds are rounded.
     """
     is_, wanted = both.decoded.feed[both.pairs[:, 0]], both.written.feed[both.pairs[:, 1]]
     slant, other = _slant(both.decoded)[both.pairs[:, 0]], _slant(both.written)[both.pairs[:, 1]]
@@ -478,8 +480,8 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
     share = np.where(turned > 0.0, 2.0 * FEED_SHARE, FEED_SHARE)
     off = np.abs(is_ - wanted) > share * asked.feed_unit_mm_min + wanted * turned
     rows, of = both.unlike(~off)
-    said = asked.feed_said[of]
-    for is_asked, which in ((True, said), (False, ~said)):
+    named = asked.feed_named[of]
+    for is_asked, which in ((True, named), (False, ~named)):
         if which.any():
             row = int(rows[which][0])
             yield (FEED_DIFFERS if is_asked else FEED_DIFFERS_OWN)(
@@ -491,7 +493,8 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
 
 
 def _slant(toolpath: Toolpath) -> Floats:
-    """(N,) length of a line in XY by its run on the faster axis, 1 to √2; 1 for anything else."""
+    """(N,) ratio of the length of a line in XY to its run on the faster axis, 1 to √2; 1 for
+    other rows."""
     run = np.abs(toolpath.end - toolpath.starts)[:, :2]
     faster = run.max(axis=1)
     line = ~toolpath.is_arc & (faster > 0.0)
@@ -499,7 +502,7 @@ def _slant(toolpath: Toolpath) -> Floats:
 
 
 def _spindle(both: _Both) -> Iterator[Finding]:
-    """SPINDLE_DIFFERS: an error where the job has the spindle turn, else told."""
+    """SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
     is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     asked = wanted[of] != OFF
@@ -523,7 +526,7 @@ def _turning(turns: float) -> str:
 
 
 def _tools(both: _Both) -> Iterator[Finding]:
-    """SETTING_DIFFERS for cuts with another tool than the program of the job has in then."""
+    """SETTING_DIFFERS for cuts with another tool than in the written program."""
     is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     asked = wanted[of] != OFF
@@ -539,9 +542,9 @@ def _tools(both: _Both) -> Iterator[Finding]:
 
 
 def _corners(both: _Both) -> Iterator[Finding]:
-    """SETTING_DIFFERS for moves whose corners may be rounded farther than the written program
-    lets the controller round them; what says nothing leaves them to the machine."""
-    is_, wanted = _rooms(both.decoded), _rooms(both.written)
+    """SETTING_DIFFERS for moves whose corners the controller may round farther than in the written
+    program. A program without a mode leaves corners to the machine and is not compared."""
+    is_, wanted = _corner_tolerances(both.decoded), _corner_tolerances(both.written)
     looser = is_[both.pairs[:, 0]] > wanted[both.pairs[:, 1]]
     rows, of = both.unlike(~looser)
     if len(rows):
@@ -555,18 +558,18 @@ def _corners(both: _Both) -> Iterator[Finding]:
         )
 
 
-def _rooms(toolpath: Toolpath) -> Floats:
-    """(N,) mm by which the corner behind each row may be rounded, or lines merged; NaN where the
-    program leaves that to the machine."""
-    rooms = [
+def _corner_tolerances(toolpath: Toolpath) -> Floats:
+    """(N,) mm by which the corner at the end of each row may be rounded, or lines merged; NaN
+    where the program leaves that to the machine."""
+    tolerances = [
         max(mode.tolerance_mm or np.inf, mode.merging_mm) if mode.corners == "blend" else 0.0
         for mode in toolpath.modes
     ]
-    return np.array([*rooms, np.nan])[toolpath.mode]
+    return np.array([*tolerances, np.nan])[toolpath.mode]
 
 
 def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
-    """SETTING_DIFFERS for places where the tool does not wait as long as was asked."""
+    """SETTING_DIFFERS where the tool dwells for less than was asked."""
     wanted, found = (np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded))
     limits = np.array([asked.limits_mm[0], asked.limits_mm[0], asked.limits_mm[1]])
     short = []
@@ -586,14 +589,14 @@ def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Find
 
 
 def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[Finding]:
-    """CLEARANCE_LOW for rapids in XY lower than asked, but for those that were asked for."""
+    """CLEARANCE_LOW for rapids in XY below the height asked for, except rapids in `written`."""
     toolpath = mine.toolpath
     if is_flat(other.toolpath):
         return
     start, end = toolpath.starts, toolpath.end
     goes = (toolpath.kind == Kind.RAPID) & (start[:, :2] != end[:, :2]).any(axis=1)
     low = np.minimum(start[:, 2], end[:, 2])
-    # Where the machine stands when the program begins is nobody's rapid.
+    # The program does not choose the height at which it begins: only that of its first end counts.
     rising = (start[:, 2] == toolpath.start[2]) & (np.cumsum(toolpath.is_motion) == 1)
     low = np.where(rising, end[:, 2], low)
     least = asked.safe_z_mm - asked.limits_mm[1]
@@ -601,8 +604,8 @@ def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[
     if len(bad) == 0:
         return
     row = int(bad[np.argmin(low[bad])])
-    yield (CLEARANCE_LOW if asked.safe_z_said else CLEARANCE_LOW_OWN)(
-        severity=_gravity(float(low[row]), asked),
+    yield (CLEARANCE_LOW if asked.safe_z_named else CLEARANCE_LOW_OWN)(
+        severity=_severity(float(low[row]), asked),
         where=f"{block_name(toolpath, row)} near {at_point(end[row])}",
         measured=low[row],
         limit=asked.safe_z_mm,
@@ -610,22 +613,23 @@ def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[
     )
 
 
-def _gravity(low_mm: float, asked: Asked) -> Severity:
-    """An error on the stock, and wherever the job names the height of rapids."""
+def _severity(low_mm: float, asked: Asked) -> Severity:
+    """An error where the tool touches the stock or the job names the height, else a warning."""
     touching = low_mm <= STOCK_TOP_MM + asked.limits_mm[1]
-    return Severity.ERROR if touching or asked.safe_z_said else Severity.WARNING
+    return Severity.ERROR if touching or asked.safe_z_named else Severity.WARNING
 
 
 def _end(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
-    """END_DIFFERS for a program without its end, or whose tool ends lower than was asked."""
+    """END_DIFFERS for a program without END, and for one whose tool ends lower or elsewhere than
+    asked."""
     if (written.kind == Kind.END).any() and not (decoded.kind == Kind.END).any():
         yield END_DIFFERS_NO_END(
             where=block_name(decoded, len(decoded) - 1) if len(decoded) else ""
         )
-    last, goal = _last(decoded), _last(written)
+    last, goal = _last_position(decoded), _last_position(written)
     if last[2] < min(goal[2], asked.safe_z_mm) - asked.limits_mm[1]:
         yield END_DIFFERS(
-            severity=_gravity(float(last[2]), asked),
+            severity=_severity(float(last[2]), asked),
             where=f"at {at_point(last)}",
             measured=last[2],
             limit=goal[2],
@@ -634,5 +638,5 @@ def _end(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding
         yield END_DIFFERS_PLACE(end=at_point(last), wanted=at_point(goal))
 
 
-def _last(toolpath: Toolpath) -> Floats:
+def _last_position(toolpath: Toolpath) -> Floats:
     return toolpath.end[-1] if len(toolpath) else toolpath.start

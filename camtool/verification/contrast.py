@@ -1,4 +1,4 @@
-"""The same program judged several ways, side by side: interpolators, play, any machine value."""
+"""The table of a program's variants (interpolators, backlash, other values), and their paths."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from camtool.verification.verify import Verification
 
 
 class ContrastRow(msgspec.Struct, frozen=True):
-    """One line of the table; µm, s. `circular_um`: the largest G of its circles. `endless`:
-    arcs whose stop test is never met."""
+    """One row of the table; µm, s. `circular_um`: the largest G of the circles. `endless`: the
+    number of arcs whose stop test is never met."""
 
     name: str
     interpolation_max_um: float | None
@@ -31,7 +31,7 @@ class ContrastRow(msgspec.Struct, frozen=True):
 
 
 def row_of(name: str, report: Report) -> ContrastRow:
-    """What the table says of one report."""
+    """The row of one report."""
     error = report.error_um
     circular = [circle.G_um for circle in report.circles if circle.G_um is not None]
     return ContrastRow(
@@ -80,7 +80,7 @@ def to_json(rows: Sequence[ContrastRow]) -> str:
 
 
 def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
-    """Where in XY (mm) the largest error of all lies; part zero when nothing cuts."""
+    """(x, y) mm of the largest error of all; part zero when nothing cuts."""
     best, place = -1.0, (0.0, 0.0)
     for verdict in verdicts:
         trace = verdict.trace
@@ -93,15 +93,15 @@ def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
 
 
 MOST_SHOWN = 40_000
-"""At most this many samples of each variant are drawn: later ones are left out."""
+"""At most so many samples of each variant are drawn; later ones are left out."""
 
 
-def strokes_within(
+def paths_within(
     chunks: Iterable[Chunk], cutting: Bools, window: Floats, *, commanded: bool
 ) -> list[Floats]:
-    """The cutting samples in the window [[xmin, xmax], [ymin, ymax]] mm, as runs (n, 2) that
-    follow each other: slides, or `commanded` positions."""
-    strokes: list[Floats] = []
+    """The cutting samples in the window [[xmin, xmax], [ymin, ymax]] mm, as consecutive polylines
+    (n, 2): positions of the slides, or `commanded` positions."""
+    paths: list[Floats] = []
     shown, before = 0, np.empty((0, 2))
     open_end = False
     for chunk in chunks:
@@ -109,19 +109,19 @@ def strokes_within(
         inside = ((points >= window[:, 0]) & (points <= window[:, 1])).all(axis=1)
         inside &= cutting[chunk.row]
         which = np.flatnonzero(inside)[: MOST_SHOWN - shown]
-        line = np.concatenate([before, points])  # each run begins where the slide came from
+        line = np.concatenate([before, points])  # each polyline begins with the sample before it
         for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1) if len(which) else []:
             first, end = int(run[0]) + len(before), int(run[-1]) + len(before) + 1
             if open_end and run[0] == 0:
-                strokes[-1] = np.concatenate([strokes[-1], line[first:end]])
+                paths[-1] = np.concatenate([paths[-1], line[first:end]])
             else:
-                strokes.append(line[max(first - 1, 0) : end])
+                paths.append(line[max(first - 1, 0) : end])
         shown += len(which)
         if len(points):
             open_end, before = bool(inside[-1]), points[-1:]
         if shown >= MOST_SHOWN:
             break
-    return strokes
+    return paths
 
 
 def _um(value: float | None) -> str:

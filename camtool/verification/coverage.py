@@ -1,16 +1,17 @@
-"""Is everything cut that was wanted, and nothing else: contours, holes, and the way round?
+"""Whether everything wanted is cut, and nothing else: contours, holes and their direction.
 
-Decoded moves are sampled and compared with the wanted moves: that gives the error of rounding,
-extra cuts, and for each decoded row the wanted contour that it belongs to. Wanted moves are
-sampled and compared with the decoded ones: that gives what is missing. Only moves at the height of
-the sample are compared (a slope: at the place nearest to it), so a lost pass or a wrong depth
-shows. How far heights may differ leaves room for slopes that a machine makes in small steps.
+Decoded moves are sampled and compared with the wanted moves, which gives the rounding error, the
+extra cuts, and the wanted contour to which each decoded row belongs. Wanted moves are sampled and
+compared with the decoded moves, which gives what is missing. A sample is compared only with moves
+at its own height (with a slope: at the point nearest to it), so that a lost pass or a wrong depth
+is found. The tolerance of heights allows for slopes that a machine makes in small steps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -52,12 +53,12 @@ from camtool.verification.matching import (
     match_rows,
     nearest_at_height,
 )
-from camtool.verification.nearest import Found, Target
+from camtool.verification.nearest import Found, MoveIndex
 
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """Rows matched, the error of rounding, and CONTOUR_MISSING and EXTRA_CUT findings."""
+    """The match of the rows, the rounding error, and CONTOUR_MISSING and EXTRA_CUT findings."""
 
     match: Match
     rounding: Figure
@@ -66,8 +67,7 @@ class Coverage:
 
 @dataclass(frozen=True, eq=False)
 class Drilled:
-    """Contours, of those that are wanted and of the decoded ones, for which a hole of the other
-    side stands: true (C,)."""
+    """Which wanted and which decoded contours (C,) are holes on the other side."""
 
     wanted: Bools
     decoded: Bools
@@ -75,7 +75,8 @@ class Drilled:
 
 @dataclass(frozen=True, eq=False)
 class _Sampled:
-    """Samples of the cuts of one side with the nearest moves of the other; `drilled` as above."""
+    """Samples of the cuts of one side, each with the nearest move of the other; `drilled` (C,) as
+    in `Drilled`."""
 
     cuts: CutMoves
     samples: Samples
@@ -84,21 +85,21 @@ class _Sampled:
     drilled: Bools
 
     def bad(self, goal: Goal) -> Bools:
-        """(S,) true for samples that the other side does not cut. A slope that is hardly below
-        the stock top may be a flat move upon it, which cuts nothing."""
+        """(S,) true for samples that the other side does not cut. Slopes within the tolerance of
+        the stock top are excepted: they may be flat moves on it, which cut nothing."""
         sloping = self.cuts.slopes[self.samples.segment]
         judged = ~sloping | (self.samples.z < STOCK_TOP_MM - goal.depth_mm)
         judged &= ~self.drilled[self.cuts.contour[self.cuts.segments.path[self.samples.segment]]]
         return np.asarray(judged & (self.wrong_depth | (self.found.distance > goal.limit_mm)))
 
 
-def cover(decoded: Target, goal: Goal, spacing_mm: float, drilled: Drilled) -> Coverage:
-    """Compare decoded and wanted cutting moves both ways, on samples about `spacing_mm` apart."""
-    cuts, wanted, limits = decoded.cuts, goal.target, (goal.limit_mm, goal.depth_mm)
+def cover(decoded: MoveIndex, goal: Goal, spacing_mm: float, drilled: Drilled) -> Coverage:
+    """Compare decoded with wanted cutting moves, and wanted with decoded ones, on samples about
+    `spacing_mm` apart."""
+    cuts, wanted, limits = decoded.cuts, goal.moves, (goal.limit_mm, goal.depth_mm)
     samples = sample_cuts(cuts, spacing_mm)
     found, wrong_depth = nearest_at_height(samples, None, wanted, limits)
-    there = _Sampled(cuts, samples, found, wrong_depth, drilled.decoded)
-    extra = tuple(_extra_cuts(there, goal))
+    extra = _uncovered(_Sampled(cuts, samples, found, wrong_depth, drilled.decoded), goal, _EXTRA)
     belongs = match_contours(cuts, samples, found, goal)
     rounding = Figure()
     real = np.isfinite(found.distance)
@@ -106,7 +107,8 @@ def cover(decoded: Target, goal: Goal, spacing_mm: float, drilled: Drilled) -> C
     rounding.add(found.distance[real], samples.points[real], rows[real])
     back = sample_cuts(wanted.cuts, spacing_mm)
     found_back, wrong_back = nearest_at_height(back, None, decoded, limits)
-    missing = _missing(_Sampled(wanted.cuts, back, found_back, wrong_back, drilled.wanted), goal)
+    wanted_samples = _Sampled(wanted.cuts, back, found_back, wrong_back, drilled.wanted)
+    missing = _uncovered(wanted_samples, goal, _MISSING)
     match = match_rows(cuts, samples, belongs, found, goal)
     return Coverage(match, rounding, (*missing, *extra))
 
@@ -115,48 +117,33 @@ _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
 _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
 
 
-def _extra_cuts(there: _Sampled, goal: Goal) -> Iterator[Finding]:
-    cuts, samples, distance = there.cuts, there.samples, there.found.distance
-    listed = list(_by_contour(cuts, samples, distance, there.bad(goal)))
-    for number, (_, worst, share) in enumerate(listed):
-        row = int(cuts.segments.path[samples.segment[worst]])
-        at = at_point(samples.points[worst])
-        wrong_depth, more = bool(there.wrong_depth[worst]), and_more(number, len(listed))
-        yield _away(distance[worst], wrong_depth, _EXTRA)(
-            where=f"{block_name(cuts.toolpath, row)} near {at}",
-            measured=_finite(distance[worst]),
-            limit=goal.limit_mm,
-            share=share,
-            more=more,
-        )
-        if more:
-            return
-
-
-def _missing(back: _Sampled, goal: Goal) -> Iterator[Finding]:
-    cuts, samples, distance = back.cuts, back.samples, back.found.distance
-    listed = list(_by_contour(cuts, samples, distance, back.bad(goal)))
-    for number, (contour, worst, share) in enumerate(listed):
+def _uncovered(
+    sampled: _Sampled, goal: Goal, sentences: tuple[Sentence, Sentence, Sentence]
+) -> Iterator[Finding]:
+    """A finding for each contour of which a part is not cut by the other side, at its sample with
+    the largest distance. Extra cuts are named by their block, missing ones by their contour."""
+    cuts, samples, distance = sampled.cuts, sampled.samples, sampled.found.distance
+    contours = list(_by_contour(cuts, samples, distance, sampled.bad(goal)))
+    for (contour, worst, share), more in listed(contours):
         row = int(cuts.segments.path[samples.segment[worst]])
         source = cuts.toolpath.text(row)
         name = f"contour {contour + 1}" + (f" ({source})" if source else "")
-        wrong_depth, more = bool(back.wrong_depth[worst]), and_more(number, len(listed))
-        yield _away(distance[worst], wrong_depth, _MISSING)(
-            where=f"{name} near {at_point(samples.points[worst])}",
+        place = block_name(cuts.toolpath, row) if sentences is _EXTRA else name
+        yield _away(distance[worst], bool(sampled.wrong_depth[worst]), sentences)(
+            where=f"{place} near {at_point(samples.points[worst])}",
             measured=_finite(distance[worst]),
             limit=goal.limit_mm,
             share=share,
             contour=name,
             more=more,
         )
-        if more:
-            return
 
 
 def _by_contour(
     cuts: CutMoves, samples: Samples, distance: Floats, bad: Bools
 ) -> Iterator[tuple[int, int, float]]:
-    """(contour, sample with the largest distance, share of its samples) where any is bad."""
+    """(contour, its sample with the largest distance, share of its samples that are bad) of each
+    contour with bad samples."""
     contour = cuts.contour[cuts.segments.path[samples.segment]]
     all_of = np.bincount(contour, minlength=cuts.contour_count)
     rows = np.flatnonzero(bad)
@@ -171,7 +158,7 @@ def _by_contour(
 def _away(
     distance: float, wrong_depth: bool, sentences: tuple[Sentence, Sentence, Sentence]
 ) -> Sentence:
-    """Which of the sentences is to be said: away, away at this depth, or nothing there."""
+    """The sentence for a sample: far from all cuts, far from those at its depth, or no cuts."""
     away, at_depth, nothing = sentences
     if not np.isfinite(distance):
         return nothing
@@ -182,16 +169,16 @@ def _finite(distance: float) -> float | None:
     return float(distance) if np.isfinite(distance) else None
 
 
-# Drilled holes: are all there, as deep as wanted, and no others?
+# Drilled holes: all that are wanted, as deep as wanted, and no others.
 #
-# A hole is a place where the tool is fed straight down below the stock top and back, in as many
-# pecks as it likes, without any cut in XY before it leaves the place: no contour begins with it.
+# At a hole the tool is fed straight down below the stock top and returns, in any number of pecks,
+# and does not cut in XY before it moves on: a plunge with which a contour begins is no hole.
 
 
 @dataclass(frozen=True, eq=False)
 class Holes:
-    """H holes of `toolpath`: where, (H, 2) mm, the height of their bottoms (H,) mm, and the row
-    (H,) that reached it first."""
+    """H holes of `toolpath`: their positions `at` (H, 2) mm, the heights of their bottoms (H,) mm,
+    and the rows (H,) that first reach them."""
 
     toolpath: Toolpath
     at: Floats
@@ -207,7 +194,7 @@ def holes_of(toolpath: Toolpath) -> Holes:
     flat = toolpath.is_motion & (moved_lengths(toolpath) > POSITION_EPS_MM)
     flat |= toolpath.kind == Kind.HOME_XY
     cutting = cutting_rows(toolpath, flat_cuts=False)
-    # A stay at one place lies between two moves in XY; neither may cut.
+    # Rows at one position lie between two moves in XY, neither of which may cut.
     stay = np.cumsum(flat)
     movers = np.flatnonzero(flat)
     cut = np.zeros(len(movers) + 2, dtype=np.bool_)
@@ -223,10 +210,10 @@ def holes_of(toolpath: Toolpath) -> Holes:
 def contours_drilled(
     cuts: CutMoves, holes: Holes, limits_mm: tuple[float, float]
 ) -> tuple[Bools, Bools]:
-    """(C,) which contours a hole stands for, and (H,) which holes do: all of the contour lies
-    within the first limit of the hole, and is as deep within the second.
+    """(C,) the contours that are holes on the other side, and (H,) those holes: all of the contour
+    lies within the first limit of the hole, and their depths agree within the second.
 
-    A contour smaller than what a dialect can say comes out as a plunge, and cuts the same.
+    A contour smaller than the resolution of a dialect becomes a plunge, which cuts the same.
     """
     drilled = np.zeros(cuts.contour_count, dtype=np.bool_)
     stands = np.zeros(len(holes), dtype=np.bool_)
@@ -257,9 +244,9 @@ def hole_findings(
     limits_mm: tuple[float, float],
     stand: tuple[Bools, Bools],
 ) -> tuple[Finding, ...]:
-    """CONTOUR_MISSING for holes that the program does not drill, EXTRA_CUT for others: within the
-    limits in XY and in height. `stand`: which decoded and which wanted holes stand for contours
-    of the other side, as `contours_drilled` tells."""
+    """CONTOUR_MISSING for wanted holes that the program does not drill, EXTRA_CUT for holes that
+    are not wanted; `limits_mm` in XY and in height. `stand`: the decoded and the wanted holes that
+    are contours on the other side, by `contours_drilled`."""
     return (
         *_unpaired(wanted, decoded, limits_mm, stand[1], _MISSING_HOLES),
         *_unpaired(decoded, wanted, limits_mm, stand[0], _EXTRA_HOLES),
@@ -273,25 +260,23 @@ def _unpaired(
     stand: Bools,
     sentences: tuple[Sentence, Sentence],
 ) -> Iterator[Finding]:
-    """A finding for each hole without another one: `sentences` where there is none at its place,
-    and where there is one of another depth."""
+    """A finding for each hole that the other side lacks; `sentences`: for no hole at its position,
+    and for one of another depth."""
     none, other_depth = sentences
     here, paired = _paired(holes, others, limits_mm)
     alone = np.flatnonzero(~paired & ~stand).tolist()
-    for number, hole in enumerate(alone):
-        more = and_more(number, len(alone))
+    for hole, more in listed(alone):
         row = int(holes.row[hole])
         yield (other_depth if here[hole] else none)(
             where=f"{block_name(holes.toolpath, row)} at {at_point(holes.at[hole])}",
             measured=STOCK_TOP_MM - holes.bottom_mm[hole],
             more=more,
         )
-        if more:
-            return
 
 
 def _paired(holes: Holes, others: Holes, limits_mm: tuple[float, float]) -> tuple[Bools, Bools]:
-    """(H,), (H,) which holes have another one at their place, and which one as deep too."""
+    """(H,), (H,) which holes have one of the others at their position, and which one that is as
+    deep."""
     here, same = np.zeros(len(holes), dtype=np.bool_), np.zeros(len(holes), dtype=np.bool_)
     mine, theirs = near_points(holes.at, others.at, limits_mm[0])
     here[mine] = True
@@ -300,53 +285,54 @@ def _paired(holes: Holes, others: Holes, limits_mm: tuple[float, float]) -> tupl
     return here, same
 
 
-# Which way round a program cuts, wherever its moves lie on those that it is compared with.
+# The direction in which a program cuts, wherever its moves lie on those it is compared with.
 
 ALONG = 0.7
-"""Two moves that coincide have the same direction when the cosine between them is above this, and
-opposite directions when it is below minus this; between these, they cross."""
+"""Two moves on each other have the same direction when the cosine between them is above this, and
+opposite directions when it is below minus this; between, one crosses the other."""
 
 LONG_ENOUGH = 1.5
-"""Moves shorter than this many times their tolerance have no certain direction: their ends are
-rounded by up to 1.41 units in all, which turns a longer one by no more than 32 degrees."""
+"""The direction of moves shorter than so many times the tolerance is not certain: their ends are
+rounded by up to 1.41 units in all, which turns a longer move by no more than 32 degrees."""
 
 Limits = tuple[float, float]
 
 
 def round_trips(cuts: CutMoves, gap_mm: float) -> Bools:
-    """(C,) contours that come back to where they were round some area: the others (open paths, to
-    and fro) may be cut from either end."""
+    """(C,) contours that enclose an area; others (open paths, paths there and back) may be cut
+    from either end."""
     return np.asarray(loops(cuts, gap_mm)[:, 0] != NO_LOOP)
 
 
 def cut_other_way(
-    decoded: Target, said: Target, limits: Limits, sample_mm: float
+    decoded: MoveIndex, source: MoveIndex, limits: Limits, sample_mm: float
 ) -> Iterator[Finding]:
-    """CUT_OTHER_WAY for contours of a program that run against those that it was written from."""
+    """CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that of
+    the moves from which it was written, `source`."""
     cuts = decoded.cuts
     rows = cuts.rows
     here, half = cuts.first[rows], np.full(len(rows), 0.5)
     z = cuts.ends_z[here].mean(axis=1)
     middles = Samples(point_at(cuts.segments, here, half), here, z, half)
-    there = nearest_at_height(middles, None, said, limits)[0].segment
+    there = nearest_at_height(middles, None, source, limits)[0].segment
     known = np.flatnonzero(there >= 0)
     rows, here, there = rows[known], here[known], there[known]
-    way = headings(cuts.segments, here, half[known])
-    share = said.table.shares(middles.points[known], there)
-    cosine = (way * headings(said.cuts.segments, there, share)).sum(axis=1)
+    heading = headings(cuts.segments, here, half[known])
+    share = source.table.shares(middles.points[known], there)
+    cosine = (heading * headings(source.cuts.segments, there, share)).sum(axis=1)
     suspect = np.zeros(len(cuts.contour), dtype=np.bool_)
     suspect[rows[cosine < -ALONG]] = True
     if suspect.any():
-        found = compared(cuts, suspect, said, limits, sample_mm)
-        trips = round_trips(said.cuts, limits[0])[said.contour[found.move]]
+        found = compared(cuts, suspect, source, limits, sample_mm)
+        trips = round_trips(source.cuts, limits[0])[source.contour[found.move]]
         yield from other_way(found, turned(found, trips, limits))
 
 
 @dataclass(eq=False)
 class Compared:
-    """Samples on some cuts of one side, and all pairs (`point`, `move`) of them with moves of the
-    other side that are near; `cosine` (P,) between both. `distance` (S,) mm from the nearest
-    one, inf where none is near."""
+    """S samples on cuts of one side, and all P pairs of a sample (`point`) with a `move` of the
+    other side near it; `cosine` (P,) of the angle between both. `distance` (S,) mm from each
+    sample to the nearest move, inf where none is near."""
 
     cuts: CutMoves
     others: CutMoves
@@ -358,7 +344,7 @@ class Compared:
 
     @property
     def off_mm(self) -> float:
-        """The farthest sample from the other side, of those that are near."""
+        """The largest distance of a sample from the other side, of those that are near it, mm."""
         return float(self.distance[np.isfinite(self.distance)].max(initial=0.0))
 
     @property
@@ -367,7 +353,7 @@ class Compared:
         return self.cuts.segments.path[self.samples.segment]
 
     def rows_along(self) -> Ints:
-        """(P, 2) rows of both sides that lie on each other and run the same way."""
+        """(P, 2) rows of both sides that lie on each other and have the same direction."""
         along = self.cosine > ALONG
         pairs = np.column_stack(
             [self.rows[self.point[along]], self.others.segments.path[self.move[along]]]
@@ -376,26 +362,26 @@ class Compared:
 
 
 def compared(
-    cuts: CutMoves, rows: Bools, target: Target, limits: Limits, sample_mm: float
+    cuts: CutMoves, rows: Bools, others: MoveIndex, limits: Limits, sample_mm: float
 ) -> Compared:
-    """The cuts of these rows (N,) of one side against the cuts of the other one, at samples about
-    `sample_mm` apart; `limits`: how far "near" is in XY, and in height."""
+    """The cuts of these rows (N,) of one side against the cuts of the other side, at samples about
+    `sample_mm` apart; `limits`: what is near, in XY and in height, mm."""
     samples = _with_ends(
         cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.segments.path]))
     )
-    point, move, distance = target.within(samples.points, samples.z, limits)
+    point, move, distance = others.within(samples.points, samples.z, limits)
     nearest = np.full(len(samples.points), np.inf)
     np.minimum.at(nearest, point, distance)
     here = headings(cuts.segments, samples.segment[point], samples.share[point])
-    share = target.table.shares(samples.points[point], move)
-    there = headings(target.cuts.segments, move, share)
+    share = others.table.shares(samples.points[point], move)
+    there = headings(others.cuts.segments, move, share)
     cosine = (here * there).sum(axis=1)
-    return Compared(cuts, target.cuts, samples, point, move, cosine, nearest)
+    return Compared(cuts, others.cuts, samples, point, move, cosine, nearest)
 
 
 def _with_ends(cuts: CutMoves, samples: Samples) -> Samples:
-    """The same with the last sample of each row on the end that is programmed: an arc whose end
-    is not on its circle passes it by."""
+    """The samples with the last one of each row moved to the programmed end, which need not lie
+    on the circle of an arc."""
     row = cuts.segments.path[samples.segment]
     last = (samples.segment == cuts.first[row + 1] - 1) & (samples.share == 1.0)
     points = np.where(last[:, None], cuts.toolpath.end[row, :2], samples.points)
@@ -403,17 +389,17 @@ def _with_ends(cuts: CutMoves, samples: Samples) -> Samples:
 
 
 def headings(segments: Segments, which: Ints, share: Floats) -> Floats:
-    """(J, 2) directions of segments `which` at parts `share` of their lengths."""
+    """(J, 2) unit directions of the segments `which` at parts `share` of their lengths."""
     chord = (segments.end - segments.start)[which]
-    # The tangent turns evenly, by the sweep in all, about the direction of the chord.
+    # The tangent turns evenly from half the sweep before the chord to half the sweep behind it.
     turn = (share - 0.5) * segments.sweep[which]
     angle = np.arctan2(chord[:, 1], chord[:, 0]) + turn
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def turned(compared: Compared, round_trip: Bools, limits: Limits) -> Ints:
-    """Samples on moves that the other side has in the other direction only; the ways of
-    contours that come round alone (`round_trip` (P,) of each pair)."""
+    """The samples on moves that the other side cuts only in the opposite direction; only contours
+    that enclose an area count (`round_trip` (P,) of each pair)."""
     cuts, samples, count = compared.cuts, compared.samples, len(compared.distance)
     same = np.zeros(count, dtype=np.bool_)
     same[compared.point[compared.cosine > ALONG]] = True
@@ -427,22 +413,20 @@ def turned(compared: Compared, round_trip: Bools, limits: Limits) -> Ints:
 
 
 def other_way(compared: Compared, turned: Ints) -> Iterator[Finding]:
-    """One finding for each contour that is cut the other way round."""
+    """One finding for each contour that is cut in the opposite direction."""
     cuts = compared.cuts
     rows = compared.rows[turned]
     first = np.unique(cuts.contour[rows], return_index=True)[1]
-    for number, place in enumerate(first.tolist()):
-        row, more = int(rows[place]), and_more(number, len(first))
+    for place, more in listed(first.tolist()):
+        row = int(rows[place])
         at = at_point(compared.samples.points[turned[place]])
         yield CUT_OTHER_WAY(where=f"{block_name(cuts.toolpath, row)} near {at}", more=more)
-        if more:
-            return
 
 
-# Places in words, for findings: points, blocks, and how many more there are.
+# Points and blocks as findings name them, and how many findings are listed.
 
 FINDINGS_PER_CODE = 20
-"""At most this many findings of one kind are listed; the last one counts all."""
+"""So many findings of one kind are listed; the last of them says how many more there are."""
 
 
 def at_point(point: Floats | tuple[float, float]) -> str:
@@ -456,6 +440,12 @@ def block_name(toolpath: Toolpath, row: int) -> str:
     return f"block {block + 1}" if block >= 0 else f"move {row + 1}"
 
 
-def and_more(number: int, total: int) -> int:
-    """How many more there are than are listed, for the last one that is; 0 for all others."""
-    return max(total - FINDINGS_PER_CODE, 0) if number == FINDINGS_PER_CODE - 1 else 0
+Item = TypeVar("Item")
+
+
+def listed(items: Sequence[Item]) -> Iterator[tuple[Item, int]]:
+    """The items that get a finding each, with the number of those that are left out: 0 for all
+    but the last one."""
+    shown = items[:FINDINGS_PER_CODE]
+    for number, item in enumerate(shown, start=1):
+        yield item, len(items) - len(shown) if number == len(shown) else 0

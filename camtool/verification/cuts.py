@@ -1,13 +1,13 @@
 """Which moves of a toolpath cut, as lines and arcs, and the contours that they form.
 
 The rule (`cutting_rows`): a row cuts when it is a feed move (LINE, ARC) that moves in XY and
-begins or ends below the stock top, z < 0. Air moves and plunges straight down are left out. A
-toolpath that never moves in Z (a bare drawing program, z ≥ 0 all along) holds no such row; when
-nothing better is known, `flat_cuts=True` makes all its feed moves in XY cut.
+begins or ends below the stock top, z < 0. Air moves and plunges straight down do not cut. A
+toolpath without motion in Z (z ≥ 0 throughout, as of a plain drawing program) has no such row;
+with `flat_cuts=True` all its feed moves in XY cut.
 
-A contour is a stay of the tool in the stock: consecutive cutting rows, with events, rows that move
-nowhere and feeds straight down or up between them (the steps from one pass to the next, the sides
-of tabs). A rapid, an air move or homing ends it.
+A contour is what the tool cuts without leaving the stock: consecutive cutting rows, with events,
+rows without motion and feeds straight down or up between them (steps from one pass to the next,
+the sides of tabs). A rapid, an air move or homing ends it.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 
 FEWEST_SAMPLES = 4
-"""Each line and arc is sampled in at least this many parts, so that short moves are not missed."""
+"""Each line and arc is sampled in at least so many parts, so that short moves are sampled too."""
 
 MOST_SAMPLES = 200_000
-"""Long programs are sampled more coarsely, so that there are about this many points."""
+"""Long programs are sampled more coarsely, so that there are about so many points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +36,9 @@ class CutMoves:
 
     Arcs run about the programmed centre with the radius of their start; above 180° they are two
     segments. `segments.path` (K,) is the toolpath row; row r owns segments
-    first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) numbers the contours from 0, −1 where
-    nothing is cut. `ends_z` (K, 2) mm: heights of the segment's start and end, between which it
-    rises or sinks evenly.
+    first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) is the number of the row's contour, from
+    0, and −1 for rows that do not cut. `ends_z` (K, 2) mm: heights of the segment's start and end,
+    between which its height changes evenly.
     """
 
     toolpath: Toolpath
@@ -54,7 +54,7 @@ class CutMoves:
 
     @property
     def slopes(self) -> Bools:
-        """(K,) true where a segment rises or sinks."""
+        """(K,) true where the height changes along a segment."""
         return np.asarray(self.ends_z[:, 0] != self.ends_z[:, 1])
 
     @property
@@ -69,7 +69,7 @@ class CutMoves:
 
     @property
     def contour_count(self) -> int:
-        """How many contours."""
+        """Number of contours."""
         return int(self.contour.max(initial=-1)) + 1
 
     def contour_ends(self) -> tuple[Ints, Ints]:
@@ -88,15 +88,13 @@ class CutMoves:
 
 
 def moved_lengths(toolpath: Toolpath) -> Floats:
-    """(N,) mm of way in XY that each row asks for; 0 for events.
-
-    An arc's is its start radius times its sweep.
-    """
+    """(N,) mm: length of each row in XY, 0 for events; of an arc, its start radius times its
+    sweep."""
     starts = toolpath.starts
     straight = toolpath.end[:, :2] - starts[:, :2]
     spoke = starts[:, :2] - toolpath.centre
-    round_way = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
-    length = np.where(toolpath.is_arc, round_way, np.hypot(straight[:, 0], straight[:, 1]))
+    along_arc = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
+    length = np.where(toolpath.is_arc, along_arc, np.hypot(straight[:, 0], straight[:, 1]))
     return np.where(toolpath.is_motion, length, 0.0)
 
 
@@ -106,7 +104,7 @@ def is_flat(toolpath: Toolpath) -> bool:
 
 
 def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool) -> Bools:
-    """(N,) true for the rows that cut, by the rule of this module; none behind the END."""
+    """(N,) true for the rows that cut, by the rule of this module; false after the END."""
     running = np.cumsum(toolpath.kind == Kind.END) == 0
     moves = running & toolpath.is_feed & (moved_lengths(toolpath) > POSITION_EPS_MM)
     if flat_cuts and is_flat(toolpath):
@@ -163,7 +161,7 @@ def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
 
 
 def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
-    """(N,) contour of each row: a new one begins where the tool left the stock in between."""
+    """(N,) contour of each row: a new one begins after the tool has left the stock."""
     starts = toolpath.starts
     rise = np.abs(toolpath.end[:, 2] - starts[:, 2]) if len(toolpath) else np.empty(0)
     flat = moved_lengths(toolpath) > POSITION_EPS_MM
@@ -179,8 +177,8 @@ def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Points (S, 2) mm on the segments `segment` (S,) of some CutMoves, ends included, at the
-    part `share` (S,) of their length, and their heights `z` (S,) mm."""
+    """Points (S, 2) mm on the segments `segment` (S,) of CutMoves, ends included, each at the
+    part `share` (S,) of the length of its segment, and their heights `z` (S,) mm."""
 
     points: Floats
     segment: Ints
@@ -188,14 +186,14 @@ class Samples:
     share: Floats
 
     def of(self, which: Ints) -> Samples:
-        """Some of them."""
+        """The samples with these indices."""
         return Samples(self.points[which], self.segment[which], self.z[which], self.share[which])
 
 
 def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> Samples:
-    """Points on the true lines and arcs (on these segments `only`), about spacing_mm apart
-    (coarser when they would exceed `MOST_SAMPLES`, but never fewer than `FEWEST_SAMPLES` parts of
-    a segment)."""
+    """Points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those segments
+    alone. The spacing is wider where there would be more than `MOST_SAMPLES` points, but each
+    segment has at least `FEWEST_SAMPLES` parts."""
     which = np.arange(len(cuts.segments)) if only is None else only
     lengths = segment_lengths(cuts.segments[which])
     spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
@@ -204,44 +202,43 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
     within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
     share, segment = within / parts[owner], which[owner]
     begin, end = cuts.ends_z[segment].T
-    # On the level exactly: rounding must not make slopes of flat moves.
+    # Level moves stay level exactly: rounding must not turn them into slopes.
     z = np.where(begin == end, begin, begin + share * (end - begin))
     return Samples(point_at(cuts.segments, segment, share), segment, z, share)
 
 
-# The closed loop that each contour comes down to: what sizes and closure are measured on.
+# The loop of each contour: its closed part, on which sizes and closure are measured.
 #
-# A contour is a stay of the tool in the stock: it may come in on a lead or down a ramp, go round
-# in several passes, overlap its start, and leave on a lead again. Its loop is the last of its
-# longest closed parts: the final pass of a profile, the outermost way of a pocket. A level contour
-# that ends where it starts is its own loop. There-and-back is none: a loop holds an area.
+# During one contour the tool may enter on a lead or down a ramp, go round in several passes,
+# overlap its start and leave on a lead. The loop of the contour is the last of its longest closed
+# parts: the final pass of a profile, the outermost ring of a pocket. A level contour that ends
+# where it starts is its own loop. A path there and back encloses no area and is not a loop.
 
 AS_LONG = 0.98
-"""A later loop of at least this part of the longest one's length is preferred to it."""
+"""A later loop replaces the longest one so far if it has at least this part of its length."""
 
 FEW_PLACES = 48
-"""Up to this many places of a contour are compared each with each: cells would take longer to
-make."""
+"""Up to so many points of a contour are compared pair by pair; above, in a grid of cells."""
 
 NO_LOOP = -1
 """First and last row of a contour without a loop."""
 
 
 def loops(cuts: CutMoves, gap_mm: float) -> Ints:
-    """(C, 2) first and last row of the loop of each contour, NO_LOOP where it has none; ends
-    within `gap_mm` of each other are one."""
+    """(C, 2) first and last row of the loop of each contour, NO_LOOP where it has none. Points
+    within `gap_mm` of each other count as one."""
     begin, finish = cuts.contour_ends()
     found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
     whole = cuts.closed(gap_mm) & _level(cuts)
     found[whole] = np.column_stack([begin, finish])[whole]
     rest = np.flatnonzero(~whole)
     if len(rest):
-        way = _Way(cuts)
+        search = _LoopSearch(cuts)
         rows = cuts.rows
         offsets = np.searchsorted(cuts.contour[rows], np.arange(len(begin) + 1))
         for contour in rest.tolist():
             mine = rows[offsets[contour] : offsets[contour + 1]]
-            found[contour] = way.longest_loop(mine, gap_mm)
+            found[contour] = search.longest_loop(mine, gap_mm)
     return found
 
 
@@ -261,15 +258,15 @@ def _level(cuts: CutMoves) -> Bools:
     return np.asarray(low == high)
 
 
-class _Way:
-    """The moves of a toolpath one after the other: how long, and what area lies beside them."""
+class _LoopSearch:
+    """Finds loops by the length of each move and the signed area between it and the origin."""
 
     def __init__(self, cuts: CutMoves) -> None:
         toolpath = cuts.toolpath
         self._begin, self._end = toolpath.starts[:, :2], toolpath.end[:, :2]
         self._length = np.where(cuts.is_cut, moved_lengths(toolpath), 0.0)
-        # Green: the area beside a move is half the cross product of its ends, and for an arc
-        # (r²/2)(t − sin t) of its segment on top.
+        # Green's theorem: half the cross product of the ends of a move, and for an arc of sweep t
+        # the area (r²/2)(t − sin t) of its circular segment on top.
         (ax, ay), (bx, by) = self._begin.T, self._end.T
         sweep = toolpath.sweeps()
         spoke = self._begin - toolpath.centre
@@ -277,7 +274,7 @@ class _Way:
         self._area = 0.5 * (ax * by - ay * bx) + 0.5 * square * (sweep - np.sin(sweep))
 
     def longest_loop(self, rows: Ints, gap_mm: float) -> tuple[int, int]:
-        """First and last of the cutting rows (R,) of one contour that make its loop."""
+        """First and last row of the loop of one contour, whose cutting rows are `rows` (R,)."""
         places = np.concatenate([self._begin[rows[:1]], self._end[rows]])
         length = np.concatenate([[0.0], np.cumsum(self._length[rows])]).tolist()
         area = np.concatenate([[0.0], np.cumsum(self._area[rows])]).tolist()
@@ -293,23 +290,24 @@ class _Way:
 
 
 def returns_to_itself(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
-    """Pairs (earlier, later) of places (P, 2) that are one, each with the latest before it."""
+    """Pairs (earlier, later) of points (P, 2) within `gap_mm` of each other: for each point the
+    latest one before it."""
     latest = (_latest_of_few if len(places) <= FEW_PLACES else _latest_before)(places, gap_mm)
     later = np.flatnonzero(latest >= 0)
     yield from zip(latest[later].tolist(), later.tolist(), strict=True)
 
 
 def _latest_of_few(places: Floats, gap_mm: float) -> Ints:
-    """(P,) the latest place before each that is the same one, −1: none. Each with each."""
+    """(P,) for each point the latest one before it within `gap_mm`, −1 for none; pair by pair."""
     off = places[:, None] - places[None]
     near = np.tril(np.hypot(off[:, :, 0], off[:, :, 1]) <= gap_mm, -1)
     return np.asarray(np.where(near, np.arange(len(places)), -1).max(axis=1, initial=-1))
 
 
 def _latest_before(places: Floats, gap_mm: float) -> Ints:
-    """The same in square cells as wide as the gap. The latest place before another one in each of
-    the nine cells about it is looked at, and what lies before that only where it is too far away:
-    a thousand passes over one place are not compared each with each."""
+    """The same, by square cells as wide as the gap. In each of the nine cells around a point the
+    latest earlier point is tried first, and points before it only where it is too far away, so
+    that a thousand passes over one point are not compared pair by pair."""
     count = len(places)
     cell = np.floor(places / gap_mm).astype(np.int64)
     cell -= cell.min(axis=0) - 1

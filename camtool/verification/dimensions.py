@@ -1,13 +1,14 @@
 """Sizes of the part and of its closed contours, wanted and predicted; and how contours close.
 
-Of a contour that is cut in several passes the deepest, last one counts, without leads and ramps:
-its loop (`camtool.verification.cuts`). The part is all loops and open contours together. Sizes are
-those of the cut edges, nominally as they are drawn, where the plan says which edges those are
-(`camtool.toolpath.wanted`); the slides move an edge as they move the box of the tool's centre:
+Of a contour that is cut in several passes, the last and deepest pass counts, without leads and
+ramps: its loop (`camtool.verification.cuts`). The part is all loops and open contours together.
+Sizes are those of the cut edges, and nominal sizes are as drawn, where the plan says which edges
+are cut (`camtool.toolpath.wanted`). The slides move an edge by as much as they move the bounding
+box of the tool centre's path:
 
     predicted edge = planned edge + (box of the slides − box of the wanted moves)
 
-Where nobody knows edges, sizes are those of the tool centre's path.
+Where the edges are not known, sizes are those of the tool centre's path.
 
     error_percent = (predicted − nominal) / nominal · 100
 
@@ -26,14 +27,14 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
-from camtool.verification.cuts import NO_LOOP, CutMoves, loops, of_loops
+from camtool.verification.cuts import NO_LOOP, CutMoves, of_loops
 from camtool.verification.matching import Match
 
 
 @dataclass(frozen=True)
 class Size:
-    """One dimension: "part X", "contour 3 Y"; mm. `error_percent` None when nominally 0.
-    `of_edge`: of the cut edge, not of the tool's centre."""
+    """One dimension, such as "part X" or "contour 3 Y", mm. `of_edge`: it is that of the cut
+    edge, not of the tool centre's path."""
 
     name: str
     nominal_mm: float
@@ -42,7 +43,7 @@ class Size:
 
     @property
     def error_percent(self) -> float | None:
-        """Predicted against nominal, per cent, positive when too large."""
+        """Predicted against nominal, per cent, positive when too large; None for a nominal 0."""
         if self.nominal_mm <= POSITION_EPS_MM:
             return None
         return (self.predicted_mm - self.nominal_mm) / self.nominal_mm * 100.0
@@ -50,8 +51,8 @@ class Size:
 
 @dataclass(frozen=True, eq=False)
 class RowSlides:
-    """Where the slides went in each of N rows, XY mm: `low`, `high` (N, 2), infinite where they
-    did not move; `places` (N+1, 2): where they stand before each row and after the last."""
+    """Positions of the slides in each of N rows, XY mm: `low` and `high` (N, 2), infinite where
+    they did not move; `places` (N+1, 2): their position before each row and after the last."""
 
     low: Floats
     high: Floats
@@ -59,41 +60,47 @@ class RowSlides:
 
 
 def places_between(start: Floats, row_end: Floats) -> Floats:
-    """(N+1, 2) mm: where the slides stand before each row and after the last, from where they
-    end (N, 2), NaN for rows that moved nothing."""
+    """(N+1, 2) mm: the position of the slides before each row and after the last. `row_end`
+    (N, 2) is the position at the end of each row, NaN for rows without motion."""
     known = np.isfinite(row_end[:, 0])
     latest = np.maximum.accumulate(np.where(known, np.arange(1, len(row_end) + 1), 0))
     places = np.concatenate([start[None, :2], row_end])
     return np.asarray(places[np.concatenate([[0], latest])])
 
 
-def closure_mm(cuts: CutMoves, slides: RowSlides, gap_mm: float) -> float:
-    """Largest distance between the slides' start and end on a closed contour; NaN without one.
-
-    A contour is closed when the programmed ends of its loop are within gap_mm.
-    """
-    found = loops(cuts, gap_mm)
-    begin, finish = found[found[:, 0] != NO_LOOP].T
+def closure_mm(loops: Ints, slides: RowSlides) -> float:
+    """Largest distance, mm, between where the slides begin and where they end a closed contour;
+    NaN where no contour is closed. `loops` (C, 2) are those of `camtool.verification.cuts`."""
+    begin, finish = loops[loops[:, 0] != NO_LOOP].T
     if len(begin) == 0:
         return math.nan
     gap = slides.places[finish + 1] - slides.places[begin]
     return float(np.hypot(gap[:, 0], gap[:, 1]).max())
 
 
-def sizes(
-    cuts: CutMoves, slides: RowSlides, wanted: CutMoves, match: Match, gap_mm: float
-) -> Iterator[Size]:
-    """The whole part, then each closed contour of `wanted`, X and Y.
+@dataclass(frozen=True, eq=False)
+class LoopedCuts:
+    """Cutting moves and the loops (C, 2) of their contours (`camtool.verification.cuts.loops`)."""
 
-    `match` says which wanted row and contour each row of `cuts` belongs to; contours that no row
-    belongs to are left out (a finding says so).
+    cuts: CutMoves
+    loops: Ints
+
+
+def sizes(
+    decoded: LoopedCuts, slides: RowSlides, goal: LoopedCuts, match: Match, gap_mm: float
+) -> Iterator[Size]:
+    """X and Y of the whole part, then of each closed contour of the wanted moves (`goal`).
+
+    `match` says to which wanted row and contour each decoded row belongs. Contours to which no
+    row belongs are left out (a finding names them).
     """
+    cuts, wanted = decoded.cuts, goal.cuts
     if len(cuts.rows) == 0 or len(wanted.rows) == 0:
         return
-    found = loops(wanted, gap_mm)
-    closed = found[:, 0] != NO_LOOP
-    counts = wanted.is_cut & (of_loops(wanted, found) | ~np.append(closed, False)[wanted.contour])
-    mine = _counting(cuts, match, counts, closed, gap_mm)
+    closed = goal.loops[:, 0] != NO_LOOP
+    in_loop = of_loops(wanted, goal.loops)
+    counts = wanted.is_cut & (in_loop | ~np.append(closed, False)[wanted.contour])
+    mine = _counting(decoded, match, counts, closed)
     if len(mine) == 0:
         return
     low, high = _predicted(cuts, slides, mine, match.contour)
@@ -104,7 +111,7 @@ def sizes(
     known = wanted.toolpath.drawn is not None
     nominal, predicted, rough = _edges(wanted, closed, centre, slide)
     seen = np.isfinite(slide[:, 0, 0]) & np.isfinite(centre[:, 0, 0])
-    # What the program does not cut at all is still a part of its nominal size.
+    # Contours that the program does not cut still count in the nominal size of the part.
     yield from _pair(
         "part", _whole(nominal), _whole(predicted[_finest(nominal, rough, seen)]), known
     )
@@ -117,9 +124,9 @@ def sizes(
 def _edges(
     wanted: CutMoves, closed: Bools, centre: Floats, slide: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Nominal and predicted boxes (C, 2, 2) of the edges that contours cut, from the boxes of the
-    wanted moves and of the slides, those boxes themselves where a contour cuts no edge; and how
-    far (C,) each is planned to stay from its nominal one, mm."""
+    """Nominal and predicted boxes (C, 2, 2) of the edges that the contours cut, and the distance
+    (C,) mm that each is planned to keep from its nominal edge. `centre` and `slide` are the boxes
+    of the wanted moves and of the slides; they are returned where a contour cuts no edge."""
     drawn, rows = wanted.toolpath.drawn, wanted.rows
     nominal, predicted, rough = centre.copy(), slide.copy(), np.zeros(len(centre))
     if drawn is not None:
@@ -134,8 +141,8 @@ def _edges(
 
 
 def _finest(nominal: Floats, rough: Floats, seen: Bools) -> Ints:
-    """Of the contours (C,) that are cut, those that decide a size: of several on one line, roughed
-    and finished, the ones that come nearest to it."""
+    """The contours that decide a size, of those (C,) that are `seen`: where several cut one edge,
+    as in roughing and finishing, those that come nearest to it."""
     rows = np.flatnonzero(seen)
     _, line = np.unique(nominal[rows].reshape(len(rows), 4), axis=0, return_inverse=True)
     least = np.full(len(rows), np.inf)
@@ -144,14 +151,14 @@ def _finest(nominal: Floats, rough: Floats, seen: Bools) -> Ints:
 
 
 def _whole(boxes: Floats) -> Floats:
-    """(2,) size in X and Y of all boxes (C, 2, 2) together; of those that are known."""
+    """(2,) size in X and Y of all boxes (C, 2, 2) together, without those that are infinite."""
     known = boxes[np.isfinite(boxes[:, 0, 0])]
     return np.asarray(known[:, :, 1].max(axis=0) - known[:, :, 0].min(axis=0))
 
 
 def _final(segments: Segments, boxes: Floats, wanted: CutMoves, gap_mm: float) -> Bools:
-    """(C,) true for contours under which no other one of the same box is cut: the tool may leave
-    the stock between two passes."""
+    """(C,) true for contours below which no contour of the same box is cut: passes between which
+    the tool leaves the stock are contours of their own."""
     contour = wanted.contour[segments.path]
     least = np.full((wanted.contour_count, 2), np.inf)
     most = np.full((wanted.contour_count, 2), -np.inf)
@@ -171,12 +178,13 @@ def _final(segments: Segments, boxes: Floats, wanted: CutMoves, gap_mm: float) -
     return np.asarray(lowest == deepest[same.reshape(-1)])
 
 
-def _counting(cuts: CutMoves, match: Match, counts: Bools, closed: Bools, gap_mm: float) -> Ints:
-    """The rows of `cuts` that make the sizes: of contours (C,) that are `closed` their own loops,
-    where they have any; else the rows that follow a wanted row (W,) which `counts`."""
+def _counting(decoded: LoopedCuts, match: Match, counts: Bools, closed: Bools) -> Ints:
+    """The decoded rows that determine the sizes: for the `closed` (C,) wanted contours the rows
+    of their decoded loops, where there are any; otherwise the rows that follow a wanted row (W,)
+    that `counts`."""
     of = match.contour
     follow = counts[match.row] & (of >= 0)
-    looped = of_loops(cuts, loops(cuts, gap_mm)) & (of >= 0) & np.append(closed, False)[of]
+    looped = of_loops(decoded.cuts, decoded.loops) & (of >= 0) & np.append(closed, False)[of]
     with_loop = np.zeros(len(closed) + 1, dtype=np.bool_)
     with_loop[of[looped]] = True
     return np.flatnonzero(looped | (follow & ~with_loop[of]))
@@ -185,8 +193,8 @@ def _counting(cuts: CutMoves, match: Match, counts: Bools, closed: Bools, gap_mm
 def _predicted(
     cuts: CutMoves, slides: RowSlides, mine: Ints, contour: Ints
 ) -> tuple[Floats, Floats]:
-    """Extents (N, 2), (N, 2) of the slides in each row, and, of the rows `mine`, where the first
-    of each contour (N,) begins."""
+    """Extents (N, 2), (N, 2) of the slides in each row. For the rows `mine`, those of the first
+    row of each contour (N,) include the position where it begins."""
     begin = mine[np.flatnonzero(np.diff(contour[mine], prepend=-1))]
     low, high = slides.low.copy(), slides.high.copy()
     low[begin] = np.minimum(low[begin], slides.places[begin])
@@ -196,7 +204,7 @@ def _predicted(
 
 def _extents(contour: Ints, low: Floats, high: Floats, wanted: CutMoves) -> Floats:
     """(C, 2, 2) box [[x low, x high], [y low, y high]] of the items of each contour; infinite
-    where it has none."""
+    for a contour without items."""
     least = np.full((wanted.contour_count, 2), np.inf)
     most = np.full((wanted.contour_count, 2), -np.inf)
     np.minimum.at(least, contour, low)

@@ -202,7 +202,7 @@ class Tally:
     air_s: float
     dwell_s: float
     compensation_s: float
-    gave_up: dict[int, tuple[float, float]]
+    endless_arcs: dict[int, tuple[float, float]]
     """Rows whose stop test was never met, and where in XY (mm) the simulation left them."""
 
     @property
@@ -225,7 +225,7 @@ def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
         air_s=float(ledger.duration_s[air].sum()),
         dwell_s=float(ledger.duration_s[dwell].sum()),
         compensation_s=float(ledger.compensation_s.sum()),
-        gave_up={
+        endless_arcs={
             row: (float(rows.commanded_end[row, 0]), float(rows.commanded_end[row, 1]))
             for row in missed
         },

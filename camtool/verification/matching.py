@@ -1,10 +1,11 @@
-"""Which wanted contour and which wanted circle each decoded row belongs to.
+"""The wanted contour and the wanted circle to which each decoded row belongs.
 
-Contours may overlap or share ends, so the nearest move of a point says little. A decoded contour
-belongs to the wanted contour that is nearest to most of its samples and covers all of them within
-the tolerance; when that one does not cover it, to the next by that count (`MOST_TRIES` are tried).
-A contour that no single wanted one covers (a foreign program may run several in one go, or too
-much) is taken row by row: a row belongs where all of its inner samples are nearest.
+Contours may overlap or share ends, so the move nearest to one point does not decide. A decoded
+contour belongs to the wanted contour that is nearest to most of its samples, if all samples lie
+within the tolerance of it; otherwise the next by that count is tried, up to `MOST_TRIES`. A
+contour that no single wanted contour covers (a foreign program may cut several without lifting, or
+more than wanted) is matched row by row: a row belongs to the contour that is nearest to all of its
+inner samples.
 """
 
 from __future__ import annotations
@@ -18,29 +19,30 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.verification.circles import Circle
 from camtool.verification.cuts import CutMoves, Samples
-from camtool.verification.nearest import ANY_CONTOUR, Found, Groups, Target, ranges, run_offsets
+from camtool.verification.nearest import ANY_CONTOUR, Found, Groups, MoveIndex, ranges, run_offsets
 
 MOST_TRIES = 4
-"""Number of wanted contours that are tried for a decoded one."""
+"""So many wanted contours are tried for each decoded contour."""
 
 LEAST_MM = 1e-6
-"""Moves nearer than this at their height are found even when no distance is allowed."""
+"""Moves nearer than this are found even when the tolerance is 0."""
 
 SAMPLES_PER_GROUP = 64
-"""Number of neighbouring samples that share one search for near moves, unless moves lie close."""
+"""Up to so many neighbouring samples share one search for near moves; fewer among close moves."""
 
 GAPS_PER_GROUP = 4.0
-"""A search extends along this many gaps between moves: its box holds about their square."""
+"""The box of a search is so many gaps between moves long, and holds about the square of that."""
 
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """What each of the N decoded rows belongs to, in the moves that it is compared with.
+    """The wanted moves to which each of the N decoded rows belongs.
 
-    `row` (N,) the wanted row nearest to its middle, −1 for rows that do not cut; `contour` (N,)
-    likewise; `only` (N,) that contour when the slides may be compared with it alone, else
-    ANY_CONTOUR; `circle` (N,) index of the full circle that the row follows, −1. `off_mm` (N, 2):
-    how far what was drawn lies from the wanted rows that it is near (`Drawn.off_mm`), at most.
+    `row` (N,) is the wanted row nearest to its middle and `contour` (N,) its contour, −1 for rows
+    that do not cut. `only` (N,) is that contour where the slides are compared with it alone, else
+    ANY_CONTOUR. `circle` (N,) is the index of the full circle that the row follows, or −1.
+    `off_mm` (N, 2) is the largest distance of the drawing from the wanted rows beside it
+    (`Drawn.off_mm`).
     """
 
     row: Ints
@@ -52,17 +54,17 @@ class Match:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """The wanted moves, their full circles, how far a decoded contour may be from its own in XY,
-    and how far in height."""
+    """The wanted moves, their full circles, and how far a decoded contour may be from its wanted
+    contour in XY and in height, mm."""
 
-    target: Target
+    moves: MoveIndex
     circles: list[Circle]
     limit_mm: float
     depth_mm: float
 
 
 def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
-    """Each row belongs to itself: for programs with nothing to compare them with."""
+    """The match of a program without wanted moves: each row belongs to itself."""
     count = len(cuts.contour)
     row = np.where(cuts.is_cut, np.arange(count), -1)
     circle = _circle_of_row(circles, count)
@@ -70,17 +72,17 @@ def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
 
 
 def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
-    """What belongs to a row of a bent toolpath belongs to the wanted row that it is there for:
-    `of` (S,) of each bent row. Contours may have become several by bending, circles too."""
+    """A match with the rows of a compensated toolpath as one with the wanted rows: `of` (S,) is
+    the wanted row of each compensated row. Compensation may divide contours and circles."""
     known = match.row >= 0
     row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
-    contour = np.where(known, goal.target.cuts.contour[np.maximum(row, 0)], -1)
-    circle = _circle_of_row(goal.circles, len(goal.target.cuts.contour))
-    off = np.where(known[:, None], _off(goal)[np.maximum(row, 0)], 0.0)
+    contour = np.where(known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
+    circle = _circle_of_row(goal.circles, len(goal.moves.cuts.contour))
+    off = np.where(known[:, None], _drawn_off_mm(goal)[np.maximum(row, 0)], 0.0)
     return replace(
         match,
         row=row,
-        off_mm=_beside(off, contour),
+        off_mm=_with_neighbours(off, contour),
         contour=contour,
         only=np.where(match.only == ANY_CONTOUR, ANY_CONTOUR, contour),
         circle=np.where(known, circle[np.maximum(row, 0)], -1),
@@ -88,20 +90,20 @@ def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
 
 
 def nearest_at_height(
-    samples: Samples, choice: Ints | None, target: Target, limits_mm: tuple[float, float]
+    samples: Samples, choice: Ints | None, moves: MoveIndex, limits_mm: tuple[float, float]
 ) -> tuple[Found, Bools]:
-    """The nearest move of the target for each sample at its own height; where none is near there,
-    the nearest at any height, and true (S,) if that one is near.
+    """The move nearest to each sample at its own height; where no move is near at that height, the
+    nearest at any height, and true (S,) where that one is near.
 
-    `choice` (S,): the contour to compare with, the same all along a segment, and what is not near
-    on it is not found at all; None: any. `limits_mm`: how far "near" is in XY, and in height.
+    `choice` (S,): the only contour to compare with, constant along a segment; only its near moves
+    are found. None: all contours. `limits_mm`: what is near, in XY and in height.
     """
     limit_mm, depth_mm = limits_mm
     near_mm = max(limit_mm, LEAST_MM)
     found, wrong_depth = _nothing(len(samples.points)), np.zeros(len(samples.points), np.bool_)
     if len(samples.points) == 0:
         return found, wrong_depth
-    every, together = np.arange(len(samples.points)), _samples_per_group(samples, target)
+    every, together = np.arange(len(samples.points)), _samples_per_group(samples, moves)
     for levels in (True, False):
         rest = every[np.isinf(found.distance)]
         if len(rest) == 0:
@@ -115,7 +117,7 @@ def nearest_at_height(
             np.full(count, limit_mm),
             contour,
             np.tile([-np.inf, np.inf], (count, 1)),
-            # All moves between here and a far one of the chosen contour would be looked at.
+            # Without a limit, all moves between a sample and a far contour would be searched.
             most_mm=math.inf if choice is None else near_mm,
         )
         if levels:
@@ -123,19 +125,19 @@ def nearest_at_height(
             high = np.maximum.reduceat(z, offsets[:-1]) + depth_mm
             heights = np.column_stack([low, high])
             groups = replace(groups, z=heights, height=z, window_mm=depth_mm, most_mm=near_mm)
-        near = target.nearest(samples.points[rest], groups)
+        near = moves.nearest(samples.points[rest], groups)
         found.distance[rest], found.segment[rest] = near.distance, near.segment
         if not levels:
             wrong_depth[rest] = near.distance <= limit_mm
     return found, wrong_depth
 
 
-def _samples_per_group(samples: Samples, target: Target) -> int:
-    """How many samples of a segment share one search, so that its box holds few moves; only time
-    depends on it."""
+def _samples_per_group(samples: Samples, moves: MoveIndex) -> int:
+    """How many samples of a segment share one search, so that its box holds few moves. Only the
+    time depends on it."""
     steps = np.hypot(*np.diff(samples.points, axis=0).T)[np.diff(samples.segment) == 0]
     spacing = max(float(steps.mean()) if len(steps) else 0.0, POSITION_EPS_MM)
-    return int(np.clip(GAPS_PER_GROUP * target.gap_mm / spacing, 1.0, SAMPLES_PER_GROUP))
+    return int(np.clip(GAPS_PER_GROUP * moves.gap_mm / spacing, 1.0, SAMPLES_PER_GROUP))
 
 
 def _nothing(count: int) -> Found:
@@ -143,9 +145,9 @@ def _nothing(count: int) -> Found:
 
 
 def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -> Ints:
-    """(S,) the wanted contour that the sample's decoded contour belongs to, ANY_CONTOUR where
-    there is none. `found` is then the nearest move of that contour: changed in place."""
-    wanted = goal.target
+    """(S,) the wanted contour to which the decoded contour of each sample belongs, ANY_CONTOUR for
+    none. `found` is changed in place to the nearest move of that contour."""
+    wanted = goal.moves
     mine = cuts.contour[cuts.segments.path[samples.segment]]
     belongs = np.full(len(mine), ANY_CONTOUR, dtype=np.int64)
     if len(mine) == 0 or len(wanted.contour) == 0:
@@ -171,7 +173,7 @@ def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -
 
 
 def _candidates(mine: Ints, nearest: Ints) -> list[Ints]:
-    """For each try (C,): the wanted contour with the most samples, the next …; −1 when no more.
+    """For each try (C,): the wanted contour nearest to most samples, then the next, −1 for none.
 
     `mine` (S,) is the decoded contour of each sample (ascending), `nearest` (S,) the wanted one.
     """
@@ -190,9 +192,9 @@ def _candidates(mine: Ints, nearest: Ints) -> list[Ints]:
 
 
 def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, goal: Goal) -> Match:
-    """What each row of `cuts` belongs to, its samples taken together; `belongs` (S,) and `found`
-    as `match_contours` leaves them."""
-    wanted, count = goal.target, len(cuts.contour)
+    """The match of each row of `cuts`, from all of its samples; `belongs` (S,) and `found` are the
+    result of `match_contours`."""
+    wanted, count = goal.moves, len(cuts.contour)
     rows = cuts.segments.path[samples.segment]
     match = Match(
         row=np.full(count, -1, dtype=np.int64),
@@ -216,18 +218,19 @@ def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, go
     match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))
     match.circle[row] = _unanimous(circle, offsets)
     followed = wanted.cuts.segments.path[found.segment]
-    match.off_mm[row] = np.maximum.reduceat(_off(goal)[followed], begin, axis=0)
-    return replace(match, off_mm=_beside(match.off_mm, match.contour))
+    match.off_mm[row] = np.maximum.reduceat(_drawn_off_mm(goal)[followed], begin, axis=0)
+    return replace(match, off_mm=_with_neighbours(match.off_mm, match.contour))
 
 
-def _off(goal: Goal) -> Floats:
-    """(W, 2) mm: how far what was drawn lies from the wanted rows; 0 where nobody knows."""
-    wanted = goal.target.cuts.toolpath
+def _drawn_off_mm(goal: Goal) -> Floats:
+    """(W, 2) mm: distances of the drawing from the wanted rows; 0 where they are not known."""
+    wanted = goal.moves.cuts.toolpath
     return np.zeros((len(wanted), 2)) if wanted.drawn is None else wanted.drawn.off_mm
 
 
-def _beside(off_mm: Floats, contour: Ints) -> Floats:
-    """The largest of each row (N, 2) and its neighbours in its contour: slides lag behind."""
+def _with_neighbours(off_mm: Floats, contour: Ints) -> Floats:
+    """The largest value of each row (N, 2) and of its neighbours in its contour, because slides
+    lag behind."""
     rows = np.flatnonzero(contour >= 0)
     most = off_mm.copy()
     same = contour[rows[1:]] == contour[rows[:-1]]
@@ -238,8 +241,8 @@ def _beside(off_mm: Floats, contour: Ints) -> Floats:
 
 
 def _unanimous(values: Ints, offsets: Ints) -> Ints:
-    """(R,) the value of all samples between the ends of each run (at its ends a row touches its
-    neighbours), −1 where they differ."""
+    """(R,) the value of all inner samples of each run, −1 where they differ; at its first and last
+    sample a row touches its neighbours."""
     inner = np.column_stack([offsets[:-1] + 1, offsets[1:] - 1]).ravel()
     low = np.minimum.reduceat(values, inner)[::2]
     high = np.maximum.reduceat(values, inner)[::2]

@@ -1,4 +1,4 @@
-"""Findings about the motion: arcs that never end, travel, reversals, play, no motion at all."""
+"""Findings about the motion: endless arcs, missed ends, travel, rapids, reversals, backlash."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
 from camtool.units import UM_PER_MM
 from camtool.verification.case import Case
-from camtool.verification.coverage import and_more, at_point, block_name, holes_of
+from camtool.verification.coverage import at_point, block_name, holes_of, listed
 from camtool.verification.cuts import CutMoves
 from camtool.verification.figures import RowFigures, Tally, missed_ends
 
 AXES = "XYZ"
 CLEARED_COVERAGES = 2.0
-"""A rapid may extend beyond the cleared area by this many tolerances of the coverage: it and the
-cuts beside it are each rounded on their own."""
+"""A rapid may leave the cleared area by so many tolerances of coverage: it and the cuts beside it
+are rounded separately."""
 
 TRAVEL_EPS_MM = 1e-6
 """A span may exceed the travel by this much, by rounding alone."""
@@ -55,14 +55,13 @@ def motion_findings(
         *_many_reversals(machine, tally, cuts),
         *_nothing_moves(cuts),
         *_homing(decoded, machine),
-        *_unknown_play(machine, tally),
+        *_unknown_backlash(machine, tally),
     )
 
 
 def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator[Finding]:
     coded = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
-    for number, (row, place) in enumerate(tally.gave_up.items()):
-        more = and_more(number, len(tally.gave_up))
+    for (row, place), more in listed(list(tally.endless_arcs.items())):
         missed = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
         yield (ARC_MISSES_END if math.isfinite(missed) else ARC_MISSES_END_FAR)(
             where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
@@ -71,24 +70,23 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
             move="arc" if decoded.is_arc[row] else "move",
             more=more,
         )
-        if more:
-            return
 
 
-def _missed_ends(held: Toolpath, case: Case, tally: Tally, rows: RowFigures) -> Iterator[Finding]:
-    """Moves that end beside their programmed ends, but for arcs that never end; a remark when
-    all are within what the part is compared by, and what the program itself lets corners be
-    rounded by (G64 P, Q)."""
+def _missed_ends(
+    quantised: Toolpath, case: Case, tally: Tally, rows: RowFigures
+) -> Iterator[Finding]:
+    """Moves that end beside their programmed ends, except endless arcs: a remark where all are
+    within the tolerance of coverage and of the corners that the program allows (G64 P, Q)."""
     axes = case.machine.axes
     steps_mm = axes.x.coded_step_mm, axes.y.coded_step_mm
-    missed = missed_ends(rows, held, steps_mm, without=tuple(tally.gave_up))
+    missed = missed_ends(rows, quantised, steps_mm, without=tuple(tally.endless_arcs))
     if missed.count == 0:
         return
-    asked = (mode.tolerance_mm + mode.merging_mm for mode in held.modes if mode.tolerance_mm)
+    asked = (mode.tolerance_mm + mode.merging_mm for mode in quantised.modes if mode.tolerance_mm)
     meant_mm = case.coverage_mm + max(asked, default=0.0)
     yield END_NOT_REACHED(
         severity=Severity.WARNING if missed.most_mm > meant_mm else Severity.INFO,
-        where=f"{block_name(held, missed.row)}, end {at_point(held.end[missed.row])}",
+        where=f"{block_name(quantised, missed.row)}, end {at_point(quantised.end[missed.row])}",
         measured=missed.most_mm * UM_PER_MM,
         limit=0.0,
         count=missed.count,
@@ -109,9 +107,7 @@ def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
 
 
 def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
-    found = _through_stock(decoded, case)
-    for number, one in enumerate(found):
-        more = and_more(number, len(found))
+    for one, more in listed(_through_stock(decoded, case)):
         yield RAPID_IN_STOCK_IN_PROGRAM(
             where=f"{block_name(decoded, one.row)} near {at_point(one.at_mm)}",
             measured=one.z_mm,
@@ -119,13 +115,11 @@ def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
             depth=-one.z_mm,
             more=more,
         )
-        if more:
-            return
 
 
 def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
-    """Rapids through what the tool has not cleared; of a tool that nobody knows all that go along
-    below the stock top, or straight down to where no feed has been."""
+    """Rapids through stock that the tool has not cleared. Where the tool is not known: all rapids
+    in XY below the stock top, and those straight down to where no feed has been."""
     diameter = case.options.tool_diameter_mm
     if diameter is not None:
         radius = np.full(len(decoded), 0.5 * diameter)
@@ -139,7 +133,8 @@ def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
 
 
 def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:
-    """Too many for the part's size: each leaves an error that does not grow with the part."""
+    """Too many reversals for the size of the part: the error at each one does not shrink with the
+    part."""
     count, limit = int(tally.cutting_reversals[:2].sum()), machine.limits.max_reversals
     if limit is None or count <= limit:
         return
@@ -175,7 +170,7 @@ def _homing(decoded: Toolpath, machine: Machine) -> Iterator[Finding]:
         yield RETURN_TO_MACHINE_ZERO(where=block_name(decoded, int(rows[0])), zero=zero)
 
 
-def _unknown_play(machine: Machine, tally: Tally) -> Iterator[Finding]:
+def _unknown_backlash(machine: Machine, tally: Tally) -> Iterator[Finding]:
     given = zip(AXES, machine.axes, machine.play_map.used, tally.steps, strict=True)
     for name, axis, cells, steps in given:
         known = cells is not None or axis.backlash_mm > 0.0 or axis.compensation_mm > 0.0

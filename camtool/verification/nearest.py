@@ -1,15 +1,17 @@
-"""Distances of points to the cutting moves: to their own row, or to the nearest of many.
+"""Distances of points from cutting moves: from a given one, or from the nearest of many.
 
 Distances are exact: to true lines and arcs, never to chords.
 
     line a→b:  |p − a − t·d|,  d = b − a,  t = clamp((p − a)·d / d², 0, 1)
-    arc:       | |p − c| − r |  inside the wedge that the arc spans at its centre c (≤ 180°, so two
-               signs of cross products tell), otherwise the distance to its nearer end.
+    arc:       | |p − c| − r |  inside the wedge that the arc spans at its centre c, otherwise the
+               distance to its nearer end. The wedge is ≤ 180°, so the signs of two cross products
+               decide.
 
-The nearest of many is searched by groups of neighbouring points. Boxes of the moves, of long ones
-piece by piece (`Layers`), give those within a margin of the group's box. When the largest distance
-found is within the margin, no move outside could be nearer; otherwise the margin grows to that
-distance. So the result is exact whatever the first margin was; a good guess only saves time.
+The nearest of many moves is searched for groups of neighbouring points. Boxes of the moves, of
+long moves piece by piece (`HeightLayers`), give the moves within a margin of the group's box. When
+the largest distance found is within the margin, no move outside can be nearer; otherwise the
+margin grows to that distance. So the result is exact whatever the first margin was: a good guess
+only saves time.
 """
 
 from __future__ import annotations
@@ -28,33 +30,33 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.verification.cuts import CutMoves
 
 PAIRS_AT_ONCE = 1 << 17
-"""Pairs of point and move that are computed together: bounds memory, fits a processor's cache."""
+"""So many pairs of point and move are computed together: bounds memory, fits the cache."""
 
 GROUPS_AT_ONCE = 1 << 13
-"""Groups whose near moves are searched together: bounds memory."""
+"""The near moves of so many groups are searched together: bounds memory."""
 
 MARGIN_GROWTH = 4.0
-"""The margin of a search grows by this factor until something is found."""
+"""The margin of a search grows by this factor while no move is found."""
 
 MARGIN_SLACK = 1.001
-"""A margin is set this much above the distance it must reach, so that rounding cannot matter."""
+"""A margin is this much larger than the distance it must reach, so that rounding cannot matter."""
 
 ANY_CONTOUR = -1
-"""A group of points that may be compared with the moves of every contour."""
+"""The contour of a group of points that is compared with the moves of every contour."""
 
 
 class SegmentTable:
-    """What distances need of each segment, in columns."""
+    """Columns of the segments from which distances are computed."""
 
     def __init__(self, segments: Segments) -> None:
         start, end = segments.start, segments.end
-        way = end - start
-        square = (way**2).sum(axis=1)
+        chord = end - start
+        square = (chord**2).sum(axis=1)
         turn = np.where(segments.bulge < 0.0, -1.0, 1.0)[:, None]
         self.is_arc = segments.is_arc
         self._ax, self._ay = np.ascontiguousarray(start.T)
         self._bx, self._by = np.ascontiguousarray(end.T)
-        self._dx, self._dy = np.ascontiguousarray(way.T)
+        self._dx, self._dy = np.ascontiguousarray(chord.T)
         self._over = 1.0 / np.where(square > 0.0, square, 1.0)
         self._cx, self._cy = np.ascontiguousarray(segments.centre.T)
         self._radius = segments.radius
@@ -64,7 +66,7 @@ class SegmentTable:
         self._vx, self._vy = np.ascontiguousarray((turn * (end - segments.centre)).T)
 
     def distances(self, points: Floats, which: Ints) -> Floats:
-        """(J,) mm from each point (J, 2) to segment which[j]."""
+        """(J,) mm from point j of (J, 2) to segment which[j]."""
         arc = self.is_arc[which]
         if arc.all():
             return self._to_arcs(points[:, 0], points[:, 1], which)
@@ -76,13 +78,13 @@ class SegmentTable:
         return found
 
     def shares(self, points: Floats, which: Ints) -> Floats:
-        """(J,) how far along segment which[j] (0 to 1) its place nearest to point j lies."""
+        """(J,) where on segment which[j] its point nearest to point j lies, from 0 to 1."""
         x, y = points[:, 0] - self._ax[which], points[:, 1] - self._ay[which]
         along = (x * self._dx[which] + y * self._dy[which]) * self._over[which]
         arc = np.flatnonzero(self.is_arc[which])
         row = which[arc]
         px, py = points[arc, 0] - self._cx[row], points[arc, 1] - self._cy[row]
-        # u points into the wedge at a right angle to the spoke of the start.
+        # u points into the wedge, at a right angle to the radius at the start.
         sine = self._ux[row] * py - self._uy[row] * px
         cosine = (self._ax[row] - self._cx[row]) * px + (self._ay[row] - self._cy[row]) * py
         angle = np.mod(np.arctan2(sine, cosine), 2.0 * np.pi)
@@ -114,13 +116,13 @@ class SegmentTable:
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """Points in runs of neighbours: group g is points[offsets[g]:offsets[g+1]], never empty.
+    """Groups of neighbouring points: group g is points[offsets[g]:offsets[g+1]], never empty.
 
-    `margin` (G,) mm first guess of the distance; `contour` (G,) the only contour to compare with
-    or ANY_CONTOUR; `z` (G, 2) mm: only moves whose heights overlap this are compared. With a
-    `height` (J,) mm of each point, only where the move is within `window_mm` of it at the place
-    nearest to the point (more on slopes, where XY shifts heights). What is farther than `most_mm`
-    counts as not found.
+    `margin` (G,) mm is a first guess of the distance; `contour` (G,) the only contour to compare
+    with, or ANY_CONTOUR; `z` (G, 2) mm the range that the heights of a move must overlap. With a
+    `height` (J,) mm of each point, the move must be within `window_mm` of that height at its point
+    nearest to it (more on slopes, where a shift in XY changes the height). Moves farther away than
+    `most_mm` are not found.
     """
 
     offsets: Ints
@@ -134,14 +136,14 @@ class Groups:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """(J,) distance mm (inf where nothing may be compared), (J,) segment (−1 then)."""
+    """(J,) distance mm, inf where no move is found, and (J,) segment, −1 there."""
 
     distance: Floats
     segment: Ints
 
 
-class Target:
-    """Cutting moves that points are compared with."""
+class MoveIndex:
+    """Cutting moves, indexed by place, contour and height."""
 
     def __init__(self, cuts: CutMoves) -> None:
         self.cuts = cuts
@@ -154,11 +156,11 @@ class Target:
         self._slope = (high - low) / np.where(length > 0.0, length, 1.0)
 
     @cached_property
-    def _layers(self) -> Layers:
-        return Layers(self.cuts.segments, self.cuts.z, self._slope, self.gap_mm)
+    def _layers(self) -> HeightLayers:
+        return HeightLayers(self.cuts.segments, self.cuts.z, self._slope, self.gap_mm)
 
     def nearest(self, points: Floats, groups: Groups) -> Found:
-        """The nearest move of each point (J, 2), and how far it is, exact."""
+        """The move nearest to each point (J, 2), and its exact distance."""
         count = len(groups.margin)
         found = Found(np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64))
         if count == 0 or len(self.boxes) == 0:
@@ -189,8 +191,8 @@ class Target:
     def within(
         self, points: Floats, height: Floats, limits_mm: tuple[float, float]
     ) -> tuple[Ints, Ints, Floats]:
-        """All pairs (point, move), in order, and how far apart (mm), of points (J, 2) at heights
-        (J,) mm: no farther apart than the first limit in XY, nor than the second in height."""
+        """All pairs (point, move) within the first limit in XY and the second in height, in order,
+        and their distances in XY, mm; of points (J, 2) at heights (J,) mm."""
         limit_mm, depth_mm = limits_mm
         none = np.empty(0, dtype=np.int64)
         parts: list[tuple[Ints, Ints, Floats]] = [(none, none, np.empty(0))]
@@ -209,7 +211,7 @@ class Target:
         return np.concatenate(every), np.concatenate(moves), np.concatenate(distances)
 
     def _reach(self, boxes: Floats) -> float:
-        """A margin, mm, that takes in every move from every group."""
+        """A margin, mm, within which every group finds every move."""
         both = np.concatenate([self.boxes, boxes])
         span = both[:, 2:].max(axis=0) - both[:, :2].min(axis=0)
         return float(np.hypot(span[0], span[1])) * MARGIN_SLACK + POSITION_EPS_MM
@@ -217,7 +219,7 @@ class Target:
     def _candidates(
         self, boxes: Floats, margin: Floats, todo: Ints, groups: Groups
     ) -> tuple[Ints, Ints]:
-        """Pairs (index into `todo`, move) with a piece whose box comes within the margin, in
+        """Pairs (index into `todo`, move) of moves with a piece whose box is within the margin, in
         order."""
         wide = boxes[todo] + margin[todo, None] * np.array([-1.0, -1.0, 1.0, 1.0])
         group, move = self._layers.pairs(wide, groups.z[todo])
@@ -228,7 +230,7 @@ class Target:
         return group[fits], move[fits]
 
     def _off_height(self, points: Floats, height: Floats, move: Ints, window_mm: float) -> Any:
-        """(J,) where the moves are at another height than the points nearest to them."""
+        """(J,) true where a move, at its place nearest to the point, is at another height."""
         begin, end = self.cuts.ends_z[move].T
         sloping = np.flatnonzero(begin != end)
         z = begin.copy()
@@ -239,7 +241,7 @@ class Target:
     def _least(
         self, points: Floats, groups: Groups, todo: Ints, pairs: tuple[Ints, Ints], found: Found
     ) -> Floats:
-        """Fill `found` for the groups `todo`; returns the largest distance in each, mm."""
+        """Fill `found` for the groups `todo`; return the largest distance in each, mm."""
         offsets = groups.offsets
         group, move = pairs
         choices = np.bincount(group, minlength=len(todo))
@@ -263,7 +265,7 @@ class Target:
                 distance[off] = np.inf
             starts = np.cumsum(many) - many
             least = np.minimum.reduceat(distance, starts)
-            # Of all that are as near the last: what is cut again later is what remains.
+            # Of several equally near moves the last: a later cut decides what remains.
             hits = np.flatnonzero(distance <= np.repeat(least, many) + POSITION_EPS_MM)
             sample_of_pair = np.repeat(np.arange(len(samples)), many)[hits]
             chosen = hits[np.flatnonzero(np.diff(sample_of_pair, append=len(samples)))]
@@ -274,33 +276,33 @@ class Target:
         return worst
 
 
-# Which moves are near a place: boxes over the pieces of long moves, in layers of like heights.
+# The moves near a place: boxes of the pieces of long moves, in layers of similar heights.
 #
-# A diagonal across the part has a box as large as the part. Moves of length L on an area A lie
-# about A / L apart. What is much longer than that is cut into pieces for the search alone, so that
-# a box holds few other moves; distances are those of whole moves. Passes one below the other lie
-# over the same places: a search asks the layers at its own height alone.
+# A diagonal across the part has a box as large as the part. Moves of total length L on an area A
+# lie about A / L apart. For the search alone, moves much longer than that are divided into pieces,
+# so that a box holds few other moves; distances are those of whole moves. Passes below each other
+# lie at the same places: a search uses only the layers at its own height.
 
 GAPS_PER_PIECE = 4.0
-"""A piece is as long as this many gaps between moves, if `MORE_PIECES` allows it."""
+"""A piece is as long as so many gaps between moves, if `MORE_PIECES` allows it."""
 
 MORE_PIECES = 400_000
-"""Cutting adds at most this many pieces: bounds memory, some 100 MB."""
+"""Moves are divided into no more additional pieces than this: bounds memory, some 100 MB."""
 
 PIECES_OF_LAYER = 512
-"""A layer takes moves of further heights until it has this many pieces."""
+"""A layer takes in moves of further heights until it has so many pieces."""
 
 
 def levels_of(z: Floats) -> Ints:
-    """(K,) the number of the heights that each move of heights (K, 2) low, high runs between, from
-    the lowest on."""
+    """(K,) a number for the lowest and highest point of each move, from `z` (K, 2): equal for
+    equal heights, ascending from the lowest."""
     return np.unique(z, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def gap_mm(segments: Segments, boxes: Floats, level: Ints | None = None) -> float:
-    """How far apart the moves of one `level` (K,) lie on average, mm; `boxes` (K, 4) are theirs.
+    """The mean distance between moves of the same `level` (K,), mm; `boxes` (K, 4) are theirs.
 
-    A place of a move lies among the length l of its own level, Σ l² / Σ l on average.
+    A point of a move lies among the total length l of its own level, on average Σ l² / Σ l.
     """
     if len(boxes) == 0:
         return 0.0
@@ -314,8 +316,8 @@ def gap_mm(segments: Segments, boxes: Floats, level: Ints | None = None) -> floa
 
 
 def boxes_of_pieces(segments: Segments, gap: float) -> tuple[Floats, Ints]:
-    """(P, 4) boxes of the pieces of K moves that lie about `gap` mm apart, and (P,) whose each
-    is. A piece of an arc of sweep s has bulge tan(s / 4n), n pieces to the arc."""
+    """(P, 4) boxes of the pieces of K moves that lie about `gap` mm apart, and (P,) the move of
+    each piece. One of n pieces of an arc of sweep s has bulge tan(s / 4n)."""
     lengths = segment_lengths(segments)
     longest = max(GAPS_PER_PIECE * gap, float(lengths.sum()) / MORE_PIECES, POSITION_EPS_MM)
     parts = np.maximum(np.ceil(lengths / longest), 1.0).astype(np.int64)
@@ -328,45 +330,45 @@ def boxes_of_pieces(segments: Segments, gap: float) -> tuple[Floats, Ints]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Layer:
+class _HeightLayer:
     """Pieces of moves between two heights, mm, no steeper than `slope`: an index of their boxes,
-    and whose they are (P,)."""
+    and the move (P,) of each piece."""
 
     low: float
     high: float
     slope: float
     index: BoxIndex
-    whose: Ints
+    move: Ints
 
 
-class Layers:
-    """The pieces of K moves that lie about `gap` mm apart, of heights z (K, 2) low, high and of
-    slopes (K,), layer by layer."""
+class HeightLayers:
+    """The pieces of K moves that lie about `gap` mm apart, in layers. `z` (K, 2) are the lowest
+    and highest points of the moves, `slope` (K,) their slopes."""
 
     def __init__(self, segments: Segments, z: Floats, slope: Floats, gap: float) -> None:
         self._count = len(z)
-        pieces, whose = boxes_of_pieces(segments, gap)
-        level = levels_of(z)[whose]
-        # Layers change between levels only: what lies in one plane is one index.
+        pieces, move = boxes_of_pieces(segments, gap)
+        level = levels_of(z)[move]
+        # A layer begins at a new level only, so that moves in one plane are in one index.
         done = np.cumsum(np.bincount(level)) - np.bincount(level)
         layer = done[level] // PIECES_OF_LAYER
         order = np.argsort(layer, kind="stable")
         parts = np.split(order, np.flatnonzero(np.diff(layer[order])) + 1) if len(order) else []
         self.layers = [
-            _Layer(
-                float(z[whose[part], 0].min()),
-                float(z[whose[part], 1].max()),
-                float(slope[whose[part]].max()),
+            _HeightLayer(
+                float(z[move[part], 0].min()),
+                float(z[move[part], 1].max()),
+                float(slope[move[part]].max()),
                 BoxIndex(pieces[part]),
-                whose[part],
+                move[part],
             )
             for part in parts
         ]
 
     def pairs(self, boxes: Floats, z: Floats, window_mm: float = 0.0) -> tuple[Ints, Ints]:
-        """Pairs (box, move), in order, of boxes (B, 4) that touch that of a piece of the move, in
-        layers within the window (and more, on slopes) of the heights z (B, 2) low, high of the
-        box. Moves of other heights may be among them."""
+        """Pairs (box, move), in order, of boxes (B, 4) that touch the box of a piece of the move;
+        only of layers within the window (and more, on slopes) of the heights z (B, 2) low, high
+        of the box, in which there may be moves of other heights."""
         found = [np.empty(0, dtype=np.int64)]
         for layer in self.layers:
             window = window_mm * (1.0 + layer.slope)
@@ -374,14 +376,14 @@ class Layers:
                 (z[:, 0] - window <= layer.high) & (layer.low <= z[:, 1] + window)
             )
             for row, piece in layer.index.pairs(boxes[rows]):
-                found.append(rows[row] * self._count + layer.whose[piece])
+                found.append(rows[row] * self._count + layer.move[piece])
         pairs = np.sort(np.concatenate(found))
         return np.divmod(pairs[np.diff(pairs, prepend=-1) > 0], self._count)
 
 
-# Runs of neighbours in long columns, without loops over them.
+# Runs of neighbouring items in long columns, without Python loops.
 #
-# A run is given by offsets: run g is items[offsets[g]:offsets[g+1]], never empty.
+# Runs are given by offsets: run g is items[offsets[g]:offsets[g+1]], never empty.
 
 
 def run_offsets(labels: Ints, longest: int) -> Ints:

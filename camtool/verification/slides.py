@@ -36,7 +36,7 @@ from camtool.verification.circles import (
 from camtool.verification.cuts import CutMoves, moved_lengths
 from camtool.verification.figures import Figure, RowFigures, add_ledger, empty_columns, row_figures
 from camtool.verification.matching import Goal, Match
-from camtool.verification.nearest import ANY_CONTOUR, Target, run_peaks
+from camtool.verification.nearest import ANY_CONTOUR, MoveIndex, run_peaks
 
 if TYPE_CHECKING:
     from camtool.kernels.judge import Sums, Task
@@ -59,7 +59,7 @@ class SeenCircle:
 class SlidePass:
     """Takes the motion in order; its figures hold after `finish`."""
 
-    def __init__(self, decoded: Target, goal: Goal, match: Match, trace: TraceSize) -> None:
+    def __init__(self, decoded: MoveIndex, goal: Goal, match: Match, trace: TraceSize) -> None:
         self.circles = goal.circles
         self.circle_figures: list[CircleFigures] = [UNSEEN] * len(goal.circles)
         self.reversing: list[Reversing | None] = [None] * len(goal.circles)
@@ -179,14 +179,14 @@ def largest(errors: Floats, which: Bools) -> float:
     return float(picked.max()) if len(picked) else math.nan
 
 
-def _task(decoded: Target, goal: Goal, match: Match, slot: Ints) -> Task:
+def _task(decoded: MoveIndex, goal: Goal, match: Match, slot: Ints) -> Task:
     from camtool.kernels.circle_bins import bin_directions
     from camtool.kernels.judge import Task
     from camtool.kernels.move_tree import move_tree
     from camtool.kernels.near_moves import Moves
 
     own = move_table(decoded.cuts)
-    wanted = own if goal.target is decoded else move_table(goal.target.cuts)
+    wanted = own if goal.moves is decoded else move_table(goal.moves.cuts)
     return Task(
         own=own.moves,
         moves=Moves(wanted.moves, wanted.heights, *move_tree(wanted.boxes)),
@@ -220,7 +220,7 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
     )
 
 
-def _heights(decoded: Target, depth_mm: float) -> Floats:
+def _heights(decoded: MoveIndex, depth_mm: float) -> Floats:
     """(N, 2) mm: between which heights each row is compared."""
     toolpath = decoded.cuts.toolpath
     ends = np.column_stack([toolpath.starts[:, 2], toolpath.end[:, 2]])

@@ -1,8 +1,8 @@
-"""Judge a program: run its decoded moves on the machine's model and compare with what was wanted.
+"""Judge a program: simulate its decoded moves on the machine and compare with what was wanted.
 
-    decoded ─held─▶ as the controller rounds it
-    held, wanted ─cuts─▶ lines and arcs that cut, by contour
-    held × wanted ─coverage─▶ rounding error, what is missing or extra, whose row is whose
+    decoded ─quantised─▶ as the controller rounds it
+    quantised, wanted ─cuts─▶ lines and arcs that cut, by contour
+    quantised × wanted ─coverage─▶ rounding error, missing and extra cuts, match of the rows
     decoded ─simulate─▶ chunks ─slides─▶ rows: errors, circles, extents, trace
     all of it ─▶ Report and Trace
 
@@ -30,9 +30,9 @@ from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Compensated, Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record
-from camtool.verification.case import Case, VerifyOptions
+from camtool.verification.case import SAMPLE_MM, Case, VerifyOptions
 from camtool.verification.circles import UNSEEN, full_circles
-from camtool.verification.conformance import Asked, Held, hold
+from camtool.verification.conformance import Asked, Conformance, conformance_of
 from camtool.verification.coverage import (
     Coverage,
     Drilled,
@@ -42,8 +42,14 @@ from camtool.verification.coverage import (
     hole_findings,
     holes_of,
 )
-from camtool.verification.cuts import CutMoves, cut_moves, is_flat, moved_lengths
-from camtool.verification.dimensions import RowSlides, closure_mm, places_between, sizes
+from camtool.verification.cuts import CutMoves, cut_moves, is_flat, loops, moved_lengths
+from camtool.verification.dimensions import (
+    LoopedCuts,
+    RowSlides,
+    closure_mm,
+    places_between,
+    sizes,
+)
 from camtool.verification.figures import (
     Figure,
     RowFigures,
@@ -57,7 +63,7 @@ from camtool.verification.figures import (
 )
 from camtool.verification.matching import Goal, carried_match, own_match
 from camtool.verification.motion_findings import motion_findings
-from camtool.verification.nearest import Target
+from camtool.verification.nearest import MoveIndex
 from camtool.verification.report import Before, Planned, Report, certain, number, reported
 from camtool.verification.shape import Wanted as WantedShape
 from camtool.verification.shape import (
@@ -74,8 +80,8 @@ __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The report, all findings that are in it, the slides' path for pictures, what became of
-    each row, the moves that the slides' path was judged against, and full circles."""
+    """The report, the findings in it, the path of the slides for pictures, the figures of each
+    row, the moves with which the path was compared, and full circles."""
 
     report: Report
     trace: Trace
@@ -85,11 +91,11 @@ class Verification:
     circles: tuple[SeenCircle, ...] = ()
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
-        """The same with these findings, in the report too."""
+        """The verification with these findings, in its report too."""
         return replace(self, report=self.report.with_findings(findings), findings=findings)
 
     def with_planning(self, planned: Planned, before: Before | None) -> Verification:
-        """The same with what planning gained in the report."""
+        """The verification with the figures of planning in its report."""
         report = msgspec.structs.replace(self.report, planned=planned, before=before)
         return replace(self, report=report)
 
@@ -101,39 +107,38 @@ def verify(
     wanted: Toolpath | None = None,
     drawing: Drawing | None = None,
     options: VerifyOptions | None = None,
-    sent: Compensated | None = None,
+    compensated: Compensated | None = None,
     asked: Asked | None = None,
-    said: Toolpath | None = None,
+    written_from: Toolpath | None = None,
 ) -> Verification:
-    """Simulate `decoded` on the target's machine and judge it; against `wanted` when there is one.
+    """Simulate `decoded` on the target's machine and judge it, against `wanted` if it is given.
 
-    `drawing` gives the fitting error and its findings; `sent` is what the program was written from
-    where `wanted` was bent; `asked` is what else its job asks for, `said` what the program was
-    written from. Toolpaths are in the work frame.
+    `drawing` gives its findings; `compensated`, `asked` and `written_from` are as in `Case`.
+    Toolpaths are in the work frame. Raises what `LoadedTarget.simulate` raises.
     """
-    case = Case(decoded, target, wanted, drawing, options or VerifyOptions(), sent, asked, said)
+    options = options or VerifyOptions()
+    case = Case(decoded, target, wanted, drawing, options, compensated, asked, written_from)
     target.check_options(case.simulation)
     fused = target.model.fused_run(decoded, target.machine, case.simulation)
     return judge(case, fused or target.simulate(decoded, case.simulation))
 
 
 def judge(case: Case, motion: Iterable[Chunk] | FusedRun) -> Verification:
-    """Judge a case by the chunks of its motion, whoever made them, or by a run that is judged as
-    it is made."""
-    # Without Z on either side, all feed moves are taken to cut.
+    """Judge a case by the chunks of its motion, or by a run that is judged as it is simulated."""
+    # Where the wanted moves have no motion in Z, all feed moves cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
-    held = case.target.model.quantised(case.decoded, case.machine)
-    decoded = Target(cut_moves(held, flat_cuts=flat_cuts))
+    quantised = case.target.model.quantised(case.decoded, case.machine)
+    decoded = MoveIndex(cut_moves(quantised, flat_cuts=flat_cuts))
     wanted = decoded
     if case.wanted is not None:
-        wanted = Target(cut_moves(case.wanted, flat_cuts=flat_cuts))
+        wanted = MoveIndex(cut_moves(case.wanted, flat_cuts=flat_cuts))
     circles = full_circles(wanted.cuts, case.coverage_mm)
     goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
     coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
-    held_against = _held_against(case, flat_cuts=flat_cuts)
+    conformance = _conformance(case, flat_cuts=flat_cuts)
     cutter = cutter_of(case.options, decoded.cuts)
-    shaped = points_wanted(decoded.cuts, cutter)
-    points = max(case.options.trace_points, shaped or 0)
+    shape_points = points_wanted(decoded.cuts, cutter)
+    points = max(case.options.trace_points, shape_points or 0)
     size = trace_size(case.decoded, case.spacing_mm, points)
     slides = SlidePass(decoded, goal, coverage.match, size)
     if isinstance(motion, Iterable):
@@ -145,78 +150,78 @@ def judge(case: Case, motion: Iterable[Chunk] | FusedRun) -> Verification:
     rows = slides.rows
     tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
     extents = toolpath_extents(case.decoded)
-    noticed = motion_findings(decoded.cuts, case, tally, extents, rows)
+    motion_faults = motion_findings(decoded.cuts, case, tally, extents, rows)
     shape = None
-    if shaped and cutter is not None:
+    if shape_points and cutter is not None:
         shape = wanted_shape(wanted.cuts, cutter, case.options.kept)
-    said = () if case.wanted is None else case.wanted.findings
-    over = overcut_findings(shape, {finding.code for finding in said})
+    planned = () if case.wanted is None else case.wanted.findings
+    overcut = overcut_findings(shape, {finding.code for finding in planned})
     turned = _turned(case, decoded, flat_cuts=flat_cuts)
-    findings = _all_findings(case, coverage, held_against, (*turned, *noticed, *over))
-    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, held_against)
+    findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
+    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, conformance)
     trace = slides.trace()
     report = result.report(extents, findings, trace, shape)
     return Verification(report, trace, findings, rows, wanted.cuts, slides.seen())
 
 
-def _coverage(case: Case, decoded: Target, goal: Goal, *, flat_cuts: bool) -> Coverage:
+def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> Coverage:
     if case.wanted is None:
         return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
-    said = goal  # what the program should say
-    if case.sent is not None:
-        cuts = cut_moves(case.sent.toolpath, flat_cuts=flat_cuts)
-        said = Goal(Target(cuts), [], goal.limit_mm, goal.depth_mm)
+    programmed = goal  # what the program should say
+    if case.compensated is not None:
+        cuts = cut_moves(case.compensated.toolpath, flat_cuts=flat_cuts)
+        programmed = Goal(MoveIndex(cuts), [], goal.limit_mm, goal.depth_mm)
     limits = goal.limit_mm, goal.depth_mm
-    bores = holes_of(decoded.cuts.toolpath)
-    wanted_bores = holes_of(said.target.cuts.toolpath)
-    missing, stand = contours_drilled(said.target.cuts, bores, limits)
-    extra, wanted_stand = contours_drilled(decoded.cuts, wanted_bores, limits)
-    coverage = cover(decoded, said, case.options.sample_mm, Drilled(missing, extra))
-    holes = hole_findings(bores, wanted_bores, limits, (stand, wanted_stand))
+    holes = holes_of(decoded.cuts.toolpath)
+    wanted_holes = holes_of(programmed.moves.cuts.toolpath)
+    missing, stand = contours_drilled(programmed.moves.cuts, holes, limits)
+    extra, wanted_stand = contours_drilled(decoded.cuts, wanted_holes, limits)
+    coverage = cover(decoded, programmed, SAMPLE_MM, Drilled(missing, extra))
+    unpaired = hole_findings(holes, wanted_holes, limits, (stand, wanted_stand))
     match = coverage.match
-    if case.sent is not None:
-        match = carried_match(match, case.sent.row, goal)
-    return replace(coverage, match=match, findings=(*coverage.findings, *holes))
+    if case.compensated is not None:
+        match = carried_match(match, case.compensated.row, goal)
+    return replace(coverage, match=match, findings=(*coverage.findings, *unpaired))
 
 
-def _turned(case: Case, decoded: Target, *, flat_cuts: bool) -> tuple[Finding, ...]:
-    if case.said is None:
+def _turned(case: Case, decoded: MoveIndex, *, flat_cuts: bool) -> tuple[Finding, ...]:
+    if case.written_from is None:
         return ()
-    said = Target(cut_moves(case.said, flat_cuts=flat_cuts))
-    limits = case.coverage_mm, case.depth_mm
-    return tuple(cut_other_way(decoded, said, limits, case.options.sample_mm))
+    source = MoveIndex(cut_moves(case.written_from, flat_cuts=flat_cuts))
+    return tuple(cut_other_way(decoded, source, (case.coverage_mm, case.depth_mm), SAMPLE_MM))
 
 
-def _held_against(case: Case, *, flat_cuts: bool) -> Held | None:
+def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
     if case.asked is None:
         return None
-    return hold(case.decoded, case.asked, flat_cuts=flat_cuts, sample_mm=case.options.sample_mm)
+    return conformance_of(case.decoded, case.asked, flat_cuts=flat_cuts, sample_mm=SAMPLE_MM)
 
 
 def _all_findings(
-    case: Case, coverage: Coverage, held: Held | None, motion: tuple[Finding, ...]
+    case: Case, coverage: Coverage, conformance: Conformance | None, motion: tuple[Finding, ...]
 ) -> tuple[Finding, ...]:
-    """Findings of every stage once, in the order of the stages. What lies beside what was asked
-    by more than the dialect's resolution is found by coverage too, where it is far: once is
-    enough."""
-    places = coverage.findings if held is None or not held.place else held.place
+    """Findings of all stages in their order, each once. Coverage finds again, with its wider
+    tolerance, what conformance finds: then only the findings of conformance are listed."""
+    places = coverage.findings
+    if conformance is not None and conformance.place:
+        places = conformance.place
     groups = (
         case.drawing.findings if case.drawing is not None else (),
         case.wanted.findings if case.wanted is not None else (),
         case.decoded.findings,
         places,
-        () if held is None else held.settings,
+        () if conformance is None else conformance.settings,
         motion,
     )
     return tuple(dict.fromkeys(finding for group in groups for finding in group))
 
 
-# All that was measured, turned into the report's record: mm to µm, NaN to null.
+# The results as the report's record: mm to µm, NaN to null.
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """All that was measured, on its way into the report."""
+    """The results of all stages, from which the report is made."""
 
     case: Case
     cuts: CutMoves
@@ -225,7 +230,7 @@ class Result:
     slides: SlidePass
     rows: RowFigures
     tally: Tally
-    held: Held | None = None
+    conformance: Conformance | None = None
 
     def report(
         self,
@@ -235,7 +240,7 @@ class Result:
         shape: WantedShape | None = None,
     ) -> Report:
         """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides, and the
-        `shape` that they should make, where one is looked at."""
+        wanted `shape`, where it is compared."""
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
@@ -245,6 +250,7 @@ class Result:
             places_between(case.decoded.start[:2], self.rows.slide_end),
         )
         x, y, z = ((certain(low), certain(high)) for low, high in extents)
+        own = LoopedCuts(self.cuts, loops(self.cuts, case.coverage_mm))
         return Report(
             target=case.machine.target.name,
             source=options.source,
@@ -256,8 +262,8 @@ class Result:
             steps=_steps(tally),
             reversals=_reversals(tally),
             error_um=self._errors(),
-            closure_um=number(closure_mm(self.cuts, slides, case.coverage_mm), UM_PER_MM),
-            dimensions=self._dimensions(slides),
+            closure_um=number(closure_mm(own.loops, slides), UM_PER_MM),
+            dimensions=self._dimensions(own, slides),
             circles=self._circles(),
             findings=reported(findings),
             contours=self.cuts.contour_count,
@@ -304,8 +310,8 @@ class Result:
         )
 
     def _fit(self) -> record.MaxRms:
-        """How far what was drawn lies from the wanted moves that cut; the rms over those moves
-        that it lies off."""
+        """The distance of the drawing from the wanted cutting moves; the rms is over the moves
+        that are not exact."""
         drawn, rows = self.wanted.toolpath.drawn, self.wanted.rows
         if self.case.wanted is None or drawn is None or not len(rows):
             return record.MaxRms()
@@ -317,13 +323,16 @@ class Result:
         )
 
     def _off_um(self, off_mm: Floats) -> float | None:
-        """The largest of some rows' distances from what was drawn; None where nobody knows."""
+        """The largest distance of rows (R, 2) from the drawing; None where none is known."""
         known = self.case.wanted is not None and self.case.wanted.drawn is not None
         return certain(float(off_mm[:, 0].max(initial=0.0)) * UM_PER_MM) if known else None
 
-    def _dimensions(self, slides: RowSlides) -> tuple[record.Dimension, ...]:
-        match = self.coverage.match
-        found = sizes(self.cuts, slides, self.wanted, match, self.case.coverage_mm)
+    def _dimensions(self, own: LoopedCuts, slides: RowSlides) -> tuple[record.Dimension, ...]:
+        match, gap_mm = self.coverage.match, self.case.coverage_mm
+        goal = own
+        if self.wanted is not self.cuts:
+            goal = LoopedCuts(self.wanted, loops(self.wanted, gap_mm))
+        found = sizes(own, slides, goal, match, gap_mm)
         return tuple(
             record.Dimension(
                 name=size.name,
@@ -405,7 +414,7 @@ class Result:
         )
 
     def _source(self, row: int) -> str:
-        """Layer and entity of the wanted move that a decoded row follows."""
+        """Layer and entity of the wanted move to which a decoded row belongs."""
         wanted = int(self.coverage.match.row[row])
         return self.wanted.toolpath.text(wanted) if wanted >= 0 else ""
 
@@ -416,13 +425,13 @@ class Result:
         return record.UnreachedReport(missed.count, certain(missed.most_mm * UM_PER_MM))
 
     def _asked(self) -> record.AskedReport | None:
-        asked, held = self.case.asked, self.held
-        if asked is None or held is None:
+        asked, conformance = self.case.asked, self.conformance
+        if asked is None or conformance is None:
             return None
         return record.AskedReport(
-            moves=held.moves,
-            alike=held.alike,
-            off_um=certain(held.off_mm * UM_PER_MM),
+            moves=conformance.moves,
+            alike=conformance.alike,
+            off_um=certain(conformance.off_mm * UM_PER_MM),
             limit_um=certain(asked.limits_mm[0] * UM_PER_MM),
         )
 
@@ -442,11 +451,11 @@ class Result:
 
 
 def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
-    """The largest difference in height between the slide and the moves as held, at the ends of
+    """The largest difference in height between the slide and the quantised moves, at the ends of
     rows that cut, mm; NaN when none does.
 
-    Z runs one way within each row and ends where the program says, so what becomes of it follows
-    from the ends of the rows alone, whatever the controller does in between.
+    Within a row Z does not reverse, and it ends where the program says, so its error follows from
+    the ends of the rows alone, whatever the controller does between them.
     """
     toolpath = cuts.toolpath
     if not cuts.is_cut.any():
@@ -457,17 +466,17 @@ def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
 
 
 def assumptions(case: Case) -> tuple[str, ...]:
-    """What the times and figures take for granted."""
+    """What the times and figures assume."""
     link = case.machine.link
-    said = case.target.model.assumptions(case.decoded, case.machine)
+    assumed = case.target.model.assumptions(case.decoded, case.machine)
     if link.baud is None:
-        return (*said, "the program is in the controller before it runs")
+        return (*assumed, "the program is in the controller before it runs")
     how = "block by block, before each is cut" if link.wait == "sequential" else "while it runs"
-    return (*said, f"the program comes at {link.baud:g} baud, {how}")
+    return (*assumed, f"the program comes at {link.baud:g} baud, {how}")
 
 
 def _block(case: Case, row: int) -> int | None:
-    """The block (from 1) that a row was read from."""
+    """The block (from 1) from which a row was read."""
     block = int(case.decoded.block[row])
     return block + 1 if block >= 0 else None
 
@@ -477,13 +486,11 @@ def _max_rms(figure: Figure) -> record.MaxRms:
 
 
 def _interpolator(case: Case) -> str:
-    """How the controller makes lines and arcs."""
+    """A word for how the controller interpolates lines and arcs."""
     return case.target.model.interpolation(case.decoded, case.machine, case.simulation)
 
 
 def _blocks(case: Case) -> int | None:
-    if case.options.blocks is not None:
-        return case.options.blocks
     highest = int(case.decoded.block.max(initial=-1))
     return highest + 1 if highest >= 0 else None
 

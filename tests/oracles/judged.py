@@ -34,7 +34,7 @@ def sample_part(*, shift: float = 0.0) -> ToolpathBuilder:
 def judged(
     decoded: Toolpath, wanted: Toolpath | None = None, bend=lambda points: points, **options
 ) -> Verification:
-    case = Case(decoded, on(MACHINE), wanted, None, VerifyOptions(**options), said=wanted)
+    case = Case(decoded, on(MACHINE), wanted, None, VerifyOptions(**options), written_from=wanted)
     return judge(case, follow(decoded, bend=bend))
 
 

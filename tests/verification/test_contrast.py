@@ -5,7 +5,7 @@ import pytest
 
 from camtool.simulation.motion import Chunk, one_row
 from camtool.verification import contrast
-from camtool.verification.contrast import row_of, strokes_within, table, to_json
+from camtool.verification.contrast import paths_within, row_of, table, to_json
 from tests.oracles.judged import judged, sample_part
 
 WINDOW = np.array([[0.0, 1.0], [0.0, 1.0]])
@@ -26,7 +26,7 @@ def chunks_of(points: list[tuple[float, float]], rows: list[int], size: int) -> 
 @pytest.mark.parametrize("size", [1, 2, 3, 100])
 def test_runs_do_not_depend_on_chunks_and_begin_where_they_come_from(size: int) -> None:
     points = [(-1.0, 0.5), (0.2, 0.5), (0.4, 0.5), (2.0, 0.5), (0.6, 0.5), (0.7, 0.7)]
-    runs = strokes_within(chunks_of(points, [0] * 6, size), CUTS, WINDOW, commanded=True)
+    runs = paths_within(chunks_of(points, [0] * 6, size), CUTS, WINDOW, commanded=True)
     assert [run.tolist() for run in runs] == [
         [[-1.0, 0.5], [0.2, 0.5], [0.4, 0.5]],
         [[2.0, 0.5], [0.6, 0.5], [0.7, 0.7]],
@@ -36,24 +36,24 @@ def test_runs_do_not_depend_on_chunks_and_begin_where_they_come_from(size: int) 
 def test_what_does_not_cut_is_left_out_but_for_where_a_cut_begins() -> None:
     points = [(0.1, 0.1), (0.2, 0.2), (0.3, 0.3), (0.4, 0.4)]
     chunks = chunks_of(points, [1, 1, 2, 2], 10)
-    (run,) = strokes_within(chunks, CUTS, WINDOW, commanded=True)
+    (run,) = paths_within(chunks, CUTS, WINDOW, commanded=True)
     assert run.tolist() == [[0.1, 0.1], [0.2, 0.2]]
-    (run,) = strokes_within(chunks[::-1], CUTS, WINDOW, commanded=True)
+    (run,) = paths_within(chunks[::-1], CUTS, WINDOW, commanded=True)
     assert run.tolist() == [[0.4, 0.4], [0.1, 0.1], [0.2, 0.2]]
 
 
 def test_slides_are_taken_unless_commanded_positions_are_asked_for() -> None:
     chunks = chunks_of([(0.1, 0.1), (0.2, 0.2)], [0, 0], 10)
-    assert strokes_within(chunks, CUTS, WINDOW, commanded=False) == []
+    assert paths_within(chunks, CUTS, WINDOW, commanded=False) == []
     high = WINDOW + np.array([[0.0], [10.0]])
-    (run,) = strokes_within(chunks, CUTS, high, commanded=False)
+    (run,) = paths_within(chunks, CUTS, high, commanded=False)
     assert run.tolist() == [[0.1, 10.1], [0.2, 10.2]]
 
 
 def test_pictures_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(contrast, "MOST_SHOWN", 7)
     points = [(0.01 * number, 0.5) for number in range(50)]
-    runs = strokes_within(chunks_of(points, [0] * 50, 3), CUTS, WINDOW, commanded=True)
+    runs = paths_within(chunks_of(points, [0] * 50, 3), CUTS, WINDOW, commanded=True)
     assert sum(len(run) for run in runs) == 7
 
 

@@ -5,7 +5,13 @@ import pytest
 
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import Segments
-from camtool.verification.nearest import MORE_PIECES, Layers, boxes_of_pieces, gap_mm, levels_of
+from camtool.verification.nearest import (
+    MORE_PIECES,
+    HeightLayers,
+    boxes_of_pieces,
+    gap_mm,
+    levels_of,
+)
 
 ROUNDING_MM = 1e-9
 
@@ -68,7 +74,7 @@ def test_layers_leave_no_near_move_out(seed: int) -> None:
     rng = np.random.default_rng(seed)
     moves, z = lifted(rng, 700)
     slope = (z[:, 1] - z[:, 0]) / segment_lengths(moves)
-    layers = Layers(moves, z, slope, gap_mm(moves, segment_boxes(moves), levels_of(z)))
+    layers = HeightLayers(moves, z, slope, gap_mm(moves, segment_boxes(moves), levels_of(z)))
     low = rng.uniform(0.0, 90.0, (60, 2))
     boxes = np.concatenate([low, low + rng.uniform(0.1, 10.0, (60, 2))], axis=1)
     heights = np.sort(rng.uniform(-1.0, 25.0, (60, 2)), axis=1)
@@ -92,7 +98,7 @@ def test_a_thousand_passes_are_not_all_asked_for_one() -> None:
     z = np.repeat(-0.001 * (np.arange(4000)[:, None] // 4), 2, axis=1)
     gap = gap_mm(moves, segment_boxes(moves), levels_of(z))
     assert gap == pytest.approx(40.0 * 30.0 / 140.0)
-    layers = Layers(moves, z, np.zeros(4000), gap)
+    layers = HeightLayers(moves, z, np.zeros(4000), gap)
     box, move = layers.pairs(np.array([[10.0, -0.1, 11.0, 0.1]]), z[400:401])
     assert 400 in move.tolist()
     assert len(box) <= 512
@@ -100,5 +106,5 @@ def test_a_thousand_passes_are_not_all_asked_for_one() -> None:
 
 def test_what_lies_in_one_plane_is_one_layer() -> None:
     moves = crossing(3000, bulges=0.0)
-    layers = Layers(moves, np.zeros((3000, 2)), np.zeros(3000), 1.0)
+    layers = HeightLayers(moves, np.zeros((3000, 2)), np.zeros(3000), 1.0)
     assert len(layers.layers) == 1

@@ -12,7 +12,7 @@ from camtool.geometry.polylines import Segments
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.cuts import cut_moves, sample_cuts
 from camtool.verification.matching import nearest_at_height
-from camtool.verification.nearest import ANY_CONTOUR, Groups, SegmentTable, Target, run_offsets
+from camtool.verification.nearest import ANY_CONTOUR, Groups, MoveIndex, SegmentTable, run_offsets
 from tests.oracles.dense_moves import cut, dense_distance
 
 DENSE = 4000
@@ -82,7 +82,7 @@ def test_the_centre_of_an_arc_is_a_radius_away() -> None:
     assert distance_each(segments.centre, segments)[0] == pytest.approx(1.0)
 
 
-def drawn(seed: int) -> Target:
+def drawn(seed: int) -> MoveIndex:
     """Some dozens of random strokes of lines and arcs, at two depths."""
     rng = np.random.default_rng(seed)
     b = ToolpathBuilder()
@@ -101,7 +101,7 @@ def drawn(seed: int) -> Target:
                 arm = complex(here[0] - cx, here[1] - cy) * complex(math.cos(turn), math.sin(turn))
                 b.arc(cx + arm.real, cy + arm.imag, centre=(cx, cy), ccw=True, feed=1)
         b.rapid(z=0.2)
-    return Target(cut_moves(b.finish(), flat_cuts=False))
+    return MoveIndex(cut_moves(b.finish(), flat_cuts=False))
 
 
 def grouped(count: int, margin: float, size: int = 7) -> Groups:
@@ -115,7 +115,7 @@ def grouped(count: int, margin: float, size: int = 7) -> Groups:
     )
 
 
-def everything(target: Target, points: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+def everything(target: MoveIndex, points: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """Distances (P,) by comparing each point with each allowed segment."""
     segments = target.cuts.segments[np.flatnonzero(allowed)]
     best = np.full(len(points), np.inf)
@@ -173,7 +173,7 @@ def test_where_nothing_may_be_compared_the_distance_is_infinite() -> None:
     found = target.nearest(np.zeros((10, 2)), high)
     assert np.isinf(found.distance).all()
     assert (found.segment == -1).all()
-    none = Target(cut_moves(ToolpathBuilder().finish(), flat_cuts=True))
+    none = MoveIndex(cut_moves(ToolpathBuilder().finish(), flat_cuts=True))
     assert np.isinf(none.nearest(np.zeros((10, 2)), groups).distance).all()
 
 
@@ -184,7 +184,7 @@ def test_the_search_among_long_moves_that_all_cross(size: int) -> None:
     for x, y, to_x, to_y in rng.uniform(0.0, 50.0, (150, 4)):
         path.rapid(x=x, y=y, z=1.0).line(z=-1.0, feed=100.0).line(to_x, to_y, feed=100.0)
         path.rapid(z=1.0)
-    target = Target(cut_moves(path.finish(), flat_cuts=False))
+    target = MoveIndex(cut_moves(path.finish(), flat_cuts=False))
     points = rng.uniform(0.0, 50.0, (400, 2))
     found = target.nearest(points, grouped(len(points), 1e-3, size))
     allowed = np.ones(len(target.boxes), dtype=np.bool_)
