@@ -1,7 +1,7 @@
-"""Measurements of coupons in, the machine's numbers with their uncertainties out.
+"""From measurements of coupons to the values of the machine, with their uncertainties.
 
 measurements ─▶ readings, each an equation ─▶ `solve`, least squares ─▶ `calibrate`, in the
-machine's own words ─▶ `to_text`, `to_data`
+machine's units ─▶ `to_text`, `to_data`
 """
 
 from __future__ import annotations
@@ -20,50 +20,49 @@ from camtool.errors import InputError
 from camtool.machine.model import Axis, Machine
 from camtool.units import UM_PER_MM
 
-# Least squares with weights, and what the readings cannot tell.
+# Weighted least squares, and parameters that the readings do not determine.
 #
 #     minimise  Σ ((measured_i − predicted_i(p)) / u_i)²
 #
-# by Gauss-Newton: each round solves the linear problem about the last values, and one is enough
-# where the equations are linear, as all are but diagonals and circles. u_i is the standard
-# uncertainty of a reading; where not all are known, all count alike. With A the weighted
-# derivatives and s² = Σ residual² / (n − p),
+# by Gauss-Newton: each round solves the problem linearised about the last values. One round is
+# enough where the equations are linear, as all are but those of diagonals and circles. u_i is the
+# standard uncertainty of a reading; where not all are known, all have the same weight. With A the
+# weighted derivatives and s² = Σ residual² / (n − p),
 #
 #     covariance = s² (AᵀA)⁻¹,
 #
-# where s is not taken below 1 if the u_i are known: residuals that happen to be small make no
-# reading better than its instrument.
+# where s is at least 1 if the u_i are known: small residuals by chance do not make a reading
+# better than its instrument.
 #
-# Parameters that the readings cannot tell are held at what the machine's file says: those that no
-# reading depends on, and of those that only occur together the least wanted one, until the rest
-# can be told. The null space of A shows which they are.
+# Parameters that the readings do not determine are fixed at the values of the machine's file:
+# those on which no reading depends, and of those that occur only together the least important one,
+# until the others are determined. The null space of A shows which they are.
 
 ROUNDS = 50
-"""Rounds of Gauss-Newton at most; a handful is usual."""
+"""Rounds of Gauss-Newton at most; about five are usual."""
 
 SETTLED = 1e-13
-"""The search has converged when no parameter moves by more than this (of 1, of a mm, of a
+"""The solution is found when no parameter changes by more than this (of 1, of a mm, of a
 tangent)."""
 
-TOLD_APART = 1e-9
-"""Singular values below this part of the largest count as zero: directions that no reading
-determines."""
+SINGULAR = 1e-9
+"""Singular values below this part of the largest are zero: no reading determines their
+direction."""
 
 INVOLVED = 1e-6
-"""A parameter takes part in such a direction when its share is above this."""
+"""A parameter is part of such a direction when its share is above this."""
 
 OUTLIER_SIGMAS = 3.0
-"""A reading whose residual exceeds this many of its standard deviations is reported as an
-outlier."""
+"""A reading whose residual exceeds so many of its standard deviations is an outlier."""
 
 OUTLIER_FREEDOM = 4
-"""The other readings determine that standard deviation when they exceed the parameters by this
-many; otherwise the uncertainty of the instrument is used."""
+"""That standard deviation is estimated from the other readings if they exceed the parameters by so
+many; otherwise it is the uncertainty of the instrument."""
 
 
 @dataclass(frozen=True)
-class Held:
-    """A parameter that was not estimated, and why."""
+class FixedParameter:
+    """A parameter that is not estimated, and the reason."""
 
     parameter: Parameter
     why: str
@@ -71,35 +70,39 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """values (P,) of the parameters in the model's order, and their covariance (P, P): nan where
-    held, and where it is not known (as many readings as parameters, and no instrument's).
-    predicted, sigma (n,) mm: of the readings; sigma is that of a residual, nan where not known.
-    freedom: readings more than parameters. spread: s, in mm where the u_i are not known, else in
-    their units; nan without freedom."""
+    """The least-squares solution.
+
+    `values` (P,) of the parameters in the order of the model, and their `covariance` (P, P): nan
+    for fixed parameters, and where it is not known (as many readings as parameters, and no
+    uncertainty of the instrument). `predicted` (n,) mm: the readings by the model; `sigma` (n,)
+    mm: standard deviations of the residuals, nan where not known. `freedom`: number of readings
+    less that of estimated parameters. `spread`: s, in mm where the u_i are not known, else in
+    their units; nan without freedom.
+    """
 
     values: Floats
     covariance: Floats
     predicted: Floats
     sigma: Floats
     free: Bools
-    held: tuple[Held, ...]
+    fixed: tuple[FixedParameter, ...]
     freedom: int
     spread: float
 
     def uncertainty(self, columns: Sequence[int]) -> float:
-        """Standard uncertainty of the mean of some parameters; nan when not known."""
+        """Standard uncertainty of the mean of the parameters `columns`; nan when not known."""
         part = self.covariance[np.ix_(columns, columns)]
         return float(np.sqrt(part.sum())) / len(columns)
 
 
 def solve(model: Model, start: Floats) -> Solution:
-    """The parameters that fit the model's readings best, from the values `start` (P,)."""
+    """The parameters that fit the readings of the model best, from the values `start` (P,)."""
     uncertain_mm = [reading.uncertainty_mm or np.nan for reading in model.readings]
     known = bool(np.isfinite(uncertain_mm).all())
     weights = 1.0 / np.array(uncertain_mm) if known else np.ones(len(uncertain_mm))
     measured = np.array([reading.measured_mm for reading in model.readings])
     values = start.copy()
-    free, held = _told_apart(model.parameters, model.slopes(values) * weights[:, None])
+    free, fixed = _identifiable(model.parameters, model.slopes(values) * weights[:, None])
     for _ in range(ROUNDS):
         matrix = model.slopes(values)[:, free] * weights[:, None]
         residual = (measured - model.predict(values)) * weights
@@ -118,17 +121,17 @@ def solve(model: Model, start: Floats) -> Solution:
     covariance[np.ix_(free, free)] = unit**2 * inverse @ inverse.T
     leverage = np.einsum("ij,ji->i", matrix, inverse)
     sigma = _sigma(residual, leverage, freedom, known=known) / weights
-    return Solution(values, covariance, predicted, sigma, free, held, freedom, spread)
+    return Solution(values, covariance, predicted, sigma, free, fixed, freedom, spread)
 
 
 def _sigma(residual: Floats, leverage: Floats, freedom: int, *, known: bool) -> Floats:
-    """(n,) standard deviation of each weighted residual, from what the other readings say.
+    """(n,) standard deviation of each weighted residual, estimated from the other readings.
 
-    Without reading i the sum of squares falls by r_i² / (1 − h_i), h the leverage. A reading
-    that alone determines a parameter (h = 1) has no residual to judge.
+    Without reading i the sum of squares is smaller by r_i² / (1 − h_i), h the leverage. A reading
+    that alone determines a parameter (h = 1) has no residual.
     """
     rest = np.clip(1.0 - leverage, 0.0, 1.0)
-    judged = rest > TOLD_APART
+    judged = rest > SINGULAR
     others = np.full(len(residual), 1.0 if known else np.nan)
     if freedom - 1 >= OUTLIER_FREEDOM:
         share = np.divide(residual**2, rest, out=np.zeros_like(rest), where=judged)
@@ -137,47 +140,50 @@ def _sigma(residual: Floats, leverage: Floats, freedom: int, *, known: bool) -> 
     return np.where(judged, others * np.sqrt(rest), np.nan)
 
 
-def _told_apart(parameters: Sequence[Parameter], matrix: Floats) -> tuple[Bools, tuple[Held, ...]]:
-    """(P,) which parameters the readings tell, and the others with the reason."""
+def _identifiable(
+    parameters: Sequence[Parameter], matrix: Floats
+) -> tuple[Bools, tuple[FixedParameter, ...]]:
+    """(P,) true for parameters that the readings determine, and the others with the reason."""
     size = np.linalg.norm(matrix, axis=0)
     free = size > 0.0
     touched = free.copy()
     while free.any():
         index = np.flatnonzero(free)
         _, singular, rows = np.linalg.svd(matrix[:, index] / size[index])
-        rank = int((singular > TOLD_APART * singular[0]).sum())
+        rank = int((singular > SINGULAR * singular[0]).sum())
         if rank == len(index):
             break
         together = index[np.abs(rows[rank:]).max(axis=0) > INVOLVED]
-        free[max(together, key=lambda column: (_wish(parameters[column]), column))] = False
-    held: list[Held] = []
+        free[max(together, key=lambda column: (_fixing_order(parameters[column]), column))] = False
+    fixed: list[FixedParameter] = []
     for column in np.flatnonzero(~free).tolist():
         why = "no reading depends on it"
         if touched[column]:
             parts = np.linalg.lstsq(matrix[:, free], matrix[:, column], rcond=None)[0]
             shares = np.abs(parts) * size[free] > INVOLVED * size[column]
             others = [str(parameters[other]) for other in np.flatnonzero(free)[shares].tolist()]
-            why = f"the readings cannot tell it from {' and '.join(others)}"
-        held.append(Held(parameters[column], why))
-    return free, tuple(held)
+            why = f"the readings cannot distinguish it from {' and '.join(others)}"
+        fixed.append(FixedParameter(parameters[column], why))
+    return free, tuple(fixed)
 
 
-def _wish(parameter: Parameter) -> int:
-    """The higher, the sooner a parameter is held: a step scale is mostly known already."""
+def _fixing_order(parameter: Parameter) -> int:
+    """Parameters with a higher number are fixed first: the scale of a step is mostly known."""
     return ("play", "squareness", "scale").index(parameter.what)
 
 
-# The numbers of the machine.
+# The values of the machine.
 
-NONE_LEFT_SIGMAS = 3.0
-"""A backlash below zero by no more than this many standard uncertainties, or than a step, counts
-as 0; below that, the measurements are at fault."""
+ZERO_SIGMAS = 3.0
+"""A backlash below zero by at most so many standard uncertainties, or by a step, counts as zero; a
+lower one is a fault of the measurements."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number of the machine: as its file said it, as measured, and its standard uncertainty
-    (None: not known). `readings` depend on it. Steps and play in mm, squareness in rad."""
+    """A value of the machine: `before` is that of its file, `value` the measured one, with its
+    standard `uncertainty` (None: not known); so many `readings` depend on it. Steps and backlash
+    (`what` is "play") in mm, squareness in rad."""
 
     what: str
     axis: str
@@ -195,7 +201,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NotEstimated:
-    """A number that the readings do not say, with the reason."""
+    """A value that the readings do not determine, with the reason."""
 
     name: str
     why: str
@@ -203,7 +209,7 @@ class NotEstimated:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A reading beside what the estimates make of it; `sigmas`: residual over its standard
+    """A reading and its prediction from the estimates; `sigmas`: residual over its standard
     deviation, None where that is not known."""
 
     reading: Reading
@@ -212,20 +218,21 @@ class Fitted:
 
     @property
     def residual_mm(self) -> float:
-        """Measured less predicted."""
+        """Measured minus predicted."""
         return self.reading.measured_mm - self.predicted_mm
 
     @property
     def outlier(self) -> bool:
-        """It stands out from what the others say."""
+        """Whether the residual exceeds `OUTLIER_SIGMAS`."""
         return self.sigmas is not None and abs(self.sigmas) > OUTLIER_SIGMAS
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Everything that was found. `freedom`: readings more than parameters; `spread_mm`: the
-    residuals' standard deviation, None without freedom; `uncertainty_mm`: of the instrument, the
-    root mean square where readings differ, None when not said of all."""
+    """The result of a calibration. `freedom`: number of readings less that of estimated
+    parameters; `spread_mm`: standard deviation of the residuals, None without freedom;
+    `uncertainty_mm`: that of the instrument, as the root mean square over the readings, None when
+    not known for all."""
 
     target: str
     file: str
@@ -237,7 +244,7 @@ class Calibration:
     uncertainty_mm: float | None
 
     def estimate(self, what: str, axis: str = "", region: str = "") -> Estimate | None:
-        """The estimate of this number, if there is one."""
+        """The estimate of this value, or None."""
         for each in self.estimates:
             if (each.what, each.axis, each.region) == (what, axis, region):
                 return each
@@ -245,12 +252,12 @@ class Calibration:
 
 
 def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
-    """The numbers of `machine` that the measurements say.
+    """Estimates of the values of `machine` from measurements.
 
-    InputError when the file is of another target, when nothing in it was measured, and for a play
-    below zero.
+    InputError for a file of another target, a file without measurements, and a backlash below
+    zero.
     """
-    _same_target(measurements, machine)
+    _check_target(measurements, machine)
     readings = readings_of(measurements, machine)
     if not readings:
         raise InputError(
@@ -258,9 +265,9 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
         )
     model = Model(readings)
     solution = solve(model, model.start(machine))
-    estimates = (*_plain(model, solution, machine), *_mean_plays(model, solution, machine))
+    estimates = (*_estimates(model, solution, machine), *_mean_backlash(model, solution, machine))
     for estimate in estimates:
-        _no_negative_play(estimate, machine, measurements.file)
+        _refuse_negative_backlash(estimate, machine, measurements.file)
     known = [reading.uncertainty_mm for reading in readings if reading.uncertainty_mm]
     predicted = solution.predicted.tolist()
     residuals = [r.measured_mm - p for r, p in zip(readings, predicted, strict=True)]
@@ -269,7 +276,9 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
         target=machine.target.name,
         file=measurements.file,
         estimates=estimates,
-        not_estimated=tuple(NotEstimated(str(each.parameter), each.why) for each in solution.held),
+        not_estimated=tuple(
+            NotEstimated(str(each.parameter), each.why) for each in solution.fixed
+        ),
         fitted=tuple(
             Fitted(reading, expected, _sigmas(residual, sigma))
             for reading, expected, residual, sigma in zip(
@@ -284,18 +293,18 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
     )
 
 
-def _same_target(measurements: Measurements, machine: Machine) -> None:
+def _check_target(measurements: Measurements, machine: Machine) -> None:
     if measurements.target not in ("", machine.target.name, machine.target.dialect):
         raise InputError(
             f"was measured on {measurements.target}, not on {machine.target.name}",
             file=measurements.file,
             where="key target",
-            mend=f"give --target {measurements.target}, or mend the key",
+            mend=f"give --target {measurements.target}, or change the key",
         )
 
 
-def _plain(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
-    """The parameters that were estimated, in the machine's units."""
+def _estimates(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
+    """The estimated parameters in the units of the machine."""
     start = model.start(machine)
     depends = model.depends(solution.values)
     found = []
@@ -317,8 +326,8 @@ def _plain(model: Model, solution: Solution, machine: Machine) -> list[Estimate]
     return found
 
 
-def _mean_plays(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
-    """The play of axes that were measured in regions: the mean, if all regions were told."""
+def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
+    """The mean backlash of axes measured in regions, where that of all regions is estimated."""
     depends = model.depends(solution.values)
     found = []
     for axis in ("x", "y"):
@@ -337,12 +346,12 @@ def _mean_plays(model: Model, solution: Solution, machine: Machine) -> list[Esti
     return found
 
 
-def _no_negative_play(estimate: Estimate, machine: Machine, file: str) -> None:
-    """InputError for a play below zero by more than a step and more than its uncertainty."""
+def _refuse_negative_backlash(estimate: Estimate, machine: Machine, file: str) -> None:
+    """InputError for a backlash below zero by more than a step and more than its uncertainty."""
     if estimate.what != "play":
         return
     axis: Axis = getattr(machine.axes, estimate.axis)
-    slack_mm = max(axis.coded_step_mm, NONE_LEFT_SIGMAS * (estimate.uncertainty or 0.0))
+    slack_mm = max(axis.coded_step_mm, ZERO_SIGMAS * (estimate.uncertainty or 0.0))
     if estimate.value < -slack_mm:
         raise InputError(
             f"{estimate.name} comes out as {estimate.value:.4g} mm, which no machine has",
@@ -364,12 +373,12 @@ def _sigmas(residual: float, sigma: float) -> float | None:
 
 
 def to_text(calibration: Calibration, machine: Machine) -> str:
-    """The numbers, what was not estimated, the residuals, what the controller should add."""
+    """The values, those not estimated, the compensation to set, and the residuals."""
     return "\n".join(_text(calibration, machine))
 
 
 def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
-    """The same as JSON has it; lengths in mm, residuals in µm, squareness in rad."""
+    """The same for JSON; lengths in mm, residuals in µm, squareness in rad."""
     return {
         "target": calibration.target,
         "file": calibration.file,
@@ -413,8 +422,8 @@ def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
 
 
 def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[str, float, int]]:
-    """(axis, mm, whole steps) that a controller would have to add at reversals to take up the
-    play that was found: B/k, in its own mm."""
+    """(axis, mm, whole steps) that the controller must add at reversals to take up the measured
+    backlash: B/k, in its own mm."""
     for axis in ("x", "y", "z"):
         play, step = calibration.estimate("play", axis), calibration.estimate("step", axis)
         if play is not None:
@@ -424,7 +433,7 @@ def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[
 
 
 def outliers(calibration: Calibration) -> list[str]:
-    """One line for each reading that stands out."""
+    """One line for each outlier."""
     return [
         f"{each.reading.coupon}, {each.reading.name}: {each.residual_mm * UM_PER_MM:+.1f} µm off, "
         f"{abs(each.sigmas or 0.0):.1f} standard deviations"
@@ -471,7 +480,7 @@ def _fit(each: Fitted) -> tuple[str, ...]:
 
 def _spread(calibration: Calibration) -> str:
     if calibration.spread_mm is None:
-        return "as many readings as numbers: nothing tells how well they fit"
+        return "as many readings as values: how well they fit is not known"
     text = (
         f"residuals {calibration.spread_mm * UM_PER_MM:.1f} µm (standard deviation, "
         f"{calibration.freedom} degrees of freedom)"
@@ -490,7 +499,7 @@ def _um(mm: float | None) -> float | None:
 
 
 def _columns(rows: list[tuple[str, ...]]) -> Iterator[str]:
-    """Rows of text, their columns under each other: the first left, numbers right."""
+    """Rows as aligned text: words to the left, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     text = {0, 1} if rows[0][1] == "reading" else {0}
     for row in rows:

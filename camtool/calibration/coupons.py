@@ -1,8 +1,8 @@
-"""The drawings that calibration needs, and what is measured on each.
+"""The coupons of a calibration as drawings, and the file in which to enter their measurements.
 
-The side from which each edge is reached must follow from the drawing, wherever the tool came
-from. Lines and rulers are closed, so that they are cut the way they are drawn; begun in the
-middle of their longest line, they reach every mark behind a run-up.
+The side from which each edge is reached must follow from the drawing, wherever the tool came from.
+Lines and rulers are closed, so that they are cut in the direction in which they are drawn; begun
+in the middle of their longest line, they reach every mark after a run-up.
 
     lines                                       steps
 
@@ -11,8 +11,8 @@ middle of their longest line, they reach every mark behind a run-up.
     │    ┌────────────────┘  first, in +        │   ┌─┐ ┌─┐ ┌─┐ ┌─┐ ┌┘   reached in +
     └────┘                   run-up             └───┘ └─┘ └─┘ └─┘ └─┘
 
-Squares are open, with a hook beside a corner at either end: cut from either one, opposite edges
-are reached from opposite sides. Circles are closed, and begin where X reverses. (Two joined
+Squares are open, with a hook beside a corner at both ends: cut from either end, opposite edges are
+reached from opposite sides. Circles are closed and begin where X reverses. (Two joined
 lines: PIC thesis, L2353-2423; parallel-port thesis, L1165; squares and circles: PIC thesis,
 L2457-2594; steps: ValCNC thesis, L1645.)
 """
@@ -32,36 +32,35 @@ from camtool.machine.model import Machine
 
 Point = tuple[float, float]
 
-# The grid on which the coupons of a sheet lie, and the cells that the sheet is divided into.
+# The grid on which the coupons of a sheet lie, and the cells into which the sheet is divided.
 #
-# Lengths are whole units, round numbers of mm that the machine can say: what is drawn is then what
-# is cut, and easy to measure.
+# Lengths are whole units, round numbers of mm that the machine can represent: they are cut as
+# drawn, and easy to measure.
 
 FINENESS = 50.0
-"""The shorter side of a region has this many units of the grid of its coupons, or a few more: the
-unit is a round number."""
+"""The shorter side of a region has so many units of the grid, or a few more: the unit is a round
+number."""
 
 MARGIN_UNITS = 2
-"""Units of that grid that stay free around each coupon."""
+"""Free units of the grid around each coupon."""
 
 RUN_UP_UNITS = 4
-"""Shortest run-up, in units of that grid."""
+"""The least length of a run-up, in units of the grid."""
 
 RUN_UP_PLAYS = 3.0
-"""A run-up is at least this many times as long as the machine's backlash and its compensation
-together. The tool begins in the middle of the longest line of a coupon, so more than two are
-needed to take both up."""
+"""A run-up is at least so many times the machine's backlash and compensation. With more than two,
+half of the longest line of a coupon, in whose middle the tool begins, takes them up."""
 
 SAME = 1e-9
-"""Numbers of units within this part of a whole number count as that number."""
+"""Numbers of units that differ by less than this from a whole number are that number."""
 
 MOST_REGIONS = 9
-"""Columns and rows of regions at most."""
+"""The most columns and rows of regions."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Where coupons may lie, mm; a margin is off already."""
+    """A rectangle for coupons, mm, without its margin."""
 
     left: float
     low: float
@@ -71,7 +70,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Grid:
-    """The grid on which coupons lie, and how long their run-ups are, mm."""
+    """The grid on which coupons lie, and the length of their run-ups, mm."""
 
     unit: float
     run_up: float
@@ -80,7 +79,7 @@ class Grid:
         return count * self.unit
 
     def down(self, length: float) -> float:
-        """The length on the grid, not longer; OptionError when nothing is left of it."""
+        """The length rounded down to the grid; OptionError when it becomes 0."""
         cut = math.floor(length / self.unit + SAME) * self.unit
         if cut <= 0.0:
             raise OptionError(
@@ -90,14 +89,14 @@ class Grid:
         return cut
 
     def middle(self, cell: Cell) -> tuple[float, float, float]:
-        """(x, y) of a cell's middle on the grid, and how far its sides are from there."""
+        """(x, y) of the middle of a cell on the grid, and the distance to its nearest side."""
         x = self.down(0.5 * (cell.left + cell.right))
         y = self.down(0.5 * (cell.low + cell.high))
         return x, y, min(cell.right - x, x - cell.left, cell.high - y, y - cell.low)
 
 
 def cells_of(size: Point, regions: tuple[int, int], unit: float) -> Iterator[tuple[str, Cell]]:
-    """(name, cell) from the lower left on, row by row: A1, B1 … A2; no names for a single one."""
+    """(name, cell) from the lower left on, row by row: A1, B1 … A2; "" for a single cell."""
     columns, rows = regions
     margin = MARGIN_UNITS * unit
     for row in range(rows):
@@ -111,7 +110,7 @@ def cells_of(size: Point, regions: tuple[int, int], unit: float) -> Iterator[tup
 
 
 def edges_of(size: Point, regions: tuple[int, int]) -> dict[str, Any]:
-    """The cells of a file of measurements; {} for a single one."""
+    """The cells for a file of measurements; {} for a single cell."""
     columns, rows = regions
     if columns * rows == 1:
         return {}
@@ -126,8 +125,8 @@ def edges_of(size: Point, regions: tuple[int, int]) -> dict[str, Any]:
 
 
 def grid_of(side: float, machine: Machine | None) -> Grid:
-    """A round unit (1, 2 or 5 by a power of ten) which the machine can say, and run-ups that take
-    up its play."""
+    """A round unit (1, 2 or 5 times a power of ten) that the machine can represent, and run-ups
+    that take up its backlash."""
     rough = side / FINENESS
     power = 10.0 ** math.floor(math.log10(rough) + SAME)
     unit = power * max(part for part in (1.0, 2.0, 5.0) if part * power <= rough * (1.0 + SAME))
@@ -141,14 +140,14 @@ def grid_of(side: float, machine: Machine | None) -> Grid:
 
 
 def _on_grid(value: float, unit: float, how: Callable[[float], float]) -> float:
-    """The value as whole units, rounded `how`; what rounding errors make of units are units."""
+    """The value as whole units, rounded by `how`; rounding errors do not change the number."""
     units = value / unit
     near = round(units)
     return (near if abs(units - near) < SAME * max(1.0, abs(near)) else how(units)) * unit
 
 
 def clean(value: float) -> float:
-    """Without the last digits that adding up units leaves."""
+    """The value without rounding errors of sums of units."""
     return round(value, 9) + 0.0
 
 
@@ -158,17 +157,17 @@ Kind = Literal["lines", "squares", "circles", "steps"]
 KINDS: tuple[Kind, ...] = ("lines", "squares", "circles", "steps")
 
 GAP_UNITS = 3
-"""Units of the grid between the two lines of a coupon, and the height of a ruler's steps."""
+"""Units of the grid between the lines of a coupon, and the height of the steps of a ruler."""
 
 SQUARES = (1.0, 0.6, 0.3)
-"""Sizes of the squares, as parts of the first: several, to tell scale from play."""
+"""Sizes of the squares, as parts of the first: several, to distinguish scale from backlash."""
 
 CIRCLES = (1.0, 2.0 / 3.0, 1.0 / 3.0)
 """Diameters of the circles, as parts of the first: 6, 4 and 2 as in the thesis, L2528-2594."""
 
 ANGLES_DEG = (15.0, 35.0, 55.0, 75.0, 105.0, 125.0, 145.0, 165.0)
-"""Where the diameters of circles are measured: eight, as in the thesis's Tabla 15, but none along
-an axis, where the slides reverse and the line has a spike or a flat."""
+"""The angles of the measured diameters: eight, as in the thesis's Tabla 15, but none along an
+axis, where the slides reverse and the line has a spike or a flat."""
 
 STEPS = 10
 """Steps of a ruler (ten "tramos": ValCNC thesis, L1645)."""
@@ -176,7 +175,7 @@ STEPS = 10
 
 @dataclass(frozen=True)
 class Path:
-    """A line of a drawing: vertices x, y, bulge in mm."""
+    """A polyline of a drawing: vertices of x, y (mm) and bulge."""
 
     layer: str
     vertices: tuple[tuple[float, float, float], ...]
@@ -185,8 +184,9 @@ class Path:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A drawing of `size` mm, its lower left corner at part zero; `tables` are the coupons of a
-    file of measurements, (kind, keys) each; `regions` its cells, the same for both axes."""
+    """A drawing of `size` mm with its lower left corner at part zero. For the file of
+    measurements, `tables` are its coupons, (kind, keys) each, and `regions` its cells, for both
+    axes."""
 
     kind: Kind
     size: Point
@@ -198,8 +198,8 @@ class Sheet:
 def sheet(
     kind: Kind, size: Point, regions: tuple[int, int] = (1, 1), machine: Machine | None = None
 ) -> Sheet:
-    """The coupons of a kind on a sheet; OptionError when they do not fit, or when the run-ups do
-    not take up the play of `machine`."""
+    """The coupons of a kind on a sheet, with run-ups for the backlash of `machine`; OptionError
+    when they do not fit."""
     if not all(1 <= count <= MOST_REGIONS for count in regions):
         raise OptionError(
             f"{regions[0]}x{regions[1]} regions", mend=f"give 1 to {MOST_REGIONS} each way"
@@ -241,12 +241,12 @@ def _along_both(one: AlongAxis, cell: Cell, grid: Grid) -> Made:
 
 
 def _two_lines(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
-    """Two lines along an axis from `corner`, (along, across) it, to `end`."""
+    """Two lines along an axis, from `corner` (along, across) to `end`."""
     along, across = corner
     run_up, gap = grid.run_up, grid.units(GAP_UNITS)
     mark = along + run_up
     length = grid.down(end - mark)
-    ways = [
+    points = [
         (along, across),
         (mark, across),
         (mark, across + gap),
@@ -257,7 +257,7 @@ def _two_lines(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
         (along, across + 3 * gap),
     ]
     table = {"axis": axis, "nominal_mm": clean(length), "first_mm": 0.0, "second_mm": 0.0}
-    return Path(f"LINES_{axis.upper()}", _turned(axis, ways), closed=True), table
+    return Path(f"LINES_{axis.upper()}", _vertices(axis, points), closed=True), table
 
 
 def _ruler(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
@@ -269,7 +269,7 @@ def _ruler(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
     there = [(along, across), *_wave(marks, (across, across + tall))]
     far = marks[-1] + run_up
     back = _wave(marks[::-1], (across + 2 * tall, across + 3 * tall))
-    ways = [*there, (far, there[-1][1]), (far, back[0][1]), *back, (along, back[-1][1])]
+    points = [*there, (far, there[-1][1]), (far, back[0][1]), *back, (along, back[-1][1])]
     table = {
         "axis": axis,
         "nominal_mm": [clean(k * pitch) for k in range(1, STEPS + 1)],
@@ -277,11 +277,11 @@ def _ruler(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
         "backward_mm": [0.0] * STEPS,
         "rows_apart_mm": clean(2 * tall),
     }
-    return Path(f"STEPS_{axis.upper()}", _turned(axis, ways), closed=True), table
+    return Path(f"STEPS_{axis.upper()}", _vertices(axis, points), closed=True), table
 
 
 def _wave(marks: Sequence[float], levels: Point) -> list[Point]:
-    """Up at one mark, down at the next."""
+    """The points of a square wave: up at one mark, down at the next."""
     points: list[Point] = []
     for number, mark in enumerate(marks):
         first, second = levels if number % 2 == 0 else levels[::-1]
@@ -290,14 +290,14 @@ def _wave(marks: Sequence[float], levels: Point) -> list[Point]:
 
 
 def _squares(cell: Cell, grid: Grid) -> Made:
-    """Squares about the cell's middle, one in the other."""
+    """Squares about the middle of the cell, one inside the other."""
     hook = grid.run_up
     x, y, most = grid.middle(cell)
     for part in SQUARES:
         half = grid.down(part * (most - hook))
         left, right, low, high = x - half, x + half, y - half, y + half
         stop = right - grid.unit
-        ways = [
+        points = [
             (right - hook, low - hook),
             (right, low - hook),
             (right, high),
@@ -309,13 +309,13 @@ def _squares(cell: Cell, grid: Grid) -> Made:
         size = clean(2.0 * half)
         diagonals = {"diagonals_mm": [0.0, 0.0]}
         yield (
-            Path("SQUARES", _turned("x", ways)),
+            Path("SQUARES", _vertices("x", points)),
             {"nominal_mm": [size, size], "dx_mm": 0.0, "dy_mm": 0.0, **diagonals},
         )
 
 
 def _circles(cell: Cell, grid: Grid) -> Made:
-    """Circles about the cell's middle, each of two half circles, counterclockwise from +X."""
+    """Circles about the middle of the cell, each of two half circles, CCW from +X."""
     x, y, most = grid.middle(cell)
     for part in CIRCLES:
         radius = grid.down(part * most)
@@ -331,19 +331,20 @@ def _circles(cell: Cell, grid: Grid) -> Made:
         )
 
 
-def _turned(axis: str, ways: Sequence[Point]) -> tuple[tuple[float, float, float], ...]:
+def _vertices(axis: str, points: Sequence[Point]) -> tuple[tuple[float, float, float], ...]:
     """Points (along, across) an axis as vertices."""
-    points = ways if axis == "x" else [(across, along) for along, across in ways]
+    if axis == "y":
+        points = [(across, along) for along, across in points]
     return tuple((clean(x), clean(y), 0.0) for x, y in points)
 
 
-# A sheet as DXF and as SVG: mm, the same bytes every time.
+# A sheet as DXF and as SVG in mm; the same sheet gives the same bytes.
 
 COLOUR = 5
-"""Index of the colour of all lines in DXF: blue."""
+"""Colour index of all lines in DXF: blue."""
 
 DECIMALS = 9
-"""Decimals of numbers in SVG."""
+"""Decimal places of numbers in SVG."""
 
 
 def dxf(sheet: Sheet) -> bytes:
@@ -352,7 +353,7 @@ def dxf(sheet: Sheet) -> bytes:
     from ezdxf.filemanagement import new
     from ezdxf.units import MM
 
-    # Without dates and GUIDs; the option is the library's own, so it is put back.
+    # Without dates and GUIDs; the option is global to the library, so it is restored.
     before = options.write_fixed_meta_data_for_testing
     options.write_fixed_meta_data_for_testing = True
     try:
@@ -392,7 +393,7 @@ def svg(sheet: Sheet) -> bytes:
 
 
 def _path(path: Path) -> str:
-    """Lines and arcs; an arc's radius is chord · (1 + b²) / (4 |b|)."""
+    """The path data; the radius of an arc is chord · (1 + b²) / (4 |b|)."""
     ring = [*path.vertices, path.vertices[0]] if path.closed else list(path.vertices)
     x, y, _ = ring[0]
     parts = [f"M {_number(x)} {_number(y)}"]
@@ -411,7 +412,7 @@ def _number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-# A file of measurements to fill in: every length of a sheet of coupons, by name.
+# A file of measurements to fill in, with every length of a sheet of coupons.
 
 HOW: dict[Kind, tuple[str, ...]] = {
     "lines": (
@@ -430,11 +431,11 @@ HOW: dict[Kind, tuple[str, ...]] = {
         "the others; backward_mm: from the same mark to those of the other row.",
     ),
 }
-"""What is measured, in words."""
+"""What to measure, as comments of the file."""
 
 
 def skeleton(sheet: Sheet, machine: Machine | None) -> str:
-    """TOML text of the sheet's measurements; 0.0 stands for what was not measured."""
+    """TOML text for the measurements of a sheet; 0.0 means not measured."""
     width, height = sheet.size
     lines = [
         f"# Measurements of the {sheet.kind} coupon, {width:g} by {height:g} mm.",
@@ -456,7 +457,7 @@ def skeleton(sheet: Sheet, machine: Machine | None) -> str:
 
 
 def _compensation(machine: Machine | None) -> str:
-    """What the controller adds at reversals, to be changed when it was off."""
+    """The compensation of the machine, for the user to change if it was off while cutting."""
     if machine is None:
         return "# compensation_mm = { x = 0.0, y = 0.0 }   # added at reversals while cutting"
     x, y = machine.axes.x.compensation_mm, machine.axes.y.compensation_mm

@@ -1,7 +1,7 @@
-"""The machine file that a calibration makes: it extends the target, as `--machine` reads it.
+"""The machine file of a calibration, for `--machine`: it extends the target.
 
-What the user's own machine file said stays; numbers that were measured take their place, each
-with its uncertainty and its source behind it.
+The values of the user's own machine file stay; measured values replace them, each with its
+uncertainty and its source in a comment.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from camtool.machine.model import Machine
 Table = dict[str, Any]
 
 WITHIN_UNCERTAINTY = 0.02
-"""Numbers are written to this part of their uncertainty."""
+"""Values are rounded to this part of their uncertainty."""
 
 DIGITS = 9
-"""Significant digits of numbers whose uncertainty is not known."""
+"""Significant digits of values whose uncertainty is not known."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -31,8 +31,8 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 def machine_file(
     calibration: Calibration, measurements: Measurements, machine: Machine, own: Table
 ) -> str:
-    """TOML text. `machine` is the one that was measured, as its files said; `own` is the table of
-    the user's file, or one that only says what it `extends`."""
+    """TOML text. `machine` has the values before the calibration; `own` is the table of the user's
+    file, or one with only the key `extends`."""
     said: Table = json.loads(json.dumps(own))  # a copy, tables and all
     notes: dict[str, str] = {}
     for axis in ("x", "y", "z"):
@@ -61,8 +61,8 @@ def _set_map(
     measurements: Measurements,
     machine: Machine,
 ) -> None:
-    """The play by region where all cells were told; an older map of an axis whose play was
-    measured as a whole no longer holds."""
+    """Set the map of backlash by region where all cells were measured; switch off an older map of
+    an axis whose backlash was measured as a whole."""
     for axis in ("x", "y"):
         cells: Regions | None = getattr(measurements.regions, axis)
         whole = calibration.estimate("play", axis)
@@ -83,7 +83,7 @@ def _set_map(
 
 
 def _rounded(estimate: Estimate | None) -> float:
-    """The value, to a small part of its uncertainty; a play that is none is 0."""
+    """The value, rounded to a small part of its uncertainty; a backlash below 0 is 0."""
     assert estimate is not None
     value = max(estimate.value, 0.0) if estimate.what != "squareness" else estimate.value
     if estimate.uncertainty:
@@ -105,7 +105,7 @@ def _within(uncertainty: float | None) -> str:
 
 
 def _plain(file: str) -> str:
-    """A file's name as part of a comment: without its folder, one line whatever it holds."""
+    """The name of a file for a comment: without its folder, with printable characters only."""
     return "".join(char if char.isprintable() else "?" for char in Path(file).name)
 
 
@@ -119,7 +119,7 @@ def _set(table: Table, key: str, value: Any) -> None:
 def _lines(
     table: Mapping[str, Any], path: tuple[str, ...], notes: Mapping[str, str]
 ) -> Iterator[str]:
-    """A table as TOML, its plain values before the tables within it."""
+    """A table as TOML, with its values before its tables."""
     values = {key: value for key, value in table.items() if not isinstance(value, dict)}
     if path and (values or not table):
         yield ""
@@ -137,7 +137,7 @@ def _key(name: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """A value of a machine file as TOML: text, numbers, truth, and rows of them."""
+    """A value as TOML: text, number, boolean, or a list of these."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, str):

@@ -1,6 +1,6 @@
-"""Measurements of coupons as their TOML file may say them, strictly: types, signs, sizes.
+"""The file of measurements of coupons, with strict checks of types, signs and sizes.
 
-    target = "pic-mmh"               # whose coupons they are
+    target = "pic-mmh"               # the target whose coupons they are
     uncertainty_mm = 0.001           # standard uncertainty of each reading; left out: not known
     compensation_mm = { x = 0.0 }    # added at reversals while cutting; left out: the machine's
 
@@ -8,7 +8,7 @@
     axis = "x"
     ...
 
-A coupon may say its own `uncertainty_mm` and `compensation_mm`, and the `source` of its numbers.
+A coupon may have its own `uncertainty_mm` and `compensation_mm`, and the `source` of its numbers.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from camtool.errors import InputError, MachineError
 from camtool.machine.ranges import Length, Lost, Place, Reading, Tolerance
 from camtool.tables import convert, read_table
 
-# The kinds of coupon as a file of measurements may say them: types, signs, sizes.
+# The kinds of coupon: types, signs, sizes.
 
 Pair = tuple[Length, Length]
 Flat = Literal["x", "y"]
@@ -34,12 +34,13 @@ Any3 = Literal["x", "y", "z"]
 _ZERO_IS_A_RESULT = ("shorter_by_mm", "gap_x_mm", "gap_y_mm")
 
 MOST_TIMES = 2.0
-"""A length that exceeds its nominal one by more than this factor, or is shorter by more, is taken
-for a mistake: a wrong unit, a lost digit."""
+"""A length more than so many times its nominal one, or less than that part of it, is a mistake: a
+wrong unit, a missing digit."""
 
 
 class Added(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the controller added at each reversal while it cut, mm; None: as the machine says."""
+    """The compensation that the controller added at reversals while cutting, mm; None: that of the
+    machine file."""
 
     x: Lost | None = None
     y: Lost | None = None
@@ -47,8 +48,8 @@ class Added(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Regions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The cells of the table in which the play of an axis was measured, as a machine's play map
-    has them: edges in table coordinates, `names[j][i]` the region of coupons in a cell."""
+    """The cells of the table in which the backlash of an axis was measured, as in `[play_map]` of
+    a machine: edges in table coordinates; `names[j][i]` is the region of the coupons in a cell."""
 
     x_mm: tuple[Place, ...]
     y_mm: tuple[Place, ...]
@@ -61,15 +62,15 @@ class Regions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RegionsOf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The cells of each axis, where there are any."""
+    """The cells of each axis, if there are any."""
 
     x: Regions | None = None
     y: Regions | None = None
 
 
 class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every coupon may say beside its lengths; `region` names the part of the table that it
-    lies in."""
+    """What every coupon may have besides its lengths; `region` names the part of the table in
+    which it lies."""
 
     kind: ClassVar[str]
     readings: ClassVar[tuple[str, ...]]
@@ -82,13 +83,13 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def axes(self) -> str:
-        """The axes whose play it may tell."""
+        """The axes whose backlash it may determine."""
         return "xy"
 
     @property
     def measured(self) -> bool:
-        """Whether anything was: 0.0 is a reading that is still to be filled in, but where it is
-        a result like any other (`shorter_by_mm`, gaps)."""
+        """Whether anything is measured: 0.0 is a reading still to be filled in, except where it is
+        a possible result (`shorter_by_mm`, gaps)."""
         for key in self.readings:
             value = getattr(self, key)
             readings = value if isinstance(value, tuple) else (value,)
@@ -101,7 +102,7 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return iter(())
 
     def faults(self) -> Iterator[tuple[str, str, str]]:
-        """(key, what is wrong, mend) of what the types cannot say."""
+        """(key, what is wrong, how to correct it) of faults that the types do not find."""
         return iter(())
 
 
@@ -157,8 +158,8 @@ class Square(Coupon, frozen=True, kw_only=True):
 
 
 class Circle(Coupon, frozen=True, kw_only=True):
-    """A whole circle, cut `direction`. `diameters_mm` are those at `angles_deg` from the X axis
-    towards the Y axis, or evenly spread over half a turn from the X axis on."""
+    """A full circle, cut in a `direction`. `diameters_mm` are those at `angles_deg` from the X
+    axis towards the Y axis, or at equal angles over half a turn from the X axis on."""
 
     kind = "circles"
     readings = ("diameters_mm",)
@@ -188,9 +189,9 @@ class Circle(Coupon, frozen=True, kw_only=True):
 
 
 class Steps(Coupon, frozen=True, kw_only=True):
-    """A ruler: the places after moves of `nominal_mm` from a zero that was reached in +.
-    `forward_mm` were reached in + too, `backward_mm` in −, at the same nominal places, in a row
-    that lies `rows_apart_mm` to the + side of the first."""
+    """A ruler: positions at `nominal_mm` from a zero that was reached in +. `forward_mm` were
+    reached in + too, `backward_mm` in −, at the same nominal positions, in a row that lies
+    `rows_apart_mm` to the + side of the first."""
 
     kind = "steps"
     readings = ("forward_mm", "backward_mm")
@@ -224,8 +225,8 @@ class Steps(Coupon, frozen=True, kw_only=True):
 
 
 class Closure(Coupon, frozen=True, kw_only=True):
-    """A contour that should close, begun in + on both axes and ended in −: how far its end lies
-    from its start, mm, positive towards +. `nominal_mm` is its size, against slips."""
+    """A closed contour, begun in + on both axes and ended in −: the distance of its end from its
+    start, mm, positive towards +. `nominal_mm` is its size, for the check of the gaps."""
 
     kind = "closures"
     readings = ("gap_x_mm", "gap_y_mm")
@@ -242,14 +243,14 @@ class Closure(Coupon, frozen=True, kw_only=True):
 
 
 KINDS: tuple[type[Coupon], ...] = (Lines, Square, Circle, Steps, Closure)
-"""The tables of a file, in order."""
+"""The kinds of tables in a file, in order."""
 
 
 # The file.
 
 
 class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The file without its coupons, whose tables are known by name only."""
+    """The file without its coupons; their tables are listed by name only."""
 
     target: str = ""
     uncertainty_mm: Tolerance | None = None
@@ -263,7 +264,7 @@ class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Measurements(msgspec.Struct, frozen=True):
-    """A file of measurements: its coupons with their names, such as "lines 2"."""
+    """A file of measurements: its measured coupons with their names, such as "lines 2"."""
 
     file: str
     target: str
@@ -274,7 +275,7 @@ class Measurements(msgspec.Struct, frozen=True):
 
 
 def read_measurements(path: Path) -> Measurements:
-    """The file, checked; InputError names file, table, key and mend."""
+    """The checked file; InputError names file, table, key and the correction."""
     file = str(path)
     try:
         table = read_table(path)
@@ -319,7 +320,7 @@ def _tables(value: Any, kind: str, file: str) -> list[dict[str, Any]]:
 
 
 def _check_regions(regions: RegionsOf, coupons: list[tuple[str, Coupon]], file: str) -> None:
-    """InputError for cells that are no grid, and for a cell without a coupon."""
+    """InputError for cells that are not a grid, and for a cell without a coupon."""
     for axis, cells in (("x", regions.x), ("y", regions.y)):
         if cells is None:
             continue
@@ -350,7 +351,7 @@ def _check_regions(regions: RegionsOf, coupons: list[tuple[str, Coupon]], file: 
 
 
 def _coupon(values: dict[str, Any], kind: type[Coupon], file: str, name: str) -> Coupon:
-    """One table as its record, checked."""
+    """One table as a checked record."""
     try:
         coupon = convert(values, kind, file)
     except MachineError as error:
@@ -375,7 +376,7 @@ def _where(name: str, key: str) -> str:
 
 
 def _unit_meant(times: float) -> str:
-    """What may have gone wrong with a length that is so many times its nominal one."""
+    """The correction for a length that is so many times its nominal one."""
     units = {"µm": 1000.0, "cm": 0.1, "m": 0.001, "inches": 1.0 / 25.4, "thousandths": 39.37}
     for unit, factor in units.items():
         if 1.0 / MOST_TIMES < times / factor < MOST_TIMES:

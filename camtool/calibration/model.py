@@ -1,45 +1,44 @@
-"""What each measured length says of the machine: one equation for each reading.
+"""The equations of the readings: how each measured length follows from the values of the machine.
 
-An axis that is commanded to X, reached in +, has its slide at k·X; reached in −, at
+When an axis is commanded to X and reaches it in +, its slide is at k·X; when it reaches X in −, at
 
     k·(X − C) + B
 
-k is the real over the coded step, B the play and C what the controller adds at each reversal,
-in its own mm: at a reversal the motor moves by C more, of which the mechanics lose B. (Slides
-engaged in + at the start; centred ones are shifted as a whole, and no distance changes.) The table
-shows x = slide_x + q·slide_y, y = slide_y: q is the tangent of the squareness, the angle by which
-the one between +X and +Y falls short of 90°.
+k is the real over the coded step, B the backlash and C what the controller adds at each reversal,
+in its own mm: at a reversal the motor moves by C more, of which the mechanics lose B. (This is for
+slides engaged in + at the start; centred slides are shifted as a whole, which changes no
+distance.) On the table x = slide_x + q·slide_y and y = slide_y, where q is the tangent of the
+squareness, the angle by which that between +X and +Y is less than 90°.
 
-So between two places that are n commanded mm apart along an axis, the slide's way is
+So between two positions that are n commanded mm apart along an axis, the slide moves by
 
     d = k·n + m·(B − k·C),     m = [second reached in −] − [first reached in −]  ∈ {−1, 0, 1}
 
 and most coupons are a choice of n and m:
 
-lines     the first line goes from a mark reached in + to the bridge, reached in +: n, m = 0; the
+lines     the first line runs from a mark reached in + to the bridge, reached in +: n, m = 0; the
           second from the bridge back to a mark reached in −: n, m = −1. It is shorter by B − k·C.
           (PIC thesis, L2353-2423; parallel-port thesis, L1165.)
 squares   edges reached from opposite sides: n = size, m = −1 on both axes. Diagonals are the
           distances of the corners, (Dx, Dy) and (−Dx, Dy) sheared: their difference is squareness.
-steps     n and m = 0 forwards; n and m = 1 backwards, measured from the same zero: along X, where
-          the rows are a apart in Y, with q·a beside it.
+steps     n and m = 0 forwards; n and m = 1 backwards, measured from the same zero. Along X, where
+          the rows are a apart in Y, q·a is added.
 closures  n = 0, m = 1.
 
-Circles. In commanded mm, with e = B/k − C for each axis, a point that is run through in − on an
-axis is shifted by e there: a circle of radius r falls into four quarters with centres of their
-own, symmetric about (e_x, e_y)/2. Seen from there the quarter in the direction u has its centre at
-s = (±e_x, ±e_y)/2, + for axes that run in −. Behind a reversal the slide waits until the motor
-has come back by e: that cuts the quarter off at the extreme, r − e/2 from the middle. Hence
+Circles. In commanded mm, with e = B/k − C for each axis, a point that an axis passes in − is
+shifted by e on that axis: a circle of radius r becomes four quarters with different centres,
+symmetric about (e_x, e_y)/2. From there the quarter in the direction u has its centre at
+s = (±e_x, ±e_y)/2, + for axes that run in −. After a reversal the slide waits until the motor has
+come back by e, which cuts the quarter off at the extreme, r − e/2 from the middle. Hence
 
     D(u) = 2·min( u·s + √(r² − (u×s)²), (r − e_a/2) / |u_a| ),
 
-a being the axis that has just reversed, and 2r − e along an axis itself, which is from extreme to
-extreme. What is seen on the table is sheared and stretched: along the direction t it is
-D(u) / |v| with v = ((cos t − q·sin t) / k_x, sin t / k_y) and u = v / |v|, because straight lines
-stay straight.
+where a is the axis that has just reversed. Along an axis, from extreme to extreme, D is 2r − e. On
+the table the circle is sheared and stretched. Because straight lines stay straight, the diameter
+along the direction t is D(u) / |v| with v = ((cos t − q·sin t) / k_x, sin t / k_y), u = v / |v|.
 
-Everything here works for complex numbers too, so that the solver can take derivatives without
-subtracting: the imaginary part of f(p + i·h) / h.
+All equations also accept complex numbers, so that the solver can take derivatives without
+subtraction: the imaginary part of f(p + i·h) / h.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ DERIVATIVE_STEP = 1e-30
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number to estimate: `what` is scale, play or squareness; `region` only of play."""
+    """A value to estimate: `what` is "scale", "play" or "squareness"; only play has a `region`."""
 
     what: str
     axis: str
@@ -92,7 +91,8 @@ SQUARENESS = Parameter("squareness", "")
 
 @dataclass(frozen=True)
 class Course:
-    """An axis as a coupon was cut: with what the controller added at reversals, in a region."""
+    """An axis while a coupon was cut: the compensation that the controller added, and the
+    region."""
 
     axis: str
     added_mm: float
@@ -111,8 +111,8 @@ class Trial:
         return self._values[self._columns[Parameter("scale", course.axis)]]
 
     def lost(self, course: Course) -> Any:
-        """B − k·C of an axis, mm. Where its play was measured in regions, it is their mean in
-        all else."""
+        """B − k·C of an axis, mm. Where its backlash is measured in regions, coupons without a
+        region take the mean of all regions."""
         own = self._columns.get(Parameter("play", course.axis, course.region))
         if own is not None:
             play = self._values[own]
@@ -127,20 +127,21 @@ class Trial:
 
 
 class Measure(Protocol):
-    """What was measured on a coupon."""
+    """A length that is measured on a coupon."""
 
     @property
     def courses(self) -> tuple[Course, ...]:
-        """The axes that it depends on."""
+        """The axes on which it depends."""
 
     def predict(self, trial: Trial) -> Any:
-        """The length that should have been read, mm."""
+        """The length by the model, mm."""
 
 
 @dataclass(frozen=True)
-class Way:
-    """The way of one axis between two places: n and m of the module's first equation. Along X,
-    `aside_mm` is how much further towards +Y the second place was read than the first one."""
+class AxisDistance:
+    """The distance along one axis between two positions: `nominal_mm` and `turned` are n and m of
+    the second equation above. Along X, `aside_mm` is how much further towards +Y the second
+    position lies."""
 
     course: Course
     nominal_mm: float
@@ -158,10 +159,10 @@ class Way:
 
 @dataclass(frozen=True)
 class Diagonal:
-    """The distance of two places, from the ways of X and Y between them."""
+    """The distance between two positions, from their distances along X and Y."""
 
-    x: Way
-    y: Way
+    x: AxisDistance
+    y: AxisDistance
 
     @property
     def courses(self) -> tuple[Course, ...]:
@@ -201,7 +202,7 @@ class Diameter:
         return 2.0 * self._from_middle((v_x / size, v_y / size), (e_x, e_y)) / size
 
     def _from_middle(self, u: tuple[Any, Any], e: tuple[Any, Any]) -> Any:
-        """The second equation of the module: half of D(u)."""
+        """Half of D(u)."""
         turn = 1.0 if self.ccw else -1.0
         runs_back = -turn * u[1].real < 0.0, turn * u[0].real < 0.0
         s_x, s_y = (
@@ -218,7 +219,7 @@ class Diameter:
 @dataclass(frozen=True)
 class Reading:
     """One measured length, mm, with its standard uncertainty where that is known. `coupon` and
-    `name` say which it is, `source` where its numbers come from."""
+    `name` identify it, `source` is where its numbers come from."""
 
     coupon: str
     name: str
@@ -229,7 +230,7 @@ class Reading:
 
 
 class Model:
-    """The parameters of a set of readings, and what the readings should be for values of them."""
+    """The parameters of a set of readings, and the readings that follow from their values."""
 
     def __init__(self, readings: Sequence[Reading]) -> None:
         self.readings = tuple(readings)
@@ -243,16 +244,16 @@ class Model:
         self._columns = {parameter: column for column, parameter in enumerate(self.parameters)}
 
     def start(self, machine: Machine) -> Floats:
-        """(P,) what the machine's file says so far."""
+        """(P,) the values of the machine's file."""
         return np.array([_said(parameter, machine) for parameter in self.parameters])
 
     def predict(self, values: Floats) -> Floats:
-        """(n,) what the readings should be, mm, for values (P,) of the parameters."""
+        """(n,) the readings by the model, mm, for values (P,) of the parameters."""
         trial = Trial(values.tolist(), self._columns)
         return np.array([reading.measure.predict(trial) for reading in self.readings])
 
     def slopes(self, values: Floats) -> Floats:
-        """(n, P) the derivatives of the predictions."""
+        """(n, P) derivatives of the predictions by the parameters."""
         columns = []
         for column in range(len(values)):
             stepped = values.astype(np.complex128)
@@ -263,13 +264,13 @@ class Model:
         return np.array(columns).T
 
     def depends(self, values: Floats) -> Bools:
-        """(n, P) which readings say anything of which parameters."""
+        """(n, P) true where a reading depends on a parameter."""
         slopes = np.abs(self.slopes(values))
         return np.asarray(slopes > ROUNDING * slopes.max(axis=0))
 
 
 def _regions(courses: Sequence[Course], axis: str) -> Iterator[str]:
-    """The named regions of an axis in their order; one without a name where there are none."""
+    """The named regions of an axis in order, or one without a name."""
     named = dict.fromkeys(each.region for each in courses if each.axis == axis and each.region)
     yield from named or ("",)
 
@@ -283,11 +284,11 @@ def _said(parameter: Parameter, machine: Machine) -> float:
     return axis.backlash_mm
 
 
-# The coupons of a file as readings.
+# The readings of the coupons in a file.
 
 
 def readings_of(measurements: Measurements, machine: Machine) -> list[Reading]:
-    """Every length that was measured, in the order of the file."""
+    """All measured lengths, in the order of the file."""
     found: list[Reading] = []
     for name, coupon in measurements.coupons:
         courses = {
@@ -310,7 +311,7 @@ Measured = Iterator[tuple[str, float, Measure]]
 
 
 def _measures(coupon: Coupon, courses: dict[str, Course]) -> Measured:
-    """(name, mm, what it is) of each length of a coupon that was measured."""
+    """(name, mm, measure) of each measured length of a coupon."""
     match coupon:
         case Lines():
             yield from _lines(coupon, courses[coupon.axis])
@@ -323,21 +324,21 @@ def _measures(coupon: Coupon, courses: dict[str, Course]) -> Measured:
         case Closure():
             for axis, gap in (("x", coupon.gap_x_mm), ("y", coupon.gap_y_mm)):
                 if gap is not None:
-                    yield f"gap in {axis}", gap, Way(courses[axis], 0.0, 1)
+                    yield f"gap in {axis}", gap, AxisDistance(courses[axis], 0.0, 1)
 
 
 def _lines(lines: Lines, course: Course) -> Measured:
     if lines.first_mm:
-        yield "first line", lines.first_mm, Way(course, lines.nominal_mm, 0)
+        yield "first line", lines.first_mm, AxisDistance(course, lines.nominal_mm, 0)
     if lines.second_mm:
-        yield "second line", lines.second_mm, Way(course, lines.nominal_mm, -1)
+        yield "second line", lines.second_mm, AxisDistance(course, lines.nominal_mm, -1)
     if lines.shorter_by_mm is not None:
-        yield "shorter by", lines.shorter_by_mm, Way(course, 0.0, 1)
+        yield "shorter by", lines.shorter_by_mm, AxisDistance(course, 0.0, 1)
 
 
 def _square(square: Square, x: Course, y: Course) -> Measured:
     width, height = square.nominal_mm
-    across, up = Way(x, width, -1), Way(y, height, -1)
+    across, up = AxisDistance(x, width, -1), AxisDistance(y, height, -1)
     if square.dx_mm:
         yield "Dx", square.dx_mm, across
     if square.dy_mm:
@@ -346,7 +347,7 @@ def _square(square: Square, x: Course, y: Course) -> Measured:
     if rising:
         yield "rising diagonal", rising, Diagonal(across, up)
     if falling:
-        yield "falling diagonal", falling, Diagonal(Way(x, -width, 1), up)
+        yield "falling diagonal", falling, Diagonal(AxisDistance(x, -width, 1), up)
 
 
 def _circle(circle: Circle, x: Course, y: Course) -> Measured:
@@ -365,11 +366,16 @@ def _steps(steps: Steps, course: Course) -> Measured:
     ):
         for nominal, value in zip(steps.nominal_mm, values or (), strict=False):
             if value:
-                yield f"{called} at {nominal:g} mm", value, Way(course, nominal, turned, aside)
+                yield (
+                    f"{called} at {nominal:g} mm",
+                    value,
+                    AxisDistance(course, nominal, turned, aside),
+                )
 
 
 def _added_mm(axis: str, machine: Axis, coupon: Coupon, measurements: Measurements) -> float:
-    """What the controller added at each reversal of the axis, in its own mm: whole steps."""
+    """The compensation that the controller added at reversals of the axis, in its own mm: whole
+    steps."""
     said = coupon.compensation_mm or Added()
     for value in (getattr(said, axis), getattr(measurements.compensation_mm, axis)):
         if value is not None:

@@ -1,1 +1,1 @@
-"""Controller models: Toolpath and machine to Motion."""
+"""What controllers share: the motion that a machine makes of a toolpath."""

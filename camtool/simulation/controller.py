@@ -1,8 +1,7 @@
-"""What the model of a controller offers: the motion of a toolpath, and what is known of it.
+"""The model of a controller: the motion of a toolpath, and what is known about it.
 
-A model subclasses `ControllerModel` and overrides what is different about it. It is asked about
-toolpaths as `read` of its target decodes them, on machines whose `[controller]` is a record of
-that target.
+A model is a subclass of `ControllerModel` that overrides what differs. Its toolpaths are those
+that `read` of its target decodes; the `[controller]` of its machines is a record of that target.
 """
 
 from __future__ import annotations
@@ -21,60 +20,60 @@ from camtool.toolpath.moves import Toolpath
 
 
 class FusedRun(Protocol):
-    """A run that is simulated and judged in one go, row by row, without chunks."""
+    """A fused run: it is judged row by row as it is simulated, without chunks."""
 
     @property
     def rows(self) -> int:
-        """How many rows it runs."""
+        """Number of rows."""
 
     def judge(self, low: int, high: int, task: Any, sums: Any) -> Ledger:
-        """Run the rows low:high, which follow those run before, and judge them by the task and
-        sums of `camtool.kernels.judge`."""
+        """Run the rows low:high, which follow those of the last call, and judge them with the task
+        and sums of `camtool.kernels.judge`."""
 
 
 class ControllerModel(ABC, Generic[ControllerT, DialectT]):
-    """One controller's own arithmetic."""
+    """The arithmetic of one controller."""
 
     @abstractmethod
     def run(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> Iterator[Chunk]:
-        """The motion, chunk by chunk, up to the end of the program. Raises MachineError, and
-        ProgramError (some only when the row comes) naming the block."""
+        """The motion in chunks, up to the end of the program. Raises MachineError, and
+        ProgramError, which names the block (some only when that row is run)."""
 
     @abstractmethod
     def interpolation(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> str:
-        """A word for the report: how lines and arcs are made, such as "dsm" or "path"."""
+        """A word for the report: the interpolation of lines and arcs, such as "dsm" or "path"."""
 
     def quantised(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> Toolpath:
-        """The moves as the controller has them before it interpolates, row by row: what its
-        interpolation is measured against. ProgramError for rows that it cannot follow.
+        """The moves as the controller rounds them before it interpolates, row by row: the error of
+        interpolation is measured from these. ProgramError for rows that it cannot follow.
 
-        Here: as they are read, homing at machine zero, nothing rounded.
+        By default: as they are read, without rounding, and with homing at machine zero.
         """
         check_positions(toolpath, machine)
         return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
 
     def spacing_mm(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> float:
-        """How far apart in XY the samples of the motion are, about; here: a step."""
+        """The approximate distance of samples of the motion in XY, mm; by default a step."""
         return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
 
     def assumptions(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]
     ) -> tuple[str, ...]:
-        """What the times and figures take for granted, one short sentence each."""
+        """What the times and figures assume, one short sentence each."""
         return ()
 
     def findings(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> tuple[Finding, ...]:
-        """What the model alone knows of a program."""
+        """Findings that only the model can make."""
         return ()
 
     def fused_run(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> FusedRun | None:
-        """The same motion as that of `run`, judged as it is made; None where that needs chunks."""
+        """The motion of `run`, judged as it is simulated; None for a model that makes chunks."""
         return None

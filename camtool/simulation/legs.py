@@ -1,8 +1,8 @@
-"""The motion of controllers whose every move is a sequence of straight legs of whole steps.
+"""The motion of controllers whose moves are sequences of straight legs of whole steps.
 
     legs of a program, block by block ─legs_fill─▶ commanded ─Mechanics─▶ slides, in chunks
 
-A sample is the position after a pass of the controller's loop, which moves at least one axis.
+A sample is the position after one pass of the controller's loop, which moves at least one axis.
 Memory grows with the legs that are given at a time, not with their steps.
 """
 
@@ -24,19 +24,18 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """L legs, each of which goes on from where the one before ended: row (L,) of the toolpath,
-    ascending; way (L, 3) steps, none of them all 0; seconds (L,) that it takes."""
+    """L legs, each of which starts where the one before ends: `row` (L,) of the toolpath,
+    ascending; `steps` (L, 3) of the axes, with sign, none of them all 0; `seconds` (L,)."""
 
     row: Ints
-    way: Ints
+    steps: Ints
     seconds: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """What is known of all R rows up to the end of the program: `start` (3,) steps where the
-    first begins; waits (R,) s of those that do not move; `compensation_s` of each step that is
-    issued at a reversal."""
+    """What applies to all R rows up to the end of the program: `start` (3,) steps; `waits` (R,) s
+    of rows without motion; `compensation_s`, the time of each step added at a reversal."""
 
     start: Ints
     waits: Floats
@@ -44,17 +43,17 @@ class Standing:
 
 
 class LegRun:
-    """One run of legs."""
+    """A run of legs on a machine."""
 
     def __init__(self, standing: Standing, machine: Machine, options: Options) -> None:
         self._standing, self._position = standing, standing.start
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         self._mechanics = Mechanics(machine, standing.start * self._step_mm, options.effects)
         self._chunk_steps = options.chunk_steps
-        self._row = -1  # the last row that is in a ledger
+        self._row = -1  # the last row in a ledger
 
     def run(self, blocks: Iterable[Legs]) -> Iterator[Chunk]:
-        """The chunks of all legs and of all rows."""
+        """The chunks of all legs, with all rows in their ledgers."""
         for legs in blocks:
             yield from self._block(legs)
         rows = np.arange(self._row + 1, len(self._standing.waits))
@@ -63,24 +62,24 @@ class LegRun:
             yield Chunk(np.empty(0, dtype=np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
 
     def _still(self, rows: Ints) -> Ledger:
-        """A ledger of rows that only wait."""
+        """A ledger of rows without motion."""
         ledger = still_ledger(rows)
         ledger.duration_s[:] = self._standing.waits[rows]
         return ledger
 
     def _block(self, legs: Legs) -> Iterator[Chunk]:
-        first = np.concatenate([[0], np.cumsum(np.abs(legs.way).max(axis=1, initial=0))])
-        begin = self._position + np.cumsum(legs.way, axis=0) - legs.way
+        first = np.concatenate([[0], np.cumsum(np.abs(legs.steps).max(axis=1, initial=0))])
+        begin = self._position + np.cumsum(legs.steps, axis=0) - legs.steps
         for low in range(0, int(first[-1]), self._chunk_steps):
             high = min(low + self._chunk_steps, int(first[-1]))
             share, commanded = _Share(first, low, high), np.empty((high - low, 3))
-            at, way = begin[share.legs], legs.way[share.legs]
-            legs_fill(share.done, at, way, self._step_mm, commanded)
+            at, steps = begin[share.legs], legs.steps[share.legs]
+            legs_fill(share.done, at, steps, self._step_mm, commanded)
             yield self._chunk(legs, share, commanded)
-        self._position = self._position + legs.way.sum(axis=0)
+        self._position = self._position + legs.steps.sum(axis=0)
 
     def _chunk(self, legs: Legs, share: _Share, commanded: Floats) -> Chunk:
-        """The samples of a window, and what the rows up to its last one did in it."""
+        """The samples of a window, with the ledger of its rows."""
         leg_row = legs.row[share.legs]
         turn = np.flatnonzero(np.diff(leg_row, prepend=-1))
         moving = leg_row[turn]
@@ -94,13 +93,13 @@ class LegRun:
         ledger.compensation_s[here] = added
         ledger.duration_s[here] = np.add.reduceat(share.part(legs.seconds), turn) + added
         ledger.iterations[here] = np.diff(offsets)
-        ledger.steps[here] = np.add.reduceat(share.steps(legs.way), turn, axis=0)
+        ledger.steps[here] = np.add.reduceat(share.steps(legs.steps), turn, axis=0)
         ledger.reversals[here] = reversals
         return Chunk(np.repeat(moving, np.diff(offsets)), commanded, slide, ledger)
 
 
 class _Share:
-    """The part of each leg that lies in the window low:high of all passes."""
+    """The part of each leg within the window low:high of all passes."""
 
     def __init__(self, first: Ints, low: int, high: int) -> None:
         begin = int(np.searchsorted(first, low, side="right")) - 1
@@ -111,21 +110,21 @@ class _Share:
         self._from = np.maximum(low - edges[:-1], 0)
         self._to = np.minimum(high - edges[:-1], self._whole)
         self.done = int(self._from[0])
-        """Passes of the first of the legs that lie before the window."""
+        """Passes of the first leg before the window."""
         self.passes: Ints = self._to - self._from
-        """(J,) passes of each of the legs in the window."""
+        """(J,) passes of each leg within the window."""
 
     def part(self, seconds: Floats) -> Floats:
-        """(J,) s of legs' `seconds` (L,) that fall in the window."""
+        """(J,) s within the window, from the `seconds` (L,) of all legs."""
         return np.asarray(seconds[self.legs] * (self.passes / self._whole))
 
-    def steps(self, way: Ints) -> Ints:
-        """(J, 3) steps of legs by `way` (L, 3) that fall in the window; see the kernel."""
-        size, whole = np.abs(way[self.legs]), self._whole[:, None]
+    def steps(self, steps: Ints) -> Ints:
+        """(J, 3) steps within the window, from those of all legs (L, 3); see the kernel."""
+        size, whole = np.abs(steps[self.legs]), self._whole[:, None]
         return np.asarray(self._to[:, None] * size // whole - self._from[:, None] * size // whole)
 
 
-# What controllers that count whole steps ask of the rows of a toolpath before they run it.
+# Checks of the rows of a toolpath for controllers that count whole steps.
 
 MAX_STEPS = 1 << 30
 """Positions beyond this many steps (43 km at 40 µm) are refused: a step of one axis times a step
@@ -133,12 +132,13 @@ of another must fit 64 bits."""
 
 
 def coded_steps_mm(machine: Machine) -> Floats:
-    """(3,) mm of a step as the controller believes it."""
+    """(3,) mm: the step of each axis as the controller assumes it."""
     return np.array([axis.coded_step_mm for axis in machine.axes])
 
 
 def check_rows(toolpath: Toolpath, machine: Machine) -> None:
-    """ProgramError for rows that no controller without homing can follow, naming the block."""
+    """ProgramError, which names the block, for rows that a controller without homing cannot
+    follow."""
     kind, step_mm = toolpath.kind, coded_steps_mm(machine)
     with np.errstate(invalid="ignore"):
         endless = (kind == Kind.DWELL) & ~((toolpath.value >= 0.0) & np.isfinite(toolpath.value))
@@ -169,5 +169,5 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def waits_s(toolpath: Toolpath, rows: int) -> Floats:
-    """(rows,) s that rows wait."""
+    """(rows,) s: the dwell of each row."""
     return np.where(toolpath.kind == Kind.DWELL, toolpath.value, 0.0)[:rows]

@@ -1,15 +1,15 @@
-"""Three axes between the controller and the slides: what the machine makes of the commands.
+"""The mechanics: how the slides of three axes follow the positions that the controller commands.
 
-In the order in which it happens: compensation, real step, play (by region), scatter (see
-`camtool.kernels.play`), squareness. docs/mechanics.md says what each of them is.
+The effects act in this order: compensation, real step, backlash (by region) and scatter (see
+`camtool.kernels.play`), squareness. docs/mechanics.md explains them.
 
-Squareness. The slide of Y runs towards Y, and towards X by tan q of its way, where q is by how
-much the angle between +X and +Y is less than a right one (Y leans towards +X when q > 0):
+Squareness. When the slide of Y moves by y, it also moves towards X by y · tan q, where q is the
+amount by which the angle between +X and +Y is less than 90° (for q > 0, Y leans towards +X):
 
     x = x_slide + y_slide · tan q,      y = y_slide.
 
-Y's real step is thus measured square to X, as a part is. A square of side a that is commanded
-has a longer diagonal towards (+, +) when q > 0: their squares differ by 4 a² tan q.
+The real step of Y is thus measured square to X, as on a part. For q > 0 a commanded square of side
+a has a longer diagonal towards (+, +): the squares of its diagonals differ by 4 a² tan q.
 """
 
 from __future__ import annotations
@@ -26,15 +26,16 @@ from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.simulation.motion import Effects
 
 REVERSAL_STEPS = 0.5
-"""An axis has reversed when it has come back by this much of a coded step."""
+"""An axis has reversed when it has moved back by this part of a coded step."""
 
 
 @dataclass(frozen=True)
 class _Varied:
-    """What `play_varied_fill` takes besides: each axis's play in mm (3,) and the cells that take
-    its place; where machine zero is; which shares of the play lie to either side; scatter."""
+    """Further arguments of `play_varied_fill`: the backlash (3,) mm of the axes, and the cells
+    that replace it; the position of machine zero (3,) mm; the shares of the backlash on either
+    side; the scatter (3,) mm and its seed."""
 
-    plays: Floats
+    backlash: Floats
     cells: tuple[PlayCells | None, ...]
     zero: Floats
     shares: Floats
@@ -42,22 +43,23 @@ class _Varied:
     seed: int
 
     def at(self, commanded_mm: Floats) -> Floats:
-        """The play (K, 3) mm at each position (K, 3) mm."""
-        plays = np.tile(self.plays, (len(commanded_mm), 1))
+        """The backlash (K, 3) mm at each position (K, 3) mm."""
+        backlash = np.tile(self.backlash, (len(commanded_mm), 1))
         x, y = commanded_mm[:, 0] - self.zero[0], commanded_mm[:, 1] - self.zero[1]
         for axis, cells in enumerate(self.cells):
             if cells is not None:
                 column = np.searchsorted(cells.x_mm[1:-1], x, side="right")
                 row = np.searchsorted(cells.y_mm[1:-1], y, side="right")
-                plays[:, axis] = np.array(cells.play_mm)[row, column]
-        return plays
+                backlash[:, axis] = np.array(cells.play_mm)[row, column]
+        return backlash
 
 
 class Mechanics:
-    """The slides of a machine, engaged as its controller record says, at rest at `start_mm` (3,).
+    """The slides of a machine, at rest at `start_mm` (3,) and engaged as its controller record
+    says.
 
-    Scale and squareness act about part zero; compensation is whole steps; `effects` says what
-    there is.
+    Scale and squareness act about part zero; compensation is in whole steps; only the `effects`
+    act.
     """
 
     def __init__(self, machine: Machine, start_mm: Floats, effects: Effects) -> None:
@@ -72,7 +74,7 @@ class Mechanics:
         for index, axis in enumerate(machine.axes):
             coded_mm = axis.coded_step_mm
             scale = axis.real_step_mm / coded_mm if effects.scale else 1.0
-            low, high = play_limits(_play_mm(axis, effects), convention, direction)
+            low, high = play_limits(_backlash_mm(axis, effects), convention, direction)
             if effects.compensation:
                 self.compensation_steps[index] = to_steps(axis.compensation_mm, coded_mm)
             added_mm = float(self.compensation_steps[index]) * coded_mm
@@ -84,13 +86,14 @@ class Mechanics:
 
     @property
     def plain(self) -> bool:
-        """Whether `axes` and `states` say everything: play is the same everywhere, nothing
-        scatters, X and Y are square."""
+        """Whether `axes` and `states` hold all of the mechanics: backlash is the same everywhere,
+        nothing scatters, X and Y are square."""
         return self._varied is None and self._lean == 0.0
 
     def follow(self, commanded_mm: Floats, offsets: Ints) -> tuple[Floats, Ints]:
-        """Slides (K, 3) mm for the controller's positions (K, 3) mm, which follow those given
-        before, and the reversals (R, 3) in each run offsets[r]:offsets[r+1] of them."""
+        """The positions of the slides (K, 3) mm for the commanded positions (K, 3) mm, which
+        continue those of the last call, and the reversals (R, 3) of the axes in each run
+        offsets[r]:offsets[r+1] of them."""
         slide = np.empty(commanded_mm.shape)
         reversals = np.zeros((len(offsets) - 1, 3), dtype=np.int64)
         given = commanded_mm, offsets, self.axes, self.states
@@ -98,31 +101,31 @@ class Mechanics:
             play_fill(*given, slide, reversals)
         else:
             v = self._varied
-            plays = v.at(commanded_mm)
-            play_varied_fill(*given, plays, v.shares, v.scatter, v.seed, slide, reversals)
+            backlash = v.at(commanded_mm)
+            play_varied_fill(*given, backlash, v.shares, v.scatter, v.seed, slide, reversals)
         if self._lean:
             slide[:, 0] += slide[:, 1] * self._lean
         return slide, reversals
 
     def place(self, position_mm: Floats) -> None:
-        """The controller stands at `position_mm` (3,) without having reversed: what follows an
+        """Set the position of the controller to `position_mm` (3,) without a reversal: after an
         arc that was left at its nearest approach."""
         self.states[:, 0] = position_mm
 
 
-def _play_mm(axis: Axis, effects: Effects) -> float:
+def _backlash_mm(axis: Axis, effects: Effects) -> float:
     return axis.backlash_mm if effects.play else 0.0
 
 
 def _varied(machine: Machine, effects: Effects, shares: Floats) -> _Varied | None:
-    """None where `play_fill` does."""
+    """The further arguments of `play_varied_fill`; None where `play_fill` is enough."""
     axes = list(machine.axes)
     cells = machine.play_map.used if effects.play else (None, None, None)
     scatter = [axis.repeatability_mm if effects.repeatability else 0.0 for axis in axes]
     if not any(cells) and not any(scatter):
         return None
     return _Varied(
-        plays=np.array([_play_mm(axis, effects) for axis in axes]),
+        backlash=np.array([_backlash_mm(axis, effects) for axis in axes]),
         cells=cells,
         zero=np.array(machine.controller.machine_zero_mm, dtype=np.float64),
         shares=shares,

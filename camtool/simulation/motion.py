@@ -1,4 +1,4 @@
-"""Motion: what the slides do, in chunks, so that memory does not grow with the program."""
+"""Motion: positions of the slides, in chunks, so that memory does not grow with the program."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from camtool.arrays import Bools, Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Ledger:
-    """What each of R rows of the toolpath did in one chunk; what several chunks say of a row
-    adds up.
+    """Time, steps and reversals of R rows of the toolpath in one chunk. A row may be in the
+    ledgers of several chunks: their values add up.
 
-    row (R,) ascending. duration_s (R,) of everything, and compensation_s (R,) of it for what the
-    controller issues at reversals; iterations (R,): passes of the interpolator, idle ones too;
-    steps (R, 3) of the program per axis, compensation left out; reversals (R, 3): changes of
-    direction per axis, each of which is one compensation. ended (R,): False when the stop test
-    of an arc was never met; its samples then stop at the nearest approach to the programmed end.
+    `row` (R,) ascending. `duration_s` (R,) in all, and `compensation_s` (R,) the part of it for
+    steps that the controller adds at reversals. `iterations` (R,): passes of the interpolator,
+    also idle ones. `steps` (R, 3) of the axes, without compensation. `reversals` (R, 3) of the
+    axes, each of which is one compensation. `ended` (R,): False when the stop test of an arc is
+    never met; its samples then stop at the nearest approach to the programmed end.
     """
 
     row: Ints
@@ -32,7 +32,7 @@ class Ledger:
 
 
 def still_ledger(rows: Ints) -> Ledger:
-    """The ledger of rows (R,) that did nothing; its columns may be written to."""
+    """The ledger of rows (R,) without motion; its columns may be written to."""
     count = len(rows)
     return Ledger(
         row=rows,
@@ -49,13 +49,13 @@ def still_ledger(rows: Ints) -> Ledger:
 class Chunk:
     """K samples in order, of one row of the toolpath or of several.
 
-    row (K,) ascending. commanded (K, 3) mm: where the controller believes that it stands, work
-    frame, after each output (the start of a row is no sample of it). slide (K, 3) mm: where the
-    slides are at the same moment, with compensation, play, real step and the rest of the
-    mechanics. Compensation steps take time but are no samples of their own.
+    `row` (K,) ascending. `commanded` (K, 3) mm: the position that the controller assumes after
+    each output, in the work frame (the start of a row is not a sample of it). `slide` (K, 3) mm:
+    the positions of the slides at the same moment, with all of the mechanics. Compensation steps
+    take time but have no samples.
 
     Every row up to the end of the program is in the ledger of at least one chunk, in order; rows
-    that do not move have no samples.
+    without motion have no samples.
     """
 
     row: Ints
@@ -90,18 +90,19 @@ def one_row(
 
 
 NO_SAMPLES: Floats = np.empty((0, 3))
-"""The samples of a row that does not move."""
+"""The samples of a row without motion."""
 
 
-# How to simulate: which interpolator, which effects of the mechanics, how much at a time.
+# Options of a simulation: the interpolator, the effects of the mechanics, the size of chunks.
 
 
 @dataclass(frozen=True)
 class Effects:
-    """The parts of the mechanics, each of which can be left out to see its share.
+    """The effects of the mechanics, each of which can be left out to see its share of the error.
 
-    play of the axes (by region too); compensation that the controller issues against it; scale
-    (real against coded step); squareness of X and Y; repeatability (random, by a seed).
+    `play`: backlash of the axes, also by region; `compensation` that the controller adds against
+    it; `scale`: real against coded step; `squareness` of X and Y; `repeatability`: random, by a
+    seed.
     """
 
     play: bool = True
@@ -113,7 +114,7 @@ class Effects:
 
 ALL = Effects()
 IDEAL = Effects(False, False, False, False, False)
-"""Slides that are where they are commanded."""
+"""Slides at the commanded positions."""
 
 CHUNK_STEPS = 1 << 16
 """Samples of a chunk by default: a few MB."""
@@ -121,8 +122,8 @@ CHUNK_STEPS = 1 << 16
 
 @dataclass(frozen=True)
 class Options:
-    """`interpolator` takes the place of the controller's own for arcs; no chunk has more than
-    `chunk_steps` samples."""
+    """`interpolator` replaces the controller's own for arcs; only the `effects` act; a chunk has
+    at most `chunk_steps` samples."""
 
     interpolator: str | None = None
     effects: Effects = ALL

@@ -1,22 +1,24 @@
-"""Any controller, as if it followed the programmed lines and arcs exactly.
+"""The exact-path controller: it follows the programmed lines and arcs exactly.
 
-It stands in where a controller's own arithmetic is not modelled: it has no interpolator, no
-acceleration, no look-ahead. What it does with a row of the toolpath:
+It is used where the arithmetic of a controller is not modelled. It has no interpolator, no
+acceleration and no look-ahead. For each row of the toolpath:
 
-1. Ends go to the nearest coded step of each axis (`controller.grid` "steps") or stay as they are
-   ("none"). Where that leaves the ends of an arc at two radii, its centre goes to the nearest
-   point as far from both. Ends that the program itself has put at two radii (by more than
-   `SPREAD_STEPS`) stay: radius and Z then change in proportion to the angle.
-2. The commanded position runs along the line or arc; see `camtool.simulation.samples` for
-   where it is sampled. Between samples nothing is rounded: steps are counted, not taken.
-3. A move takes way / feed, a rapid way / `Machine.rapid_mm_min`, and no straight move is faster
-   than the highest rate of each axis, no helix than that of Z. Compensation takes no time.
-4. Play, compensation and scale act on the commanded position as on that of any other controller.
-   An axis has reversed when it came back by half a coded step: less is not seen by a motor.
+1. Ends are rounded to the nearest coded step of each axis (`controller.grid` "steps") or not
+   rounded ("none"). Where rounding leaves the ends of an arc at different radii, its centre moves
+   to the nearest point at the same distance from both. Where the program itself has the ends at
+   different radii (by more than `SPREAD_STEPS`), the centre stays, and the radius changes in
+   proportion to the angle, as Z does.
+2. The commanded position moves along the line or arc and is sampled as in
+   `camtool.simulation.samples`. Samples are not rounded: steps are counted, not taken.
+3. A feed move takes length / feed, a rapid length / `Machine.rapid_mm_min`. No straight move is
+   faster than the highest rate of each axis, and no helix than that of Z. Compensation takes no
+   time.
+4. Backlash, compensation and scale act on the commanded position as with any other controller. An
+   axis has reversed when it has moved back by half a coded step, the least that a motor can do.
 
-Positions at and between samples: an error that changes with the way changes by no more than the
-way, so the largest error between two samples exceeds that at the nearer one by half the spacing
-at most; extents, reversals and the steps of each axis do not depend on the spacing.
+Between two samples an error changes by no more than the length of the path between them, so the
+largest error exceeds that at the nearer sample by at most half the spacing. Extents, reversals and
+the steps of each axis do not depend on the spacing.
 """
 
 from __future__ import annotations
@@ -44,21 +46,20 @@ from camtool.simulation.samples import (
 from camtool.toolpath.moves import Kind, Toolpath
 
 SPREAD_STEPS = 2.0
-"""The radii at the two ends of an arc that differ by this many steps or fewer differ by
-rounding."""
+"""Radii of the ends of an arc that differ by at most so many steps differ because of rounding."""
 
 LEAST_CHORD_STEPS = 2.0
-"""An arc with its ends nearer than this keeps its centre: they give no direction."""
+"""An arc whose ends are nearer than this keeps its centre: its chord has no certain direction."""
 
 
 _Machine = Machine[PathController, Any]
 
 
 class PathModel(ControllerModel[PathController, Any]):
-    """Any controller, as if it followed the programmed path exactly."""
+    """The exact-path controller."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion; ProgramError for rows that no controller can follow."""
+        """The motion; ProgramError, which names the block, for rows that cannot be followed."""
         path = self.quantised(toolpath, machine)
         spacing_mm = sample_spacing_mm(path, machine)
         check_rows(path, path.running)
@@ -76,15 +77,15 @@ class PathModel(ControllerModel[PathController, Any]):
         return on_steps(toolpath, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """A coded step, or what a million samples of the whole program allow."""
+        """A coded step, or more where the program would have more than `MAX_SAMPLES` samples."""
         return sample_spacing_mm(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Nothing is interpolated."""
+        """ "path": nothing is interpolated."""
         return "path"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What the times leave out."""
+        """What the times do not include."""
         return (
             "the controller follows every line and arc exactly",
             "speeds change at once: there is no acceleration, and compensation takes no time",
@@ -92,26 +93,27 @@ class PathModel(ControllerModel[PathController, Any]):
 
 
 def _durations(path: Toolpath, machine: Machine) -> Floats:
-    """(N,) s of each row; NaN feeds, which `check_rows` refuses, only behind the end."""
+    """(N,) s of each row. Feeds may be NaN only after the end of the program: `check_rows` refuses
+    others."""
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
     speed = np.where(path.is_feed, path.feed, machine.rapid_mm_min)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         seconds = np.where(path.is_motion | homing, 60.0 * move_lengths(path) / speed, 0.0)
-    way = np.abs(path.end - path.starts) if len(path) else np.zeros((0, 3))
+    travel = np.abs(path.end - path.starts) if len(path) else np.zeros((0, 3))
     for index, axis in enumerate(machine.axes):
         if axis.max_rate_mm_min is not None:
-            least = 60.0 * way[:, index] / axis.max_rate_mm_min
-            turns = path.is_arc & (index < 2)  # but a helix rises evenly
+            least = 60.0 * travel[:, index] / axis.max_rate_mm_min
+            turns = path.is_arc & (index < 2)  # Z of a helix moves evenly
             seconds = np.where(turns, seconds, np.maximum(seconds, least))
     return np.where(path.kind == Kind.DWELL, path.value, seconds)
 
 
 def on_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The moves with their ends at the nearest coded steps, homing at machine zero.
+    """The moves with their ends at the nearest coded steps, and homing at machine zero.
 
-    Raises ProgramError for arcs without a centre and for positions beyond all steps. An arc
-    shorter than a step, whose rounded ends would turn it into a full circle, becomes a line; one
-    that lacks less than a step of its full circle becomes that.
+    Raises ProgramError for arcs without a centre and for positions that cannot be counted. An arc
+    shorter than a step, which rounding would turn into a full circle, becomes a line; one that is
+    less than a step short of a full circle becomes a full circle.
     """
     check_positions(toolpath, machine)
     home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
@@ -128,12 +130,12 @@ def on_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
 
 
 def _centred(made: Toolpath, sweep: Floats, machine: Machine) -> Toolpath:
-    """Arcs whose centres are as far from their rounded ends as from their rounded starts.
+    """Arcs with centres at the same distance from their rounded ends and starts.
 
-    With the chord's direction u and its middle m, the nearest such point to the centre c is
-    c − ((c − m)·u) u. It is as far from c as the ends' radii differ, times radius / chord: an arc
-    of little sweep still runs between its ends, but one that lacks little of a full circle would
-    be thrown to a side. So for more than half a turn the chord must not be below the radius.
+    With the direction u and the midpoint m of the chord, the nearest such point to the centre c is
+    c − ((c − m)·u) u. Its distance from c is the difference of the radii times radius / chord. An
+    arc of small sweep still runs between its ends, but one that is nearly a full circle would move
+    far to one side: for more than half a turn the chord must therefore be at least the radius.
     """
     step = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     begin, end, centre = made.starts[:, :2], made.end[:, :2], made.centre
@@ -150,7 +152,7 @@ def _centred(made: Toolpath, sweep: Floats, machine: Machine) -> Toolpath:
 
 
 def _turned_back(made: Toolpath, inside_out: Bools, short: Bools) -> Toolpath:
-    """Arcs that rounding has turned inside out: the short ones as lines, the long ones closed."""
+    """The arcs that rounding has turned inside out: short ones as lines, long ones as circles."""
     lines, full = inside_out & short, inside_out & ~short
     end = made.end.copy()
     end[full, :2] = made.starts[full, :2]
@@ -160,7 +162,7 @@ def _turned_back(made: Toolpath, inside_out: Bools, short: Bools) -> Toolpath:
 
 
 def _on_grid(points: Floats, machine: Machine) -> Floats:
-    """Points (..., 3) mm, each coordinate at its nearest coded step."""
+    """Points (..., 3) mm with each coordinate at its nearest coded step."""
     columns = [
         to_steps(points[..., index], axis.coded_step_mm) * axis.coded_step_mm
         for index, axis in enumerate(machine.axes)

@@ -1,4 +1,4 @@
-"""What every controller asks of the rows of a toolpath before it runs them."""
+"""Checks of the rows of a toolpath before any controller runs them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 
 MAX_PATH_STEPS = 1 << 40
-"""Positions beyond this many steps (a million kilometres at 1 µm) are refused: counts must stay
-exact in a float."""
+"""Positions beyond this many steps (a million kilometres at 1 µm) are refused, so that counts
+are exact in a float."""
 
 
 def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
-    """The same with events where the moves before them ended, and homing at `home` (3,) mm."""
+    """The toolpath with events at the ends of the moves before them, and homing at `home` (3,)
+    mm."""
     kind, count = toolpath.kind, len(toolpath)
     end = toolpath.end.copy()
     for axis, homing in ((0, Kind.HOME_XY), (1, Kind.HOME_XY), (2, Kind.HOME_Z)):
@@ -40,7 +41,8 @@ def check_positions(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def check_rows(path: Toolpath, rows: int) -> None:
-    """ProgramError for moves without a feed and events that cannot be followed."""
+    """ProgramError for feed moves without a feed and for events that cannot be followed, in the
+    first `rows` rows."""
     running = np.arange(len(path)) < rows
     with np.errstate(invalid="ignore"):
         no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
@@ -55,13 +57,13 @@ def check_rows(path: Toolpath, rows: int) -> None:
 
 
 def refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "") -> None:
-    """ProgramError for the first bad row, if there is one."""
+    """ProgramError for the first row that is `bad` (N,), if there is one."""
     rows = np.flatnonzero(bad)
     if len(rows):
         raise ProgramError(message, where=block_of(toolpath, int(rows[0])), mend=mend)
 
 
 def block_of(toolpath: Toolpath, row: int) -> str:
-    """The block (from 1) that a row was read from, or the row when it was planned."""
+    """The block (from 1) from which a row was read, or the row where none was read."""
     block = int(toolpath.block[row])
     return f"block {block + 1}" if block >= 0 else f"move {row}"

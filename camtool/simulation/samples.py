@@ -1,10 +1,10 @@
-"""Motions whose samples are numbered from 0, any window of them at a time, none of them held.
+"""Motions whose samples are numbered from 0 and computed window by window.
 
-`row_chunks` makes the chunks of such a motion. `PathSamples` are those of a toolpath along its own
-lines and arcs: each line is one piece; each arc is cut where an axis turns (right, above, left,
-below of its centre), so that in every piece X and Y run one way. Each piece is sampled evenly, its
-end included: whatever the spacing, the ends of all moves and the turning points of all axes are
-samples, and with them extents and reversals are exact.
+`row_chunks` makes the chunks of such a motion. `PathSamples` are the samples of a toolpath along
+its own lines and arcs. A line is one piece; an arc is divided where an axis reverses (right of,
+above, left of and below its centre), so that X and Y are monotone in every piece. Each piece is
+sampled evenly, its end included. Whatever the spacing, the ends of all moves and the reversals of
+all axes are samples, so extents and reversals are exact.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
 from camtool.toolpath.moves import PolarArcs, Toolpath
 
 MAX_SAMPLES = 1_000_000
-"""Samples are a coded step apart, or wider when a program would have more of them than this."""
+"""Samples are a coded step apart, or farther where a program would have more samples than this."""
 
 SPACING_EPS = 1e-6
-"""Samples may be farther apart by this part of their spacing, by rounding alone."""
+"""Samples may be farther apart by this part of their spacing, because of rounding."""
 
 TURN_EPS_RAD = 1e-9
-"""A turning point nearer than this to an end of its arc is that end."""
+"""A reversal nearer than this to an end of its arc is that end."""
 
 TURNS_OF_ARC = 4
-"""No arc passes more turning points between its ends than this."""
+"""An arc has at most so many reversals between its ends."""
 
 
 class Samples(Protocol):
@@ -45,12 +45,12 @@ class Samples(Protocol):
         """Row (K,) and commanded position (K, 3) mm of the samples low:high."""
 
     def steps(self, bounds: Ints) -> Ints:
-        """(R, 3) steps of each axis within samples bounds[r]:bounds[r+1]."""
+        """(R, 3) steps of the axes within samples bounds[r]:bounds[r+1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class RowTotals:
-    """What each row takes in all: seconds (R,); `iterates`: each sample is a pass of the
+    """The time of each row, `seconds` (R,); `iterates`: each sample is a pass of the
     interpolator."""
 
     seconds: Floats
@@ -60,8 +60,8 @@ class RowTotals:
 def row_chunks(
     samples: Samples, totals: RowTotals, mechanics: Mechanics, chunk_steps: int
 ) -> Iterator[Chunk]:
-    """The chunks of all rows, none with more than `chunk_steps` samples; the time of a row that
-    lies in several is shared out by samples."""
+    """The chunks of all rows, each with at most `chunk_steps` samples; the time of a row in
+    several chunks is divided in proportion to its samples."""
     first = samples.first
     rows, total = len(first) - 1, int(first[-1])
     done = 0  # rows whose ledger is complete
@@ -93,13 +93,13 @@ def row_chunks(
 
 
 def sample_spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """How far apart samples are: the finer coded step of X and Y, or what `MAX_SAMPLES` allows."""
+    """Distance of samples, mm: the finer coded step of X and Y, or what `MAX_SAMPLES` allows."""
     step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     return max(step, float(move_lengths(toolpath).sum()) / MAX_SAMPLES)
 
 
 def move_lengths(toolpath: Toolpath) -> Floats:
-    """(N,) mm of way of each row in space, whatever moves it (events have none)."""
+    """(N,) mm: length of each row in space, 0 for events."""
     if len(toolpath) == 0:
         return np.zeros(0)
     length = np.linalg.norm(toolpath.end - toolpath.starts, axis=1)
@@ -112,7 +112,7 @@ def move_lengths(toolpath: Toolpath) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """Stretches of rows from `begin` (P,) to `end` (P,), as shares of the row `row` (P,)."""
+    """Pieces of rows: from `begin` (P,) to `end` (P,), as shares of the length of `row` (P,)."""
 
     row: Ints
     begin: Floats
@@ -120,24 +120,26 @@ class _Pieces:
 
 
 class PathSamples:
-    """The samples of all rows of a toolpath, numbered from 0 in order; none are held."""
+    """The samples of all rows of a toolpath, numbered from 0 in order; none are stored."""
 
     def __init__(self, toolpath: Toolpath, spacing_mm: float) -> None:
-        """`spacing_mm` is the widest distance of two samples along the path."""
+        """`spacing_mm` is the largest distance between two samples along the path."""
         self._toolpath = toolpath
         self._starts = toolpath.starts
-        self._way = toolpath.end - self._starts
+        self._travel = toolpath.end - self._starts
         self._arms = PolarArcs(toolpath, toolpath.is_arc)
         self._arm_of_row = np.full(len(toolpath), -1, dtype=np.int64)
         self._arm_of_row[self._arms.row] = np.arange(len(self._arms.row))
         length = move_lengths(toolpath)
         self._pieces = _pieces(length, self._arms)
         pieces = self._pieces
-        way = length[pieces.row] * (pieces.end - pieces.begin)
-        self._parts = np.maximum(np.ceil(way / spacing_mm - SPACING_EPS), 1.0).astype(np.int64)
+        of_piece = length[pieces.row] * (pieces.end - pieces.begin)
+        self._parts = np.maximum(np.ceil(of_piece / spacing_mm - SPACING_EPS), 1.0).astype(
+            np.int64
+        )
         self._offsets = np.concatenate([[0], np.cumsum(self._parts)])
         self.first = self._offsets[np.searchsorted(pieces.row, np.arange(len(toolpath) + 1))]
-        """(N+1,) row r owns samples first[r]:first[r+1]; its start is no sample of it."""
+        """(N+1,) row r owns samples first[r]:first[r+1]; its start is not one of them."""
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Row (K,) and position (K, 3) mm of the samples low:high."""
@@ -145,7 +147,7 @@ class PathSamples:
         return row, self.points(row, share)
 
     def places(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row (K,) and share (K,) of its way, in (0, 1], of the samples low:high."""
+        """Row (K,) and share (K,) of its length, in (0, 1], of the samples low:high."""
         index = np.arange(low, high)
         piece = np.searchsorted(self._offsets, index, side="right") - 1
         part, parts = index - self._offsets[piece] + 1, self._parts[piece]
@@ -154,8 +156,8 @@ class PathSamples:
         return self._pieces.row[piece], share
 
     def points(self, row: Ints, share: Floats) -> Floats:
-        """(K, 3) mm: the points at shares (K,) of the ways of rows (K,)."""
-        points = self._starts[row] + share[:, None] * self._way[row]
+        """(K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""
+        points = self._starts[row] + share[:, None] * self._travel[row]
         arm = self._arm_of_row[row]
         on_arc = np.flatnonzero(arm >= 0)
         points[on_arc] = self._arms.points(arm[on_arc], share[on_arc])
@@ -165,7 +167,7 @@ class PathSamples:
 
 
 class CountedSamples(PathSamples):
-    """The same, and the steps of each axis between them: changes of its nearest step."""
+    """The same, with the steps of each axis between samples: changes of its nearest step."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine, spacing_mm: float) -> None:
         super().__init__(toolpath, spacing_mm)
@@ -193,7 +195,7 @@ class CountedSamples(PathSamples):
 
 
 def _pieces(length: Floats, arms: PolarArcs) -> _Pieces:
-    """All pieces in order: rows without arcs that move are one, arcs as many as they need."""
+    """All pieces in order: one for each straight row with motion, one or more for each arc."""
     straight = length > 0.0
     straight[arms.row] = False
     rows = np.flatnonzero(straight)
@@ -209,10 +211,10 @@ def _pieces(length: Floats, arms: PolarArcs) -> _Pieces:
 
 
 def _arc_pieces(arms: PolarArcs) -> _Pieces:
-    """Arcs cut at their turning points.
+    """Arcs divided at the reversals of their axes.
 
-    These lie at angles k·π/2. Seen in the direction of the arc (σ = ±1) from its start at σ·a,
-    the next ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...
+    These lie at angles k·π/2. In the direction of the arc (σ = ±1) from its start at σ·a, the next
+    ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...
     """
     quarter = 0.5 * np.pi
     ahead = np.sign(arms.sweep) * arms.angle

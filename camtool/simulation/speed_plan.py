@@ -1,8 +1,8 @@
-"""How long blocks take: trapezoids of speed between corners, planned ahead.
+"""The times of blocks: trapezoids of speed between corners, with look-ahead.
 
-A block is a straight piece or an arc that is accelerated and slowed down as one: d mm long, at
-most v mm/s within it, a mm/s² along it. From entry speed v0 to exit speed v1 it rises at a to a
-peak, stays there, and falls at a:
+A block is a line or an arc with one acceleration: d mm long, at most v mm/s fast, a mm/s². From
+the entry speed v0 the speed rises with a to a peak, stays there, and falls with a to the exit
+speed v1:
 
     peak² = min(v², a d + (v0² + v1²)/2)
     time  = (peak − v0)/a + (peak − v1)/a + (d − (2 peak² − v0² − v1²)/(2a)) / peak
@@ -21,9 +21,9 @@ from camtool.machine.model import Machine
 
 @dataclass(frozen=True, eq=False)
 class SpeedPlan:
-    """N blocks in order: length_mm, speed_mm_s (the highest within each), acceleration_mm_s2, and
-    corner_mm_s, the highest speed at the start of each, 0 where the machine stands before it;
-    each (N,), all above 0 but the corners."""
+    """N blocks in order: `length_mm`, `speed_mm_s` (the highest in each), `acceleration_mm_s2`,
+    and `corner_mm_s`, the highest speed at the start of each, 0 where it starts from rest; each
+    (N,), all above 0 except the corners."""
 
     length_mm: Floats
     speed_mm_s: Floats
@@ -31,8 +31,8 @@ class SpeedPlan:
     corner_mm_s: Floats
 
     def entries(self, window: int) -> Floats:
-        """(N + 1,) mm/s at the start of each block, and 0 behind the last, for a planner that
-        holds `window` blocks with the one under way."""
+        """(N + 1,) mm/s at the start of each block, and 0 after the last, for a planner with a
+        buffer of `window` blocks, the current one included."""
         from camtool.kernels.lookahead import entry_speeds
 
         before = np.concatenate([[0.0], self.speed_mm_s[:-1]])
@@ -43,7 +43,7 @@ class SpeedPlan:
         return np.sqrt(square)
 
     def seconds(self, window: int) -> Floats:
-        """(N,) s that each block takes."""
+        """(N,) s: the time of each block, for a buffer of `window` blocks."""
         entry = self.entries(window)
         first, last = entry[:-1], entry[1:]
         a, d = self.acceleration_mm_s2, self.length_mm
@@ -54,13 +54,13 @@ class SpeedPlan:
 
 
 def allowed_along(limit: Floats, unit: Floats) -> Floats:
-    """(B,) what the limits of three axes (3,) allow along unit vectors (B, 3)."""
+    """(B,) the largest value along unit vectors (B, 3) within the limits of three axes (3,)."""
     with np.errstate(divide="ignore"):
         return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))
 
 
 def axis_limits(machine: Machine, key: str) -> Floats:
-    """(3,) a limit of each axis; MachineError where one is not said."""
+    """(3,) the limit `key` of each axis; MachineError where one is missing."""
     values = []
     for name, axis in zip("xyz", machine.axes, strict=True):
         value: float | None = getattr(axis, key)
@@ -68,7 +68,7 @@ def axis_limits(machine: Machine, key: str) -> Floats:
             raise MachineError(
                 f"the planner of {machine.target.name} needs the {key} of each axis",
                 where=f"table [axes.{name}], key {key}",
-                mend="say it: it is one of the controller's settings",
+                mend="give it: it is one of the controller's settings",
             )
         values.append(value)
     return np.array(values)

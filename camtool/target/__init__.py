@@ -1,1 +1,1 @@
-"""What a target must offer, the loader of machine files, and how targets are found."""
+"""The contract of targets, the loader of machine files, and the registry of installed targets."""

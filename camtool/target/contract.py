@@ -1,12 +1,12 @@
 """The contract of a target: one machine's dialect and its controller, behind one object.
 
-A target is the object that an entry point of the group `camtool.postprocessors` names. It says
-what its machine file may hold (`controllers`, `dialect`), writes and reads programs, and has the
-model of its controller. What stands here with a body is optional: a target overrides what is
-different about it. docs/write-a-post.md builds a whole one.
+A target is the object that an entry point of the group `camtool.postprocessors` names. It defines
+what its machine file may contain (`controllers`, `dialect`), writes and reads programs, and has
+the model of its controller. Methods with a body are optional: a target overrides them where it
+differs. docs/write-a-post.md builds a complete target.
 
-A list of all targets asks each for its records only; so a target imports its writer, its reader
-and its model in the methods that need them.
+A list of all targets uses only the attributes of each; so a target imports its writer, its reader
+and its model within the methods that need them.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Target(ABC):
-    """A machine that camtool speaks to. `read` shares no code with `write`, so that a fault in one
-    shows in the other.
+    """A machine for which camtool writes programs. `read` shares no code with `write`, so that a
+    fault in one shows in the other.
 
-    `controllers`: what `[controller]` may be, one record per `model`; that of the exact path
-    (`PathController`) may stand there always. `dialect`: what `[dialect]` may say; writer and
-    reader find it in `machine.dialect`.
+    `controllers`: the records of `[controller]`, one for each `model`; the exact path
+    (`PathController`) is always possible. `dialect`: the record of `[dialect]`; writer and reader
+    find it in `machine.dialect`.
     """
 
     name: ClassVar[str]
@@ -43,45 +43,45 @@ class Target(ABC):
     dialect: ClassVar[type[msgspec.Struct]] = NoDialect
 
     interpolators: ClassVar[tuple[str, ...]] = ()
-    """What `--interpolator` may put in the place of the controller's own, if anything."""
+    """The choices of `--interpolator`, if there are any."""
     codes: ClassVar[tuple[TargetCode, ...]] = ()
-    """Codes of its own findings; each name begins with the target's and a dot."""
+    """The codes of its own findings; their names start with the name of the target and a dot."""
     starts_spindle: ClassVar[bool] = False
-    """Whether a program starts the spindle, at the speed that it says."""
+    """Whether a program starts the spindle, at a speed in the program."""
     any_machine: ClassVar[bool] = False
-    """Whether the machine file stands for any machine, with travel and rates of none in
-    particular."""
+    """Whether the machine file describes no particular machine: travel and rates are examples."""
     filter_default: ClassVar[bool] = False
-    """Whether `camtool filter` takes it where no target is named."""
+    """Whether `camtool filter` uses it by default."""
 
     @abstractmethod
     def write(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Program:
-        """The program; PostError naming the move that the machine or the dialect cannot do."""
+        """The program; PostError, which names the move, for what the machine or its dialect cannot
+        do."""
 
     @abstractmethod
     def read(self, data: bytes, machine: Machine[Any, Any]) -> Toolpath:
-        """The moves as this machine's controller decodes them; ProgramError with block, column."""
+        """The moves as the controller decodes them; ProgramError, which names block and column."""
 
     def check(self, machine: Machine[Any, Any]) -> None:  # noqa: B027 - most need not
-        """Raise MachineError where values of a machine do not go together."""
+        """MachineError for values of a machine that contradict each other."""
 
     def model(self) -> ControllerModel[Any, Any]:
-        """How its controllers move; asked only where `controllers` names any."""
+        """The model of its controllers; needed only where `controllers` names any."""
         raise NotImplementedError(f"{self.name} has no model of its controllers")
 
     def listing(self, data: bytes, machine: Machine[Any, Any]) -> Listing | None:
-        """Which part of a program, which `read` takes, each block is; None where nobody can show
-        it."""
+        """The program, which `read` accepts, divided into blocks; None without such a listing."""
         return None
 
     def line_bytes(self, data: bytes, machine: Machine[Any, Any]) -> int:
-        """How many bytes go over the line to the machine, where the file is a listing of them."""
+        """The number of bytes sent over the line to the machine, where it is not the file's
+        size."""
         return len(data)
 
     def stray_mm(self, machine: Machine[Any, Any]) -> float:
-        """How far moves may leave the wanted path on purpose, at most."""
+        """The largest distance from the wanted path that the writer allows on purpose, mm."""
         return 0.0
 
     def unit_mm(self, machine: Machine[Any, Any], axis: Axis) -> float:
-        """The finest difference of places that a program can say along an axis."""
+        """The resolution of positions in a program along an axis, mm."""
         return max(axis.coded_step_mm, axis.resolution_mm or 0.0)

@@ -1,11 +1,12 @@
-"""A machine file to a `Machine`: the target's own, the user's and `--set` values laid over it.
+"""From machine files to a `Machine`: the target's own file, the user's file and `--set` values.
 
-A user's file `extends = "pic-mmh"` a target and says only what differs; a flag such as
-`--set axes.x.backlash_mm=0.2` changes single values. Both are laid over the target's own file
-before anything is checked, so that nothing can slip in unchecked. What `[controller]` and
-`[dialect]` may say is the target's: its records go into the type that the table is converted to.
+A user's file `extends = "pic-mmh"` a target and contains only what differs; a flag such as `--set
+axes.x.backlash_mm=0.2` changes one value. Both replace values of the target's own file before the
+result is checked. The target defines the contents of `[controller]` and `[dialect]`: its records
+are part of the type to which the table is converted.
 
-A target whose makers left a number out names it at the top of its file, for the user to give:
+A target whose file lacks numbers that differ from machine to machine names them at its top; the
+user's file must give them:
 
     needs = ["axes.x.coded_step_mm", "axes.y.coded_step_mm"]
 """
@@ -28,7 +29,7 @@ from camtool.tables import DEEPEST, Table, convert, parsed_table, read_table
 from camtool.target.contract import Target
 
 NEEDS = "needs"
-"""Key at the top of a target's file: the keys that only the user's machine file can give."""
+"""Key at the top of a target's file: the keys that the user's machine file must give."""
 
 
 def resolved_table(
@@ -38,8 +39,8 @@ def resolved_table(
     user_file: Path | None = None,
     settings: Sequence[str] = (),
 ) -> tuple[Table, str]:
-    """A target's table with a user's file and `key.key=value` settings over it, and the name of
-    what was laid over it last; MachineError where keys are left that only the user can give."""
+    """A target's table with the values of a user's file and of `key.key=value` settings, and the
+    name of the last of these sources; MachineError where keys of `needs` are missing."""
     table = base
     name = base_name
     if user_file is not None:
@@ -60,8 +61,8 @@ def resolved_table(
 
 
 def machine_of(target: Target, table: Table, name: str) -> Machine:
-    """A resolved table as the machine of this target, checked; MachineError names the key that
-    does not fit, and `name`."""
+    """A resolved table as a checked machine of this target; MachineError names the wrong key, and
+    `name` as the source."""
     records: Any = reduce(or_, _records(target))
     generic: Any = Machine
     kind: type[Machine] = generic[records, target.dialect]
@@ -72,12 +73,12 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
 
 
 def _records(target: Target) -> tuple[type[SlideStart], ...]:
-    """What `[controller]` may be."""
+    """The records of `[controller]`."""
     return (*target.controllers, PathController)
 
 
 def extended_by(user_file: Path) -> str:
-    """The target that a user's machine file extends; MachineError when it names none."""
+    """The target that a user's machine file extends; MachineError without one."""
     extends = read_table(user_file).get("extends")
     if not isinstance(extends, str):
         raise MachineError(
@@ -91,12 +92,12 @@ def extended_by(user_file: Path) -> str:
 
 
 def names_of(base: Table, base_name: str) -> TargetNames:
-    """The `[target]` of a target's table, which may lack what the user must give."""
+    """The `[target]` of a target's table, which may lack keys of `needs`."""
     return convert(base.get("target", {}), TargetNames, base_name, "target")
 
 
 def missing_keys(table: Table, name: str) -> tuple[str, ...]:
-    """The keys of `needs` that nobody has given yet, such as "axes.x.coded_step_mm"."""
+    """The keys of `needs` that are not in the table, such as "axes.x.coded_step_mm"."""
     keys = convert(table.get(NEEDS, []), list[str], name, NEEDS)
     return tuple(key for key in keys if not _has(table, key.split(".")))
 
@@ -110,23 +111,23 @@ def _has(table: Any, keys: list[str]) -> bool:
 
 
 def _refuse_incomplete(table: Table, name: str) -> None:
-    """MachineError for a target that still lacks what only the user's machine file can say."""
+    """MachineError for a table that lacks keys of `needs`."""
     missing = missing_keys(table, name)
     if not missing:
         return
     *tables, key = missing[0].split(".")
     target = table["target"]["name"]
     raise MachineError(
-        f"key is missing: nobody can know it but the user (needed: {', '.join(missing)})",
+        f"key is missing: only the user can know it (needed: {', '.join(missing)})",
         file=name,
         where=(f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}",
-        mend=f'say it in your machine file, which extends = "{target}", and give --machine FILE',
+        mend=f'give it in your machine file, which extends = "{target}", and give --machine FILE',
     )
 
 
 def _overlaid(target: Target, below: Table, above: Table) -> Table:
-    """`_laid_over`; where `above` names another controller model, the options of the model below
-    go with it, but for those that all controllers have."""
+    """`_laid_over`; where `above` names another controller model, the options of the old model
+    are dropped, except those that all controllers have."""
     old, new = below.get("controller"), above.get("controller")
     if isinstance(old, dict) and isinstance(new, dict) and "model" in new:
         own = _own_options(target, old.get("model")) if new["model"] != old.get("model") else set()
@@ -135,7 +136,7 @@ def _overlaid(target: Target, below: Table, above: Table) -> Table:
 
 
 def _own_options(target: Target, model: object) -> set[str]:
-    """The options that only this model of a controller has."""
+    """The options of this controller model that not all controllers have."""
     shared = {field.name for field in msgspec.structs.fields(SlideStart)}
     return {
         field.name
@@ -146,7 +147,7 @@ def _own_options(target: Target, model: object) -> set[str]:
 
 
 def _laid_over(below: Table, above: Table) -> Table:
-    """`below` with the values of `above`, table by table; both stay as they are."""
+    """`below` with the values of `above`, table by table; neither is changed."""
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)
@@ -156,7 +157,7 @@ def _laid_over(below: Table, above: Table) -> Table:
 
 
 def _setting(text: str) -> Table:
-    """`axes.x.backlash_mm=0.2` as nested tables; a value that is no TOML value is a string."""
+    """`axes.x.backlash_mm=0.2` as nested tables; a value that is not TOML is taken as a string."""
     key, equals, value = text.partition("=")
     keys = key.strip().split(".")
     if (

@@ -1,9 +1,9 @@
-"""The targets: found by entry point, each with its machine file beside it.
+"""The installed targets: found by entry points, each with its machine file.
 
-A third party adds a target as camtool's own are added: an entry point of the group
-`camtool.postprocessors`, named like the target, that points at a `Target` (see
-`camtool.target.contract`) in a package that has `machine.toml` beside its `__init__.py`. Nothing
-is imported but the target that is asked for, and a broken one is named and harms nothing else.
+A third party adds a target as camtool adds its own: by an entry point of the group
+`camtool.postprocessors` with the name of the target, which points at a `Target` (see
+`camtool.target.contract`) in a package with `machine.toml` beside its `__init__.py`. Only the
+target that is asked for is imported. A broken plug-in is reported by name and harms no other.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ GROUP = "camtool.postprocessors"
 MACHINE_FILE = "machine.toml"
 
 OURS = "camtool_postprocessors."
-"""Modules that are camtool's own: what goes wrong in them is a fault of camtool itself."""
+"""The prefix of camtool's own modules: exceptions in them are faults of camtool itself."""
 
 NOT_SAID = "not said"
 
 
 @dataclass(frozen=True)
 class LoadedTarget:
-    """A machine and the target that speaks to it. `file` is the target's own machine file, `table`
-    what was laid over it and it together. `any_machine`: the numbers are those of no particular
-    machine, and nobody has said others."""
+    """A machine and its target. `file` is the target's own machine file, `table` its values with
+    those of the user. `any_machine`: the numbers are examples of no particular machine, and the
+    user has given no others."""
 
     machine: Machine
     target: Target
@@ -63,16 +63,15 @@ class LoadedTarget:
 
     @property
     def interpolators(self) -> tuple[str, ...]:
-        """What the machine's controller has to choose from."""
+        """The interpolators from which the user may choose."""
         exact = isinstance(self.machine.controller, PathController)
         return () if exact else self.target.interpolators
 
     def simulate(self, toolpath: Toolpath, options: Options | None = None) -> Iterator[Chunk]:
-        """The motion that the machine's controller and mechanics make of a toolpath, chunk by
-        chunk.
+        """The motion that the machine's controller and mechanics make of a toolpath, in chunks.
 
-        Rows behind the end of the program are not run. Raises OptionError, MachineError, and
-        ProgramError (some of them only when the row comes) naming the block.
+        Rows after the end of the program are not run. Raises OptionError, MachineError, and
+        ProgramError, which names the block (some only when that row is run).
         """
         from camtool.simulation.motion import Options
 
@@ -81,7 +80,7 @@ class LoadedTarget:
         return self.model.run(toolpath, self.machine, options)
 
     def check_options(self, options: Options) -> None:
-        """OptionError for what the machine's controller cannot do."""
+        """OptionError for options that the machine's controller does not have."""
         if options.chunk_steps < 1:
             raise OptionError(f"chunk_steps is {options.chunk_steps}", mend="give at least 1")
         known = self.interpolators
@@ -100,22 +99,21 @@ class LoadedTarget:
         )
 
     def with_settings(self, settings: Sequence[str]) -> LoadedTarget:
-        """The same with `key.key=value` settings over its machine; MachineError names the wrong
-        one."""
+        """The target with further `key.key=value` settings; MachineError names a wrong one."""
         if not settings:
             return self
         table, name = resolved_table(self.target, self.table, str(self.file), None, settings)
         return replace(self, machine=machine_of(self.target, table, name), table=table)
 
     def values(self) -> dict[str, Any]:
-        """All values of the machine as `--set` takes them; of its dialect those that are said."""
+        """All values of the machine, by the keys of `--set`; of the dialect only those given."""
         values: dict[str, Any] = msgspec.to_builtins(self.machine)
         return values | {"dialect": self.table.get("dialect", {})}
 
     def changed_values(self) -> list[tuple[str, str, str]]:
-        """(key, value, the target's own value) of all that differs, as `--set` takes them.
+        """(key, value, the target's own value) of all values that differ, as `--set` takes them.
 
-        What the target leaves to the user to say differs always: its own value is `not said`.
+        Keys of `needs` always differ: the target's own value is `not said`.
         """
         now = dict(_flat("", self.values()))
         base = read_table(self.file)
@@ -133,8 +131,8 @@ class LoadedTarget:
 
 @dataclass(frozen=True)
 class ListedTarget:
-    """What a list says of a target: `needs` are the keys that the user's machine file must give
-    before it can be loaded, such as "axes.x.coded_step_mm"; () when it is complete."""
+    """A target in a list. `needs` are the keys that the user's machine file must give before it
+    can be loaded, such as "axes.x.coded_step_mm"; () when it is complete."""
 
     target: TargetNames
     needs: tuple[str, ...]
@@ -142,14 +140,14 @@ class ListedTarget:
 
 
 def target_names() -> list[str]:
-    """Names of all installed targets, sorted; nothing is imported."""
+    """The names of all installed targets, sorted; no target is imported."""
     return sorted(point.name for point in entry_points(group=GROUP))
 
 
 def load_target(
     name: str, *, machine_file: Path | None = None, settings: Sequence[str] = ()
 ) -> LoadedTarget:
-    """The target `name`, with a user's machine file and `--set` values over it.
+    """The target `name`, with the values of a user's machine file and of `--set`.
 
     Raises UnknownTargetError (with the nearest names) and MachineError.
     """
@@ -161,7 +159,7 @@ def load_target(
 
 
 def list_target(name: str) -> ListedTarget:
-    """What a list says of the target `name`, complete or not; raises as `load_target` does."""
+    """The target `name` for a list, complete or not; raises as `load_target` does."""
     target, file = find_target(name)
     table = read_table(file)
     needs = missing_keys(table, str(file))
@@ -192,7 +190,7 @@ def each_target(
 
 
 def filter_target() -> str | None:
-    """The target that `camtool filter` takes where none is named."""
+    """The target that `camtool filter` uses by default."""
     found = each_target(find_target)
     return next((name for name, (target, _) in found if target.filter_default), None)
 
@@ -203,7 +201,7 @@ def find_target(name: str) -> tuple[Target, Path]:
 
 
 def _found(name: str) -> EntryPoint:
-    """The entry point of a target; UnknownTargetError when there is none."""
+    """The entry point of a target; UnknownTargetError, with the nearest names, without one."""
     found = {point.name: point for point in entry_points(group=GROUP)}
     if name not in found:
         near = difflib.get_close_matches(name, found, n=3, cutoff=0.4) or sorted(found)
@@ -214,7 +212,7 @@ def _found(name: str) -> EntryPoint:
 
 
 def _load(point: EntryPoint) -> tuple[Target, Path]:
-    """The target and its machine file; a broken plug-in is named, nothing else."""
+    """The target and its machine file; MachineError, which names it, for a broken plug-in."""
     try:
         target = point.load()
         if not isinstance(target, Target):
@@ -223,7 +221,7 @@ def _load(point: EntryPoint) -> tuple[Target, Path]:
             if not code.name.startswith(f"{target.name}."):
                 raise ValueError(f"the code {code.name} does not begin with {target.name}.")
         file = Path(str(sys.modules[point.module].__file__)).with_name(MACHINE_FILE)
-    except Exception as error:  # whatever a third party's module raises belongs to it
+    except Exception as error:  # a plug-in may raise anything
         raise MachineError(
             f"target {point.name!r} cannot be loaded ({type(error).__name__}: {error})",
             where=f"plug-in {point.value}",
@@ -235,8 +233,8 @@ def _load(point: EntryPoint) -> tuple[Target, Path]:
 
 
 class Guarded:
-    """A third party's target, or its model: what it raises and should not is reported as its own
-    fault."""
+    """A third party's target, or its model: an unexpected exception is reported as a fault of the
+    plug-in."""
 
     def __init__(self, guarded: Any, value: str) -> None:
         self._guarded = guarded

@@ -18,10 +18,10 @@ _BACKLASH = "# backlash_mm = 0.0         # measure yours: camtool coupon, camtoo
 def machine_template(name: str, base: str, base_text: str, needs: Iterable[str] = ()) -> str:
     """TOML text of the machine `name`, which extends the target `base`.
 
-    `backlash_mm` stands with every axis, for no machine is without. Every value of the target's
-    own file (`base_text`) stands there as a comment, with its source:
-    what differs is uncommented and changed. `needs` are the keys that must be. OptionError for a
-    name that is no word of small letters, digits and hyphens.
+    Every value of the target's own file (`base_text`) is a comment in it, with its source, for the
+    user to uncomment and change; every axis has `backlash_mm`, since every machine has backlash.
+    `needs` are keys that the user must give. OptionError for a name that is not a word of small
+    letters, digits and hyphens.
     """
     if not _NAME.fullmatch(name):
         raise OptionError(
@@ -64,7 +64,7 @@ def machine_template(name: str, base: str, base_text: str, needs: Iterable[str] 
 
 
 def _own_part(text: str) -> Iterable[str]:
-    """The lines below the target's own tables: those that a user's machine may change."""
+    """The lines of the tables that a user's machine file may change."""
     table = ""
     for line in text.splitlines():
         heading = _TABLE.match(line)

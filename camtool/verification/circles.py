@@ -1,17 +1,16 @@
-"""Full circles of a toolpath, the figures of ISO 230-4 for what became of them, and reversals.
+"""Full circles of a toolpath, their figures by ISO 230-4, and their reversals.
 
-About a programmed circle (centre c, radius R) the slides are seen as radii over the angle, kept
-in bins of half a degree (`camtool.kernels.circle_bins`): of each bin the points with the least and
-the largest radius and the mean point. Memory is that of the bins, however many steps there are.
+On a programmed circle (centre c, radius R) the radius of the slides' path is recorded over the
+angle in bins of half a degree (`camtool.kernels.circle_bins`): for each bin the points with the
+least and the largest radius and the mean point. Memory does not grow with the steps.
 
     F max, F min = largest, least |p − c| − R           (radial error, programmed centre)
     G            = largest − least |p − c'|              (circular error)
     D            = mean of |p − c| − R over the bins     (mean radial error)
 
-c' is the centre of the circle that fits the bins' mean points best by least squares of the radial
-distances; each bin counts alike, as the angle does for a ball-bar. With the centres e apart, the
-extreme of a bin is found about c and taken about c': that is wrong by no more than
-e · 2π/720, 0.9 % of e.
+c' is the centre of the least-squares circle through the mean points of the bins; all bins have the
+same weight, as all angles have for a ball-bar. The extremes of a bin are found about c and used
+about c'. With the centres e apart this is wrong by no more than e · 2π/720, 0.9 % of e.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.cuts import CutMoves
 
 FIT_ROUNDS = 30
-"""The search of the least-squares centre, which takes about four rounds, ends after this many."""
+"""At most so many rounds for the least-squares centre, which converges in about four."""
 
 FIT_END_MM = 1e-9
 """The least-squares centre is found when it moves by less than this."""
@@ -50,8 +49,8 @@ class Circle:
 
 @dataclass(frozen=True)
 class CircleFigures:
-    """What became of a circle, mm; NaN where the slides left fewer than three angles, G also where
-    they did not go round the programmed centre: as with play that comes near to the radius."""
+    """Figures of a circle, mm: NaN with fewer than three bins; G also where the slides do not go
+    round the programmed centre, as with a backlash near the radius."""
 
     circular_mm: float
     radial_max_mm: float
@@ -60,15 +59,15 @@ class CircleFigures:
 
 
 UNSEEN = CircleFigures(math.nan, math.nan, math.nan, math.nan)
-"""Figures of a circle that nothing followed."""
+"""Figures of a circle that the slides did not follow."""
 
 
 def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
-    """Runs of consecutive level arcs that cut about one centre, one way round, and make a full
-    turn; of those that lie below each other (passes, or a helix and its last turn) the deepest.
+    """Runs of consecutive level arcs that cut about one centre in one direction and make a full
+    turn; of circles below each other (passes, or a helix and its last turn) the deepest.
 
-    `gap_mm` is how far centres and radii may differ, and how much of the way round may lack (a
-    post may leave a rest that a line mends).
+    `gap_mm`: by how much centres and radii may differ, and how much of the circumference may be
+    missing (a writer may close an arc by a line).
     """
     toolpath = cuts.toolpath
     level = toolpath.starts[:, 2] == toolpath.end[:, 2]
@@ -86,8 +85,8 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
     )
     first = np.concatenate([[0], np.flatnonzero(breaks) + 1])
     last = np.concatenate([first[1:], [len(arcs)]]) - 1
-    way = np.abs(np.add.reduceat(toolpath.sweeps()[arcs], first)) * radius[first]
-    full = np.flatnonzero(way >= 2.0 * np.pi * radius[first] - gap_mm)
+    length = np.abs(np.add.reduceat(toolpath.sweeps()[arcs], first)) * radius[first]
+    full = np.flatnonzero(length >= 2.0 * np.pi * radius[first] - gap_mm)
     return _deepest(
         [
             _circle(toolpath, arcs[first[run] : last[run] + 1], float(radius[first[run]]))
@@ -98,7 +97,7 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
 
 
 def _deepest(circles: list[Circle], gap_mm: float) -> list[Circle]:
-    """Of circles one below the other the deepest, of equals all, in their order."""
+    """Of circles below each other the deepest, in their order; all of several equally deep."""
     lowest: dict[tuple[object, ...], float] = {}
     keys = []
     for circle in circles:
@@ -138,12 +137,12 @@ def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
 
 
 def mean_points(seen: Floats) -> Floats:
-    """(J, 2) about the programmed centre, of bins (J, 9) that are not empty."""
+    """(J, 2) mean points about the programmed centre, of bins (J, 9) that are not empty."""
     return np.asarray(seen[:, 1:3] / seen[:, :1])
 
 
 def circular_error(seen: Floats) -> float:
-    """G of bins (J, 9) that are not empty, J ≥ 1; NaN where they do not go round the centre."""
+    """G from bins (J, 9) that are not empty, J ≥ 1; NaN where they do not surround the centre."""
     mean = mean_points(seen)
     if not _surrounds(mean):
         return math.nan
@@ -153,8 +152,7 @@ def circular_error(seen: Floats) -> float:
 
 
 def _surrounds(points: Floats) -> bool:
-    """Whether points (J, 2) lie on all sides of the origin: none of the angles between them, as
-    seen from there, is half a turn."""
+    """Whether points (J, 2) surround the origin: no angle between neighbours is half a turn."""
     angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
     return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)
 
@@ -188,38 +186,37 @@ def least_squares_centre(points: Floats) -> Floats:
     return centre
 
 
-# What a ball-bar would show of a circle: reversals, and both ways round together.
+# What a ball-bar shows of a circle: reversals, and both directions together.
 #
-# At 0° and 180° X turns, at 90° and 270° Y does. What an axis does wrong at its reversal lies
-# along the radius there. Of the mean radii of the bins of half a degree
-# (`camtool.kernels.circle_bins`):
+# X reverses at 0° and 180°, Y at 90° and 270°. The error of an axis at its reversal lies along the
+# radius there. From the mean radii of the bins of half a degree (`camtool.kernels.circle_bins`):
 #
-# - the step at such a place is the radius behind it (in the direction of travel) less that before
-#   it, each taken there from a straight line through the bins of its side;
-# - the spike is what sticks out beyond both sides, outwards (+) or inwards;
-# - the reversal value B of an axis is estimated from the whole circle: a slide that stands off by
-#   ±B/2 depending on the direction of its axis changes the radius at the angle t by
-#   ∓B/2 |cos t| (X) or |sin t| (Y), so the radii are fitted by least squares with
+# - the step at a reversal is the radius after it (in the direction of travel) less that before it,
+#   each from a straight line through the bins of its side;
+# - the spike is what exceeds both sides, outwards (+) or inwards;
+# - the reversal value B of an axis is estimated from the whole circle: a slide that is off by ±B/2
+#   depending on the direction of its axis changes the radius at the angle t by ∓B/2 |cos t| (X) or
+#   |sin t| (Y), so the radii are fitted by least squares with
 #
 #       r = c + e_x cos t + e_y sin t + (B_x/2) d_x |cos t| + (B_y/2) d_y |sin t|,
 #
-#   d = −1 where the axis goes towards the place where it stands farthest out, +1 behind it.
+#   d = −1 where the axis moves towards its outermost position, +1 after it.
 
 QUADRANTS_DEG = (0, 90, 180, 270)
-"""Where an axis turns: X, Y, X, Y."""
+"""The angles at which X, Y, X and Y reverse."""
 
 NEAR_BINS, FAR_BINS = 3, 15
-"""A step is seen between 1.5° and 7.5° to either side, a spike within 1.5°."""
+"""A step is measured between 1.5° and 7.5° on either side, a spike within 1.5°."""
 
 SAME_SHARE = 1e-3
-"""Circles whose centres and radii differ by less than this share of the radius are one circle
-cut twice."""
+"""Circles whose centres and radii differ by less than this share of the radius are the same
+circle, cut twice."""
 
 
 @dataclass(frozen=True)
 class Reversing:
-    """mm: `step` and `spike` at 0°, 90°, 180°, 270°; `value` B of X and Y. NaN where the slides
-    left too few bins."""
+    """The reversals of a circle, mm: `step` and `spike` at 0°, 90°, 180° and 270°; the reversal
+    `value` B of X and Y. NaN with too few bins."""
 
     step: tuple[float, float, float, float]
     spike: tuple[float, float, float, float]
@@ -228,7 +225,7 @@ class Reversing:
 
 @dataclass(frozen=True)
 class BothWays:
-    """A circle that was cut both ways round, mm: bi-directional circular error G(b) and mean
+    """A circle that is cut in both directions, mm: bi-directional circular error G(b) and mean
     bi-directional radial error D."""
 
     circle: Circle
@@ -241,7 +238,7 @@ def reversing(bins: Floats, ccw: bool) -> Reversing:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = bins[:, 1:3] / bins[:, :1]
         least, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
-    # The mean of points along an arc of angle w lies at sin(w/2)/(w/2) of the radius.
+    # The mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius.
     half = np.pi / len(bins)
     radius = np.hypot(mean[:, 0], mean[:, 1]) * (half / math.sin(half))
     steps, spikes = [], []
@@ -257,8 +254,8 @@ def reversing(bins: Floats, ccw: bool) -> Reversing:
     )
 
 
-def _at(radius: Floats, least: Floats, largest: Floats, at: int, way: int) -> tuple[float, float]:
-    """Step and spike at the edge below bin `at`; `way` +1 for growing angles."""
+def _at(radius: Floats, least: Floats, largest: Floats, at: int, turn: int) -> tuple[float, float]:
+    """Step and spike at the lower edge of bin `at`; `turn` is +1 for growing angles."""
     count = len(radius)
     away = np.arange(NEAR_BINS, FAR_BINS) + 0.5
     behind = radius[(at + np.arange(NEAR_BINS, FAR_BINS)) % count]
@@ -270,18 +267,18 @@ def _at(radius: Floats, least: Floats, largest: Floats, at: int, way: int) -> tu
     seen = np.isfinite(largest[near])
     out = float(largest[near][seen].max(initial=-math.inf)) - max(high, low)
     into = min(high, low) - float(least[near][seen].min(initial=math.inf))
-    return way * (high - low), max(out, 0.0) if out >= into else -max(into, 0.0)
+    return turn * (high - low), max(out, 0.0) if out >= into else -max(into, 0.0)
 
 
 def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
-    """B of X and of Y by least squares; NaN when less than half of the circle is there."""
+    """B of X and of Y by least squares; NaN when less than half of the bins are filled."""
     angle = (np.arange(len(radius)) + 0.5) * (2.0 * np.pi / len(radius))
     seen = np.isfinite(radius)
     if seen.sum() < len(radius) // 2:
         return math.nan, math.nan
     cos, sin = np.cos(angle[seen]), np.sin(angle[seen])
     turn = 1.0 if ccw else -1.0
-    # Growing angles leave 0° with sin > 0, and 90° with cos < 0.
+    # With growing angles, sin > 0 after 0°, and cos < 0 after 90°.
     x = turn * np.sign(sin) * cos
     y = -turn * np.sign(cos) * sin
     table = np.column_stack([np.ones(len(cos)), cos, sin, 0.5 * x, 0.5 * y])
@@ -290,11 +287,11 @@ def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
 
 
 class Pairs:
-    """The circles that are cut clockwise and counterclockwise about one centre. Only their bins
-    are kept, and only until the second of them is done."""
+    """Pairs of circles cut clockwise and counterclockwise about one centre. Only the bins of the
+    first are kept, and only until the second is done."""
 
     def __init__(self, circles: Sequence[Circle]) -> None:
-        """Each takes the first free partner: as many pairs as there are of the rarer way."""
+        """Each counterclockwise circle takes the first free clockwise one as its partner."""
         self._circles = circles
         self._partner: dict[int, int] = {}
         self._waiting: dict[int, Floats] = {}
@@ -310,11 +307,11 @@ class Pairs:
                     self._partner[first], self._partner[int(second)] = int(second), first
 
     def partner(self, circle: int) -> int | None:
-        """The other circle of its pair; None where it has none."""
+        """The other circle of the pair; None for a circle without a partner."""
         return self._partner.get(circle)
 
     def add(self, circle: int, bins: Floats) -> list[BothWays]:
-        """Take the bins of a circle; what it and its partner make when that is done already."""
+        """Take the bins of a circle; the figures of the pair if its partner is done already."""
         partner = self._partner.get(circle)
         if partner is None:
             return []
@@ -327,7 +324,7 @@ class Pairs:
 
 
 def both_ways(circle: Circle, bins: Floats) -> BothWays:
-    """The figures of a circle from the bins (2 B, 9) of both ways round; NaN without points."""
+    """The figures of a circle from the bins (2 B, 9) of both directions; NaN without points."""
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) == 0:
         return BothWays(circle, math.nan, math.nan)

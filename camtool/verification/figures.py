@@ -1,12 +1,12 @@
 """The figures of a verification: of streams of errors, of rows, of contours, of the whole motion.
 
 `Figure` takes errors in mm, batch by batch, and gives the maximum (exact, with its place), the
-root of the mean square (exact, every sample counts alike) and the 95th percentile, in memory that
-does not grow with the stream. The percentile comes from a histogram: the middle of the bin that
-holds the sample of that rank. Bins (`camtool.kernels.error_bins`) are between 1/256 and 1/128 of
-their value wide. So the percentile is within 0.4 % of a sample's true value.
+root of the mean square (exact, all samples with the same weight) and the 95th percentile, in
+memory that does not grow with the stream. The percentile comes from a histogram: it is the middle
+of the bin with the sample of that rank. Bins (`camtool.kernels.error_bins`) are between 1/256 and
+1/128 of their value wide, so the percentile is within 0.4 % of the exact value.
 
-`RowFigures` hold what became of each row of the program; all figures of contours, of the worst
+`RowFigures` are the figures of each row of the program. All figures of contours, of the worst
 moves and of the whole motion (`Tally`) are sums and maxima over rows.
 """
 
@@ -26,16 +26,16 @@ from camtool.verification.cuts import CutMoves
 from camtool.verification.matching import Match
 
 PERCENTILE = 0.95
-"""Which percentile of the errors the report calls p95."""
+"""The percentile of the errors that the report calls p95."""
 
 
 class Figure:
-    """Maximum, rms and 95th percentile of errors ≥ 0, mm; all NaN while nothing was added."""
+    """Maximum, rms and 95th percentile of errors ≥ 0, mm; all NaN without any error."""
 
     def __init__(self) -> None:
         self.count = 0
         self.at_mm: tuple[float, float] = (math.nan, math.nan)
-        """Where the maximum was found first."""
+        """The place of the maximum, mm; of several, the first."""
         self.row = -1
         """Toolpath row of the maximum."""
         self._max = -math.inf
@@ -53,7 +53,7 @@ class Figure:
             self._max = float(errors[worst])
             self.at_mm = (float(points[worst, 0]), float(points[worst, 1]))
             self.row = int(rows[worst])
-        # Bin 0 is for 0; the last one for what is too large.
+        # The first bin is for 0, the last one for all larger errors.
         bins = np.clip(leading_bits(errors) - BEFORE_FIRST, 0, BINS - 1)
         self._histogram += np.bincount(bins, minlength=BINS)
 
@@ -61,8 +61,8 @@ class Figure:
     def of_rows(
         cls, largest: Floats, squares: Floats, counts: Ints, histogram: Ints | None
     ) -> Figure:
-        """The figure of what was judged row by row: the largest error (N,) mm of each row or NaN,
-        sums of squares (N,) mm², counts (N,); `histogram` (L · BINS,) of all, L numbers for each
+        """The figure of N rows: `largest` error (N,) mm of each row, or NaN; sums of squares (N,)
+        mm²; counts (N,) of samples; `histogram` (L · BINS,) of all samples, L numbers for each
         bin."""
         made = cls()
         made.count = int(counts.sum())
@@ -103,18 +103,18 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class RowFigures:
-    """Of N rows of the decoded toolpath, all in mm and XY; rows behind the end have nothing.
+    """Figures of the N rows of the decoded toolpath, in mm and XY; rows after the end have none.
 
-    samples (N,). Only of rows that cut, NaN for the others' maxima and 0 for their sums:
-    `interpolation` and `mechanics` (N,) largest errors with `interpolation_squares` and
-    `mechanics_squares` (N,) mm² the sums of squares over the samples; `known` (N,) how many
-    samples have a total error, `total` (N,) the largest, `total_squares` (N,) mm²,
-    `total_sum` (N,) with the sign, + to the left of the wanted move, and `total_at` (N, 2)
-    where the slides were when it was largest.
+    `samples` (N,): their number. For rows that cut (others have NaN as maxima and 0 as sums):
+    `interpolation` and `mechanics` (N,), the largest errors, and `interpolation_squares` and
+    `mechanics_squares` (N,) mm², their sums of squares over the samples; `known` (N,), the number
+    of samples with a total error, `total` (N,), the largest of them, `total_squares` (N,) mm²,
+    `total_sum` (N,) with sign, + to the left of the wanted move, and `total_at` (N, 2), the
+    position of the slides at the largest.
 
-    `low`, `high` (N, 2) extents of the slides, infinite where they did not move; `slide_end` and
-    `commanded_end` (N, 2) where they and the controller stood after the last sample, NaN where
-    there is none. `ledger`: what all chunks say of each row, added up.
+    `low`, `high` (N, 2): extents of the slides, infinite where they did not move; `slide_end` and
+    `commanded_end` (N, 2): positions of the slides and of the controller after the last sample,
+    NaN without samples. `ledger`: the sum of the ledgers of all chunks.
     """
 
     samples: Ints
@@ -135,7 +135,7 @@ class RowFigures:
 
 
 def empty_columns(count: int) -> Floats:
-    """(count, 19) columns of `camtool.kernels.judge` of rows that did nothing."""
+    """(count, 19) columns of `camtool.kernels.judge` for rows without samples."""
     from camtool.kernels import judge as at
 
     columns = np.zeros((count, at.ROW_COLUMNS))
@@ -147,7 +147,7 @@ def empty_columns(count: int) -> Floats:
 
 
 def row_figures(columns: Floats, is_cut: Bools, ledger: Ledger) -> RowFigures:
-    """The record of the columns (N, 19) that the judge has filled."""
+    """The figures in the columns (N, 19) that the judge has filled."""
     from camtool.kernels import judge as at
 
     samples, known = columns[:, at.SAMPLES].astype(np.int64), columns[:, at.KNOWN].astype(np.int64)
@@ -176,7 +176,7 @@ def row_figures(columns: Floats, is_cut: Bools, ledger: Ledger) -> RowFigures:
 
 
 def add_ledger(whole: Ledger, part: Ledger) -> None:
-    """Add what a chunk says of its rows, each of which it says once, to the whole program's."""
+    """Add the ledger of a chunk, with each row at most once, to that of the whole program."""
     rows = part.row
     whole.duration_s[rows] += part.duration_s
     whole.compensation_s[rows] += part.compensation_s
@@ -186,12 +186,12 @@ def add_ledger(whole: Ledger, part: Ledger) -> None:
     whole.ended[rows] &= part.ended
 
 
-# Figures of the whole motion: steps, reversals, time, and arcs that never end.
+# Figures of the whole motion: steps, reversals, time, and endless arcs.
 
 
 @dataclass(frozen=True, eq=False)
 class Tally:
-    """Sums over the whole program; reversals and times also apart for cutting and the rest.
+    """Sums over the whole program. Reversals and times are divided into cutting and the rest;
     `compensation_s` is a part of cutting and air."""
 
     steps: Ints
@@ -203,7 +203,7 @@ class Tally:
     dwell_s: float
     compensation_s: float
     endless_arcs: dict[int, tuple[float, float]]
-    """Rows whose stop test was never met, and where in XY (mm) the simulation left them."""
+    """Rows whose stop test was never met, with the place in XY (mm) where they were left."""
 
     @property
     def time_s(self) -> float:
@@ -212,7 +212,7 @@ class Tally:
 
 
 def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
-    """The sums over all rows; `is_cut` (N,) tells those that cut."""
+    """The sums over all rows; `is_cut` (N,): the rows that cut."""
     ledger, dwell = rows.ledger, decoded.kind == Kind.DWELL
     air = ~is_cut & ~dwell
     missed = np.flatnonzero(~ledger.ended).tolist()
@@ -232,18 +232,18 @@ def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
     )
 
 
-# Figures of contours, the worst moves, and ends that are not reached.
+# Figures of contours, the worst moves, and missed ends.
 
 END_STEPS = 1.5
-"""A move has missed its end when the controller stands more than this many steps beside it: one
-step can be rounding by the interpolator."""
+"""A move misses its end when the controller stops more than so many steps beside it; one step is
+the rounding of an interpolator."""
 
 
 @dataclass(frozen=True)
 class ContourFigures:
-    """The total error of one wanted contour, mm: the largest with its place and toolpath row, root
-    of the mean square, and mean with sign (+ to the left of the way) without the fit; and the
-    largest errors of interpolation, mechanics and fit on it."""
+    """The total error of one wanted contour, mm: the maximum with its place and toolpath row, the
+    root of the mean square, and the signed mean (+ to the left of the direction of travel) without
+    the fit; and the largest errors of interpolation, mechanics and fit on it."""
 
     contour: int
     row: int
@@ -257,7 +257,7 @@ class ContourFigures:
 
 
 def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
-    """One for each wanted contour that some row with a known error belongs to."""
+    """The figures of each wanted contour to which rows with a known error belong."""
     known = np.flatnonzero((rows.known > 0) & (match.contour >= 0))
     if len(known) == 0:
         return
@@ -288,13 +288,13 @@ def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
 
 
 def mean_error_mm(rows: RowFigures) -> float:
-    """The mean of all total errors with their sign; NaN without any."""
+    """The signed mean of all total errors, mm; NaN without any."""
     count = int(rows.known.sum())
     return float(rows.total_sum.sum()) / count if count else float("nan")
 
 
 def worst_rows(rows: RowFigures, count: int) -> Ints:
-    """The rows with the largest total errors, worst first, of equals the first."""
+    """The `count` rows with the largest total errors, worst first; of equals the first."""
     known = np.flatnonzero(rows.known > 0)
     order = np.lexsort((known, -rows.total[known]))
     return np.asarray(known[order][:count])
@@ -302,8 +302,8 @@ def worst_rows(rows: RowFigures, count: int) -> Ints:
 
 @dataclass(frozen=True)
 class MissedEnds:
-    """How many moves the controller left beside their ends, and the farthest: its row (−1 when
-    there is none), how far (mm)."""
+    """The number of moves that the controller leaves beside their ends, and the row (−1 for none)
+    and the distance (mm) of the farthest."""
 
     count: int
     row: int
@@ -312,15 +312,15 @@ class MissedEnds:
 
 def missed_ends(
     rows: RowFigures,
-    held: Toolpath,
+    quantised: Toolpath,
     steps_mm: tuple[float, float],
     without: tuple[int, ...] = (),
 ) -> MissedEnds:
-    """Where the controller stood after each row against the end of it as `held`, but for the rows
-    `without`; `steps_mm` are the coded steps of X and Y."""
+    """The positions of the controller after the rows, against the ends of the `quantised` moves,
+    except for the rows `without`; `steps_mm` are the coded steps of X and Y."""
     stood = np.isfinite(rows.commanded_end[:, 0])
     stood[list(without)] = False
-    off = np.abs(np.where(stood[:, None], rows.commanded_end - held.end[:, :2], 0.0))
+    off = np.abs(np.where(stood[:, None], rows.commanded_end - quantised.end[:, :2], 0.0))
     missed = (off > END_STEPS * np.array(steps_mm)).any(axis=1)
     if not missed.any():
         return MissedEnds(0, -1, 0.0)
@@ -330,7 +330,7 @@ def missed_ends(
 
 
 def contour_name(cuts: CutMoves, contour: int) -> str:
-    """`contour 3 (CUT/CIRCLE 3C)`, as other figures and findings count them."""
+    """`contour 3 (CUT/CIRCLE 3C)`: contours are numbered from 1."""
     rows = np.flatnonzero(cuts.contour == contour)
     source = cuts.toolpath.text(int(rows[0])) if len(rows) else ""
     return f"contour {contour + 1}" + (f" ({source})" if source else "")

@@ -1,12 +1,12 @@
-"""The Report: what a verification found, as a record, JSON, text, Markdown and HTML.
+"""The Report: the results of a verification as a record, JSON, text, Markdown and HTML.
 
-The keys are stable: they may grow, they are never renamed (a test holds the list). No value is
-NaN or infinite: what is not known is null. Numbers are rounded to `DECIMALS` places, far below
-anything that a machine shows, so that the same job gives the same bytes on every computer.
+The keys are stable: keys may be added, but are never renamed (a test has the list). No value is
+NaN or infinite: unknown values are null. Numbers are rounded to `DECIMALS` places, far below the
+resolution of any machine, so that the same job gives the same bytes on every computer.
 
     records ─▶ Report ─▶ limits of a pipeline (`Gates`)
                   ├────▶ `facts`, lines for a terminal and for the margin of a picture
-                  └────▶ `sheets`, tables of words ─▶ `Page` ─▶ `markdown`, `html`, `page_json`
+                  └────▶ `sheets`, tables of text ─▶ `Page` ─▶ `markdown`, `html`, `page_json`
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class MaxRms(msgspec.Struct, frozen=True):
 
 
 class ErrorFigures(msgspec.Struct, frozen=True):
-    """Maximum, root of the mean square, 95th percentile (within 0.5 %), and mean with sign: to
-    the left of the way counts +."""
+    """Maximum, root of the mean square, 95th percentile (within 0.5 %), and signed mean: + to the
+    left of the direction of travel."""
 
     max: float | None = None
     rms: float | None = None
@@ -68,14 +68,14 @@ class InterpolationFigures(msgspec.Struct, frozen=True):
 class Errors(msgspec.Struct, frozen=True):
     """Predicted errors by source, µm.
 
-    fit: what was drawn to the lines and arcs that stand for it, at the part's size: curves, and
-    all that was joined, merged, recognised or left out on reading; None where no drawing is
-    known. rounding: moves as the controller holds them (the dialect's digits and whole steps) to
-    the wanted ones. interpolation: commanded positions to the moves as held. mechanics: slides to
-    commanded positions. total: slides to the wanted moves and the fit there on top, so never less
-    than their distance to what was drawn; to the moves as held where nothing was wanted. Its mean
-    is without the fit. depth_max: heights of the slide to those of the moves as held, while
-    cutting."""
+    fit: distance of the drawing from the lines and arcs that replace it, at the size of the part:
+    curves, and all that was joined, merged, recognised or left out on reading; None without a
+    drawing. rounding: of the moves as the controller rounds them (digits of the dialect, whole
+    steps) from the wanted moves. interpolation: of the commanded positions from the rounded moves.
+    mechanics: of the slides from the commanded positions. total: of the slides from the wanted
+    moves, plus the fit there, so never less than their distance from the drawing; without wanted
+    moves, from the rounded moves. Its mean is without the fit. depth_max: difference in height of
+    the slide from the rounded moves, while cutting."""
 
     fit: MaxRms = MaxRms()
     rounding: MaxRms = MaxRms()
@@ -111,7 +111,7 @@ class AxisCounts(msgspec.Struct, frozen=True):
 
 
 class Reversals(msgspec.Struct, frozen=True):
-    """Reversals of each axis in all, and of these while cutting and otherwise."""
+    """Reversals of each axis: all, those while cutting, and the others."""
 
     x: int
     y: int
@@ -121,8 +121,8 @@ class Reversals(msgspec.Struct, frozen=True):
 
 
 class TimeSplit(msgspec.Struct, frozen=True):
-    """Where the time goes, s. `compensation` is a part of `cutting` and `air`: what the controller
-    issues at reversals; `link` is what the line that the program comes down adds."""
+    """Parts of the time, s. `compensation` is the part of `cutting` and `air` for steps that the
+    controller adds at reversals; `link` is the additional time of the line to the machine."""
 
     cutting: float
     air: float
@@ -132,9 +132,9 @@ class TimeSplit(msgspec.Struct, frozen=True):
 
 
 class Dimension(msgspec.Struct, frozen=True):
-    """A size of the cut edge, nominally as drawn; of the tool centre's path where no drawing is
-    known (`of`: "edge", "centre"). error_percent > 0 when it comes out too large. Of a contour in
-    several passes the deepest and last one counts, without leads and ramps."""
+    """A size of the cut edge, nominally as drawn, or without a drawing of the tool centre's path
+    (`of`: "edge", "centre"). error_percent > 0 when it is too large. Of a contour in several
+    passes the last and deepest counts, without leads and ramps."""
 
     name: str
     nominal_mm: float
@@ -146,9 +146,9 @@ class Dimension(msgspec.Struct, frozen=True):
 class CircleReport(msgspec.Struct, frozen=True):
     """A full circle: G, F max and F min as ISO 230-4 defines them; D is the mean of r − R. A
     circle in several passes, or at the end of a helix, is reported once: its deepest level turn.
-    `step_um` and `spike_um` at 0°, 90°, 180° and 270°, where X, Y, X, Y turn, and B the reversal
-    values of X and Y: see `camtool.verification.circles`. All are about the programmed circle;
-    `fit_um`: how far what was drawn lies from that at most.
+    `step_um` and `spike_um` at 0°, 90°, 180° and 270°, where X, Y, X and Y reverse, and B, the
+    reversal values of X and Y: see `camtool.verification.circles`. All refer to the programmed
+    circle; `fit_um`: the largest distance of the drawing from it.
     """
 
     centre_mm: tuple[float, float]
@@ -166,7 +166,7 @@ class CircleReport(msgspec.Struct, frozen=True):
 
 
 class BothWaysReport(msgspec.Struct, frozen=True):
-    """A circle that is cut both ways round: bi-directional circular error G(b) and mean
+    """A circle that is cut in both directions: bi-directional circular error G(b) and mean
     bi-directional radial error D (ISO 230-4)."""
 
     centre_mm: tuple[float, float]
@@ -176,8 +176,8 @@ class BothWaysReport(msgspec.Struct, frozen=True):
 
 
 class ContourReport(msgspec.Struct, frozen=True):
-    """The total error of one contour, µm, and where it is largest; its largest errors by source;
-    `block` from 1, None when no program was read."""
+    """The total error of one contour, µm, with the place of its maximum, and its largest errors by
+    source; `block` from 1, None when no program was read."""
 
     name: str
     max_um: float
@@ -204,15 +204,16 @@ class WorstReport(msgspec.Struct, frozen=True):
 
 
 class UnreachedReport(msgspec.Struct, frozen=True):
-    """How many moves the controller leaves beside their programmed ends, and how far at most."""
+    """The number of moves that the controller leaves beside their ends, and the largest
+    distance."""
 
     moves: int
     max_um: float
 
 
 class ShapeReport(msgspec.Struct, frozen=True):
-    """What a round tool cuts away beside the wanted shape, and what stays of it, seen from above:
-    areas, and how deep they reach."""
+    """What a round tool removes beside the wanted shape (overcut) and what it leaves of it
+    (undercut), seen from above: areas and depths."""
 
     tool_diameter_mm: float
     overcut_mm2: float
@@ -222,9 +223,9 @@ class ShapeReport(msgspec.Struct, frozen=True):
 
 
 class AskedReport(msgspec.Struct, frozen=True):
-    """Moves as programmed against those that the job asks for: how many cut, how many of these
-    are the very moves that camtool would write, how far the others are from what was asked at
-    most, and how far they may be."""
+    """Programmed moves against those that the job asks for: the number of cutting moves, how many
+    of them are exactly those that camtool would write, the largest distance of the others from
+    what was asked, and the tolerance."""
 
     moves: int
     alike: int
@@ -245,8 +246,8 @@ class FindingReport(msgspec.Struct, frozen=True):
 
 
 class PlannedOperation(msgspec.Struct, frozen=True):
-    """How an operation cuts; feeds in mm/min. `spindle_rpm` is None where nobody says a speed;
-    `passes` and the depth of the deepest one are of those kinds that have any."""
+    """How an operation cuts; feeds in mm/min. `spindle_rpm` is None without a speed; `passes` and
+    the depth of the deepest are None for kinds of operation without passes."""
 
     name: str
     kind: str
@@ -260,8 +261,8 @@ class PlannedOperation(msgspec.Struct, frozen=True):
 
 
 class Planned(msgspec.Struct, frozen=True):
-    """What planning gained: how far rapids go in XY, mm, with everything in the order and from
-    the starts in which it was drawn, and as it was put into order; and how the operations cut."""
+    """The length of rapids in XY, mm, in the order and from the starts of the drawing and as
+    planned; and how the operations cut."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -270,7 +271,7 @@ class Planned(msgspec.Struct, frozen=True):
 
 class Before(msgspec.Struct, frozen=True):
     """The same job without `--minimise reversals`, `--approach` and `--compensate`: reversals of
-    X and Y, the largest predicted error, the time. Null where that job could not be made."""
+    X and Y, the largest predicted error, the time. Null where that job cannot be made."""
 
     reversals_cutting: int | None = None
     reversals_air: int | None = None
@@ -282,9 +283,9 @@ class Before(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """Everything that a verification found. `blocks`, `bytes` None when no program was given.
-    `against`: "drawing" where errors are those to what was drawn, "program" where no drawing is
-    known, and they are those to the program's own moves, or to another program's."""
+    """The results of a verification. `blocks` and `bytes` are None without a program. `against`:
+    "drawing" where errors are distances from the drawing, "program" where there is no drawing and
+    they are distances from the moves of the program, or of the program it was converted from."""
 
     target: str
     source: str
@@ -320,8 +321,8 @@ class Report(msgspec.Struct, frozen=True):
         return to_json(self)
 
     def to_text(self, *, findings: bool = True) -> str:
-        """The summary that `camtool post` and `camtool verify` print, without a final newline;
-        `findings=False` leaves these out."""
+        """The summary that `camtool post` and `camtool verify` print, without a final newline, and
+        with a line for each finding unless `findings=False`."""
         lines = [f"{name:<10} {value}" for name, value in facts(self)]
         for item in self.findings if findings else ():
             place = f" [{item.where}]" if item.where else ""
@@ -329,7 +330,7 @@ class Report(msgspec.Struct, frozen=True):
         return "\n".join(map(one_line, lines))
 
     def worst_text(self) -> str:
-        """The moves with the largest errors, one to a line, "" when nothing is cut; µm."""
+        """The moves with the largest errors, one per line, µm; "" when nothing is cut."""
         lines = [
             f"{named(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
             f" {um(item.interpolation_um)}, mechanics {um(item.mechanics_um)}"
@@ -344,7 +345,7 @@ class Report(msgspec.Struct, frozen=True):
         return markdown(Page(self.source or self.target, self, self.findings))
 
     def notes(self) -> tuple[str, ...]:
-        """Two short lines to set beside a picture: target, time and reversals, and the error."""
+        """Two short lines beside a picture: target, time and reversals; the error."""
         total = self.error_um.total
         return (
             f"{self.target}: {clock(self.time_s)} h, {self.cutting_reversals} reversals",
@@ -362,7 +363,7 @@ class Report(msgspec.Struct, frozen=True):
 
 
 def reported(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
-    """Findings for the report, in their order, each once."""
+    """The findings as records of the report, in order, each once."""
     return tuple(
         FindingReport(
             code=finding.code.name,
@@ -378,24 +379,24 @@ def reported(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
 
 
 def number(value: float | None, scale: float = 1.0) -> float | None:
-    """`value` · scale rounded for the report; None for what is not finite. No −0."""
+    """`value` · scale, rounded for the report, never −0; None for values that are not finite."""
     if value is None or not math.isfinite(value):
         return None
     return round(float(value) * scale, DECIMALS) + 0.0
 
 
 def certain(value: float) -> float:
-    """A number that is always known, rounded for the report."""
+    """A known number, rounded for the report, never −0."""
     return round(float(value), DECIMALS) + 0.0
 
 
-# Limits that a pipeline sets on a report: what exceeds one is a finding, and exit code 1.
+# Limits of a pipeline: exceeding one is a finding, and exit code 1.
 
 
 @dataclass(frozen=True)
 class Gates:
-    """The largest total error (mm), reversals of X and Y while cutting, and time (s) that are
-    allowed; None: any."""
+    """The largest allowed total error (mm), number of reversals of X and Y while cutting, and time
+    (s); None: no limit."""
 
     error_mm: float | None = None
     reversals: int | None = None
@@ -403,7 +404,7 @@ class Gates:
 
 
 def gate_findings(report: Report, gates: Gates) -> Iterator[Finding]:
-    """An ABOVE_GATE for each limit that the report exceeds, or that it cannot be held against."""
+    """ABOVE_GATE for each limit that the report exceeds, or whose figure is not known."""
     if gates.error_mm is not None:
         yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
     count = report.cutting_reversals
@@ -426,10 +427,10 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
         yield ABOVE_GATE(where="--max-error", measured=found_um, limit=limit_um)
 
 
-# The report in words.
+# The report as lines of text.
 
 MOST_OPERATIONS = 6
-"""At most this many operations are listed one by one."""
+"""So many operations are listed; the others are counted."""
 
 
 def clock(seconds: float) -> str:
@@ -501,7 +502,7 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
 
 
 def _asked_words(asked: AskedReport) -> str:
-    """How many moves are the very ones that were asked for."""
+    """How many moves are exactly those that camtool would write."""
     if asked.alike == asked.moves:
         return f"all {asked.moves} cutting moves are those that camtool writes"
     return (
@@ -511,7 +512,7 @@ def _asked_words(asked: AskedReport) -> str:
 
 
 def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
-    """Tool, spindle, feeds, depth and passes of the operations, one to a line."""
+    """Tool, spindle, feeds, depth and passes, one line per operation."""
     for each in operations[:MOST_OPERATIONS]:
         name = one_line(each.name or each.kind)
         tool = f"tool {each.tool_diameter_mm:g} mm" if each.tool_diameter_mm else "no tool width"
@@ -528,12 +529,12 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
 
 
 def to_what(report: Report) -> str:
-    """What errors are measured to, where that is not what was drawn."""
+    """A remark on the reference of the errors where it is not the drawing, else ""."""
     return "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
 
 
 def _shape_words(shape: ShapeReport) -> str:
-    """Over- and undercut of a round tool."""
+    """Overcut and undercut of a round tool."""
     over = f"overcut {shape.overcut_um:.2f} µm deep, {shape.overcut_mm2:.4f} mm²"
     under = f"undercut {shape.undercut_um:.2f} µm, {shape.undercut_mm2:.4f} mm²"
     return f"{over}; {under} (tool {shape.tool_diameter_mm:g} mm)"
@@ -545,10 +546,10 @@ def named(block: int | None, move: int) -> str:
 
 
 def _before_words(report: Report) -> str:
-    """What the same job would be without what was done against reversals and play."""
+    """The figures of the same job without measures against reversals and backlash."""
     before = report.before
     if before is None or before.time_s is None:
-        return "not known: the job cannot be cut the plain way"
+        return "not known: the job without these measures cannot be cut"
     error, time = f"{um(before.total_max_um)} µm", clock(before.time_s)
     return (
         f"{before.reversals_cutting} reversals while cutting, {before.reversals_air} in the air,"
@@ -568,33 +569,32 @@ def _error_sources(report: Report) -> str:
 
 
 def um(value: float | None) -> str:
-    """Micrometres to two decimals, a dash for what is not known."""
+    """Micrometres with two decimals, a dash for an unknown value."""
     return "–" if value is None else f"{value:.2f}"
 
 
 def mm(value: float) -> str:
-    """Millimetres to three decimals."""
+    """Millimetres with three decimals."""
     return f"{value:.3f}".replace("-", "−")
 
 
 def percent(value: float | None) -> str:
-    """Per cent with its sign, a dash for what is not known."""
+    """Per cent with sign, a dash for an unknown value."""
     return "–" if value is None else f"{value:+.2f} %".replace("-", "−")
 
 
-# What a page about a program says, before it becomes Markdown, HTML or JSON.
+# The contents of a page about a program, for Markdown, HTML and JSON.
 #
-# A page is made of nothing but its inputs: no time, no place, no order of a hash, so that the same
-# job gives the same bytes.
+# A page depends only on its inputs, not on the time, the folder or the order of hashes, so that
+# the same job gives the same bytes.
 
 NAME_SHOWN = 200
-"""A cell or a finding's text is shortened to this many characters on a page; JSON has all of
-it."""
+"""The text of a cell or a finding is shortened to so many characters on a page, not in JSON."""
 
 
 @dataclass(frozen=True)
 class Changed:
-    """A value of the machine that is not its target's own: by `--machine` or `--set`."""
+    """A value of the machine that `--machine` or `--set` has changed."""
 
     key: str
     value: str
@@ -603,8 +603,8 @@ class Changed:
 
 @dataclass(frozen=True)
 class Setup:
-    """The machine and what was asked for: digests (SHA-256, hex) of all the machine's values and
-    of the program, the values that differ from the target's own, and the flags that were given."""
+    """The machine and the settings: digests (SHA-256, hex) of all values of the machine and of the
+    program, the values that differ from the target's own, and the flags on the command line."""
 
     machine: str
     machine_sha256: str
@@ -615,8 +615,8 @@ class Setup:
 
 @dataclass(frozen=True)
 class Page:
-    """A page: `report` is None where nothing could be judged, and then `findings` say why.
-    `pictures` are (caption, address): a file beside the page, or a data address."""
+    """A page: `report` is None where the program could not be judged; `findings` then say why.
+    `pictures` are (caption, address): of a file beside the page, or a data address."""
 
     title: str
     report: Report | None
@@ -626,13 +626,13 @@ class Page:
 
     @property
     def verdict(self) -> str:
-        """In one word whether the program may be cut."""
+        """ "error", "warning" or "fine": whether the program may be cut."""
         grave = {finding.severity for finding in self.findings}
         return next((word for word in ("error", "warning") if word in grave), "fine")
 
 
 def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
-    """(name, value) of the machine and the settings, in their order."""
+    """(name, value) of the machine and the settings, in order."""
     digests = [("machine", f"{setup.machine}, digest {setup.machine_sha256}")]
     if setup.program_sha256 is not None:
         digests.append(("program", f"digest {setup.program_sha256}"))
@@ -643,14 +643,14 @@ def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
 
 
 def shortened(words: str) -> str:
-    """Words that do not fill a page."""
+    """The text, shortened to `NAME_SHOWN` characters."""
     return words if len(words) <= NAME_SHOWN else words[: NAME_SHOWN - 1] + "…"
 
 
 def page_json(page: Page) -> str:
     """The report's own keys, with `title`, `verdict` and `setup` before them; indented.
 
-    Where nothing could be judged, `findings` are all that follows."""
+    Where the program could not be judged, only `findings` follow."""
     body: dict[str, Any] = {"title": page.title, "verdict": page.verdict}
     body["setup"] = None if page.setup is None else asdict(page.setup)
     if page.report is not None:
@@ -659,13 +659,13 @@ def page_json(page: Page) -> str:
     return to_json(body)
 
 
-# The tables of a Report as rows of words, for Markdown and HTML alike.
+# The tables of a Report as rows of text, for Markdown and HTML.
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table: `noun` names what its rows are, `words` how many of its first columns hold words
-    (the rest are numbers). Cells are words of any kind, not yet escaped."""
+    """A table: `noun` is what its rows are called, `words` the number of leading columns with text
+    (the others hold numbers). Cells are not escaped."""
 
     noun: str
     heads: tuple[str, ...]
@@ -674,7 +674,7 @@ class Sheet:
 
 
 def sheets(report: Report) -> Iterator[Sheet]:
-    """Errors by source, dimensions, circles, contours and worst moves; none that is empty."""
+    """Errors by source, dimensions, circles, contours and worst moves, without empty tables."""
     every = (
         _error_sheet(report),
         _dimension_sheet(report),
@@ -741,7 +741,7 @@ def _both_ways_sheet(report: Report) -> Sheet:
 
 
 def _contour_sheet(report: Report) -> Sheet:
-    """The contours, those with the largest errors first."""
+    """The contours, by falling error."""
     heads = (
         "contour",
         "where",
@@ -797,20 +797,20 @@ def _at(at_mm: tuple[float, float]) -> str:
     return f"({at_mm[0]:.3f}, {at_mm[1]:.3f})"
 
 
-# A page as Markdown that fits the summary of a pipeline's job or a comment of a pull request.
+# A page as Markdown, for the summary of a pipeline's job or a comment on a pull request.
 #
-# Names come from drawings: whatever they hold, they are words here, neither mark-up nor a link, a
-# picture, a mention or a formula.
+# Names come from drawings: whatever they contain, they are shown as text, never as mark-up, a
+# link, a picture, a mention or a formula.
 
 MARKDOWN_ROWS = 12
-"""Markdown has at most this many rows of each table; JSON has them all."""
+"""Markdown shows so many rows of each table; JSON has them all."""
 
 MARKDOWN_FINDINGS = 50
-"""Markdown has at most this many findings, the gravest first; JSON has them all."""
+"""Markdown shows so many findings, errors first; JSON has them all."""
 
 PAGE_BYTES = 65_000
-"""A page ends before it is longer: a comment on GitHub holds 65,536 characters, and a job's
-summary 1 MiB, so that sixteen pages fit one."""
+"""The longest page: a comment on GitHub may have 65,536 characters, and the summary of a job 1
+MiB, so that sixteen pages fit into it."""
 
 _MARKS = frozenset("\\`*_[]<>|#~$&!")
 _BROKEN = {"@": "@<!-- -->", "://": ":<!-- -->//", "www.": "www<!-- -->."}
@@ -818,7 +818,7 @@ _GRAVEST_FIRST = {"error": 0, "warning": 1}
 
 
 def markdown(page: Page) -> str:
-    """The page, at most PAGE_BYTES long; a line at its end says so where something is left out."""
+    """The page, at most PAGE_BYTES long; where something is left out, its last line says so."""
     kept: list[str] = []
     room = PAGE_BYTES
     for line in _markdown_lines(page):
@@ -831,7 +831,7 @@ def markdown(page: Page) -> str:
 
 
 def markdown_words(words: str) -> str:
-    """One line that Markdown takes as words, and not too many of them."""
+    """The text, shortened and escaped, as one line of Markdown."""
     line = shortened(one_line(words))
     escaped = "".join("\\" + sign if sign in _MARKS else sign for sign in line)
     for mark, broken in _BROKEN.items():

@@ -1,16 +1,16 @@
-"""The shape that a tool makes against the one that it should make, seen from above.
+"""The machined shape against the wanted shape, seen from above.
 
-What is cut away at the surface is what the tool's cross-section there covers on its way: a disc
-of its diameter, or, of a V bit, the larger the deeper its tip is. Overcut is what is cut away
-beside the wanted, undercut what stays of it; each has an area and a depth, how far its farthest
-point lies from the other shape. Wanted is what the tool covers on the wanted path, but for what
-must stay (`Kept`): where a plan itself cuts beyond a drawn wall, that is overcut, however well it
-is followed, and an error that is found (`OVERCUT`).
+At the surface of the stock the tool removes what its cross-section there covers along its path: a
+disc of its diameter, or for a V bit a disc that is larger the deeper the tip is. Overcut is
+removed but should not be, undercut should be removed but is not. Each has an area and a depth: the
+largest distance of its points from the other shape. The wanted shape is what the tool covers along
+the wanted path, without what must stay (`Kept`): where the plan itself cuts into a drawn wall,
+that is overcut, however well the path is followed, and a finding (`OVERCUT`).
 
-Arcs are chords here, and so are the discs' edges: both shapes with the same tolerance, so that
-depths are wrong by two of it at most; what is not deeper than that is nothing. All depths of a
-job are seen as one. The predicted path is the thinned one of the trace, which must have points
-enough for its arcs (`points_wanted`).
+Arcs and the edges of discs are chords here, with the same tolerance for both shapes. Depths are
+therefore wrong by up to twice the tolerance, and smaller depths are taken as 0. All depths of a
+job are seen as one. The predicted path is the thinned trace, which needs enough points for its
+arcs (`points_wanted`).
 """
 
 from __future__ import annotations
@@ -34,41 +34,39 @@ from camtool.verification.cuts import CutMoves, moved_lengths
 from camtool.verification.slides import Trace
 
 SHAPE_TOLERANCE_MM = 5e-4
-"""How far chords may be from their arcs, at most ..."""
+"""The tolerance of chords, at most ..."""
 
 TOLERANCE_SHARE = 2e-3
 """... and at most this share of the tool's radius."""
 
 FEWEST_QUARTER = 8
-"""A quarter of the tool's edge has at least this many chords."""
+"""A quarter of the tool's edge has at least so many chords."""
 
 KEPT_SHARE = 0.25
-"""Chords of material to be kept are nearer to their arcs than those of cuts: within this part of
-the tolerance."""
+"""The tolerance of chords for what must stay, as a part of the tolerance for cuts."""
 
 KEPT_SLACK_MM = 1e-3
-"""Material to be kept counts as thinner by a micrometre: carvings and tight slots are as exact."""
+"""What must stay is reduced by this at its edges: carvings and tight slots are no more exact."""
 
 DEPTH_SPACING_MM = 0.02
-"""The depth of a strip is measured at places no farther apart than this ..."""
+"""The depth of a strip is measured at points no farther apart than this ..."""
 
 MOST_PLACES = 20_000
-"""... but at no more than about this many of them."""
+"""... but at no more than about so many points."""
 
 OVERCUT_MM = 0.005
-"""A plan that goes beyond the drawing by more than this is in error."""
+"""A plan that cuts into what must stay by more than this is an error."""
 
 MOST_MOVES = 10_000
-"""Programs of more cutting moves get no shape: sweeping them would take longer than all other work
-..."""
+"""Programs of more cutting moves get no shape: to sweep them would take longest of all ..."""
 
 MOST_POINTS = 200_000
-"""... and none whose path needs more points than this to be exact."""
+"""... and so do programs whose path would need more points than this."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """The machined shape against the wanted one, mm and mm²; `tolerance_mm` of its chords."""
+    """The machined shape against the wanted shape, mm and mm²; `tolerance_mm` of the chords."""
 
     diameter_mm: float
     overcut_mm2: float
@@ -87,11 +85,11 @@ class Cutter:
 
     @property
     def tolerance_mm(self) -> float:
-        """How far chords may be from their arcs."""
+        """The tolerance of chords, mm."""
         return min(SHAPE_TOLERANCE_MM, TOLERANCE_SHARE * 0.5 * self.diameter_mm)
 
     def radius_mm(self, z: Floats) -> Floats:
-        """(J,) how wide it cuts at the surface with its tip at these heights."""
+        """(J,) mm: the radius of the cut at the surface, with the tip at the heights `z` (J,)."""
         most = 0.5 * self.diameter_mm
         if self.cone is None:
             return np.full(len(z), most)
@@ -100,14 +98,14 @@ class Cutter:
 
     @property
     def quarter(self) -> int:
-        """So many chords are a quarter of its edge."""
+        """Number of chords of a quarter of its edge."""
         sagitta = max(1.0 - self.tolerance_mm / (0.5 * self.diameter_mm), 0.0)
         return max(FEWEST_QUARTER, math.ceil(0.25 * math.pi / math.acos(sagitta)))
 
 
 def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
-    """The tool that these moves are judged with; a V bit of which nobody knows how wide it is at
-    its top is as wide as it must be. None when there is no tool, or none of any width."""
+    """The tool for these moves. A V bit of unknown diameter is as wide as the deepest cut needs.
+    None without a tool, and for one without width."""
     diameter = options.tool_diameter_mm or 0.0
     if not diameter and options.cone is not None and len(cuts.ends_z):
         depth = max(-float(cuts.ends_z.min()), 0.0)
@@ -116,12 +114,12 @@ def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
 
 
 def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
-    """How many points a trace of these moves must have for the shape of a tool; None when that is
-    too much work, or no tool.
+    """The number of points that a trace of these moves needs for the shape; None without a tool,
+    and where that would be too many.
 
-    Chords of s mm leave an arc of radius r by s²/(8 r), so s ≤ √(8 r tolerance) of the smallest
-    arc will do; a trace has a point every 2 way / points mm, twice as far apart at most, and one
-    at the end of each move.
+    Chords of s mm are s²/(8 r) off an arc of radius r, so s ≤ √(8 r tolerance) for the smallest
+    arc is enough. A trace has a point every 2 length / points mm, or up to twice as far apart, and
+    one at the end of each move.
     """
     arcs = decoded.segments.is_arc
     if cutter is None or len(decoded.rows) > MOST_MOVES:
@@ -130,15 +128,15 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
     if arcs.any():
         least = float(decoded.segments.radius[arcs].min())
         chord = math.sqrt(8.0 * least * cutter.tolerance_mm)
-        way = float(moved_lengths(decoded.toolpath).sum())
-        points += math.ceil(4.0 * way / chord)
+        length = float(moved_lengths(decoded.toolpath).sum())
+        points += math.ceil(4.0 * length / chord)
     return points if points <= MOST_POINTS else None
 
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What a tool should cut away, a region of shapely's; how far the wanted path itself takes it
-    into what must stay, mm, and where."""
+    """What a tool should remove, as a region of shapely; how deep (mm) the wanted path itself cuts
+    into what must stay, and where."""
 
     cutter: Cutter
     region: Any
@@ -147,8 +145,8 @@ class Wanted:
 
 
 def wanted_shape(cuts: CutMoves, cutter: Cutter, kept: Sequence[Kept] = ()) -> Wanted | None:
-    """What the tool covers along the wanted moves; where it is known what must stay, along the
-    runs that must leave it, without that. None when nothing is cut."""
+    """What the tool covers along the wanted moves; with `kept`, what it covers along its runs,
+    without what must stay. None when nothing is cut."""
     import shapely
 
     if not kept:
@@ -167,25 +165,26 @@ def wanted_shape(cuts: CutMoves, cutter: Cutter, kept: Sequence[Kept] = ()) -> W
         taken.append(into)
     if not left:
         return None
-    asked = left[0] if len(left) == 1 else shapely.union_all(left)
-    # What one may not take, another may.
-    _, depth, at = _beyond(shapely.union_all(taken), asked, cutter.tolerance_mm)
-    return Wanted(cutter, asked, depth, at)
+    wanted = left[0] if len(left) == 1 else shapely.union_all(left)
+    # What must stay for one operation may be removed by another.
+    _, depth, at = _beyond(shapely.union_all(taken), wanted, cutter.tolerance_mm)
+    return Wanted(cutter, wanted, depth, at)
 
 
 def overcut_findings(
-    wanted: Wanted | None, said: Collection[Code | TargetCode]
+    wanted: Wanted | None, planned: Collection[Code | TargetCode]
 ) -> Iterator[Finding]:
-    """A plan that cuts beyond the walls of its drawing, unless that is said already."""
-    if wanted is None or wanted.beyond_mm <= OVERCUT_MM or Code.GOUGE in said:
+    """OVERCUT for a plan that cuts into what must stay, unless GOUGE is among the codes of its
+    findings already."""
+    if wanted is None or wanted.beyond_mm <= OVERCUT_MM or Code.GOUGE in planned:
         return
     x, y = wanted.at_mm
     yield OVERCUT(where=f"near ({x:.3f}, {y:.3f}) mm", measured=wanted.beyond_mm, limit=OVERCUT_MM)
 
 
 def machined_shape(trace: Trace, toolpath: Toolpath, wanted: Wanted) -> Shape | None:
-    """What the tool makes along the trace of a toolpath against what it should make; None when it
-    cuts nothing."""
+    """What the tool covers along the trace of a toolpath against what it should cover; None when
+    nothing is cut."""
     cutter, tolerance = wanted.cutter, wanted.cutter.tolerance_mm
     made = _swept(_runs(trace, toolpath, cutter), cutter)
     if made is None:
@@ -196,21 +195,21 @@ def machined_shape(trace: Trace, toolpath: Toolpath, wanted: Wanted) -> Shape | 
 
 
 def _beyond(one: Any, other: Any, tolerance: float) -> tuple[float, float, tuple[float, float]]:
-    """Area (mm²) of `one` outside of `other`, how far it reaches (mm) and where; 0 within
-    chords."""
+    """Area (mm²) of `one` outside `other`, its depth (mm) and its place; 0 for depths within the
+    tolerance of chords."""
     import shapely
 
     rest = shapely.difference(one, other)
     if rest.is_empty:
         return 0.0, 0.0, (0.0, 0.0)
-    # Between its corners a strip may be wider than at them.
+    # A strip may be deeper between its corners than at them.
     dense = shapely.segmentize(rest, max(rest.length / MOST_PLACES, DEPTH_SPACING_MM))
     places = shapely.get_coordinates(dense)
     nowhere = (0.0, 0.0)
     if len(shapely.get_coordinates(shapely.boundary(other))) == 0:
         return float(rest.area), math.inf, nowhere
     tree = shapely.STRtree(_pieces(other))
-    shapely.prepare(other)  # which newer shapely does by itself
+    shapely.prepare(other)  # newer versions of shapely do this themselves
     places = places[~shapely.intersects_xy(other, *places.T)]
     points = shapely.points(places)
     (row, _), distance = tree.query_nearest(points, return_distance=True, all_matches=False)
@@ -222,7 +221,7 @@ def _beyond(one: Any, other: Any, tolerance: float) -> tuple[float, float, tuple
 
 
 def _pieces(region: Any) -> Any:
-    """The edges of a region's boundary, one by one."""
+    """The edges of the boundary of a region."""
     import shapely
 
     rings = shapely.get_rings(shapely.get_parts(region))
@@ -243,10 +242,10 @@ class _Lines:
 
 
 def _swept(lines: _Lines, cutter: Cutter) -> Any:
-    """What the tool covers at the surface along lines; None along nothing.
+    """What the tool covers at the surface along lines; None without lines.
 
-    Between two near points of a V bit's way the radius changes evenly: it covers the hull of the
-    discs at both.
+    Between two neighbouring points the radius of a V bit changes evenly: it covers the convex hull
+    of the discs at both.
     """
     import shapely
 
@@ -263,8 +262,8 @@ def _swept(lines: _Lines, cutter: Cutter) -> Any:
 
 
 def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
-    """The cutting stretches of a trace as lines, straightened within the tolerance; those of a V
-    bit row by row, as its height changes evenly along each."""
+    """The cutting runs of a trace as lines, simplified within the tolerance; with a V bit each row
+    is a line, because the height changes evenly along it."""
     import shapely
 
     which = np.flatnonzero(trace.cutting)
@@ -275,13 +274,13 @@ def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
     heights: list[Floats] = []
     line: list[Ints] = []
     for run in np.split(which, np.flatnonzero(ends) + 1) if len(which) else ():
-        begin = max(int(run[0]) - 1, 0)  # the slides come from there
+        begin = max(int(run[0]) - 1, 0)  # the position before the run
         some = trace.points[begin : int(run[-1]) + 1]
         if len(some) < 2:
             continue
         row = int(trace.row[run[0]])
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(some, axis=0).T))])
-        share = way / way[-1] if way[-1] > 0.0 else np.zeros(len(way))
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(some, axis=0).T))])
+        share = length / length[-1] if length[-1] > 0.0 else np.zeros(len(length))
         low, high = toolpath.starts[row, 2], toolpath.end[row, 2]
         solid = np.column_stack([some, low + share * (high - low)])
         flat = shapely.simplify(shapely.linestrings(solid), 0.5 * cutter.tolerance_mm)
@@ -295,8 +294,8 @@ def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
 
 
 def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
-    """The moves of runs that cut, and the heights (K, 2) of their ends; each once, where the tool
-    is as wide at every height."""
+    """The cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves at
+    several heights one is enough, unless the tool is a V bit."""
     rows = [np.hstack([run[:-1], run[1:]]) for run in kept.runs]
     moves = np.concatenate([np.empty((0, 8)), *rows])
     lowest = np.minimum(moves[:, 2], moves[:, 6])
@@ -309,7 +308,7 @@ def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
 
 
 def _solid(kept: Kept, swept: Any, tolerance: float) -> Any:
-    """What must stay, a hair smaller than drawn, about a region."""
+    """What must stay around a region, smaller than drawn by `KEPT_SLACK_MM`."""
     import shapely
 
     low_x, low_y, high_x, high_y = shapely.bounds(swept).tolist()
@@ -325,7 +324,7 @@ def _solid(kept: Kept, swept: Any, tolerance: float) -> Any:
 
 
 def _chords(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:
-    """Lines and arcs, with the heights (K, 2) of their ends, as lines of chords."""
+    """Lines and arcs as chords, with the heights (K, 2) of their ends."""
     radius = np.where(segments.is_arc, segments.radius, 1.0)
     most = 2.0 * np.arccos(np.clip(1.0 - tolerance / np.maximum(radius, tolerance), -1.0, 1.0))
     parts = np.where(segments.is_arc, np.ceil(np.abs(segments.sweep) / most), 1.0)

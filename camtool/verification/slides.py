@@ -1,9 +1,9 @@
-"""One pass over the motion: the errors of interpolation and mechanics, and what the part becomes.
+"""One pass over the motion: errors of interpolation and mechanics, circles, and the slides' path.
 
 The compiled judge (`camtool.kernels.judge`) takes the samples, from chunks or from a controller
-that is run on the way, and fills columns of the rows; this module sets its task and reads what it
-found. Circles are closed as soon as their last row is done, so that bins are there only for those
-that are under way. Memory grows with the rows of the program, not with the steps.
+that is judged as it is simulated, and fills columns of the rows; this module sets its task and
+reads the results. A circle is evaluated when its last row is done, so that only circles in
+progress have bins. Memory grows with the rows of the program, not with the steps.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ BINS_KEPT = 64
 
 @dataclass(frozen=True, eq=False)
 class SeenCircle:
-    """A circle and what became of it, with its bins (720, 9) about the programmed centre."""
+    """A circle, its figures, and its bins (720, 9) about the programmed centre."""
 
     circle: Circle
     figures: CircleFigures
@@ -57,7 +57,7 @@ class SeenCircle:
 
 
 class SlidePass:
-    """Takes the motion in order; its figures hold after `finish`."""
+    """Takes the motion in order; its figures are complete after `finish`."""
 
     def __init__(self, decoded: MoveIndex, goal: Goal, match: Match, trace: TraceSize) -> None:
         self.circles = goal.circles
@@ -107,22 +107,22 @@ class SlidePass:
         )
 
     def run(self, steps: FusedRun) -> None:
-        """All rows of a controller that is run on the way."""
+        """All rows of a controller that is judged as it is simulated."""
         for low, high in pairwise(self._bounds(0, steps.rows)):
             self._close(low)
             add_ledger(self._ledger, steps.judge(low, high, self._task, self._sums))
 
     def finish(self) -> None:
-        """No more motion will come: close the circles."""
+        """End of the motion: evaluate the remaining circles."""
         self._close(len(self._ledger.row))
 
     def _bounds(self, low: int, high: int) -> list[int]:
-        """Rows from low to high at which circles must be closed first, both ends included."""
+        """`low`, `high` and the rows between them before which circles are evaluated."""
         inner = sorted({int(self._last[circle]) + 1 for circle in self._closing})
         return [low, *(row for row in inner if low < row < high), high]
 
     def _close(self, row: int) -> None:
-        """Take the figures of the circles that end before a row, and free their bins."""
+        """Evaluate the circles that end before a row, and empty their bins."""
         while self._closing and self._last[self._closing[0]] < row:
             circle = self._closing.pop(0)
             bins = self._sums.bins[self._slot[circle]]
@@ -137,7 +137,7 @@ class SlidePass:
             bins[:] = empty_bins(1)[0]
 
     def seen(self) -> tuple[SeenCircle, ...]:
-        """The circles that were gone round, in their order, as far as they are kept."""
+        """The circles that the slides followed, in order; at most `BINS_KEPT`."""
         return tuple(
             SeenCircle(self.circles[circle], self.circle_figures[circle], found, self.bins[circle])
             for circle in sorted(self.bins)
@@ -146,7 +146,7 @@ class SlidePass:
 
     @property
     def rows(self) -> RowFigures:
-        """What became of each row."""
+        """The figures of each row."""
         return row_figures(self._sums.rows, self._cuts.is_cut, self._ledger)
 
     def trace(self) -> Trace:
@@ -154,7 +154,7 @@ class SlidePass:
         return trace_of(self._sums, self._start, self._cuts.is_cut, self._most)
 
     def interpolation(self) -> Figure:
-        """Interpolation over all samples that cut."""
+        """The interpolation error over all cutting samples."""
         rows = self.rows
         judged = np.where(self._cuts.is_cut, rows.samples, 0)
         return Figure.of_rows(
@@ -162,19 +162,19 @@ class SlidePass:
         )
 
     def mechanics(self) -> Figure:
-        """Mechanics over all samples that cut; without a percentile."""
+        """The error of the mechanics over all cutting samples, without a percentile."""
         rows = self.rows
         judged = np.where(self._cuts.is_cut, rows.samples, 0)
         return Figure.of_rows(rows.mechanics, rows.mechanics_squares, judged, None)
 
     def total(self) -> Figure:
-        """The total over all samples that have one."""
+        """The total error over all samples that have one."""
         rows = self.rows
         return Figure.of_rows(rows.total, rows.total_squares, rows.known, self._sums.histograms[1])
 
 
 def largest(errors: Floats, which: Bools) -> float:
-    """The largest of the errors (N,) that are picked and known, mm; NaN without any."""
+    """The largest known error (N,) of the rows `which` (N,), mm; NaN without any."""
     picked = errors[which & np.isfinite(errors)]
     return float(picked.max()) if len(picked) else math.nan
 
@@ -221,14 +221,15 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
 
 
 def _heights(decoded: MoveIndex, depth_mm: float) -> Floats:
-    """(N, 2) mm: between which heights each row is compared."""
+    """(N, 2) mm: the lowest and highest height with which each row is compared."""
     toolpath = decoded.cuts.toolpath
     ends = np.column_stack([toolpath.starts[:, 2], toolpath.end[:, 2]])
     return np.asarray(np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]))
 
 
 def _rows_of_circles(circle: Ints, count: int) -> tuple[Ints, Ints]:
-    """(count,), (count,) first and last row (N,) that belong to each circle; last −1: none."""
+    """(count,), (count,) first and last row of each circle; last is −1 for a circle without rows.
+    `circle` (N,) is the circle of each row."""
     first = np.full(count, len(circle), dtype=np.int64)
     last = np.full(count, -1, dtype=np.int64)
     rows = np.flatnonzero(circle >= 0)
@@ -238,7 +239,8 @@ def _rows_of_circles(circle: Ints, count: int) -> tuple[Ints, Ints]:
 
 
 def _slots(first: Ints, last: Ints) -> Ints:
-    """(C,) bins for each circle: other ones than those of circles whose rows overlap its own."""
+    """(C,) the number of the bins that each circle uses: circles with overlapping rows use
+    different ones."""
     slot = np.full(len(first), -1, dtype=np.int64)
     busy: list[tuple[int, int]] = []
     free: list[int] = []
@@ -255,14 +257,14 @@ def _in_order(first: Ints, last: Ints) -> Iterator[int]:
     yield from seen[np.argsort(first[seen], kind="stable")].tolist()
 
 
-# Cutting moves as the columns that the compiled judge reads: one move for each row that cuts.
+# Cutting moves as columns for the compiled judge: one move for each row that cuts.
 
 
 @dataclass(frozen=True, eq=False)
 class MoveTable:
     """The J rows of a toolpath that cut: `moves` (J, 16) of `camtool.kernels.move_errors`,
-    `boxes` (J, 4), `heights` (J, 2) mm, `contour` (J,) ascending, `of_row` (N,) the index of each
-    row or −1."""
+    `boxes` (J, 4), `heights` (J, 2) mm, `contour` (J,) ascending; `of_row` (N,) is the index of
+    each row, or −1."""
 
     moves: Floats
     boxes: Floats
@@ -271,7 +273,7 @@ class MoveTable:
     of_row: Ints
 
     def ranges(self, only: Ints) -> Ints:
-        """(R, 2) first and last (not included) index of the contours `only` (R,), or of all."""
+        """(R, 2) begin and end (not included) of the contours `only` (R,), or of all moves."""
         low = np.searchsorted(self.contour, only, side="left")
         high = np.searchsorted(self.contour, only, side="right")
         every = only == ANY_CONTOUR
@@ -289,13 +291,13 @@ def move_table(cuts: CutMoves) -> MoveTable:
     is_arc, centre = segments.is_arc[first], segments.centre[first]
     sweep = np.abs(segments.sweep[first]) * (last - first + 1)
     turn = np.where(segments.bulge[first] < 0.0, -1.0, 1.0)
-    way = end - start
-    square = (way**2).sum(axis=1)
+    chord = end - start
+    square = (chord**2).sum(axis=1)
     toolpath = cuts.toolpath
     closed = (toolpath.starts[rows, :2] == toolpath.end[rows, :2]).all(axis=1)
     moves = np.zeros((len(rows), at.COLUMNS))
     moves[:, [at.AX, at.AY]], moves[:, [at.BX, at.BY]] = start, end
-    moves[:, [at.DX, at.DY]] = way
+    moves[:, [at.DX, at.DY]] = chord
     moves[:, at.OVER] = 1.0 / np.where(square > 0.0, square, 1.0)
     moves[:, at.TURN] = turn
     arcs = np.flatnonzero(is_arc)
@@ -318,16 +320,16 @@ def move_table(cuts: CutMoves) -> MoveTable:
     )
 
 
-# The path of the slides, thinned for pictures: bounded, with row ends and error peaks kept.
+# The path of the slides, thinned for pictures to a bounded number of points.
 #
-# Of every `stride` samples of a row the judge keeps the one with the largest error, and each row's
-# last (`camtool.kernels.thin_trace`).
+# Of every `stride` samples of a row the judge keeps the one with the largest error, and the last
+# sample of each row (`camtool.kernels.thin_trace`).
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Points (T, 2) mm of the slides in order, `error_mm` (T,) against what was wanted (0 where
-    nothing is cut), `row` (T,) of the decoded toolpath, `cutting` (T,)."""
+    """T positions of the slides in order: `points` (T, 2) mm, `error_mm` (T,) from the wanted
+    moves (0 where nothing is cut), `row` (T,) of the decoded toolpath, `cutting` (T,)."""
 
     points: Floats
     error_mm: Floats
@@ -337,8 +339,8 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class TraceSize:
-    """Where the slides begin (1, 2) mm, of how many samples of a row one is kept, and how many
-    points there may be in the end."""
+    """The start of the slides (1, 2) mm; one of every `stride` samples of a row is kept; the most
+    points of a trace."""
 
     start: Floats
     stride: int
@@ -346,7 +348,7 @@ class TraceSize:
 
 
 def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
-    """A stride for samples about `spacing_mm` apart, so that about half of `most` come of it."""
+    """A stride for samples about `spacing_mm` apart that keeps about half of `most` points."""
     rise = np.abs(decoded.end[:, 2] - decoded.starts[:, 2]) if len(decoded) else np.zeros(0)
     expected = float((moved_lengths(decoded) + rise).sum()) / spacing_mm
     stride = max(1, int(np.ceil(2.0 * expected / most)))
@@ -354,12 +356,13 @@ def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
 
 
 def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
-    """What the judge kept, and the start (1, 2) mm before it; of what is more than `most` points
-    (more rows than points) the peaks again. `cutting` (N,) tells the rows that cut."""
+    """The start (1, 2) mm and the samples that the judge kept. Where they are more than `most`
+    (more rows than points), runs of them are reduced to the sample with the largest error.
+    `cutting` (N,): the rows that cut."""
     from camtool.kernels.thin_trace import WRITTEN, unwritten
 
-    written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)
-    kept = np.concatenate([sums.trace[:written], held])
+    written = int(sums.pen[WRITTEN])
+    kept = np.concatenate([sums.trace[:written], unwritten(sums.pen)])
     row, count = kept[:, 3].astype(np.int64), len(kept)
     whole = Trace(
         np.concatenate([start, kept[:, :2]]),

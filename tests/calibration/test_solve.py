@@ -1,4 +1,4 @@
-"""Least squares against numpy's own, what cannot be told, and outliers."""
+"""Least squares against numpy's own, parameters that are not determined, and outliers."""
 
 from __future__ import annotations
 
@@ -97,17 +97,17 @@ def test_the_compensation_that_was_active_is_part_of_the_play(tmp_path: Path) ->
         (
             "[[squares]]\nnominal_mm = [5.0, 4.0]\ndx_mm = 4.9\ndy_mm = 3.9\n",
             {
-                "scale of x": "the readings cannot tell it from play of x",
-                "scale of y": "the readings cannot tell it from play of y",
+                "scale of x": "the readings cannot distinguish it from play of x",
+                "scale of y": "the readings cannot distinguish it from play of y",
                 "squareness": "no reading depends on it",
             },
         ),
         (
             "[[squares]]\nnominal_mm = [5.0, 5.0]\ndiagonals_mm = [7.08, 7.06]\n",
             {
-                "scale of x": "the readings cannot tell it from play of x",
-                "play of y": "the readings cannot tell it from play of x",
-                "scale of y": "the readings cannot tell it from play of x",
+                "scale of x": "the readings cannot distinguish it from play of x",
+                "play of y": "the readings cannot distinguish it from play of x",
+                "scale of y": "the readings cannot distinguish it from play of x",
             },
         ),
         (

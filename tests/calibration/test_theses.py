@@ -85,7 +85,11 @@ def test_the_two_lines_of_the_pic_machine() -> None:
 def test_the_squares_of_the_pic_machine_with_their_signs() -> None:
     result = calibrated("pic-mmh-squares.toml", "pic-mmh")
     held = [each.name for each in result.not_estimated]
-    assert held == ["scale of x", "scale of y", "squareness"]  # one size: no telling from play
+    assert held == [
+        "scale of x",
+        "scale of y",
+        "squareness",
+    ]  # one size: not distinguished from play
     # Dx = 2.5 − (B − C): what is left is the mean of 2.5 − Dx, with its sign. The thesis's
     # |2.5 − D| gives 11.67 (printed 11.5) and 9.67 µm (9.5) (L2457-2488), right for X alone.
     added = {"x": 1375 * 0.00014, "y": 1204 * 0.00014}  # whole steps of 0.1925 and 0.1685
