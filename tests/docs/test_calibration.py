@@ -57,7 +57,7 @@ def test_the_error_is_seen_and_falls(folder: Path) -> None:
 def test_the_table_says_what_the_commands_find(folder: Path) -> None:
     report = json.loads((folder / "my-mmh.json").read_text())
     found = {(e["what"], e["axis"], e["region"]): e for e in report["estimates"]}
-    assert f"play {1000 * found['play', 'x', '']['value']:.2f} and" in PAGE
+    assert f"backlash {1000 * found['play', 'x', '']['value']:.2f} and" in PAGE
     assert f"{1000 * found['play', 'y', '']['value']:.2f} µm (printed" in PAGE
     x, y = found["step", "x", ""], found["step", "y", ""]
     assert f"steps of {1e6 * x['value']:.2f} and {1e6 * y['value']:.2f} nm" in PAGE
@@ -84,7 +84,7 @@ def test_the_table_says_what_the_other_samples_give() -> None:
     steps = [1e6 * value_of(circles, "step", axis) for axis in "xy"]
     assert f"steps of {steps[0]:.2f} and {steps[1]:.2f} nm" in PAGE
     plays = [1e3 * value_of(circles, "play", axis) for axis in "xy"]
-    assert f"play {plays[0]:.0f} and {plays[1]:.0f} µm" in PAGE
+    assert f"backlash {plays[0]:.0f} and {plays[1]:.0f} µm" in PAGE
     assert circles.spread_mm is not None
     assert f"residuals of {1000.0 * circles.spread_mm:.0f} µm" in PAGE
 
