@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from camtool.verification.verify import Verification
 
 WINDOW_STEPS = 30.0
-"""The picture shows so many steps of the coarser axis on each side of the largest error ..."""
+"""The picture shows this many steps of the coarser axis on each side of the largest error ..."""
 
 WINDOW_ERRORS = 1.5
-"""... or so many times that error, whichever is more ..."""
+"""... or this many times that error, whichever is more ..."""
 
 WHOLE = 2.0
-"""... or the whole path, unless it is so many times larger than that."""
+"""... or the whole path, unless it is this many times larger than that."""
 
 ROOM = 0.25
 """Paths are drawn in a window wider by this share on each side: the page may show more."""

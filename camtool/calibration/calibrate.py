@@ -53,7 +53,7 @@ INVOLVED = 1e-6
 """A parameter is part of such a direction when its share is above this."""
 
 OUTLIER_SIGMAS = 3.0
-"""A reading whose residual exceeds so many of its standard deviations is an outlier."""
+"""A reading whose residual exceeds this many of its standard deviations is an outlier."""
 
 OUTLIER_FREEDOM = 4
 """That standard deviation is estimated from the other readings if they exceed the parameters by so
@@ -175,15 +175,15 @@ def _fixing_order(parameter: Parameter) -> int:
 # The values of the machine.
 
 ZERO_SIGMAS = 3.0
-"""A backlash below zero by at most so many standard uncertainties, or by a step, counts as zero; a
-lower one is a fault of the measurements."""
+"""A backlash below zero by at most this many standard uncertainties, or by a step, counts as zero;
+a lower one is a fault of the measurements."""
 
 
 @dataclass(frozen=True)
 class Estimate:
     """A value of the machine: `before` is that of its file, `value` the measured one, with its
-    standard `uncertainty` (None: not known); so many `readings` depend on it. Steps and backlash
-    (`what` is "play") in mm, squareness in rad."""
+    standard `uncertainty` (None: not known); `readings` is the number of readings that depend on
+    it. Steps and backlash (`what` is "play") in mm, squareness in rad."""
 
     what: str
     axis: str

@@ -38,7 +38,7 @@ Point = tuple[float, float]
 # drawn, and easy to measure.
 
 FINENESS = 50.0
-"""The shorter side of a region has so many units of the grid, or a few more: the unit is a round
+"""The shorter side of a region has this many units of the grid, or a few more: the unit is a round
 number."""
 
 MARGIN_UNITS = 2
@@ -48,8 +48,8 @@ RUN_UP_UNITS = 4
 """The least length of a run-up, in units of the grid."""
 
 RUN_UP_PLAYS = 3.0
-"""A run-up is at least so many times the machine's backlash and compensation. With more than two,
-half of the longest line of a coupon, in whose middle the tool begins, takes them up."""
+"""A run-up is at least this many times the machine's backlash and compensation. With more than
+two, half of the longest line of a coupon, in whose middle the tool begins, takes them up."""
 
 SAME = 1e-9
 """Numbers of units that differ by less than this from a whole number are that number."""

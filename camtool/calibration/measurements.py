@@ -34,8 +34,8 @@ Any3 = Literal["x", "y", "z"]
 _ZERO_IS_A_RESULT = ("shorter_by_mm", "gap_x_mm", "gap_y_mm")
 
 MOST_TIMES = 2.0
-"""A length more than so many times its nominal one, or less than that part of it, is a mistake: a
-wrong unit, a missing digit."""
+"""A length more than this many times its nominal one, or less than that part of it, is a mistake:
+a wrong unit, a missing digit."""
 
 
 class Added(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -376,7 +376,7 @@ def _where(name: str, key: str) -> str:
 
 
 def _unit_meant(times: float) -> str:
-    """The correction for a length that is so many times its nominal one."""
+    """The correction for a length that is this many times its nominal one."""
     units = {"µm": 1000.0, "cm": 0.1, "m": 0.001, "inches": 1.0 / 25.4, "thousandths": 39.37}
     for unit, factor in units.items():
         if 1.0 / MOST_TIMES < times / factor < MOST_TIMES:

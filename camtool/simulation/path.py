@@ -46,7 +46,8 @@ from camtool.simulation.samples import (
 from camtool.toolpath.moves import Kind, Toolpath
 
 SPREAD_STEPS = 2.0
-"""Radii of the ends of an arc that differ by at most so many steps differ because of rounding."""
+"""Radii of the ends of an arc that differ by at most this many steps differ because of
+rounding."""
 
 LEAST_CHORD_STEPS = 2.0
 """An arc whose ends are nearer than this keeps its centre: its chord has no certain direction."""

@@ -32,7 +32,7 @@ TURN_EPS_RAD = 1e-9
 """A reversal nearer than this to an end of its arc is that end."""
 
 TURNS_OF_ARC = 4
-"""An arc has at most so many reversals between its ends."""
+"""An arc has at most this many reversals between its ends."""
 
 
 class Samples(Protocol):

@@ -18,14 +18,14 @@ COVERAGE_MM = 0.005
 """A move is missing, or extra, when farther than this from all moves of the other side ..."""
 
 COVERAGE_STEPS = 4.0
-"""... or than so many steps of the coarser axis, whichever is more ..."""
+"""... or than this many steps of the coarser axis, whichever is more ..."""
 
 COVERAGE_RESOLUTIONS = 1.5
-"""... or than so many units of a dialect that is coarser than the steps: rounding moves vertices
+"""... or than this many units of a dialect that is coarser than the steps: rounding moves vertices
 by up to 0.71 of a unit, and starts that a machine cannot reach by up to 1.41."""
 
 DEPTH_FITS = 2.0
-"""Heights may differ by the tolerance of coverage, by that of Z, or by so many fit tolerances,
+"""Heights may differ by the tolerance of coverage, by that of Z, or by this many fit tolerances,
 whichever is most: machines without slopes make slopes in steps of that height."""
 
 SAMPLE_MM = 0.01
@@ -35,7 +35,7 @@ TRACE_POINTS = 20_000
 """Points of the slides' path that are kept for pictures."""
 
 WORST_LISTED = 10
-"""So many moves with the largest errors are in a report, unless another number is given."""
+"""Number of moves with the largest errors in a report, unless another number is given."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class VerifyOptions:
     `kept`: which runs cut, and what must stay; () where that is not known. `size_bytes`: size of
     the file; `line_bytes`: what is sent over the line to the machine. `stray_mm`: how far the
     dialect may leave the wanted path on purpose. `trace_points`: points of the slides' path for
-    pictures. `worst`: so many moves with the largest errors are listed.
+    pictures. `worst`: number of moves listed as those with the largest errors.
     """
 
     interpolator: str | None = None

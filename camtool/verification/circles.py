@@ -26,7 +26,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.cuts import CutMoves
 
 FIT_ROUNDS = 30
-"""At most so many rounds for the least-squares centre, which converges in about four."""
+"""At most this many rounds for the least-squares centre, which converges in about four."""
 
 FIT_END_MM = 1e-9
 """The least-squares centre is found when it moves by less than this."""

@@ -119,7 +119,7 @@ def _same(one: Toolpath, other: Toolpath) -> bool:
 # What a job asks of a program, and the sides that are compared: decoded, written and wanted.
 
 LIMIT_UNITS = 1.5
-"""Moves may be so many units of the dialect apart: rounding moves ends by up to 0.71 of a unit,
+"""Moves may be this many units of the dialect apart: rounding moves ends by up to 0.71 of a unit,
 and the centres of arcs as well."""
 
 

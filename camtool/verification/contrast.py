@@ -93,7 +93,7 @@ def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
 
 
 MOST_SHOWN = 40_000
-"""At most so many samples of each variant are drawn; later ones are left out."""
+"""At most this many samples of each variant are drawn; later ones are left out."""
 
 
 def paths_within(

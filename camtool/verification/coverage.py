@@ -292,7 +292,7 @@ ALONG = 0.7
 opposite directions when it is below minus this; between, one crosses the other."""
 
 LONG_ENOUGH = 1.5
-"""The direction of moves shorter than so many times the tolerance is not certain: their ends are
+"""The direction of moves shorter than this many times the tolerance is not certain: their ends are
 rounded by up to 1.41 units in all, which turns a longer move by no more than 32 degrees."""
 
 Limits = tuple[float, float]
@@ -426,7 +426,8 @@ def other_way(compared: Compared, turned: Ints) -> Iterator[Finding]:
 # Points and blocks as findings name them, and how many findings are listed.
 
 FINDINGS_PER_CODE = 20
-"""So many findings of one kind are listed; the last of them says how many more there are."""
+"""At most this many findings of one kind are listed; the last of them says how many more there
+are."""
 
 
 def at_point(point: Floats | tuple[float, float]) -> str:

@@ -24,10 +24,11 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 
 FEWEST_SAMPLES = 4
-"""Each line and arc is sampled in at least so many parts, so that short moves are sampled too."""
+"""Each line and arc is sampled in at least this many parts, so that short moves are sampled
+too."""
 
 MOST_SAMPLES = 200_000
-"""Long programs are sampled more coarsely, so that there are about so many points."""
+"""Long programs are sampled more coarsely, so that there are about this many points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +219,7 @@ AS_LONG = 0.98
 """A later loop replaces the longest one so far if it has at least this part of its length."""
 
 FEW_PLACES = 48
-"""Up to so many points of a contour are compared pair by pair; above, in a grid of cells."""
+"""Up to this many points of a contour are compared pair by pair; above, in a grid of cells."""
 
 NO_LOOP = -1
 """First and last row of a contour without a loop."""

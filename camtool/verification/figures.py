@@ -235,7 +235,7 @@ def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
 # Figures of contours, the worst moves, and missed ends.
 
 END_STEPS = 1.5
-"""A move misses its end when the controller stops more than so many steps beside it; one step is
+"""A move misses its end when the controller stops more than this many steps beside it; one step is
 the rounding of an interpolator."""
 
 

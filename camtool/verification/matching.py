@@ -22,16 +22,17 @@ from camtool.verification.cuts import CutMoves, Samples
 from camtool.verification.nearest import ANY_CONTOUR, Found, Groups, MoveIndex, ranges, run_offsets
 
 MOST_TRIES = 4
-"""So many wanted contours are tried for each decoded contour."""
+"""At most this many wanted contours are tried for each decoded contour."""
 
 LEAST_MM = 1e-6
 """Moves nearer than this are found even when the tolerance is 0."""
 
 SAMPLES_PER_GROUP = 64
-"""Up to so many neighbouring samples share one search for near moves; fewer among close moves."""
+"""Up to this many neighbouring samples share one search for near moves; fewer among close
+moves."""
 
 GAPS_PER_GROUP = 4.0
-"""The box of a search is so many gaps between moves long, and holds about the square of that."""
+"""The box of a search is this many gaps between moves long, and holds about the square of that."""
 
 
 @dataclass(frozen=True, eq=False)

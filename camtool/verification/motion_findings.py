@@ -34,8 +34,8 @@ from camtool.verification.figures import RowFigures, Tally, missed_ends
 
 AXES = "XYZ"
 CLEARED_COVERAGES = 2.0
-"""A rapid may leave the cleared area by so many tolerances of coverage: it and the cuts beside it
-are rounded separately."""
+"""A rapid may leave the cleared area by this many tolerances of coverage: it and the cuts beside
+it are rounded separately."""
 
 TRAVEL_EPS_MM = 1e-6
 """A span may exceed the travel by this much, by rounding alone."""

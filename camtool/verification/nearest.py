@@ -30,10 +30,11 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.verification.cuts import CutMoves
 
 PAIRS_AT_ONCE = 1 << 17
-"""So many pairs of point and move are computed together: bounds memory, fits the cache."""
+"""At most this many pairs of point and move are computed together: bounds memory, fits the
+cache."""
 
 GROUPS_AT_ONCE = 1 << 13
-"""The near moves of so many groups are searched together: bounds memory."""
+"""The near moves of this many groups are searched together: bounds memory."""
 
 MARGIN_GROWTH = 4.0
 """The margin of a search grows by this factor while no move is found."""
@@ -284,13 +285,13 @@ class MoveIndex:
 # lie at the same places: a search uses only the layers at its own height.
 
 GAPS_PER_PIECE = 4.0
-"""A piece is as long as so many gaps between moves, if `MORE_PIECES` allows it."""
+"""A piece is as long as this many gaps between moves, if `MORE_PIECES` allows it."""
 
 MORE_PIECES = 400_000
 """Moves are divided into no more additional pieces than this: bounds memory, some 100 MB."""
 
 PIECES_OF_LAYER = 512
-"""A layer takes in moves of further heights until it has so many pieces."""
+"""A layer takes in moves of further heights until it has this many pieces."""
 
 
 def levels_of(z: Floats) -> Ints:

@@ -430,7 +430,7 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
 # The report as lines of text.
 
 MOST_OPERATIONS = 6
-"""So many operations are listed; the others are counted."""
+"""At most this many operations are listed; the others are counted."""
 
 
 def clock(seconds: float) -> str:
@@ -589,7 +589,7 @@ def percent(value: float | None) -> str:
 # the same job gives the same bytes.
 
 NAME_SHOWN = 200
-"""The text of a cell or a finding is shortened to so many characters on a page, not in JSON."""
+"""The text of a cell or a finding is shortened to this many characters on a page, not in JSON."""
 
 
 @dataclass(frozen=True)
@@ -803,10 +803,10 @@ def _at(at_mm: tuple[float, float]) -> str:
 # link, a picture, a mention or a formula.
 
 MARKDOWN_ROWS = 12
-"""Markdown shows so many rows of each table; JSON has them all."""
+"""Markdown shows this many rows of each table; JSON has them all."""
 
 MARKDOWN_FINDINGS = 50
-"""Markdown shows so many findings, errors first; JSON has them all."""
+"""Markdown shows this many findings, errors first; JSON has them all."""
 
 PAGE_BYTES = 65_000
 """The longest page: a comment on GitHub may have 65,536 characters, and the summary of a job 1

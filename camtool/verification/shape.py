@@ -40,7 +40,7 @@ TOLERANCE_SHARE = 2e-3
 """... and at most this share of the tool's radius."""
 
 FEWEST_QUARTER = 8
-"""A quarter of the tool's edge has at least so many chords."""
+"""A quarter of the tool's edge has at least this many chords."""
 
 KEPT_SHARE = 0.25
 """The tolerance of chords for what must stay, as a part of the tolerance for cuts."""
@@ -52,7 +52,7 @@ DEPTH_SPACING_MM = 0.02
 """The depth of a strip is measured at points no farther apart than this ..."""
 
 MOST_PLACES = 20_000
-"""... but at no more than about so many points."""
+"""... but at no more than about this many points."""
 
 OVERCUT_MM = 0.005
 """A plan that cuts into what must stay by more than this is an error."""
