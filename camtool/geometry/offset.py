@@ -71,7 +71,7 @@ from camtool.geometry.measure import Frames, dot, path_lengths, point_at, signed
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, lines_reversed
 
 NODE_EPS_MM = 1e-8
-"""Ends and meetings of raw elements nearer than this are one node."""
+"""Ends and intersections of raw elements nearer than this become one node."""
 
 VALIDITY_EPS_MM = 2e-7
 """A slice may be nearer to the source than the distance by this much and is still kept."""

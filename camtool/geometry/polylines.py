@@ -24,11 +24,12 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 
 POSITION_EPS_MM = 1e-6
-"""Two positions nearer than this are one (docs/numerics.md)."""
+"""Two positions nearer than this are equal (docs/numerics.md)."""
 
 BULGE_EPS = 1e-12
 """|bulge| may exceed 1 by rounding alone, by no more than this, and is then set to ±1; a bulge
-below this is a line: it strays from its chord c by |bulge|·c/2, less than an atom at 1 m."""
+below this is a line: the arc deviates from its chord c by |bulge|·c/2, less than an atom at 1
+m."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,7 +75,7 @@ LEVEL_EPS_MM = 1e-9
 """A radius nearer than this to a limit is the limit: rounding, along walls that are parallel."""
 
 FIT_SHARE = 0.75
-"""Share of the tolerance for lines and arcs through samples of the axis; what lies between the
+"""Share of the tolerance for lines and arcs through samples of the axis; the error between the
 samples takes less than the rest."""
 
 FEWEST_FOR_ARC = 5

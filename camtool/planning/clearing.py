@@ -55,10 +55,11 @@ ALL_OF_IT = 0.98
 """A thinner hair is taken when it shows this part of the length that the tolerance shows."""
 
 BEYOND = 3.0
-"""How far from the region of the true tool a slot begins, in hairs: sharp corners reach out."""
+"""Distance of a slot's beginning from the region of the true tool, in hairs: sharp corners extend
+outwards."""
 
 SLOT_LEAST = 0.5
-"""The shortest band, all round, that counts as a slot, over the tool's diameter."""
+"""The shortest perimeter of a band that counts as a slot, over the tool's diameter."""
 
 BAND_PLACES = 200
 """Number of places at which a band is measured."""
@@ -67,7 +68,7 @@ ON_LINE_MM = 5e-6
 """A place this near to the boundary of a region is still inside it."""
 
 POLE_SHARE = 0.01
-"""How near to its true place the pole of a region is looked for, over the extent of the region."""
+"""Tolerance for the pole of a region, over the extent of the region."""
 
 
 @dataclass(eq=False)

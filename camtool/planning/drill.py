@@ -40,7 +40,7 @@ SAMPLES_ROUND = 64.0
 """At least this many points of a path are examined to see whether it is a circle."""
 
 SAME_HOLE_MM = 1e-2
-"""Holes whose centres are nearer than this are one."""
+"""Holes whose centres are nearer than this are the same hole."""
 
 HOLE_SIZE_MM = 1e-2
 """A circle fits a drill when their diameters differ by no more than this."""
@@ -55,7 +55,7 @@ PECK_SHARE = 1e-9
 """A last peck shorter than this share of the others is left out."""
 
 MOVES_OF_PECK = 3
-"""Down, out, and back to just above."""
+"""Number of moves of a peck: down, out, and back to just above."""
 
 NAMES_SHOWN = 3
 """At most this many paths are named in a finding; the others are counted."""

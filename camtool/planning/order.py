@@ -49,8 +49,8 @@ SHOWN_ITEMS = 5
 
 
 SPECK_MM = 1e-4
-"""A run that stays at one place (a drilled hole) lies in what holds a line of this length there:
-long enough to be a line, far shorter than any tool is wide."""
+"""For the order, a run that stays at one place (a drilled hole) is a line of this length: long
+enough to be a line, far shorter than any tool is wide."""
 
 
 @dataclass(frozen=True, eq=False)

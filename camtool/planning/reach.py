@@ -44,13 +44,13 @@ PROBES = (0.0, 0.3, 0.5, 0.7, 1.0)
 together with something, only on how far it leads."""
 
 PARTING = 4.0
-"""Ends of sections that meet no other are one place when they are no farther apart than so many
-times √(2 r · TOGETHER_MM), on which a disc of radius r comes off a straight wall by TOGETHER_MM:
-where it does is not seen more sharply."""
+"""Ends of sections that meet no other are at one place when they are no farther apart than this
+many times √(2 r · TOGETHER_MM): over that length a disc of radius r leaves a straight wall by
+TOGETHER_MM, so the place is known no better."""
 
 CORNER_SHARE = 0.25
-"""Pieces up to this part of the tool's disc count as feet of corners, and are one finding: that
-of a corner of 55 degrees is as large."""
+"""Pieces up to this part of the tool's disc count as feet of corners, and give one finding
+together: that of a corner of 55 degrees is as large."""
 
 
 @dataclass(frozen=True, eq=False)

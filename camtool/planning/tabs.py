@@ -51,7 +51,7 @@ SIDE_ANGLE_RAD = 0.25 * math.pi
 """Slope of the sides of ramped tabs when the tool may plunge."""
 
 COUNT_SLACK = 1e-9
-"""The path may be longer than tabs times their spacing by this part, by rounding."""
+"""The path may exceed the number of tabs times their spacing by this part, by rounding."""
 
 TAB_CORNER_RAD = 0.1
 """A path that turns by more than this at a vertex has a corner, where no tab is put."""
@@ -61,7 +61,7 @@ PLACES_PER_SIDE = 32
 corner."""
 
 TAB_SLACK_MM = 1e-5
-"""A bridge may be narrower than asked by this much."""
+"""A bridge may be narrower than requested by this much."""
 
 WIDTH_ROUNDS = 8
 """The length of a tab on a bend is searched in this many rounds of as many places, each round

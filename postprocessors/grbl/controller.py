@@ -271,8 +271,8 @@ MAX_DIGITS = 8
 """grbl drops the digits of a number after this many (MAX_INT_DIGITS, nuts_bolts.c)."""
 
 DECIMAL_EPS = 1e-6
-"""Units of the last decimal: a number farther than this from all such units was not written with
-so many decimals, and is taken as its nearest float."""
+"""Units of the last decimal: a number farther than this from all such units was written with more
+decimals, and becomes its nearest float."""
 
 FULL_TURN_RAD = np.float32(5e-7)
 """An arc that turns by less is a full circle (ARC_ANGULAR_TRAVEL_EPSILON, config.h)."""

@@ -37,7 +37,7 @@ from .numbers import Grid
 
 WINDOW: Final = (0.6, 1.1)
 WINDOW_SLACK: Final = 4
-"""The end is looked for from WINDOW[0]·L − slack to WINDOW[1]·L + slack iterations."""
+"""The end is searched from WINDOW[0]·L − slack to WINDOW[1]·L + slack iterations."""
 
 APART: Final = 16
 """Another start of D may take this many iterations more or less to a step: the paths may be one

@@ -39,8 +39,8 @@ MOST_FEED_UNITS: Final = 99
 """Largest feed word: two digits (L3297-3309)."""
 
 ARC_RADIUS_SPREAD_MM: Final = 0.005
-"""The radii at the start and at the end of an arc may differ by this much, no more. It is above
-what rounding centre and ends to 1 µm makes of an arc (√2 µm at each end)."""
+"""The radii at the start and at the end of an arc may differ by at most this. Rounding centre and
+ends to 1 µm causes less (√2 µm at each end)."""
 
 MOST_DWELL_S: Final = 9900.0
 """A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
