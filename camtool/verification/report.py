@@ -558,14 +558,22 @@ def _before_words(report: Report) -> str:
 
 
 def _error_sources(report: Report) -> str:
-    error = report.error_um
-    figures = {
-        "fit": error.fit.max,
-        "rounding": error.rounding.max,
-        "interpolation": error.interpolation.max,
-        "mechanics": error.mechanics.max,
+    sources = _by_source(report.error_um)
+    return ", ".join(f"{name} {um(most)}" for name, (most, _, _) in sources.items()) + " µm"
+
+
+_MaxRmsP95 = tuple[float | None, float | None, float | None]
+
+
+def _by_source(error: Errors) -> dict[str, _MaxRmsP95]:
+    """Maximum, rms and 95th percentile of the error of each source, µm."""
+    inside = error.interpolation
+    return {
+        "fit": (error.fit.max, error.fit.rms, None),
+        "rounding": (error.rounding.max, error.rounding.rms, None),
+        "interpolation": (inside.max, inside.rms, inside.p95),
+        "mechanics": (error.mechanics.max, error.mechanics.rms, None),
     }
-    return ", ".join(f"{name} {um(most)}" for name, most in figures.items()) + " µm"
 
 
 def um(value: float | None) -> str:
@@ -687,19 +695,9 @@ def sheets(report: Report) -> Iterator[Sheet]:
 
 
 def _error_sheet(report: Report) -> Sheet:
-    error = report.error_um
-    named_figures = {
-        "fit": (error.fit.max, error.fit.rms, None),
-        "rounding": (error.rounding.max, error.rounding.rms, None),
-        "interpolation": (
-            error.interpolation.max,
-            error.interpolation.rms,
-            error.interpolation.p95,
-        ),
-        "mechanics": (error.mechanics.max, error.mechanics.rms, None),
-        "total": (error.total.max, error.total.rms, error.total.p95),
-    }
-    rows = tuple((name, *map(um, figures)) for name, figures in named_figures.items())
+    total = report.error_um.total
+    figures = {**_by_source(report.error_um), "total": (total.max, total.rms, total.p95)}
+    rows = tuple((name, *map(um, three)) for name, three in figures.items())
     return Sheet("sources", ("error by source", "max µm", "rms µm", "p95 µm"), rows)
 
 
