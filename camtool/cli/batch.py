@@ -34,7 +34,7 @@ _RUN = "How the batch runs"
     "--preview", type=click.Choice(("svg", "png")), help="A picture beside each program."
 )
 @click.option("--reports", is_flag=True, help="The report of each as JSON beside its program.")
-@click.option("--json", "summary", metavar="FILE", help="What became of each; - is stdout.")
+@click.option("--json", "summary", metavar="FILE", help="The result of each drawing; - is stdout.")
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
 @click.option(
     "--compensate",
@@ -44,8 +44,8 @@ _RUN = "How the batch runs"
 @click.option("--no-own-jobs", is_flag=True, help="Ignore part.toml beside part.dxf.")
 @option(_RUN, "--jobs", "-j", type=click.IntRange(min=1), help="Processes.  [one for each core]")
 @option(_RUN, "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, tcp://host:8786.")
-@option(_RUN, "--timeout", callback=duration, metavar="TIME", help="Longest for one drawing, 60s.")
-@option(_RUN, "--force", is_flag=True, help="Make what is up to date too.")
+@option(_RUN, "--timeout", callback=duration, metavar="TIME", help="Time limit for each drawing, such as 60s.")
+@option(_RUN, "--force", is_flag=True, help="Make programs that are up to date again.")
 @option(_RUN, "--fail-fast", is_flag=True, help="Stop at the first that fails.")
 @picture_options
 @gate_options

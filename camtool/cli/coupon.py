@@ -78,7 +78,7 @@ def coupon(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Draw coupons of a KIND: what `camtool calibrate` wants to have cut and measured.
+    """Draw coupons of a KIND: the parts to cut and measure for `camtool calibrate`.
 
     \b
     lines    two lines along each axis, joined at one end: backlash, also by --regions

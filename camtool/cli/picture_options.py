@@ -183,7 +183,7 @@ def picture_options(command: Command) -> Command:
                 "--size",
                 type=click.INT,
                 metavar="PX",
-                help="Width of the picture; letters and lines suit it.  [1200, .svg 1000]",
+                help="Width of the picture in pixels; text and lines scale with it.  [1200, .svg 1000]",
             ),
             option(
                 _PICTURE,
@@ -198,7 +198,7 @@ def picture_options(command: Command) -> Command:
                 "--exaggerate",
                 type=click.FLOAT,
                 metavar="TIMES",
-                help="Draw the predicted path so many times as far from the wanted one.",
+                help="Draw deviations from the wanted path this many times larger.",
             ),
             option(
                 _PICTURE,

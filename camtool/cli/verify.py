@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     "--worst",
     type=click.IntRange(min=0),
     metavar="COUNT",
-    help="List so many moves with the largest errors.",
+    help="How many of the moves with the largest errors to list.",
 )
 @click.option(
     "--compensated",

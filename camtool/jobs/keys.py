@@ -499,7 +499,7 @@ PLACE = {
     ),
     "mirror": Key("mirror", one_of(("x", "y")), "Turn the sign of x, or of y.", '"x"'),
     "rotate": Key("rotate_rad", ANGLE, "Counterclockwise, in degrees.", '"90deg"'),
-    "scale": Key("scale", FACTOR, "Times as large."),
+    "scale": Key("scale", FACTOR, "Scale factor."),
     "fit": Key(
         "fit_mm", Value(plain(lengths), "WxH"), "As large as fits (8x6mm; 0: any).", '"8x6mm"'
     ),
