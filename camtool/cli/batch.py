@@ -44,7 +44,13 @@ _RUN = "How the batch runs"
 @click.option("--no-own-jobs", is_flag=True, help="Ignore part.toml beside part.dxf.")
 @option(_RUN, "--jobs", "-j", type=click.IntRange(min=1), help="Processes.  [one for each core]")
 @option(_RUN, "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, tcp://host:8786.")
-@option(_RUN, "--timeout", callback=duration, metavar="TIME", help="Time limit for each drawing, such as 60s.")
+@option(
+    _RUN,
+    "--timeout",
+    callback=duration,
+    metavar="TIME",
+    help="Time limit for each drawing, such as 60s.",
+)
 @option(_RUN, "--force", is_flag=True, help="Make programs that are up to date again.")
 @option(_RUN, "--fail-fast", is_flag=True, help="Stop at the first that fails.")
 @picture_options

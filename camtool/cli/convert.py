@@ -21,7 +21,9 @@ from camtool.cli.report import Outputs, report_option
 @click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")
 @click.argument("program", metavar="PROGRAM")
 @click.option("--from", "source", metavar="NAME", required=True, help="The machine it is for.")
-@click.option("--to", "target", metavar="NAME", required=True, help="The machine to convert it for.")
+@click.option(
+    "--to", "target", metavar="NAME", required=True, help="The machine to convert it for."
+)
 @click.option("-o", "--output", metavar="FILE", help="The program; - is stdout.  [PROGRAM.ext]")
 @click.option("--machine", metavar="FILE", help="A TOML file that extends the machine of --to.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change its values.")

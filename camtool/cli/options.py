@@ -342,7 +342,12 @@ class DrawingFlags:
 def drawing_options(command: Command) -> Command:
     """Adds `drawing: DrawingFlags`."""
     options = [
-        option(_READ, "--format", type=click.Choice(FORMATS), help="The format, where the content is not to decide."),
+        option(
+            _READ,
+            "--format",
+            type=click.Choice(FORMATS),
+            help="Read it as this format, not by its content.",
+        ),
         option(_READ, "--units", metavar="UNIT", help="Unit of the drawing: mm, in, um, px ..."),
         option(
             _READ,
@@ -351,7 +356,10 @@ def drawing_options(command: Command) -> Command:
             help="Pixels per inch of an SVG.  [96, or that of the program that drew it]",
         ),
         _length(
-            "--tolerance", "tolerance_mm", "LENGTH", "Largest distance of fitted arcs from the curves of the part."
+            "--tolerance",
+            "tolerance_mm",
+            "LENGTH",
+            "Largest distance of fitted arcs from the curves of the part.",
         ),
         _length("--gap", "gap_mm", "LENGTH", "Ends nearer than this are joined."),
         _switch("--across-layers", "Join ends of different layers too."),
@@ -457,9 +465,7 @@ def job_options(command: Command) -> Command:
     names = ["job", "operation", *(name for keys in FLAGS.values() for name in keys)]
     of_job = next(iter(FLAGS))
     options = [
-        option(
-            of_job, "--job", metavar="FILE", help="A TOML file with values for these flags."
-        ),
+        option(of_job, "--job", metavar="FILE", help="A TOML file with values for these flags."),
         option(
             of_job,
             "--operation",

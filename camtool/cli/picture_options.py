@@ -183,7 +183,7 @@ def picture_options(command: Command) -> Command:
                 "--size",
                 type=click.INT,
                 metavar="PX",
-                help="Width of the picture in pixels; text and lines scale with it.  [1200, .svg 1000]",
+                help="Width in pixels; text and lines scale with it.  [1200, .svg 1000]",
             ),
             option(
                 _PICTURE,
