@@ -58,7 +58,7 @@ from camtool.geometry.medial import (
 from camtool.geometry.nesting import nesting, regions
 from camtool.geometry.offset import merge_points
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
+from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
 from camtool.planning.paths import backwards, joined
@@ -236,10 +236,12 @@ def _passed_by(pieces: list[Floats], point: Floats) -> float:
     return float(points_to_segments(point[None, :], segments).min())
 
 
-def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> Run:
+def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> CutRun:
     """The run along a path (n, 4) of x, y, rho, bulge."""
     vertices = np.column_stack([path[:, :2], 0.0 - cone.depth_of(path[:, 2]), path[:, 3]])
-    return Run(vertices, feeds_along(vertices, setting.feeds), setting.feeds.plunge_mm_min, name)
+    return CutRun(
+        vertices, feeds_along(vertices, setting.feeds), setting.feeds.plunge_mm_min, name
+    )
 
 
 def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:

@@ -1,6 +1,6 @@
 """A contour, its start and direction chosen, as runs of the tool: how it goes in, down and out.
 
-    path ──MeasuredPath──▶ lengths ──ramps: profile of z──▶ ──tabs: raised──▶ lifted ──leads──▶ Run
+    path ─MeasuredPath─▶ lengths ─ramps─▶ profile of z ─tabs.raised─▶ lifted ─leads─▶ CutRun
 
 A closed contour is one run: down, round and round, the overlap. With leads it is one run for each
 pass, from the lead-in to the lead-out; where it ramps down, it stays one run, and goes out and
@@ -18,7 +18,7 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.findings import ENTRY_CHANGED, Finding
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
-from camtool.planning.items import Bridge, Contour, Run
+from camtool.planning.items import Bridge, Contour, CutRun
 from camtool.planning.leads import KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place
 from camtool.planning.paths import MeasuredPath
@@ -50,7 +50,7 @@ class CutContour:
     """The runs that cut a contour, what did not go as the operation asks, and the bridges that
     its tabs leave."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[CutRun, ...]
     findings: tuple[Finding, ...]
     bridges: tuple[Bridge, ...]
 
@@ -69,7 +69,7 @@ def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut) -> CutContour:
     paths, leads = made(contour, along, (angle, tabs), keep_out)
     feeds = contour.setting.feeds
     runs = [
-        Run(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, contour.name)
+        CutRun(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, contour.name)
         for vertices in paths
     ]
     findings += [*left_out, *leads.findings]

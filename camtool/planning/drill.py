@@ -25,7 +25,7 @@ from camtool.findings import (
 )
 from camtool.geometry.measure import path_extents, sample
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.planning.items import RAPID, Chosen, Fixed, Run, Setting, Work
+from camtool.planning.items import RAPID, Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation, refuse_endless
 from camtool.planning.naming import key_of, operation_name
 
@@ -166,7 +166,7 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
     return [depth_mm * ((step + 1) / count) for step in range(count)]
 
 
-def _run(hole: Hole, setting: Setting) -> Run:
+def _run(hole: Hole, setting: Setting) -> CutRun:
     """Down and up in the hole: cut a peck, rapid out, rapid back to just above it, and so on."""
     operation, feed = setting.operation, setting.feeds.plunge_mm_min
     top = min(PECK_TOP_MM, setting.safe_z_mm)
@@ -177,7 +177,7 @@ def _run(hole: Hole, setting: Setting) -> Run:
         heights += [top, above - last, -depth]
         feeds += [RAPID, RAPID, feed]
     vertices = np.array([(*hole.at_mm, z, 0.0) for z in heights])
-    return Run(vertices, np.array(feeds), feed, hole.name, operation.dwell_s)
+    return CutRun(vertices, np.array(feeds), feed, hole.name, operation.dwell_s)
 
 
 def _circles(chosen: Chosen) -> tuple[list[Hole], list[str]]:

@@ -3,7 +3,7 @@
     operation ─▶ Work: items ─order─▶ items with start and direction ─▶ runs ─link─▶ moves
 
 An item is cut in one go, before or after others. A `Contour` leaves its start (and perhaps its
-direction) to the order; a `Fixed` item is cut as it is. A `Run` is one stay of the tool in the
+direction) to the order; a `Fixed` item is cut as it is. A `CutRun` is one stay of the tool in the
 stock: it goes down at its first point and comes up at its last one.
 """
 
@@ -42,7 +42,7 @@ class Setting:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class CutRun:
     """`vertices` (n, 4) of x, y, z, bulge in mm, work frame, n ≥ 1; the bulge belongs to the move
     that leaves its vertex (with a change of z it is a helix); `feed_mm_min` (n−1,), RAPID (NaN)
     for a rapid. The tool comes down from safe z to the first vertex at the plunge feed of
@@ -93,7 +93,7 @@ class Fixed:
     `outline`: a closed path around it, when there is one, for the nesting.
     """
 
-    runs: tuple[Run, ...]
+    runs: tuple[CutRun, ...]
     setting: Setting
     name: str
     source: int = -1
@@ -150,7 +150,7 @@ class Step:
     operation: Operation
     setting: Setting
     chosen: Chosen
-    runs: tuple[Run, ...]
+    runs: tuple[CutRun, ...]
     owners: tuple[Item, ...]
     findings: tuple[Finding, ...]
     rapid_drawn_mm: float

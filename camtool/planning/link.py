@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from camtool.planning.items import Run
+from camtool.planning.items import CutRun
 from camtool.planning.job import Operation, Tool
 from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
@@ -18,7 +18,7 @@ ROUNDED_DECIMALS = 10
 """Positions are rounded to this many decimals of a mm: far coarser than the noise of doubles, and
 far finer than any machine or tolerance."""
 
-Approach = Callable[[Run], tuple[float, float] | None]
+Approach = Callable[[CutRun], tuple[float, float] | None]
 """Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
 
 
@@ -37,7 +37,7 @@ def rounded(toolpath: Toolpath) -> Toolpath:
 
 
 def link(
-    worked: Sequence[tuple[Operation, Sequence[Run]]],
+    worked: Sequence[tuple[Operation, Sequence[CutRun]]],
     safe_z_mm: float,
     approaches: Callable[[], Approach] | None = None,
 ) -> ToolpathBuilder:
@@ -85,7 +85,7 @@ def _spin(builder: ToolpathBuilder, speed: float | None, wanted: float | None) -
 
 
 def _cut_one(
-    builder: ToolpathBuilder, run: Run, safe_z_mm: float, approach: Approach | None
+    builder: ToolpathBuilder, run: CutRun, safe_z_mm: float, approach: Approach | None
 ) -> None:
     builder.source = run.name
     x, y, z, _ = run.vertices[0].tolist()

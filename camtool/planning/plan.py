@@ -34,7 +34,7 @@ from camtool.planning.drawn import drawn_of
 from camtool.planning.drill import drill
 from camtool.planning.engrave import engrave
 from camtool.planning.gouges import side_findings
-from camtool.planning.items import Bridge, Chosen, Contour, Item, Run, Setting, Step, Work
+from camtool.planning.items import Bridge, Chosen, Contour, CutRun, Item, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link, rounded
@@ -177,7 +177,7 @@ def _step(
     _refuse_endless(items, setting)
     rows = best_order(choices, must_precede(items), *ends)
     keep_out = _walls(placed, job, setting.operation)
-    runs: list[Run] = []
+    runs: list[CutRun] = []
     bridges: list[Bridge] = []
     owners: list[Item] = []
     for row in rows.tolist():
@@ -272,7 +272,7 @@ def _with_starts(item: Item) -> Item:
     return replace(item, path=path, starts=starts)
 
 
-def _end(runs: tuple[Run, ...], here: Point) -> Point:
+def _end(runs: tuple[CutRun, ...], here: Point) -> Point:
     """Where the tool comes up after the runs."""
     if not runs:
         return here

@@ -49,7 +49,7 @@ from camtool.planning.clearing import (
     slot_paths,
     zigzag_paths,
 )
-from camtool.planning.items import Chosen, Fixed, Run, Setting, Work
+from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, joined
@@ -90,8 +90,8 @@ class Cleared:
     """The runs that clear a region, in order; and what did not fit of their entries, with the
     first run for which that is so."""
 
-    runs: list[Run]
-    changed: dict[str, Run]
+    runs: list[CutRun]
+    changed: dict[str, CutRun]
 
 
 def pocket(chosen: Chosen, setting: Setting) -> Work:
@@ -134,11 +134,11 @@ def pockets(chosen: Chosen) -> list[Pocket]:
 
 def _cleared(wanted: Polylines, slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
     """The runs of one region: each connected tool centre region, then the slots."""
-    groups: list[list[Run]] = []
-    changed: dict[str, Run] = {}
+    groups: list[list[CutRun]] = []
+    changed: dict[str, CutRun] = {}
     tool_region = offset_shape(wanted, setting.operation.tool.radius_mm)
     for part in parts_of(tool_region):
-        whole, runs = ConnectedRegion(part), list[Run]()
+        whole, runs = ConnectedRegion(part), list[CutRun]()
         for path, around in _paths(part, setting.operation):
             down = down_for(path, around, whole, setting)
             runs += lowered(path, down, over_floor(whole), setting, each.name)
@@ -152,9 +152,9 @@ def _cleared(wanted: Polylines, slots: list[Floats], each: Pocket, setting: Sett
     return Cleared(_nearest_next(groups), changed)
 
 
-def _nearest_next(groups: list[list[Run]]) -> list[Run]:
+def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
     """All runs, after those of one connected region those of the one whose begin is nearest."""
-    runs: list[Run] = []
+    runs: list[CutRun] = []
     left = list(groups)
     while left:
         here = runs[-1].vertices[-1, :2] if runs else left[0][0].vertices[0, :2]
@@ -230,7 +230,7 @@ def _too_small(each: Pocket, operation: Operation) -> Finding:
     )
 
 
-def _changed(each: Pocket, change: str, run: Run) -> Finding:
+def _changed(each: Pocket, change: str, run: CutRun) -> Finding:
     return ENTRY_CHANGED_IN_POCKET(
         where=at_place(each.name, run.vertices[0, :2].tolist()), change=change
     )
@@ -280,9 +280,9 @@ def down_for(
     return Down(changed=f"a plunge instead of a {entry.kind}")
 
 
-def lowered(path: Floats, down: Down, link: Link, setting: Setting, name: str) -> list[Run]:
+def lowered(path: Floats, down: Down, link: Link, setting: Setting, name: str) -> list[CutRun]:
     """The runs that follow a path (n, 3) at all levels: one, unless there is no link back."""
-    runs: list[Run] = []
+    runs: list[CutRun] = []
     parts: list[Floats] = []
     for above, level in pairwise((0.0, *setting.levels_mm)):
         entry = _entry(path, down, link, (above, level), setting)
@@ -358,10 +358,10 @@ def _at(flat: Floats, z: float) -> Floats:
     return np.insert(flat, 2, z, axis=1)
 
 
-def _run(parts: list[Floats], setting: Setting, name: str) -> Run:
+def _run(parts: list[Floats], setting: Setting, name: str) -> CutRun:
     vertices = joined(parts)
     feeds = setting.feeds
-    return Run(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, name)
+    return CutRun(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, name)
 
 
 def over_floor(region: ConnectedRegion) -> Link:

@@ -37,7 +37,7 @@ from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments, reverse
 from camtool.machine.model import Axis, Machine, PlayCells, SlideStart
-from camtool.planning.items import Contour, Fixed, Item, Run
+from camtool.planning.items import Contour, CutRun, Fixed, Item
 from camtool.planning.job import Operation
 from camtool.planning.paths import flat
 from camtool.units import UM_PER_MM
@@ -615,7 +615,7 @@ class Approaches:
             for axis, residual in zip(loosest(machine), residuals(machine), strict=True)
         ]
 
-    def __call__(self, run: Run) -> tuple[float, float] | None:
+    def __call__(self, run: CutRun) -> tuple[float, float] | None:
         """Where the tool goes first (x, y) mm, at safe z; None: straight to the first point of the
         run, as always where neither axis has backlash or compensation.
 

@@ -41,7 +41,7 @@ from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import path_lengths, point_at, segment_boxes, signed_areas
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.planning.items import Bridge, Contour, Feeds, Item, Run
+from camtool.planning.items import Bridge, Contour, CutRun, Feeds, Item
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name
 from camtool.planning.paths import QUARTER, MeasuredPath
@@ -355,12 +355,12 @@ class RaisedRuns:
     """The runs of an operation, raised where they would have cut bridges, and the
     findings of that."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[CutRun, ...]
     findings: tuple[Finding, ...]
 
 
 def raised_over_bridges(
-    runs: Sequence[Run], operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
+    runs: Sequence[CutRun], operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
 ) -> RaisedRuns:
     """The runs of an operation, kept above all bridges: no cut goes through them.
 
@@ -411,7 +411,9 @@ class _Found:
             )
 
 
-def _raised(run: Run, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _Found) -> Run:
+def _raised(
+    run: CutRun, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _Found
+) -> CutRun:
     """The run kept above the bridges near to it; itself when it is so already."""
     vertices = run.vertices
     moves = np.hypot(*np.diff(vertices[:, :2], axis=0).T) > POSITION_EPS_MM
@@ -442,7 +444,7 @@ def _raised(run: Run, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _
     return replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
 
 
-def _drilled(run: Run, bridge: Bridge, tool: Tool, found: _Found) -> None:
+def _drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _Found) -> None:
     place, deep = run.vertices[:1, :2], float(run.vertices[:, 2].min())
     reach = tool.radius_mm - BRIDGE_SLACK_MM
     through = deep < bridge.top_mm and reach > 0.0
@@ -511,7 +513,7 @@ def _box(bridge: Bridge, reach: float) -> tuple[float, float, float, float]:
     return x - size, y - size, x + size, y + size
 
 
-def _extent(run: Run) -> tuple[Floats, Floats]:
+def _extent(run: CutRun) -> tuple[Floats, Floats]:
     """A box around a run; an arc of a half circle stays within its chord's length of its ends."""
     chords = np.hypot(*np.diff(run.vertices[:, :2], axis=0).T)
     bent = run.vertices[:-1, 3] != 0.0

@@ -454,7 +454,7 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
     yield "target", f"{report.target} ({how})"
     if report.dimensions:
         x, y = report.dimensions[:2]
-        shown = f"error {percent(x.error_percent)}, {percent(y.error_percent)}"
+        shown = f"error X {percent(x.error_percent)}, Y {percent(y.error_percent)}"
         what = "" if x.of == "edge" else " of the tool's centre"
         yield "size", f"{x.nominal_mm:.3f} × {y.nominal_mm:.3f} mm{what}; predicted {shown}"
     spans = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
@@ -479,7 +479,7 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
     if report.planned is not None:
         yield from (("cut", line) for line in _operation_words(report.planned.operations))
         far, drawn = report.planned.rapid_mm, report.planned.rapid_drawn_mm
-        yield "rapids", f"{mm(far)} mm in XY (as drawn {mm(drawn)} mm)"
+        yield "rapids", f"{mm(far)} mm in XY ({mm(drawn)} mm in the order of the drawing)"
     if report.before is not None:
         yield "before", _before_words(report)
     if report.asked is not None:
@@ -521,8 +521,8 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
         if each.passes is not None and each.passes > 1:
             passes += f"es of {each.deepest_pass_mm:.4g} at most"
         yield (
-            f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g}, plunge {each.plunge_mm_min:g}"
-            f" mm/min, {each.depth_mm:.4g} mm deep{passes}"
+            f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g} mm/min, plunge"
+            f" {each.plunge_mm_min:g} mm/min, {each.depth_mm:.4g} mm deep{passes}"
         )
     if len(operations) > MOST_OPERATIONS:
         yield f"and {len(operations) - MOST_OPERATIONS} operations more"

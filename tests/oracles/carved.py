@@ -14,11 +14,11 @@ import shapely
 
 from camtool.arrays import Floats
 from camtool.geometry.polylines import Polylines
-from camtool.planning.items import Run
+from camtool.planning.items import CutRun
 from tests.oracles.offset import chords
 
 
-def dense(run: Run, step_mm: float) -> Floats:
+def dense(run: CutRun, step_mm: float) -> Floats:
     """(J, 3) x, y, z along a run, arcs and helices as they are, no farther apart than the step."""
     rows = [run.vertices[0, :3].tolist()]
     for (ax, ay, az, bulge), (bx, by, bz, _) in zip(
@@ -46,7 +46,7 @@ def _on_arc(
     return cx + cosine * x - sine * y, cy + sine * x + cosine * y
 
 
-def swept(runs: Iterable[Run], slope: float, tip_mm: float, step_mm: float) -> shapely.Geometry:
+def swept(runs: Iterable[CutRun], slope: float, tip_mm: float, step_mm: float) -> shapely.Geometry:
     """What a cone (tangent of its half angle, radius of its tip) cuts at z = 0 along the runs."""
     parts = []
     for run in runs:

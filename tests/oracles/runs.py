@@ -12,12 +12,12 @@ from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.contours import runs_of as cut_of
-from camtool.planning.items import Contour, Run
+from camtool.planning.items import Contour, CutRun
 from camtool.planning.leads import KeepOut
 from tests.oracles.arcs import FLAT, centre_of
 
 
-def runs_of(contour: Contour, path: Polyline) -> tuple[list[Run], list[Finding]]:
+def runs_of(contour: Contour, path: Polyline) -> tuple[list[CutRun], list[Finding]]:
     """The runs that cut a contour that keeps away from nothing else, and what is said of them."""
     cut = cut_of(contour, path, KeepOut(Polylines.of([]), np.empty(0, dtype=np.bool_)))
     return list(cut.runs), list(cut.findings)
@@ -63,7 +63,7 @@ def steepest(vertices: Floats) -> float:
     return max(slopes)
 
 
-def cut_over(runs: Iterable[Run], places: Floats, step_mm: float) -> tuple[Floats, float]:
+def cut_over(runs: Iterable[CutRun], places: Floats, step_mm: float) -> tuple[Floats, float]:
     """How low (J,) the tool gets over each of these places of a contour (J, 2), and the most that
     it takes away there at a time; points of the run farther than 2 steps from any place count
     for nothing."""

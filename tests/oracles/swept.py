@@ -13,7 +13,7 @@ import shapely
 
 from camtool.arrays import Floats
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.items import Run
+from camtool.planning.items import CutRun
 from tests.oracles.offset import GRID_MM, chords, dense, distance, inside, near_region, pieces
 
 CHORD_RAD = 0.05
@@ -26,7 +26,7 @@ SAG = 2e-5
 """How far the chords that stand for arcs of a drawing are from them, over its size."""
 
 
-def at_depth(runs: Sequence[Run], z: float) -> list[Polyline]:
+def at_depth(runs: Sequence[CutRun], z: float) -> list[Polyline]:
     """The stretches of the runs at one height, seen from above."""
     found = []
     for run in runs:
@@ -118,7 +118,7 @@ def _boundary(area: shapely.Geometry) -> list[Polyline]:
 
 
 def complaints(
-    runs: Sequence[Run], region: Polylines, radius_mm: float, z: float, *, share: float = 1e-3
+    runs: Sequence[CutRun], region: Polylines, radius_mm: float, z: float, *, share: float = 1e-3
 ) -> list[str]:
     """What is wrong with runs that shall clear a region down to z with a tool of this radius."""
     paths, area = at_depth(runs, z), area_of(region)
@@ -138,7 +138,7 @@ def complaints(
     return found + gouges(runs, region, radius_mm)
 
 
-def gouges(runs: Sequence[Run], region: Polylines, radius_mm: float) -> list[str]:
+def gouges(runs: Sequence[CutRun], region: Polylines, radius_mm: float) -> list[str]:
     """How far the tool is nearer to the boundary of the region than its radius, anywhere."""
     found = []
     for run in runs:

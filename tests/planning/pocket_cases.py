@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import approach
 from camtool.geometry.nesting import oriented
 from camtool.geometry.polylines import Polyline, Polylines, rotated
-from camtool.planning.items import Chosen, Feeds, Run, Setting, Work
+from camtool.planning.items import Chosen, CutRun, Feeds, Setting, Work
 from camtool.planning.job import Operation, Tool
 from camtool.planning.pocket import pocket
 from camtool.planning.settings import levels
@@ -87,7 +87,7 @@ def work_of(paths: Sequence[Polyline], diameter_mm: float, **settings: Any) -> W
     return pocket(chosen_of(paths), setting_of(diameter_mm, **settings))
 
 
-def runs_of(work: Work) -> list[Run]:
+def runs_of(work: Work) -> list[CutRun]:
     """All runs of all items."""
     return [run for item in work.items for run in item.runs]
 

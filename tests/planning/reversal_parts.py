@@ -11,7 +11,7 @@ import numpy as np
 
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
-from camtool.planning.items import Contour, Feeds, Item, Run, Setting
+from camtool.planning.items import Contour, CutRun, Feeds, Item, Setting
 from camtool.planning.job import Operation
 from camtool.planning.link import link
 from camtool.planning.paths import flat
@@ -28,13 +28,13 @@ LEAST_TURN_MM = 1e-6
 """How far back an axis must come for a reversal, where no machine says how fine its steps are."""
 
 
-def reversals_of(cut: Polyline | Run, machine: Machine | None = None) -> tuple[int, int]:
+def reversals_of(cut: Polyline | CutRun, machine: Machine | None = None) -> tuple[int, int]:
     """How often X and Y turn round between the first point of a path or run and its last one.
 
     What comes back by less than half a step of the machine (`LEAST_TURN_MM` without one) is no
     reversal; nor is the first motion, which an approach takes care of.
     """
-    path = flat(cut.vertices) if isinstance(cut, Run) else cut
+    path = flat(cut.vertices) if isinstance(cut, CutRun) else cut
     if path is None:
         return 0, 0
     parts = parts_of(path)
@@ -63,13 +63,13 @@ def contour(
     )
 
 
-def run_of(path: Polyline) -> Run:
+def run_of(path: Polyline) -> CutRun:
     flat = path.vertices
     if path.closed:
         flat = np.concatenate([flat, flat[:1]])
     vertices = np.insert(flat, 2, -DEPTH_MM, axis=1)
     vertices[-1, 3] = 0.0
-    return Run(vertices, np.full(len(vertices) - 1, 0.8), 0.8, "test")
+    return CutRun(vertices, np.full(len(vertices) - 1, 0.8), 0.8, "test")
 
 
 def toolpath(paths: Sequence[Polyline], machine: Machine, *, approach: bool) -> Toolpath:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine, PathController, PlayCells, PlayMap
-from camtool.planning.items import Run
+from camtool.planning.items import CutRun
 from camtool.planning.reversing import (
     APPROACH_MARGIN_MM,
     Approaches,
@@ -27,7 +27,7 @@ from tests.strategies import contours, open_contours
 from tests.targets import simulate
 
 
-def line(*points: tuple[float, float]) -> Run:
+def line(*points: tuple[float, float]) -> CutRun:
     return run_of(Polyline(np.array([(x, y, 0.0) for x, y in points])))
 
 
@@ -47,13 +47,13 @@ MARGIN = APPROACH_MARGIN_MM
     ],
 )
 def test_both_axes_come_as_they_go_on(
-    machine: Machine, run: Run, from_x: float, from_y: float, why: str
+    machine: Machine, run: CutRun, from_x: float, from_y: float, why: str
 ) -> None:
     assert Approaches(machine)(run) == pytest.approx((1 + from_x, 2 + from_y)), why
 
 
 def test_a_hole_is_always_reached_from_one_side(machine: Machine) -> None:
-    hole = Run(np.array([[1, 2, -1.0, 0], [1, 2, 0.5, 0]]), np.array([5.0]), 5.0, "hole")
+    hole = CutRun(np.array([[1, 2, -1.0, 0], [1, 2, 0.5, 0]]), np.array([5.0]), 5.0, "hole")
     assert Approaches(machine)(hole) == pytest.approx((1 - MARGIN, 2 - MARGIN))
 
 

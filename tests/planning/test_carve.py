@@ -19,7 +19,7 @@ from camtool.geometry.distance import nearest
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.importers.read import read_drawing
 from camtool.planning.carve import CARVE_TOLERANCE_MM, vcarve
-from camtool.planning.items import Chosen, Feeds, Fixed, Run, Setting, Work
+from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes
 from tests.oracles.carved import area_of, dense, swept
@@ -70,7 +70,7 @@ def setting_of(*levels: float, angle: float = math.pi / 2, **tool: float) -> Set
     return Setting(operation, Feeds(100.0, 100.0), levels or (-100.0,), 5.0)
 
 
-def runs_of(work: Work) -> list[Run]:
+def runs_of(work: Work) -> list[CutRun]:
     return [run for item in work.items if isinstance(item, Fixed) for run in item.runs]
 
 

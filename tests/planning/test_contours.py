@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from camtool.findings import Code
 from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline, reverse, rolled, rotated
-from camtool.planning.items import Contour, Feeds, Run, Setting
+from camtool.planning.items import Contour, CutRun, Feeds, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.settings import levels
 from tests.oracles.runs import cut_over, most_at_a_time, move_length, run_points, runs_of, steepest
@@ -40,7 +40,9 @@ def contour(path: Polyline, depth: tuple[float, ...] = (-0.4, -0.8, -1.0), **kin
     return Contour(path, setting, "part/LINE 1", 0, **own)
 
 
-def cut(path: Polyline, depth: tuple[float, ...] = (-0.4, -0.8, -1.0), **kind: Any) -> list[Run]:
+def cut(
+    path: Polyline, depth: tuple[float, ...] = (-0.4, -0.8, -1.0), **kind: Any
+) -> list[CutRun]:
     runs, findings = runs_of(contour(path, depth, **kind), path)
     assert findings == []
     return runs
@@ -175,7 +177,7 @@ def test_slopes_are_slow_enough_for_the_plunge_feed() -> None:
         assert min(feeds) < 100 or entry == ramp(10.0)
 
 
-def _vertices(runs: list[Run]) -> np.ndarray:
+def _vertices(runs: list[CutRun]) -> np.ndarray:
     return np.concatenate([run.vertices for run in runs])
 
 

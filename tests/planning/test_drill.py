@@ -21,7 +21,7 @@ from camtool.planning.drill import (
     drill,
     peck_depths,
 )
-from camtool.planning.items import Chosen, Feeds, Fixed, Run, Setting, Work
+from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes
 
@@ -59,7 +59,7 @@ def holes_of(work: Work) -> list[tuple[float, float]]:
     return [tuple(run.vertices[0, :2].round(9).tolist()) for run in runs_of(work)]
 
 
-def runs_of(work: Work) -> list[Run]:
+def runs_of(work: Work) -> list[CutRun]:
     return [run for item in work.items if isinstance(item, Fixed) for run in item.runs]
 
 

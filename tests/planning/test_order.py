@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.arrays import Ints
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
-from camtool.planning.items import Contour, Feeds, Fixed, Item, Run, Setting
+from camtool.planning.items import Contour, CutRun, Feeds, Fixed, Item, Setting
 from camtool.planning.job import Operation
 from camtool.planning.order import (
     Choices,
@@ -52,7 +52,7 @@ def box(x0: float, y0: float, x1: float, y1: float) -> Contour:
 
 
 def hole(x: float, y: float) -> Fixed:
-    run = Run(np.array([[x, y, 0.0, 0.0], [x, y, -1.0, 0.0]]), np.array([30.0]), 30.0, "hole")
+    run = CutRun(np.array([[x, y, 0.0, 0.0], [x, y, -1.0, 0.0]]), np.array([30.0]), 30.0, "hole")
     return Fixed((run,), SETTING, "hole")
 
 
@@ -124,7 +124,7 @@ def test_only_contours_wait_for_what_they_hold() -> None:
 def test_an_arc_of_a_run_is_seen_as_an_arc() -> None:
     # Down, then half round: its chord lies within the box, the arc does not.
     rows = np.array([[1.0, 5, 0, 0], [1, 5, -1, -1.0], [1, 1, -1, 0]])
-    across = Fixed((Run(rows, np.full(2, 30.0), 30.0, "arc"),), SETTING, "arc")
+    across = Fixed((CutRun(rows, np.full(2, 30.0), 30.0, "arc"),), SETTING, "arc")
     assert must_precede([across, box(0.5, 0, 9, 9)]).tolist() == [[0, 1]]
     rows[1, 3] = 1.0
     assert must_precede([across, box(0.5, 0, 9, 9)]).tolist() == []

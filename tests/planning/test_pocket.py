@@ -17,7 +17,7 @@ from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotated
 from camtool.planning.clearing import Cell, Steps, parts_of, ring_cells
-from camtool.planning.items import Fixed, Run
+from camtool.planning.items import CutRun, Fixed
 from camtool.planning.job import Entry
 from camtool.planning.pocket import pocket
 from tests.oracles import swept
@@ -87,13 +87,13 @@ def test_turned_mirrored_and_scaled() -> None:
     assert thirty.vertices[:, :2] == pytest.approx(30.0 * one.vertices[:, :2], abs=1e-5)
 
 
-def without_a_ring(run: Run) -> Run:
+def without_a_ring(run: CutRun) -> CutRun:
     """The run with a shortcut over its middle half."""
     count = len(run.vertices)
     keep = np.r_[0 : count // 4, 3 * count // 4 : count]
     vertices = run.vertices[keep].copy()
     vertices[count // 4 - 1, 3] = 0.0
-    return Run(vertices, run.feed_mm_min[keep[:-1]], run.plunge_mm_min, run.name)
+    return CutRun(vertices, run.feed_mm_min[keep[:-1]], run.plunge_mm_min, run.name)
 
 
 def test_the_oracle_can_find_fault() -> None:
@@ -102,7 +102,7 @@ def test_the_oracle_can_find_fault() -> None:
     (left_over,) = complaints([without_a_ring(run)], region_of([SQUARE]), 0.5, -1.0)
     assert "left over" in left_over
     beside = run.vertices + np.array([0.1, 0.0, 0.0, 0.0])
-    aside = Run(beside, run.feed_mm_min, run.plunge_mm_min, run.name)
+    aside = CutRun(beside, run.feed_mm_min, run.plunge_mm_min, run.name)
     assert any("into the wall" in each for each in gouges([aside], region_of([SQUARE]), 0.5))
 
 
@@ -140,7 +140,7 @@ def test_the_tool_goes_down_once_where_it_can_stay(
     assert len(runs_of(work)) == runs
 
 
-def rings_of(run: Run) -> list[Polyline]:
+def rings_of(run: CutRun) -> list[Polyline]:
     """The closed loops of a run at one level: from a place until it comes there again."""
     (way,) = at_depth([run], -1.0)
     found, begin = [], 0
