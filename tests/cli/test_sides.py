@@ -95,7 +95,7 @@ def test_a_new_job_cuts_a_right_part(camtool: Run, tmp_path: Path, plate: Path) 
     (outer,) = (
         line.split("/")[0].strip() for line in text.splitlines() if "1 on layer OUTER" in line
     )
-    assert outer.startswith("1 on layer OUTER outside: nothing is around it, but")
+    assert outer.startswith("1 on layer OUTER outside: nothing is around it except")
     assert "1 on layer WINDOW inside: within the part OUTER/LWPOLYLINE" in text
     assert "2 on layer BORES inside: within the part OUTER/LWPOLYLINE" in text
     facts = json.loads(
