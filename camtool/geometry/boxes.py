@@ -157,7 +157,7 @@ def _looks(boxes: Floats) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """`rows` (K, 11) of camtool.kernels.offset_curves, their `boxes` (K, 4) and the `tree` of
+    """`rows` (K, 11) of camtool.kernels.offsets, their `boxes` (K, 4) and the `tree` of
     camtool.kernels.box_tree over these."""
 
     rows: Floats
@@ -167,8 +167,7 @@ class Curves:
     @classmethod
     def of(cls, segments: Segments, *, margin_mm: float = 0.0) -> Curves:
         """The segments, with boxes that are wider by a margin all round."""
-        from camtool.kernels.box_tree import tree_of
-        from camtool.kernels.offset_curves import curve_boxes
+        from camtool.kernels.offsets import curve_boxes, tree_of
 
         rows = curve_rows_of(segments)
         boxes = curve_boxes(rows, margin_mm)
@@ -176,8 +175,8 @@ class Curves:
 
 
 def curve_rows_of(segments: Segments) -> Floats:
-    """(K, 11) rows of camtool.kernels.offset_curves."""
-    from camtool.kernels.offset_curves import curve_rows
+    """(K, 11) rows of camtool.kernels.offsets."""
+    from camtool.kernels.offsets import curve_rows
 
     columns = (segments.start, segments.end, segments.bulge)
     return curve_rows(*(np.ascontiguousarray(column) for column in columns))

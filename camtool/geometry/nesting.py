@@ -61,7 +61,7 @@ def nesting(lines: Polylines, holds: Bools | None = None) -> Nesting:
 
 def inside(points: Floats, ring: Segments) -> Bools:
     """(P,) true for the points (P, 2) within a closed path; on the line either may come out."""
-    from camtool.kernels.inside import insides
+    from camtool.kernels.offsets import insides
 
     curves = Curves.of(ring)
     return insides(
@@ -88,7 +88,7 @@ def _box_in(boxes: Floats, box: Floats) -> Bools:
 
 def _held(points: Floats, first_point: Ints, inner: Ints, ring: Segments) -> tuple[Ints, Ints]:
     """Which paths of `inner` have all their points in the ring, and which have all on its line."""
-    from camtool.kernels.inside import HELD, ON_LINE, holds
+    from camtool.kernels.offsets import HELD, ON_LINE, holds
 
     curves = Curves.of(ring)
     arrays = (curves.rows, ring.bulge, curves.tree)

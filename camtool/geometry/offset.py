@@ -171,8 +171,7 @@ Arrays = tuple[Floats, Floats, Floats, Floats]
 def source_arrays(source: Segments, kites: Floats) -> Arrays:
     """What elements may not come near to, as the kernels take it: the rows of the source and their
     tree, the kites (J, 10) of mitres and theirs."""
-    from camtool.kernels.box_tree import tree_of
-    from camtool.kernels.offset_kites import kite_boxes
+    from camtool.kernels.offsets import kite_boxes, tree_of
 
     curves = Curves.of(source)
     return curves.rows, curves.tree, kites, tree_of(kite_boxes(kites))
@@ -180,7 +179,7 @@ def source_arrays(source: Segments, kites: Floats) -> Arrays:
 
 def _meets_itself(lines: Polylines) -> bool:
     """Whether closed paths have common points, other than between neighbours."""
-    from camtool.kernels.offset_meet import TA, TB, meetings_of, pairs_of
+    from camtool.kernels.offsets import TA, TB, meetings_of, pairs_of
 
     curves = Curves.of(Segments.of(lines), margin_mm=POSITION_EPS_MM)
     pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
@@ -378,7 +377,7 @@ def trim_raw(raw: RawOffset, source: Arrays, asked: Offset) -> RawOffset:
     What goes could never be kept, and what is kept is not cut by it: this only saves cuts, which
     would grow with the square of the number of elements where the distance is large against them.
     """
-    from camtool.kernels.offset_near import trimmed_ends
+    from camtool.kernels.offsets import trimmed_ends
 
     spare = TRIM_SPARE * VALIDITY_EPS_MM
     ends = trimmed_ends(curve_rows_of(raw.elements), source, (asked.distance_mm, spare))
@@ -443,7 +442,7 @@ class Slices:
 
 def slice_elements(elements: Segments, others: Segments | None) -> Slices:
     """The elements cut at all meetings with each other and with `others`."""
-    from camtool.kernels.offset_meet import TA, TB, X, Y, meetings_of, pairs_of
+    from camtool.kernels.offsets import TA, TB, X, Y, meetings_of, pairs_of
 
     eps = NODE_EPS_MM
     own = Curves.of(elements, margin_mm=eps)
@@ -462,7 +461,7 @@ def slice_elements(elements: Segments, others: Segments | None) -> Slices:
 
 def _cut(elements: Segments, rows: Ints, found: Floats) -> Slices:
     """The elements cut at `found` (J, 3), the fraction and the place on the element rows[j]."""
-    from camtool.kernels.offset_nodes import in_order
+    from camtool.kernels.offsets import in_order
 
     count = len(elements)
     every = np.arange(count)
@@ -483,7 +482,7 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
 
     Points within `eps_mm` share a node, and so do chains of such points.
     """
-    from camtool.kernels.offset_nodes import merged
+    from camtool.kernels.offsets import merged
 
     skew = points @ np.array(SKEW)
     node, first = merged(points, skew, np.argsort(skew), eps_mm)
@@ -497,7 +496,7 @@ def valid_slices(slices: Slices, elements: Segments, source: Arrays, asked: Offs
     The raw offset changes between valid and invalid only where it meets itself, so that one point
     would do; several guard against slices that are hardly too near anywhere.
     """
-    from camtool.kernels.offset_near import far_enough
+    from camtool.kernels.offsets import far_enough
 
     limits = (asked.distance_mm, VALIDITY_EPS_MM)
     curves = curve_rows_of(elements)
@@ -512,7 +511,7 @@ def without_doubles(slices: Slices, elements: Segments) -> Slices:
 
     Such a pair encloses nothing: it is where the offset falls apart, or collapses to a line.
     """
-    from camtool.kernels.offset_nodes import doubles_left
+    from camtool.kernels.offsets import doubles_left
 
     middle = 0.5 * (slices.t0 + slices.t1)
     eps = 2.0 * NODE_EPS_MM
@@ -521,7 +520,7 @@ def without_doubles(slices: Slices, elements: Segments) -> Slices:
 
 def without_dead_ends(slices: Slices) -> Slices:
     """The slices that others lead to and lead on from."""
-    from camtool.kernels.offset_nodes import leading_on
+    from camtool.kernels.offsets import leading_on
 
     return slices[leading_on(*slices.ends)]
 
@@ -533,7 +532,7 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
     enough from the source is on the left, and so it falls into parts that only touch. Each loop
     begins with its first slice, and they come in the order of these.
     """
-    from camtool.kernels.offset_loops import traced
+    from camtool.kernels.offsets import traced
 
     rows, begins = traced(curve_rows_of(elements), slices.element, slices.span, slices.ends)
     loops = [rows[low:high] for low, high in pairwise(begins.tolist())]
@@ -547,7 +546,7 @@ def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> Polylines
     Segments up to POSITION_EPS_MM go. A path of which nothing is left goes, and so does one whose
     mean width, area over half the length, is no more than that.
     """
-    from camtool.kernels.offset_loops import written
+    from camtool.kernels.offsets import written
 
     eps = POSITION_EPS_MM
     begins = np.concatenate([[0], np.cumsum([len(loop) for loop in loops])]).astype(np.int64)

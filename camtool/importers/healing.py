@@ -356,7 +356,7 @@ def _near(points: Floats, segments: Segments, times: float) -> tuple[Floats, Int
     """(P,) how far the nearest segment is from each point; and pairs (J,), (J,) of a point and a
     segment that is no farther from it than so many times that."""
     from camtool.geometry.boxes import Curves
-    from camtool.kernels.offset_near import curves_within, nearest_distances
+    from camtool.kernels.offsets import curves_within, nearest_distances
 
     points = np.ascontiguousarray(points)
     curves = Curves.of(segments)

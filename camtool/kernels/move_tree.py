@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from camtool.kernels.box_tree import LEAF
+from camtool.kernels.offsets import LEAF
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

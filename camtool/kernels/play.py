@@ -1,41 +1,82 @@
-"""The play of an axis (backlash), and what the controller issues against it.
+"""The play of axes: slides that follow the motor's positions, and random numbers for axes that
+scatter.
 
-The slide sits between two flanks of the nut: with the motor at m (mm) it can only be in
-[m + low, m + high], high − low = play, and it moves only when a flank takes it along:
-
-    s_k = min(max(s_{k−1}, m_k + low), m_k + high)          (the play operator)
-
-Before the first motion s = m. "preloaded" in + : the flank that pushes towards + touches, low = 0,
-high = play; in − : low = −play, high = 0. "centred": low = −play/2, high = +play/2. The two
-differ by half the play, and by nothing else.
-
-Compensation is the controller's own policy: whenever the commanded direction of an axis changes,
-it issues so much more in the new direction before the step itself; that moves the motor, not the
-controller's position. A first motion against the direction that the axis is believed to be
-engaged in counts as a change. (Thesis of the PIC18F8720, L1707-1709, L1774-1778.)
-
-An axis has reversed when it came back by half a coded step from the furthest that it went in its
-direction: rounding of positions in mm must not make a reversal, and any step does.
-
-Positions, compensation and the half step are in one unit, mm or steps; `scale` makes it mm.
-
-Exact, because the slide is either left alone or set to (position + added) · scale + flank, where
-`added` is 0 or one compensation, in the direction that is not the first one: nothing is summed
-up, and cutting the samples into blocks changes no bit. The operator does not depend on the rate,
-so a monotone burst of compensation steps acts as its last one. Compiled, because every position
-depends on the one before.
+Compiled, because every position depends on the one before; C types stand in the .pxd beside this
+file.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from camtool.kernels.compiled import bare, kernel
-from camtool.kernels.deviates import deviate
+from camtool.arrays import Floats, Ints
 
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
+# Random numbers with a number each: the same on every machine, in whatever order they are asked.
+#
+# The n-th number of a stream is the sum of twelve uniform ones, less its mean: of mean 0, of
+# standard deviation 1 (1 − 2⁻³³ of it), never beyond ±6, and near enough to a normal one (fourth
+# moment 2.9 for 3). Sums of integers are exact; logarithms and cosines, of which normal numbers
+# are made else, differ between platforms in their last bits.
+#
+# The uniform numbers are the 16-bit parts of three outputs of SplitMix64 (Steele, Lea, Flood,
+# "Fast splittable pseudorandom number generators", 2014), whose k-th output from a key is a
+# mixture of the bits of key + k·γ: nothing is carried along.
+
+
+GAMMA = 0x9E3779B97F4A7C15
+"""2⁶⁴ divided by the golden ratio, odd: what the counter of SplitMix64 goes on by."""
+
+MIXER, OTHER_MIXER = 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+"""The factors of SplitMix64."""
+
+ALL_BITS = 0xFFFFFFFFFFFFFFFF
+"""What is left of a product, as in C."""
+
+
+def _mixed(word: int) -> int:
+    """The output function of SplitMix64."""
+    word = ((word ^ (word >> 30)) * MIXER) & ALL_BITS
+    word = ((word ^ (word >> 27)) * OTHER_MIXER) & ALL_BITS
+    return word ^ (word >> 31)
+
+
+def deviate(seed: int, stream: int, number: int) -> float:
+    """The `number`-th of a stream ≥ 0, from 0 on."""
+    key = _mixed((seed + (stream + 1) * GAMMA) & ALL_BITS)
+    total = 0
+    for k in range(1, 4):
+        word = _mixed((key + (3 * number + k) * GAMMA) & ALL_BITS)
+        for part in range(4):
+            total += (word >> (16 * part)) & 0xFFFF
+    return (float(total) - 6.0 * 65535.0) / 65536.0
+
+
+# The play of an axis (backlash), and what the controller issues against it.
+#
+# The slide sits between two flanks of the nut: with the motor at m (mm) it can only be in
+# [m + low, m + high], high − low = play, and it moves only when a flank takes it along:
+#
+#     s_k = min(max(s_{k−1}, m_k + low), m_k + high)          (the play operator)
+#
+# Before the first motion s = m. "preloaded" in + : the flank that pushes towards + touches, low =
+# 0, high = play; in − : low = −play, high = 0. "centred": low = −play/2, high = +play/2. The two
+# differ by half the play, and by nothing else.
+#
+# Compensation is the controller's own policy: whenever the commanded direction of an axis changes,
+# it issues so much more in the new direction before the step itself; that moves the motor, not the
+# controller's position. A first motion against the direction that the axis is believed to be
+# engaged in counts as a change. (Thesis of the PIC18F8720, L1707-1709, L1774-1778.)
+#
+# An axis has reversed when it came back by half a coded step from the furthest that it went in its
+# direction: rounding of positions in mm must not make a reversal, and any step does.
+#
+# Positions, compensation and the half step are in one unit, mm or steps; `scale` makes it mm.
+#
+# Exact, because the slide is either left alone or set to (position + added) · scale + flank, where
+# `added` is 0 or one compensation, in the direction that is not the first one: nothing is summed
+# up, and cutting the samples into blocks changes no bit. The operator does not depend on the rate,
+# so a monotone burst of compensation steps acts as its last one. Compiled, because every position
+# depends on the one before.
 
 
 def play_limits(play_mm: float, convention: str, direction: int) -> tuple[float, float]:
@@ -54,7 +95,6 @@ def play_start(position: float, scale: float, direction: int) -> Floats:
     return np.array([position, direction, 0.0, position * scale, 0.0, 0.0], dtype=np.float64)
 
 
-@bare
 def turned(
     position: float, furthest: float, direction: float, least: float
 ) -> tuple[float, float, bool]:
@@ -67,13 +107,11 @@ def turned(
     return furthest, direction, False
 
 
-@bare
 def taken_along(slide: float, motor: float, low: float, high: float) -> float:
     """The play operator: the slide after the motor went to `motor` mm without turning round."""
     return min(max(slide, motor + low), motor + high)
 
 
-@kernel
 def play_fill(
     positions: Floats, offsets: Ints, axes: Floats, states: Floats, out: Floats, turns: Ints
 ) -> None:
@@ -103,7 +141,6 @@ def play_fill(
         states[axis, 2], states[axis, 3] = added, slide
 
 
-@kernel
 def play_varied_fill(
     positions: Floats,
     offsets: Ints,
@@ -144,3 +181,81 @@ def play_varied_fill(
         states[axis, 0], states[axis, 1] = furthest, direction
         states[axis, 2], states[axis, 3] = added, slide
         states[axis, 4], states[axis, 5] = number, shift
+
+
+# The play of an axis over blocks of positions that mostly run one way.
+#
+# While the motor runs one way, the play operator of `play_fill` has no memory but where
+# the slide stood at first: with rising motor positions m_k
+#
+#     s_k = min(max(s_{k−1}, m_k + low), m_k + high) = max(s_0, m_k + low),
+#
+# since m_k + low rises too, and s_{k−1} ≤ m_{k−1} + high ≤ m_k + high; falling the same with the
+# other flank. Exact to the last bit, since max and min only choose. A reversal comes with the
+# first sample that moves, in a block that turns nowhere else; blocks that do are taken step by
+# step.
+
+
+RISING, FALLING, STILL, TURNING = 1, -1, 0, 2
+"""Which way a block of positions runs."""
+
+
+def way_of(before: int, positions: Ints) -> int:
+    """Which way positions (n,) run that follow `before`."""
+    least = most = positions[0] - before
+    for k in range(1, len(positions)):
+        change = positions[k] - positions[k - 1]
+        least = min(least, change)
+        most = max(most, change)
+    if least >= 0:
+        return RISING if most > 0 else STILL
+    return FALLING if most <= 0 else TURNING
+
+
+def play_block(way: int, positions: Floats, axis: Floats, state: Floats, out: Floats) -> int:
+    """Slides, `out` (n,) mm, for positions (n,) that run `way`; returns the reversals.
+
+    `axis` (5,) and `state` (4,) as in `play_fill`; steps are wider than axis[4].
+    """
+    if way == TURNING or len(positions) == 0:
+        return _step_by_step(positions, axis, state, out)
+    scale, low, high = axis[0], axis[1], axis[2]
+    begin, reversals = 0, 0
+    if way != STILL and way != state[1]:
+        while positions[begin] == state[0]:
+            begin += 1
+        if begin > 0:
+            state[3] = taken_along(state[3], (state[0] + state[2]) * scale, low, high)
+        for k in range(begin):
+            out[k] = state[3]
+        state[1] = way
+        state[2] += way * axis[3]
+        reversals = 1
+    added = state[2]
+    slide = taken_along(state[3], (positions[begin] + added) * scale, low, high)
+    count = len(positions)
+    if way == STILL:
+        for k in range(begin, count):
+            out[k] = slide
+    elif way == RISING:
+        for k in range(begin, count):
+            motor = (positions[k] + added) * scale + low
+            out[k] = slide if slide > motor else motor
+    else:
+        for k in range(begin, count):
+            motor = (positions[k] + added) * scale + high
+            out[k] = slide if slide < motor else motor
+    state[0], state[3] = positions[count - 1], out[count - 1]
+    return reversals
+
+
+def _step_by_step(positions: Floats, axis: Floats, state: Floats, out: Floats) -> int:
+    reversals = 0
+    for k in range(len(positions)):
+        state[0], state[1], reversed_ = turned(positions[k], state[0], state[1], axis[4])
+        if reversed_:
+            state[2] += state[1] * axis[3]
+            reversals += 1
+        state[3] = taken_along(state[3], (positions[k] + state[2]) * axis[0], axis[1], axis[2])
+        out[k] = state[3]
+    return reversals

@@ -87,7 +87,7 @@ def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
         return found
     from camtool.geometry.boxes import Curves
     from camtool.geometry.polylines import segment_rows
-    from camtool.kernels.offset_near import curves_within, nearest_distances
+    from camtool.kernels.offsets import curves_within, nearest_distances
 
     curves = Curves.of(Segments.of(lines))
     of = of[segment_rows(lines)]

@@ -170,7 +170,7 @@ class _Parts:
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
-    from camtool.kernels.offset_near import curves_within, nearest_distances
+    from camtool.kernels.offsets import curves_within, nearest_distances
 
     curves, points = Curves.of(segments), np.ascontiguousarray(points)
     away = nearest_distances(points, curves.rows, curves.tree)
@@ -193,7 +193,7 @@ def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
 
 def _distances(points: Floats, segments: Segments) -> Floats:
     """(P,) distance of each point (P, 2) from the nearest segment."""
-    from camtool.kernels.offset_near import nearest_distances
+    from camtool.kernels.offsets import nearest_distances
 
     curves = Curves.of(segments)
     return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)

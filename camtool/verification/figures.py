@@ -3,7 +3,7 @@
 `Figure` takes errors in mm, batch by batch, and gives the maximum (exact, with its place), the
 root of the mean square (exact, all samples with the same weight) and the 95th percentile, in
 memory that does not grow with the stream. The percentile comes from a histogram: it is the middle
-of the bin with the sample of that rank. Bins (`camtool.kernels.error_bins`) are between 1/256 and
+of the bin with the sample of that rank. Bins (`camtool.kernels.judging`) are between 1/256 and
 1/128 of their value wide, so the percentile is within 0.4 % of the exact value.
 
 `RowFigures` are the figures of each row of the program. All figures of contours, of the worst
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.kernels.error_bins import BEFORE_FIRST, BINS, SHIFT, leading_bits
+from camtool.kernels.judging import BEFORE_FIRST, BINS, SHIFT, leading_bits
 from camtool.simulation.motion import Ledger
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.cuts import CutMoves
@@ -135,8 +135,8 @@ class RowFigures:
 
 
 def empty_columns(count: int) -> Floats:
-    """(count, 19) columns of `camtool.kernels.judge` for rows without samples."""
-    from camtool.kernels import judge as at
+    """(count, 19) columns of `camtool.kernels.judging` for rows without samples."""
+    from camtool.kernels import judging as at
 
     columns = np.zeros((count, at.ROW_COLUMNS))
     columns[:, [at.LOW_X, at.LOW_Y]] = np.inf
@@ -148,7 +148,7 @@ def empty_columns(count: int) -> Floats:
 
 def row_figures(columns: Floats, is_cut: Bools, ledger: Ledger) -> RowFigures:
     """The figures in the columns (N, 19) that the judge has filled."""
-    from camtool.kernels import judge as at
+    from camtool.kernels import judging as at
 
     samples, known = columns[:, at.SAMPLES].astype(np.int64), columns[:, at.KNOWN].astype(np.int64)
     judged = is_cut & (samples > 0)

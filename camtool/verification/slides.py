@@ -1,6 +1,6 @@
 """One pass over the motion: errors of interpolation and mechanics, circles, and the slides' path.
 
-The compiled judge (`camtool.kernels.judge`) takes the samples, from chunks or from a controller
+The compiled judge (`camtool.kernels.judging`) takes the samples, from chunks or from a controller
 that is judged as it is simulated, and fills columns of the rows; this module sets its task and
 reads the results. A circle is evaluated when its last row is done, so that only circles in
 progress have bins. Memory grows with the rows of the program, not with the steps.
@@ -39,7 +39,7 @@ from camtool.verification.matching import Goal, Match
 from camtool.verification.nearest import ANY_CONTOUR, MoveIndex, run_peaks
 
 if TYPE_CHECKING:
-    from camtool.kernels.judge import Sums, Task
+    from camtool.kernels.judging import Sums, Task
 
 
 BINS_KEPT = 64
@@ -79,7 +79,7 @@ class SlidePass:
 
     def add(self, chunk: Chunk) -> None:
         """The next samples of the program."""
-        from camtool.kernels.judge import judge_samples
+        from camtool.kernels.judging import judge_samples
 
         add_ledger(self._ledger, chunk.ledger)
         if len(chunk.row) == 0:
@@ -132,7 +132,7 @@ class SlidePass:
             self.both_ways += self._pairs.add(circle, bins)
             if len(self.bins) < BINS_KEPT:
                 self.bins[circle] = bins.copy()
-            from camtool.kernels.circle_bins import empty_bins
+            from camtool.kernels.judging import empty_bins
 
             bins[:] = empty_bins(1)[0]
 
@@ -180,10 +180,8 @@ def largest(errors: Floats, which: Bools) -> float:
 
 
 def _task(decoded: MoveIndex, goal: Goal, match: Match, slot: Ints) -> Task:
-    from camtool.kernels.circle_bins import bin_directions
-    from camtool.kernels.judge import Task
+    from camtool.kernels.judging import Task, bin_directions
     from camtool.kernels.move_tree import move_tree
-    from camtool.kernels.near_moves import Moves
 
     own = move_table(decoded.cuts)
     wanted = own if goal.moves is decoded else move_table(goal.moves.cuts)
@@ -203,11 +201,7 @@ def _task(decoded: MoveIndex, goal: Goal, match: Match, slot: Ints) -> Task:
 
 
 def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
-    from camtool.kernels.circle_bins import empty_bins
-    from camtool.kernels.error_bins import BINS
-    from camtool.kernels.judge import Sums
-    from camtool.kernels.near_moves import no_list
-    from camtool.kernels.thin_trace import new_pen
+    from camtool.kernels.judging import BINS, Sums, empty_bins, new_pen, no_list
 
     room = 2 * trace.most + rows
     return Sums(
@@ -262,7 +256,7 @@ def _in_order(first: Ints, last: Ints) -> Iterator[int]:
 
 @dataclass(frozen=True, eq=False)
 class MoveTable:
-    """The J rows of a toolpath that cut: `moves` (J, 16) of `camtool.kernels.move_errors`,
+    """The J rows of a toolpath that cut: `moves` (J, 16) of `camtool.kernels.judging`,
     `boxes` (J, 4), `heights` (J, 2) mm, `contour` (J,) ascending; `of_row` (N,) is the index of
     each row, or −1."""
 
@@ -283,7 +277,7 @@ class MoveTable:
 
 def move_table(cuts: CutMoves) -> MoveTable:
     """The columns of the moves that cut."""
-    from camtool.kernels import move_errors as at
+    from camtool.kernels import judging as at
 
     rows, segments = cuts.rows, cuts.segments
     first, last = cuts.first[rows], cuts.first[rows + 1] - 1
@@ -323,7 +317,7 @@ def move_table(cuts: CutMoves) -> MoveTable:
 # The path of the slides, thinned for pictures to a bounded number of points.
 #
 # Of every `stride` samples of a row the judge keeps the one with the largest error, and the last
-# sample of each row (`camtool.kernels.thin_trace`).
+# sample of each row (`camtool.kernels.judging`).
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,7 +353,7 @@ def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
     """The start (1, 2) mm and the samples that the judge kept. Where they are more than `most`
     (more rows than points), runs of them are reduced to the sample with the largest error.
     `cutting` (N,): the rows that cut."""
-    from camtool.kernels.thin_trace import WRITTEN, unwritten
+    from camtool.kernels.judging import WRITTEN, unwritten
 
     written = int(sums.pen[WRITTEN])
     kept = np.concatenate([sums.trace[:written], unwritten(sums.pen)])

@@ -27,13 +27,13 @@ from typing import Final
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.kernels.direct_search import (
+
+from .numbers import Grid
+from .steps import (
     direct_search_hits,
     direct_search_nearest,
     direct_search_path,
 )
-
-from .numbers import Grid
 
 WINDOW: Final = (0.6, 1.1)
 WINDOW_SLACK: Final = 4

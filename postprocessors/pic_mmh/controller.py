@@ -32,14 +32,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.findings import Finding
-from camtool.kernels import arc_stops as stopping
-from camtool.kernels import leg_steps as columns
-from camtool.kernels.approach import approach_scan, approach_start, expected_quadrants
-from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
-from camtool.kernels.direct_search import direct_search_fill, direct_search_start
-from camtool.kernels.heading import rounded_radius
 from camtool.kernels.lattice import to_steps
-from camtool.kernels.stairs import stairs_fill, stairs_start
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
@@ -47,9 +40,23 @@ from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
 from camtool.simulation.rows import block_of, refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
+from . import steps as loops
 from .dialect import Dialect, PicMmhController
 from .findings import ARC_END_UNSURE
 from .legs import METHODS, FusedLegs, legs_of, positions
+from .steps import (
+    approach_scan,
+    approach_start,
+    dda_arc_fill,
+    dda_arc_start,
+    dda_line_fill,
+    direct_search_fill,
+    direct_search_start,
+    expected_quadrants,
+    rounded_radius,
+    stairs_fill,
+    stairs_start,
+)
 
 _Machine = Machine[PicMmhController, Dialect]
 
@@ -232,9 +239,9 @@ class PicMmhRun:
         how = (
             METHODS[self._options.interpolator or controller.arcs],
             controller.initial_error == "rounded-radius",
-            stopping.READINGS[controller.arc_end],
+            loops.READINGS[controller.arc_end],
         )
-        stopping.run_on(moves, self._position[:2].copy(), ends, self._centres, how, stops)
+        loops.run_on(moves, self._position[:2].copy(), ends, self._centres, how, stops)
         self._ends[:, :2] = np.where(toolpath.is_motion[:, None], ends, self._ends[:, :2])
         return stops
 
@@ -490,20 +497,18 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, legs: Ints) -> tuple
     """One ARC_END_UNSURE for the arcs of `legs` (L, 14), each from the end of the row before it,
     that do not stop on their end by every reading."""
     arcs = legs[
-        (legs[:, columns.KIND] == columns.ARC) & (legs[:, [columns.A, columns.B]] != 0).any(axis=1)
+        (legs[:, loops.KIND] == loops.ARC) & (legs[:, [loops.A, loops.B]] != 0).any(axis=1)
     ]
-    met = [
-        _stops(arcs, rounded, stopping.EQUAL)[:, stopping.MET] != 0 for rounded in (False, True)
-    ]
+    met = [_stops(arcs, rounded, loops.EQUAL)[:, loops.MET] != 0 for rounded in (False, True)]
     unsure = ~(met[0] & met[1])
     if not unsure.any():
         return ()
     apart = {
         name: max(float(_apart(arcs[unsure], rounded, number).max()) for rounded in (False, True))
-        for name, number in stopping.READINGS.items()
-        if number != stopping.EQUAL
+        for name, number in loops.READINGS.items()
+        if number != loops.EQUAL
     }
-    row = int(arcs[unsure][0, columns.ROW])
+    row = int(arcs[unsure][0, loops.ROW])
     taken = machine.controller.arc_end
     return (
         ARC_END_UNSURE(
@@ -522,12 +527,12 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, legs: Ints) -> tuple
 
 def _stops(arcs: Ints, rounded: bool, reading: int) -> Ints:
     """(L, 4) of `camtool.kernels.arc_stops`, by direct search."""
-    out = np.empty((len(arcs), stopping.STOP_COLUMNS), dtype=np.int64)
-    stopping.arc_stops(np.ascontiguousarray(arcs), (columns.DSM, rounded, reading), out)
+    out = np.empty((len(arcs), loops.STOP_COLUMNS), dtype=np.int64)
+    loops.arc_stops(np.ascontiguousarray(arcs), (loops.DSM, rounded, reading), out)
     return out
 
 
 def _apart(arcs: Ints, rounded: bool, reading: int) -> Floats:
     """(L,) steps from the stop of each arc to its end."""
-    stops = _stops(arcs, rounded, reading)[:, [stopping.STOP_X, stopping.STOP_Y]]
-    return np.asarray(np.hypot(*(stops - arcs[:, [columns.END_X, columns.END_Y]]).T))
+    stops = _stops(arcs, rounded, reading)[:, [loops.STOP_X, loops.STOP_Y]]
+    return np.asarray(np.hypot(*(stops - arcs[:, [loops.END_X, loops.END_Y]]).T))

@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.kernels import leg_steps as columns
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Ledger
 from camtool.toolpath.moves import Kind, Toolpath
 
+from . import steps as loops
+
 if TYPE_CHECKING:
-    from camtool.kernels.judge import Sums, Task
+    from camtool.kernels.judging import Sums, Task
 
 
-METHODS: Final = {"dsm": columns.DSM, "stairs": columns.STAIRS, "dda": columns.DDA}
+METHODS: Final = {"dsm": loops.DSM, "stairs": loops.STAIRS, "dda": loops.DDA}
 """The numbers that the kernels know the methods of arcs by."""
 
 
@@ -44,27 +45,27 @@ def legs_of(toolpath: Toolpath, places: Ints, centres: Ints, stops: Ints) -> Int
     `positions`, `centres` (N, 2) steps, `stops` (N,) samples of arcs or −1."""
     count = len(toolpath)
     begin, way = places[:-1], np.diff(places, axis=0)
-    flat = np.zeros((count, columns.LEG_COLUMNS), dtype=np.int64)
-    flat[:, columns.ROW] = np.arange(count)
-    flat[:, [columns.FROM_X, columns.FROM_Y]] = begin[:, :2]
+    flat = np.zeros((count, loops.LEG_COLUMNS), dtype=np.int64)
+    flat[:, loops.ROW] = np.arange(count)
+    flat[:, [loops.FROM_X, loops.FROM_Y]] = begin[:, :2]
     deep = flat.copy()
     arc = toolpath.is_arc
-    flat[:, columns.KIND] = np.where(arc, columns.ARC, columns.LINE)
+    flat[:, loops.KIND] = np.where(arc, loops.ARC, loops.LINE)
     about = np.where(arc[:, None], centres, begin[:, :2])
-    flat[:, [columns.ORIGIN_X, columns.ORIGIN_Y]] = about
+    flat[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = about
     sign = np.where((way[:, :2] < 0) & ~arc[:, None], -1, 1)
-    flat[:, [columns.SIGN_X, columns.SIGN_Y]] = sign
+    flat[:, [loops.SIGN_X, loops.SIGN_Y]] = sign
     spoke = begin[:, :2] - centres
-    flat[:, [columns.A, columns.B]] = np.where(arc[:, None], spoke, np.abs(way[:, :2]))
-    flat[:, [columns.END_X, columns.END_Y]] = places[1:, :2] - about
-    flat[:, columns.CW] = toolpath.kind == Kind.ARC_CW
-    flat[:, columns.STOP] = stops
-    deep[:, columns.KIND] = columns.DEPTH
-    deep[:, [columns.FROM_X, columns.FROM_Y]] = places[1:, :2]  # XY first, then Z
-    deep[:, [columns.ORIGIN_X, columns.ORIGIN_Y]] = places[1:, :2]
-    deep[:, columns.A] = np.abs(way[:, 2])
-    deep[:, columns.CW] = np.sign(way[:, 2])
-    both = np.stack([flat, deep], axis=1).reshape(-1, columns.LEG_COLUMNS)
+    flat[:, [loops.A, loops.B]] = np.where(arc[:, None], spoke, np.abs(way[:, :2]))
+    flat[:, [loops.END_X, loops.END_Y]] = places[1:, :2] - about
+    flat[:, loops.CW] = toolpath.kind == Kind.ARC_CW
+    flat[:, loops.STOP] = stops
+    deep[:, loops.KIND] = loops.DEPTH
+    deep[:, [loops.FROM_X, loops.FROM_Y]] = places[1:, :2]  # XY first, then Z
+    deep[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = places[1:, :2]
+    deep[:, loops.A] = np.abs(way[:, 2])
+    deep[:, loops.CW] = np.sign(way[:, 2])
+    both = np.stack([flat, deep], axis=1).reshape(-1, loops.LEG_COLUMNS)
     moves = np.column_stack([arc | way[:, :2].any(axis=1), way[:, 2] != 0]).reshape(-1)
     return np.ascontiguousarray(both[moves])
 
@@ -94,30 +95,29 @@ class FusedLegs:
 
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
         """Run the rows low:high, which follow those run before, and judge them."""
-        from camtool.kernels import judge_steps as judging
 
         method, rounded, by_event, step_mm = self._how
-        first, last = np.searchsorted(self._legs[:, columns.ROW], [low, high])
+        first, last = np.searchsorted(self._legs[:, loops.ROW], [low, high])
         legs = self._legs[first:last]
-        counts = np.zeros((len(legs), judging.COUNT_COLUMNS), dtype=np.int64)
+        counts = np.zeros((len(legs), loops.COUNT_COLUMNS), dtype=np.int64)
         number = METHODS[method]
         mechanics = self._mechanics.axes, self._mechanics.states
-        judging.judge_legs(legs, (number, rounded), step_mm, mechanics, counts, task, sums)
-        row = legs[:, columns.ROW] - low
-        deep = (legs[:, columns.KIND] == columns.DEPTH).astype(np.int64)
-        reversals = counts[:, judging.REVERSALS : judging.REVERSALS + 3]
+        loops.judge_legs(legs, (number, rounded), step_mm, mechanics, counts, task, sums)
+        row = legs[:, loops.ROW] - low
+        deep = (legs[:, loops.KIND] == loops.DEPTH).astype(np.int64)
+        reversals = counts[:, loops.REVERSALS : loops.REVERSALS + 3]
         added = reversals @ self._mechanics.compensation_steps
-        outputs = counts[:, judging.SAMPLES if by_event else judging.PASSES]
+        outputs = counts[:, loops.SAMPLES if by_event else loops.PASSES]
         period_s = self._periods_s[low + row, deep]
         count = high - low
-        missed = np.bincount(row[counts[:, judging.ENDED] == 0], minlength=count)
-        steps = counts[:, judging.STEPS : judging.STEPS + 3]
+        missed = np.bincount(row[counts[:, loops.ENDED] == 0], minlength=count)
+        steps = counts[:, loops.STEPS : loops.STEPS + 3]
         return Ledger(
             row=np.arange(low, high),
             duration_s=self._still_s[low:high]
             + np.bincount(row, (outputs + added) * period_s, minlength=count),
             compensation_s=np.asarray(np.bincount(row, added * period_s, minlength=count) * 1.0),
-            iterations=_summed(row, counts[:, judging.PASSES : judging.PASSES + 1], count)[:, 0],
+            iterations=_summed(row, counts[:, loops.PASSES : loops.PASSES + 1], count)[:, 0],
             steps=_summed(row, steps, count),
             reversals=_summed(row, reversals, count),
             ended=missed == 0,

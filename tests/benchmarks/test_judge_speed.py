@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camtool.kernels.circle_bins import bin_directions
-from camtool.kernels.error_bins import BEFORE_FIRST, BINS
+from camtool.kernels.judging import BEFORE_FIRST, BINS, bin_directions
 from camtool.simulation.motion import Options
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath

@@ -4,22 +4,21 @@ import math
 
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh import steps as loops
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camtool.kernels import arc_stops as stopping
-from camtool.kernels import leg_steps as columns
 from tests.oracles import arc_ends as oracle
 
 
 def stop(
     start: tuple[int, int], end: tuple[int, int], clockwise: bool, rounded: bool, reading: str
 ) -> oracle.Stop:
-    leg = np.zeros((1, columns.LEG_COLUMNS), dtype=np.int64)
-    leg[0, columns.KIND], leg[0, columns.CW], leg[0, columns.STOP] = columns.ARC, clockwise, -1
-    leg[0, [columns.A, columns.B, columns.END_X, columns.END_Y]] = (*start, *end)
-    out = np.zeros((1, stopping.STOP_COLUMNS), dtype=np.int64)
-    stopping.arc_stops(leg, (columns.DSM, rounded, stopping.READINGS[reading]), out)
+    leg = np.zeros((1, loops.LEG_COLUMNS), dtype=np.int64)
+    leg[0, loops.KIND], leg[0, loops.CW], leg[0, loops.STOP] = loops.ARC, clockwise, -1
+    leg[0, [loops.A, loops.B, loops.END_X, loops.END_Y]] = (*start, *end)
+    out = np.zeros((1, loops.STOP_COLUMNS), dtype=np.int64)
+    loops.arc_stops(leg, (loops.DSM, rounded, loops.READINGS[reading]), out)
     samples, x, y, met = out[0].tolist()
     return oracle.Stop(samples, (x, y), bool(met))
 

@@ -5,14 +5,14 @@ from itertools import islice
 
 import numpy as np
 import pytest
-
-from camtool.kernels.direct_search import (
+from camtool_postprocessors.pic_mmh.steps import (
     direct_search_fill,
     direct_search_hits,
     direct_search_nearest,
     direct_search_path,
     direct_search_start,
 )
+
 from tests.oracles.controllers import direct_search
 
 

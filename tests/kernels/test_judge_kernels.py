@@ -6,17 +6,26 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from camtool.kernels.box_tree import LEAF
-from camtool.kernels.circle_bins import ANGLE_BINS, bin_directions, empty_bins
+from camtool.kernels.judging import (
+    ANGLE_BINS,
+    COUNT,
+    LOOKED,
+    WRITTEN,
+    Moves,
+    bin_directions,
+    empty_bins,
+    new_pen,
+    no_list,
+    trace_block,
+    unwritten,
+)
 from camtool.kernels.move_tree import FIRST, LAST, hilbert_order, move_tree
-from camtool.kernels.near_moves import COUNT, LOOKED, Moves, no_list
-from camtool.kernels.thin_trace import WRITTEN, new_pen, unwritten
+from camtool.kernels.offsets import LEAF
 from tests.oracles.kernel_doors import (
     fill_bins_,
     lower_errors_,
     nearest_errors_,
     set_errors_,
-    trace_block_,
 )
 from tests.oracles.near_moves import Arc, Line, Move, nearest, random_move
 
@@ -216,7 +225,7 @@ def test_the_trace_is_that_of_a_loop(stride: int) -> None:
                 if len(part):
                     x, y, error = (np.ascontiguousarray(column) for column in part.T)
                     largest = float(error.max())
-                    trace_block_(number, x, y, error, largest, pen, trace)
+                    trace_block(number, x, y, error, largest, pen, trace)
         got = np.concatenate([trace[: int(pen[WRITTEN])], unwritten(pen)])
         wanted = thinned([[tuple(point) for point in row.tolist()] for row in rows], stride)
         assert got.tolist() == [list(point) for point in wanted]
@@ -226,7 +235,7 @@ def test_a_full_trace_keeps_the_ends_of_rows() -> None:
     pen, trace = new_pen(1, 3), np.empty((20, 4))
     for number in range(4):
         x = np.arange(3.0)
-        trace_block_(number, x, x, x + 1.0, 3.0, pen, trace)
+        trace_block(number, x, x, x + 1.0, 3.0, pen, trace)
     got = np.concatenate([trace[: int(pen[WRITTEN])], unwritten(pen)])
     assert got[:, 3].tolist() == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
     assert got[3:, 0].tolist() == [2.0, 2.0, 2.0]

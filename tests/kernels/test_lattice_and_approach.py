@@ -5,10 +5,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh.steps import (
+    approach_scan,
+    approach_start,
+    direct_search_path,
+    expected_quadrants,
+    heading,
+    rounded_radius,
+)
 
-from camtool.kernels.approach import approach_scan, approach_start, expected_quadrants
-from camtool.kernels.direct_search import direct_search_path
-from camtool.kernels.heading import heading, rounded_radius
 from camtool.kernels.lattice import to_steps
 from tests.oracles.controllers import SIGNS, first_quadrant, x_grows
 

@@ -25,7 +25,7 @@ from camtool.geometry.offset import (
     without_doubles,
 )
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.kernels import offset_curves, offset_kites, offset_meet, offset_near
+from camtool.kernels import offsets
 from tests.oracles import offset_stages as oracle
 from tests.oracles.contours import RANDOM, gear
 from tests.oracles.offset_shapes import kites
@@ -49,8 +49,8 @@ def test_rows_are_the_curves(seed: int) -> None:
     rng = np.random.default_rng(seed)
     some = segments(rng, 40)
     rows, boxes = curve_rows_of(some), segment_boxes(some)
-    assert np.allclose(rows[:, offset_curves.LENGTH], segment_lengths(some), rtol=1e-13)
-    held = offset_curves.curve_boxes(rows, 0.0)
+    assert np.allclose(rows[:, offsets.LENGTH], segment_lengths(some), rtol=1e-13)
+    held = offsets.curve_boxes(rows, 0.0)
     assert (held[:, :2] <= boxes[:, :2] + 1e-12).all()
     assert (held[:, 2:] >= boxes[:, 2:] - 1e-12).all()
     # Not much wider than need be: as the rectangle about chord and arc is.
@@ -58,9 +58,9 @@ def test_rows_are_the_curves(seed: int) -> None:
     assert (held[:, 2:] - held[:, :2]).max() <= 2.0 * chord.max()
     for t in (0.0, 0.3, 1.0):
         wanted = point_at(some, np.arange(len(some)), np.full(len(some), t))
-        got = [offset_curves.point_on(rows, i, t) for i in range(len(some))]
+        got = [offsets.point_on(rows, i, t) for i in range(len(some))]
         assert np.allclose(got, wanted, atol=1e-13)
-        lengths = [offset_curves.along(rows, i, *p) for i, p in enumerate(wanted)]
+        lengths = [offsets.along(rows, i, *p) for i, p in enumerate(wanted)]
         assert np.allclose(lengths, t * segment_lengths(some), atol=1e-11)
 
 
@@ -71,22 +71,23 @@ def test_distances(seed: int) -> None:
     curves = Curves.of(some)
     points = rng.uniform(-5.0, 15.0, (60, 2))
     every = points_to_segments(points, some)
-    got = offset_near.nearest_distances(points, curves.rows, curves.tree)
+    got = offsets.nearest_distances(points, curves.rows, curves.tree)
     assert np.allclose(got, every.min(axis=1), atol=1e-13)
     limits = rng.uniform(0.0, 4.0, len(points))
-    pairs = offset_near.curves_within(points, limits, curves.rows, curves.tree)
+    pairs = offsets.curves_within(points, limits, curves.rows, curves.tree)
     assert (np.diff(pairs[:, 0]) >= 0).all()
     assert sorted(map(tuple, pairs.tolist())) == [
         (int(i), int(j)) for i, j in zip(*np.nonzero(every <= limits[:, None]), strict=True)
     ]
     room, reach = np.empty(64, np.int64), float(rng.uniform(0.5, 4.0))
+    stack = np.empty(offsets.DEPTH, np.int64)
     for point, row in zip(points, every, strict=True):
-        at = (float(point[0]), float(point[1]))
-        count = offset_near.gathered(curves.rows, curves.tree, at, reach, room)
+        x, y = float(point[0]), float(point[1])
+        count = offsets.gathered(curves.rows, curves.tree, x, y, reach, room, stack)
         assert sorted(room[:count]) == np.flatnonzero(row < reach).tolist()
         if count > 1:
             few = room[: count - 1].copy()
-            assert offset_near.gathered(curves.rows, curves.tree, at, reach, few) == -1
+            assert offsets.gathered(curves.rows, curves.tree, x, y, reach, few, stack) == -1
 
 
 @given(SEEDS, st.booleans())
@@ -99,9 +100,9 @@ def test_meetings(seed: int, grid: bool) -> None:
         (each_once(crossings(one, one, position_eps_mm=eps)), a, True),
         (crossings(one, other, position_eps_mm=eps), b, False),
     ):
-        pairs = offset_meet.pairs_of(a.boxes, a.tree, curves.boxes, curves.tree, own)
+        pairs = offsets.pairs_of(a.boxes, a.tree, curves.boxes, curves.tree, own)
         assert len(np.unique(pairs, axis=0)) == len(pairs)
-        rows, at = offset_meet.meetings_of(a.rows, curves.rows, pairs, eps)
+        rows, at = offsets.meetings_of(a.rows, curves.rows, pairs, eps)
         got = np.column_stack([rows, at[:, 2:], at[:, :2]])
         want = np.column_stack([wanted.row_a, wanted.row_b, wanted.ta, wanted.tb, wanted.point])
         # Where curves are tangent, what they share up to eps is one meeting here, and may be two
@@ -208,10 +209,11 @@ def test_depth_in_kites(seed: int, limit: float) -> None:
     wanted = [shapely.Polygon(kite) for kite in kites([p], d, limit)]
     _, _, own, tree = source_arrays(Segments.of(p), raw.kites)
     assert len(own) == len(wanted)
+    stack = np.empty(offsets.DEPTH, np.int64)
     for x, y in rng.uniform(-14.0, 14.0, (200, 2)):
         points = [shapely.Point(x, y)] * len(wanted)
         deep = [
             k.exterior.distance(q) for k, q in zip(wanted, points, strict=True) if k.contains(q)
         ]
-        got = offset_kites.deepest(own, tree, (x, y), 0.0, math.inf)
+        got = offsets.deepest(own, tree, x, y, 0.0, math.inf, stack)
         assert math.isclose(got, max(deep, default=0.0), abs_tol=1e-9)

@@ -4,8 +4,8 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh.steps import direct_search_path
 
-from camtool.kernels.direct_search import direct_search_path
 from camtool.kernels.play import play_fill, play_limits, play_start
 from tests.oracles import controllers as twins
 from tests.oracles.mechanics import PulsedAxis

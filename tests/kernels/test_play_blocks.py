@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from camtool.kernels.play import play_fill
-from tests.oracles.kernel_doors import play_block_, way_of_
+from camtool.kernels.play import play_block, play_fill, way_of
 
 STEP = 0.00014
 
@@ -30,10 +29,10 @@ def compare(blocks: list[np.ndarray], axis: np.ndarray, direction: int, begin: i
     fast, literal = start(begin, direction), np.tile(start(begin, direction), (3, 1))
     at, simple = begin, 0
     for steps in blocks:
-        way = way_of_(at, steps)
+        way = way_of(at, steps)
         simple += way != 2
         out = np.empty(len(steps))
-        reversals = play_block_(way, steps * STEP, axis, fast, out)
+        reversals = play_block(way, steps * STEP, axis, fast, out)
         wanted, turns = slow(steps, axis, literal)
         assert np.array_equal(out, wanted)
         assert reversals == turns
@@ -77,6 +76,6 @@ def test_long_walks_and_places_that_the_controller_only_believes_in(axis) -> Non
         for part in (steps[1:], steps):
             out = np.empty(len(part))
             one, other = fast.copy(), literal.copy()
-            play_block_(way_of_(jump, part), part * STEP, numbers, one, out)
+            play_block(way_of(jump, part), part * STEP, numbers, one, out)
             assert np.array_equal(out, slow(part, numbers, other)[0])
             assert np.array_equal(one[:4], other[0, :4])

@@ -5,9 +5,14 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from camtool_postprocessors.pic_mmh.steps import (
+    dda_arc_fill,
+    dda_arc_start,
+    dda_line_fill,
+    stairs_fill,
+    stairs_start,
+)
 
-from camtool.kernels.dda import dda_arc_fill, dda_arc_start, dda_line_fill
-from camtool.kernels.stairs import stairs_fill, stairs_start
 from tests.oracles import controllers as twins
 
 NOWHERE = (10**9, 10**9)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.kernels import move_errors as at
+from camtool.kernels import judging as at
 
 
 @dataclass(frozen=True)

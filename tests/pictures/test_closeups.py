@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camtool.kernels.circle_bins import empty_bins
+from camtool.kernels.judging import empty_bins
 from camtool.pictures.options import Options
 from camtool.pictures.picture import ERRORS_ACROSS, LEAST_SHARE, closeups
 from camtool.pictures.scene import Round, Scene

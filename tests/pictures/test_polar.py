@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from camtool.errors import OptionError
-from camtool.kernels.circle_bins import bin_directions, empty_bins, fill_bins
+from camtool.kernels.judging import bin_directions, empty_bins
 from camtool.pictures.draw import draw, png
 from camtool.pictures.options import Options
 from camtool.pictures.scene import Round, Scene, rounds_of
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles import svg_page
 from tests.oracles.dense_moves import pic_mmh
+from tests.oracles.kernel_doors import fill_bins_
 from tests.oracles.png import decode
 from tests.targets import verify
 
@@ -26,7 +27,7 @@ def seen(error_mm, turns: float = 1.0) -> Round:
     radius = RADIUS + error_mm(angle)
     bins = empty_bins(1)[0]
     x, y = CENTRE[0] + radius * np.cos(angle), CENTRE[1] + radius * np.sin(angle)
-    fill_bins(x, y, CENTRE, bin_directions(), bins)
+    fill_bins_(x, y, CENTRE, bin_directions(), bins)
     return Round((10.0, -4.0), RADIUS, True, bins, 0.02, (0.01, -0.01, 0.0), (0.004, np.nan))
 
 

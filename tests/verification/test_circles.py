@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from camtool.kernels.circle_bins import ANGLE_BINS, bin_directions, empty_bins
+from camtool.kernels.judging import ANGLE_BINS, bin_directions, empty_bins
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.circles import (
     UNSEEN,

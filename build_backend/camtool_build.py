@@ -1,0 +1,380 @@
+"""The build backend: setuptools, and the compiled loops made by Cython on the way.
+
+A module is compiled when a .pxd lies beside it, which holds nothing but C types: its .py stays
+plain Python, and runs uncompiled too. Cython is given a copy of both under build/, in which
+
+- numbers stand in functions for the constants of modules (NAMES IN CAPITALS, math.inf and so on):
+  C knows them when it is compiled, and a module's own names would be looked up in a dictionary;
+- names that the .pxd cimports are not imported once more.
+
+Where there is no C compiler, zig's is asked for, a wheel from the package index. With
+CAMTOOL_CHECKED=1 in the environment every index and every sum of integers is checked, and the
+compiler's sanitizers are not needed for that.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import os
+import re
+import shutil
+import sys
+import sysconfig
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from setuptools import Extension, build_meta
+from setuptools.command.build_ext import build_ext
+
+ROOT = Path(__file__).parents[1]
+ROOMS = {"camtool": "camtool", "camtool_postprocessors": "postprocessors"}
+"""The packages that are installed, and their folders here."""
+
+SHARED = "camtool.kernels._memoryviews"
+"""What all compiled modules need of Cython's memoryviews, once."""
+
+CHECKED = os.environ.get("CAMTOOL_CHECKED") == "1"
+
+DIRECTIVES = {
+    "language_level": 3,
+    "annotation_typing": False,  # types stand in the .pxd
+    "infer_types": True,
+    "boundscheck": CHECKED,
+    "initializedcheck": CHECKED,
+    "overflowcheck": CHECKED,
+    "wraparound": False,
+    "cdivision": True,  # as in C: 1/0 is inf, and // and % are for numbers that are not negative
+    "cpow": True,
+    "auto_pickle": False,
+}
+
+FLAGS = {
+    "unix": ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-g0", "-w"],
+    "msvc": ["/O2", "/fp:precise"],
+}
+"""No sum is fused with a product, so the same numbers come out everywhere."""
+
+UNORDERED = "camtool.kernels.sums"
+"""The one module whose sums may be taken in any order, of numbers that are finite."""
+
+UNORDERED_FLAGS = {
+    "unix": ["-ffinite-math-only", "-fno-signed-zeros", "-fassociative-math"],
+    "msvc": ["/fp:fast"],
+}
+
+WIDE = """
+#if defined(__x86_64__) && defined(__GNUC__)
+#define WIDE_BODY(result) static inline __attribute__((always_inline)) result
+#define WIDE(result, name, given, passed) \\
+  __attribute__((flatten, target("avx512f,avx512bw,avx512dq,avx512vl"))) \\
+  static result name##_512 given { return name##_body passed; } \\
+  __attribute__((flatten, target("avx2"))) \\
+  static result name##_256 given { return name##_body passed; } \\
+  static result name##_128 given { return name##_body passed; } \\
+  static result name given { \\
+    if (__builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) \\
+      return name##_512 passed; \\
+    return __builtin_cpu_supports("avx2") ? name##_256 passed : name##_128 passed; \\
+  }
+#else
+#define WIDE_BODY(result) static result
+#define WIDE(result, name, given, passed) static result name given { return name##_body passed; }
+#endif
+"""
+"""C for functions that a .pxd marks by a comment, `# wide`: machine code for three kinds of x86
+processors, of which they take the one that runs them. What is rounded is the same in all."""
+
+NUMBERS = {
+    ("math", "inf"): math.inf,
+    ("math", "nan"): math.nan,
+    ("math", "pi"): math.pi,
+    ("np", "inf"): math.inf,
+    ("np", "nan"): math.nan,
+    ("np", "pi"): math.pi,
+}
+
+
+def compiled_modules() -> dict[str, Path]:
+    """The source of each module that is compiled, by its name."""
+    found = {}
+    for package, folder in ROOMS.items():
+        for types in sorted((ROOT / folder).rglob("*.pxd")):
+            parts = types.relative_to(ROOT / folder).with_suffix("").parts
+            if types.with_suffix(".py").exists():
+                found[".".join([package, *parts])] = types.with_suffix(".py")
+    return found
+
+
+def source_of(module: str) -> Path | None:
+    """The file of a module of ours, or None."""
+    package, *parts = module.split(".")
+    if package not in ROOMS or not parts:
+        return None
+    path = (ROOT / ROOMS[package]).joinpath(*parts).with_suffix(".py")
+    return path if path.exists() else None
+
+
+def imported_from(node: ast.ImportFrom, module: str) -> str:
+    """The whole name of the module that an import in `module` speaks of."""
+    above = module.split(".")[: -node.level] if node.level else []
+    return ".".join([*above, *([node.module] if node.module else [])])
+
+
+def constants(module: str) -> dict[str, Any]:
+    """The numbers, and tuples of numbers, that a module has under names in capitals."""
+    path = source_of(module)
+    known: dict[str, Any] = {}
+    if path is None:
+        return known
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            names = [(each.name, each.asname or each.name) for each in node.names]
+            if any(name.isupper() for name, _ in names):
+                theirs = constants(imported_from(node, module))
+                known |= {mine: theirs[name] for name, mine in names if name in theirs}
+        elif isinstance(node, ast.Assign):
+            code = compile(ast.Expression(node.value), str(path), "eval")
+            try:
+                value = eval(code, {"__builtins__": {"range": range}, "math": math}, dict(known))
+            except (NameError, TypeError, AttributeError, KeyError):
+                continue
+            for target in node.targets:
+                if isinstance(target, ast.Name):
+                    known[target.id] = value
+                elif isinstance(target, ast.Tuple):
+                    each = [name.id for name in target.elts if isinstance(name, ast.Name)]
+                    known |= dict(zip(each, value, strict=True))
+    return {
+        name: value
+        for name, value in known.items()
+        if name.isupper() and all(_fits(part) for part in _parts(value))
+    }
+
+
+def _parts(value: Any) -> tuple[Any, ...]:
+    return value if isinstance(value, tuple) and value else (value,)
+
+
+def _fits(value: Any) -> bool:
+    """Whether a number may stand in C as it is; larger ones are variables of the .pxd."""
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 31)
+
+
+def as_text(value: Any) -> str:
+    """A number, or a tuple of numbers, as Cython reads it."""
+    if isinstance(value, tuple):
+        return f"({', '.join(as_text(part) for part in value)},)"
+    if isinstance(value, float) and not math.isfinite(value):
+        return f'float("{value}")'
+    return f"({value!r})"
+
+
+def lowered(text: str, module: str, cimported: set[str]) -> str:
+    """What Cython is given of a module."""
+    known, lines = constants(module), text.encode().split(b"\n")
+    tree = ast.parse(text)
+    for node in reversed(list(_replaced(tree, known, cimported))):
+        low, high = node.lineno - 1, (node.end_lineno or node.lineno) - 1
+        if isinstance(node, ast.Name):
+            new = as_text(known[node.id])
+        elif isinstance(node, ast.Attribute):
+            new = as_text(NUMBERS[_dotted(node)])
+        else:
+            new = _without(node, cimported)
+        # As many lines as before, so that Cython's messages point to the right ones.
+        after = new.encode() + b" \\\n" * 0 + lines[high][node.end_col_offset or 0 :]
+        lines[low : high + 1] = [lines[low][: node.col_offset] + after, *[b""] * (high - low)]
+    return b"\n".join(lines).decode()
+
+
+def _replaced(
+    tree: ast.Module, known: dict[str, Any], cimported: set[str]
+) -> Iterator[ast.Name | ast.Attribute | ast.Import | ast.ImportFrom]:
+    """What does not stay as it is, in its order."""
+    found: list[Any] = []
+    for top in tree.body:
+        if isinstance(top, ast.Import | ast.ImportFrom):
+            if any((each.asname or each.name) in cimported for each in top.names):
+                found.append(top)
+        elif isinstance(top, ast.FunctionDef | ast.ClassDef):
+            for node in ast.walk(top):
+                constant = isinstance(node, ast.Name) and node.id in known
+                if constant or (isinstance(node, ast.Attribute) and _dotted(node) in NUMBERS):
+                    found.append(node)
+    yield from sorted(found, key=lambda node: (node.lineno, node.col_offset))
+
+
+def _dotted(node: ast.Attribute) -> tuple[str, str]:
+    return (node.value.id if isinstance(node.value, ast.Name) else "", node.attr)
+
+
+def _without(node: ast.Import | ast.ImportFrom, cimported: set[str]) -> str:
+    """An import without the names that the .pxd cimports."""
+    node.names = [each for each in node.names if (each.asname or each.name) not in cimported]
+    return ast.unparse(node) if node.names else "pass"
+
+
+def cimported_names(types: str) -> set[str]:
+    """The names that a .pxd cimports."""
+    found = re.findall(r"^from \S+ cimport (?:\(([^)]*)\)|(.*))$", types, re.MULTILINE)
+    names = ",".join(within or plain for within, plain in found).split(",")
+    return {name.split()[-1] for name in names if name.strip()}
+
+
+def lowered_copies(folder: Path) -> list[Extension]:
+    """Writes what Cython is given into `folder`; what is to be compiled there."""
+    made = []
+    for types in (ROOT / ROOMS["camtool"] / "kernels").glob("*.pxd"):
+        if not types.with_suffix(".py").exists():
+            _write(folder / "camtool" / "kernels" / types.name, types.read_text(encoding="utf-8"))
+    for module, source in compiled_modules().items():
+        target = folder.joinpath(*module.split(".")).with_suffix(".py")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        for above in target.parents[: len(module.split(".")) - 1]:
+            (above / "__init__.py").touch()
+        types = source.with_suffix(".pxd").read_text(encoding="utf-8")
+        text = lowered(source.read_text(encoding="utf-8"), module, cimported_names(types))
+        if CHECKED:
+            # What is found wrong is raised, and not only said.
+            types = types.replace(" noexcept", "")
+        _write(target, text)
+        _write(target.with_suffix(".pxd"), types)
+        made.append(Extension(module, [str(target)]))
+    shared = folder.joinpath(*SHARED.split(".")).with_suffix(".c")
+    return [*made, Extension(SHARED, [str(shared)])]
+
+
+def _write(path: Path, text: str) -> None:
+    """Leaves a file alone that has this text: what was made of it is still good."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def widen(folder: Path, module: Extension) -> None:
+    """Gives the wide functions of a module their forms, in its C."""
+    types = folder.joinpath(*module.name.split(".")).with_suffix(".pxd")
+    names = re.findall(
+        r"(\w+)\([^()]*\) noexcept  # wide", types.read_text() if types.exists() else ""
+    )
+    source = types.with_suffix(".c")
+    if not names or "WIDE_BODY" in (text := source.read_text(encoding="utf-8")):
+        return
+    prefix = "__pyx_f_" + "".join(f"{len(part)}{part}_" for part in module.name.split("."))
+    for name in (prefix + name for name in names):
+        head = re.search(rf"^static (.+) {name}\((.*)\) \{{$", text, re.MULTILINE)
+        assert head, f"{module.name}: {name}"
+        result, given = head.groups()
+        passed = ", ".join(each.split()[-1] for each in given.split(", "))
+        body = f"static {result} {name}({given}); WIDE_BODY({result}) {name}_body({given}) {{"
+        text = text[: head.start()] + body + text[head.end() :]
+        text += f"\nWIDE({result}, {name}, ({given}), ({passed}))\n"
+    text = text.replace('#include "Python.h"', '#include "Python.h"' + WIDE, 1)
+    source.write_text(text, encoding="utf-8")
+
+
+class BuildKernels(build_ext):
+    """Makes the modules that are compiled."""
+
+    def finalize_options(self) -> None:
+        """All cores, and where the copies for Cython lie."""
+        super().finalize_options()
+        self.parallel = self.parallel or os.cpu_count()
+
+    def run(self) -> None:
+        """From Python to C, and from there to machine code."""
+        from Cython.Build import cythonize
+
+        before = Path.cwd()
+        folder = ROOT / "build" / ("checked" if CHECKED else "lowered")
+        modules = lowered_copies(folder)
+        os.chdir(folder)
+        try:
+            relative = [
+                Extension(each.name, [str(Path(each.sources[0]).relative_to(folder))])
+                for each in modules
+            ]
+            made = cythonize(
+                relative,
+                compiler_directives=DIRECTIVES,
+                shared_utility_qualified_name=SHARED,
+                nthreads=0 if sys.platform == "win32" else os.cpu_count() or 1,
+                quiet=True,
+            )
+        finally:
+            os.chdir(before)
+        for each in made:
+            widen(folder, each)
+            each.sources = [str(folder / source) for source in each.sources]
+            each._needs_stub = False
+        self.extensions = made
+        super().run()
+
+    def build_extensions(self) -> None:
+        """With the flags of the compiler at hand."""
+        kind = "msvc" if self.compiler.compiler_type == "msvc" else "unix"
+        for each in self.extensions:
+            unordered = UNORDERED_FLAGS[kind] if each.name == UNORDERED else []
+            each.extra_compile_args = FLAGS[kind] + unordered
+        super().build_extensions()
+
+
+def settings() -> dict[str, Any]:
+    """What setup.py tells setuptools."""
+    packages = []
+    for package, folder in ROOMS.items():
+        for init in sorted((ROOT / folder).rglob("__init__.py")):
+            parts = init.parent.relative_to(ROOT / folder).parts
+            packages.append(".".join([package, *parts]))
+    modules = [Extension(name, []) for name in [*compiled_modules(), SHARED]]
+    return {
+        "packages": packages,
+        "package_dir": ROOMS,
+        "ext_modules": modules,
+        "cmdclass": {"build_ext": BuildKernels},
+    }
+
+
+def has_compiler() -> bool:
+    """Whether a C compiler is there; on Windows setuptools looks for Visual Studio's itself."""
+    if sys.platform == "win32":
+        return True
+    named = os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc"
+    return shutil.which(named.split()[0]) is not None
+
+
+def use_zig() -> None:
+    """Let zig's compiler stand in for the one that is not there."""
+    if not has_compiler():
+        compiler = f"{sys.executable} -m ziglang cc"
+        os.environ |= {"CC": compiler, "LDSHARED": f"{compiler} -shared"}
+
+
+# The hooks of a build backend.
+
+build_sdist = build_meta.build_sdist
+prepare_metadata_for_build_wheel = build_meta.prepare_metadata_for_build_wheel
+prepare_metadata_for_build_editable = build_meta.prepare_metadata_for_build_editable
+get_requires_for_build_sdist = build_meta.get_requires_for_build_sdist
+
+
+def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
+    """setuptools and Cython stand in pyproject.toml."""
+    return [] if has_compiler() else ["ziglang"]
+
+
+get_requires_for_build_editable = get_requires_for_build_wheel
+
+
+def build_wheel(folder: str, config_settings: Any = None, metadata: str | None = None) -> str:
+    """A wheel with what was compiled."""
+    use_zig()
+    return str(build_meta.build_wheel(folder, config_settings, metadata))
+
+
+def build_editable(folder: str, config_settings: Any = None, metadata: str | None = None) -> str:
+    """The compiled modules lie beside their sources."""
+    use_zig()
+    return str(build_meta.build_editable(folder, config_settings, metadata))

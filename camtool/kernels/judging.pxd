@@ -1,0 +1,171 @@
+"""The C types of `judging`."""
+
+cimport cython
+from libc cimport math
+from camtool.kernels.offsets cimport apart_square, wait_for_children
+from camtool.kernels.sums cimport largest, smallest, square_total, total
+from camtool.kernels.types cimport Int
+
+cdef class Search:
+    cdef double[:, ::1] table, heights, nodes
+    cdef Int[::1] order, found, stack
+    cdef double[::1] apart, memo, x, y, error
+
+cdef class Judge:
+    cdef double[:, ::1] own, window, centre, directions, figures, trace
+    cdef Int[:, ::1] rows, histograms
+    cdef double[:, :, ::1] bins
+    cdef double[::1] off, pen
+    cdef Search search
+    cdef double[::1] x, y, slide_x, slide_y, errors, size
+    cdef double[::1] spoke_x, spoke_y, squares
+    cdef Int[::1] bits, places
+
+@cython.locals(k=Int)
+cdef void _to_line(
+    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+) noexcept  # wide
+
+@cython.locals(k=Int, outside=Int, above_half=bint)
+cdef bint _all_in_wedge(
+    double[:, ::1] moves, Int row, double[::1] x, double[::1] y
+) noexcept  # wide
+
+cdef double _depth(double from_start, double from_end, bint above_half) noexcept
+
+cdef double _off(double height, double over) noexcept
+
+cdef double _outside(double px, double py, double radius, double half, double over) noexcept
+
+@cython.locals(k=Int, far=Int)
+cdef void _to_circle(
+    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+) noexcept  # wide
+
+@cython.locals(k=Int, above_half=bint, inside=bint)
+cdef void _to_arc(
+    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+) noexcept  # wide
+
+cpdef void lower_errors(
+    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+) noexcept
+
+cdef double smaller(double one, double other) noexcept
+
+cdef double larger(double one, double other) noexcept
+
+@cython.locals(k=Int)
+cdef Int first_of(double[::1] values, Int low, double value) noexcept
+
+@cython.locals(other=Int, k=Int, n=Int)
+cdef bint _is_there(double[:, ::1] table, Int[::1] found, Int count, Int move) noexcept
+
+@cython.locals(
+    leaves=Int, count=Int, height=Int, node=Int, low=Int, place=Int, k=Int, order=Int[::1],
+    stack=Int[::1], found=Int[::1], best=double, limit=double, apart=double, table=double[:, ::1],
+    nodes=double[:, ::1], heights=double[:, ::1], memo=double[::1], distance=double[::1],
+    spot_x=double[::1], spot_y=double[::1], spot_error=double[::1]
+)
+cdef (double, Int) _search(
+    Int first, Int last, double z_low, double z_high, Search search
+) noexcept
+
+cdef double _looser(double limit) noexcept
+
+@cython.locals(
+    kept=Int, k=Int, move=Int, found=Int[::1], table=double[:, ::1], memo=double[::1],
+    distance=double[::1]
+)
+cdef void _keep(double nearest, Int count, Search search) noexcept
+
+@cython.locals(count=Int, memo=double[::1])
+cdef void _renew(
+    double x, double y, Int first, Int last, double z_low, double z_high, Search search
+) noexcept
+
+@cython.locals(k=Int, beyond=Int)
+cdef Int _within(double[::1] memo, double[::1] x, double[::1] y, Int low) noexcept  # wide
+
+@cython.locals(
+    done=Int, run=Int, count=Int, k=Int, found=Int[::1], same=bint, table=double[:, ::1],
+    memo=double[::1], here=double[::1], here_x=double[::1], here_y=double[::1]
+)
+cpdef void nearest_errors(
+    double[::1] x, double[::1] y, Int first, Int last, double z_low, double z_high, Search search,
+    double[::1] out
+) noexcept
+
+@cython.locals(which=Int)
+cdef Int _bin_of(double x, double y, double[:, ::1] directions) noexcept
+
+@cython.locals(k=Int, inside=Int)
+cdef Int _stay(
+    double[::1] spoke_x, double[::1] spoke_y, Int low, Int count, double[:, ::1] directions,
+    Int which
+) noexcept
+
+@cython.locals(k=Int, outside=Int, out=bint)
+cdef Int _inside(
+    double[::1] spoke_x, double[::1] spoke_y, Int low, Int high, double[:, ::1] directions,
+    Int which
+) noexcept  # wide
+
+@cython.locals(done=Int, which=Int, stay=Int)
+cpdef void fill_bins(
+    double[::1] x, double[::1] y, double cx, double cy, double[:, ::1] directions,
+    double[:, ::1] bins, double[::1] spoke_x, double[::1] spoke_y, double[::1] squares
+) noexcept
+
+@cython.locals(k=Int)
+cdef void _spokes(
+    double[::1] x, double[::1] y, double cx, double cy, double[::1] spoke_x, double[::1] spoke_y,
+    double[::1] squares
+) noexcept  # wide
+
+@cython.locals(k=Int, least=double, most=double)
+cdef void _add(
+    double[::1] spoke_x, double[::1] spoke_y, double[::1] squares, Int low, Int high,
+    double[:, ::1] bins, Int which
+) noexcept
+
+@cython.locals(at=Int)
+cdef void _write(double[::1] pen, double x, double y, double error, double[:, ::1] trace) noexcept
+
+cdef void _end_run(double[::1] pen, double[:, ::1] trace) noexcept
+
+cdef void end_row(double[::1] pen, double[:, ::1] trace) noexcept
+
+@cython.locals(count=Int, low=Int, high=Int, at=Int, left=Int, peak=double)
+cpdef void trace_block(
+    Int row, double[::1] x, double[::1] y, double[::1] error, double most, double[::1] pen,
+    double[:, ::1] trace
+) noexcept
+
+@cython.locals(count=Int, k=Int, low_x=double, low_y=double, high_x=double, high_y=double)
+cdef (double, double) _spread(
+    double[:, ::1] figures, Int row, double[::1] x, double[::1] y, double[::1] slide_x,
+    double[::1] slide_y, double[::1] squares
+) noexcept  # wide
+
+@cython.locals(count=Int, k=Int, leading=Int)
+cdef (double, double, double) _sizes(
+    double[::1] errors, double off, double[::1] size, Int[::1] bits, Int[::1] places
+) noexcept  # wide
+
+@cython.locals(k=Int)
+cdef void _count(Int[::1] places, Int count, Int[:, ::1] histograms, Int which) noexcept
+
+@cython.locals(
+    last=Int, own=Int, k=Int, circle=Int, first=Int, upto=Int, rows=Int[:, ::1], bits=Int[::1],
+    places=Int[::1], shown=double, most=double, squares=double, signed=double,
+    figures=double[:, ::1], window=double[:, ::1], x=double[::1], y=double[::1],
+    slide_x=double[::1], slide_y=double[::1], errors=double[::1], size=double[::1], pen=double[::1]
+)
+cdef void judge_block(Int row, Int count, Judge judge) noexcept
+
+@cython.locals(
+    done=Int, count=Int, k=Int, axis=Int, judge=Judge, near=bint, slide_x=double[::1],
+    slide_y=double[::1], x=double[::1], y=double[::1]
+)
+cpdef judge_samples(Int[::1] row, double[:, ::1] commanded, double[:, ::1] slide, task, sums)

@@ -1,0 +1,869 @@
+"""Judging the samples of a motion: errors, extents, circles and a thinned trace in one pass.
+
+Samples come in blocks of at most `BLOCK`, each of one row of the program, and stay in the
+processor's cache: a few loops run over a block before the next one comes. Per sample of a row
+that cuts:
+
+    interpolation = commanded position to the row's own move
+    mechanics     = |slide − commanded|
+    total         = slide to the nearest wanted move that the row may be compared with, and how
+                    far what was drawn may lie from that
+
+Memory is that of the rows, the moves and the circles; it does not grow with the samples.
+Distances are exact; sums are taken in no certain order. Compiled, because a program takes millions
+of steps; C types stand in the .pxd beside this file.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.arrays import Floats, Ints
+from camtool.kernels.move_tree import FIRST as FIRST_BELOW
+from camtool.kernels.move_tree import LAST as LAST_BELOW
+from camtool.kernels.offsets import DEPTH, LEAF, apart_square, wait_for_children
+from camtool.kernels.sums import largest, smallest, square_total, total
+
+# Bins for the sizes of errors: those of a float's own bits. Plain numpy: no kernel.
+#
+# The exponent and the first `MANTISSA_BITS` bits of the mantissa, taken as one integer, grow with
+# the number and make bins whose width is between 1/256 and 1/128 of their value.
+
+
+MANTISSA_BITS = 7
+"""Bits of the mantissa that tell bins apart: bins are at most 2⁻⁷, 0.8 %, wide."""
+
+SMALLEST_MM = 2.0**-30
+"""Errors below this (a thousandth of a nanometre) are counted as 0 by the percentile."""
+
+LARGEST_MM = 2.0**20
+"""Errors above this (a kilometre) share the last bin of the percentile."""
+
+SHIFT = 52 - MANTISSA_BITS
+"""How far a float's bits are shifted to leave those that tell bins apart."""
+
+
+def leading_bits(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+    """The leading bits of each float64 ≥ 0, as integers in the order of the values."""
+    return np.right_shift(np.ascontiguousarray(values).view(np.int64), SHIFT)
+
+
+BEFORE_FIRST = ((1023 - 30) << MANTISSA_BITS) - 1
+"""What the leading bits of an error are above its bin: bin 0 is for 0 and for what is less."""
+
+BINS = ((1023 + 20) << MANTISSA_BITS) - BEFORE_FIRST + 1
+"""How many bins; the last one is also for what is too large."""
+
+# How far points are from a move, with the side that they lie on: a line or an arc, many at once.
+#
+# A move is a row of numbers (see the columns below). The error of a point is its distance to the
+# move, exact to the true line or arc, and positive to the left of the move's direction:
+#
+#     line a→b:  |p − a − t·d|,  d = b − a,  t = clamp((p − a)·d / d², 0, 1),  sign of d × (p − a)
+#     arc:       ±(R − |p − c|) inside the wedge that the arc spans at its centre c, otherwise the
+#                distance to its nearer end with that sign
+#
+# The wedge is told by the cross products with the spokes of the two ends: both, up to half a turn,
+# and either, above it. What is exact: no angle is ever taken, and no chord. Compiled, and written
+# as loops without branches over blocks of points, which the processor runs several at a time.
+#
+# `best` holds the error of least size so far; each call lowers it where this move is nearer.
+
+
+COLUMNS = 16
+"""Numbers of a move: start x, y; end x, y; way x, y; 1 / way²; centre x, y; radius (0: a line);
+turn (+1 ccw, −1 cw); normals into the wedge at its start x, y and its end x, y; 1 when it is wider
+than half a turn, 2 when it is a whole turn, else 0."""
+
+NEAR = 2.0**-9
+"""Up to this part of its radius from a circle the series of a root stands for it."""
+
+FULL = 2.0
+"""What a whole turn has in its last column."""
+
+AX, AY, BX, BY, DX, DY, OVER, CX, CY, RADIUS, TURN, UX, UY, VX, VY, WIDE = range(16)
+
+
+def _to_line(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
+    ax, ay, dx, dy = moves[row, AX], moves[row, AY], moves[row, DX], moves[row, DY]
+    over = moves[row, OVER]
+    for k in range(len(x)):
+        px, py = x[k] - ax, y[k] - ay
+        t = (px * dx + py * dy) * over
+        t = smaller(larger(t, 0.0), 1.0)
+        off_x, off_y = px - t * dx, py - t * dy
+        apart = math.sqrt(off_x * off_x + off_y * off_y)
+        error = math.copysign(apart, dx * py - dy * px)
+        best[k] = error if first or apart < abs(best[k]) else best[k]
+
+
+def _all_in_wedge(moves: Floats, row: int, x: Floats, y: Floats) -> bool:
+    cx, cy, ux, uy = moves[row, CX], moves[row, CY], moves[row, UX], moves[row, UY]
+    vx, vy, above_half = moves[row, VX], moves[row, VY], moves[row, WIDE] != 0.0
+    outside = 0
+    for k in range(len(x)):
+        px, py = x[k] - cx, y[k] - cy
+        depth = _depth(ux * py - uy * px, px * vy - py * vx, above_half)
+        outside += 1 if depth < 0.0 else 0
+    return outside == 0
+
+
+def _depth(from_start: float, from_end: float, above_half: bool) -> float:
+    """Not below 0 in the wedge, from what a point is to the inside of its two edges."""
+    if above_half:
+        return larger(from_start, from_end)
+    return smaller(from_start, from_end)
+
+
+def _off(height: float, over: float) -> float:
+    """How far outside of a circle a point is that is `height` = h above it, for small h.
+
+    With h = (|p|² − R²) / 2R and q = h / R, `over` being 1 / R, that is
+
+        √(R² + 2Rh) − R = h (1 − q/2 + q²/2 − 5q³/8 + 7q⁴/8 − 21q⁵/16 + …);
+
+    within |q| ≤ 2⁻⁹ what is left out is below 2⁻⁵³ R. Roots take three times as long.
+    """
+    q = height * over
+    return height * (1.0 + q * (-0.5 + q * (0.5 + q * (-0.625 + q * 0.875))))
+
+
+def _outside(px: float, py: float, radius: float, half: float, over: float) -> float:
+    """How far a point about the centre is outside of the circle; `half` is 1 / 2R. It hangs on
+    the point alone by which way, and so do its last bits."""
+    height = (px * px + py * py - radius * radius) * half
+    apart = math.sqrt(px * px + py * py) - radius
+    return _off(height, over) if abs(height) <= NEAR * radius else apart
+
+
+def _to_circle(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
+    cx, cy, radius, turn = moves[row, CX], moves[row, CY], moves[row, RADIUS], moves[row, TURN]
+    square, half, over = radius * radius, 0.5 / radius, 1.0 / radius
+    near, far = NEAR * radius, 0
+    if first and abs((x[0] - cx) ** 2 + (y[0] - cy) ** 2 - square) * half <= near:
+        for k in range(len(x)):
+            px, py = x[k] - cx, y[k] - cy
+            height = (px * px + py * py - square) * half
+            far += 1 if abs(height) > near else 0
+            best[k] = -turn * _off(height, over)
+        if far == 0:
+            return
+    for k in range(len(x)):
+        error = -turn * _outside(x[k] - cx, y[k] - cy, radius, half, over)
+        best[k] = error if first or abs(error) < abs(best[k]) else best[k]
+
+
+def _to_arc(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
+    ax, ay, bx, by = moves[row, AX], moves[row, AY], moves[row, BX], moves[row, BY]
+    cx, cy, radius, turn = moves[row, CX], moves[row, CY], moves[row, RADIUS], moves[row, TURN]
+    ux, uy, vx, vy = moves[row, UX], moves[row, UY], moves[row, VX], moves[row, VY]
+    above_half, half, over = moves[row, WIDE] != 0.0, 0.5 / radius, 1.0 / radius
+    for k in range(len(x)):
+        px, py = x[k] - cx, y[k] - cy
+        inward = -turn * _outside(px, py, radius, half, over)
+        to_a = (x[k] - ax) * (x[k] - ax) + (y[k] - ay) * (y[k] - ay)
+        to_b = (x[k] - bx) * (x[k] - bx) + (y[k] - by) * (y[k] - by)
+        end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
+        inside = _depth(ux * py - uy * px, px * vy - py * vx, above_half) >= 0.0
+        error = inward if inside else end
+        best[k] = error if first or abs(error) < abs(best[k]) else best[k]
+
+
+def lower_errors(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
+    """Lower `best` (n ≥ 1,) to the errors of the points x, y (n,) against one row of `moves`
+    (K, 16); set it to them when this is the `first` move."""
+    if moves[row, RADIUS] == 0.0:
+        _to_line(moves, row, x, y, best, first)
+    elif moves[row, WIDE] == FULL or _all_in_wedge(moves, row, x, y):
+        _to_circle(moves, row, x, y, best, first)
+    else:
+        _to_arc(moves, row, x, y, best, first)
+
+
+def smaller(one: float, other: float) -> float:
+    """The smaller of two numbers, neither of which is NaN."""
+    return one if one < other else other
+
+
+def larger(one: float, other: float) -> float:
+    """The larger of two numbers, neither of which is NaN."""
+    return one if one > other else other
+
+
+def first_of(values: Floats, low: int, value: float) -> int:
+    """The first place of `value` in `values` (n,) from `low` on, where it is."""
+    k = low
+    while values[k] != value:
+        k += 1
+    return k
+
+
+# The nearest of many moves for points that follow each other: a short list serves many of them.
+#
+# Around a point q whose nearest move is d away, the list holds every move within d + 2ρ of q. As
+# long as a point p stays within ρ of q the nearest move of p is in the list:
+#
+#     |p s| ≤ |p s_q| ≤ |p q| + d ≤ ρ + d   for the nearest s of p,
+#     |q s| ≤ |q p| + |p s| ≤ d + 2ρ.
+#
+# So what is found is exact whatever ρ is; ρ only trades the search for a new list against
+# distances to moves that are not the nearest: it doubles when the last list cost less than the
+# search for it, and halves when it cost more. The search goes down a tree of the moves' boxes.
+
+
+SEARCH_COST = 400.0
+"""A search for a list costs about as much as so many distances."""
+
+FIRST_REACH_MM = 0.05
+"""ρ of the first list."""
+
+MOST_REACH_MM = 1e6
+"""ρ grows no further: a kilometre is all that a program can say."""
+
+SLACK = 1e-12
+"""Limits of a list are taken this part wider, plus `SLACK_MM`: rounding must not lose a move."""
+
+SLACK_MM = 1e-12
+"""See `SLACK`."""
+
+QX, QY, REACH, MEMO_FIRST, MEMO_LAST, Z_LOW, Z_HIGH, COUNT, LEAST, USED, LOOKED = range(11)
+"""The memo of a list, float64: the point q, ρ (−1: there is no list), which moves first:last and
+heights it holds, how many moves are in it, how many of these are as near to q as any, for how
+many points it was used, and how many nodes and moves the search for it looked at."""
+
+MEMO = 11
+"""Numbers in a memo."""
+
+
+class Moves(NamedTuple):
+    """K moves: their table (K, 16) of `move_errors`, heights (K, 2), and the nodes (2L, 6) and
+    order (K,) of `move_tree`."""
+
+    table: Floats
+    heights: Floats
+    nodes: Floats
+    order: Ints
+
+
+class Near(NamedTuple):
+    """A list: the moves found (K,), how far from q each is (K,) mm, and its memo (11,)."""
+
+    found: Ints
+    apart: Floats
+    memo: Floats
+
+
+def no_list(moves: int) -> Near:
+    """Room for a list of so many moves, that is none yet."""
+    memo = np.zeros(MEMO)
+    memo[REACH] = -1.0
+    return Near(np.empty(moves, dtype=np.int64), np.empty(moves), memo)
+
+
+class Search:
+    """The nearest of moves, by a list: its arrays, and room for what is looked at."""
+
+    def __init__(self, moves: Moves, near: Near) -> None:
+        self.table, self.heights, self.nodes, self.order = moves
+        self.found, self.apart, self.memo = near
+        self.stack = np.empty(DEPTH, dtype=np.int64)
+        self.x, self.y, self.error = np.empty(1), np.empty(1), np.empty(1)
+
+
+def _is_there(table: Floats, found: Ints, count: int, move: int) -> bool:
+    """Whether the move is one of the `count` found: passes one below the other are the same in
+    XY."""
+    for n in range(count):
+        other, k = found[n], 0
+        while k < COLUMNS and table[other, k] == table[move, k]:
+            k += 1
+        if k == COLUMNS:
+            return True
+    return False
+
+
+def _search(
+    first: int, last: int, z_low: float, z_high: float, search: Search
+) -> tuple[float, int]:
+    """The least distance of q, and how many moves were found: all that are no farther than that
+    and 2ρ, and some that are. Only moves first:last count whose heights overlap z_low … z_high."""
+    table, heights, nodes, order = search.table, search.heights, search.nodes, search.order
+    found, distance, memo = search.found, search.apart, search.memo
+    spot_x, spot_y, spot_error, stack = search.x, search.y, search.error, search.stack
+    x, y, beyond = memo[QX], memo[QY], 2.0 * memo[REACH]
+    spot_x[0], spot_y[0] = x, y
+    leaves = len(nodes) // 2
+    best, limit, count = math.inf, math.inf, 0
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        memo[LOOKED] += 1.0
+        if nodes[node, FIRST_BELOW] >= last or nodes[node, LAST_BELOW] <= first:
+            continue
+        if apart_square(nodes, node, x, y) > limit * limit:
+            continue
+        if node < leaves:
+            height = wait_for_children(nodes, node, x, y, stack, height)
+            continue
+        low = (node - leaves) * LEAF
+        for place in range(low, min(low + LEAF, len(order))):
+            k = order[place]
+            if k < first or k >= last:
+                continue
+            if heights[k, 0] > z_high or heights[k, 1] < z_low:
+                continue
+            lower_errors(table, k, spot_x, spot_y, spot_error, True)
+            apart = abs(spot_error[0])
+            memo[LOOKED] += 1.0
+            if apart < best:
+                best, limit = apart, _looser(apart + beyond)
+            if apart <= limit:
+                found[count], distance[count] = k, apart
+                count += 1
+    return best, count
+
+
+def _looser(limit: float) -> float:
+    return limit * (1.0 + SLACK) + SLACK_MM
+
+
+def _keep(nearest: float, count: int, search: Search) -> None:
+    """Leave in the list, of the first `count` moves, those that must be in it, each once."""
+    table, found, distance, memo = search.table, search.found, search.apart, search.memo
+    limit, least = _looser(nearest + 2.0 * memo[REACH]), _looser(nearest)
+    kept = 0
+    memo[LEAST] = 0.0
+    for k in range(count):
+        move, apart = found[k], distance[k]
+        if apart <= limit and not _is_there(table, found, kept, move):
+            found[kept] = move
+            kept += 1
+            if apart <= least:
+                memo[LEAST] += 1.0
+    memo[COUNT] = kept
+
+
+def _renew(
+    x: float, y: float, first: int, last: int, z_low: float, z_high: float, search: Search
+) -> None:
+    """Make the list around q = (x, y) anew, with a ρ from how well the last one did."""
+    memo = search.memo
+    if memo[REACH] < 0.0:
+        memo[REACH] = FIRST_REACH_MM
+    elif memo[USED] * (memo[COUNT] - memo[LEAST]) > SEARCH_COST:
+        memo[REACH] *= 0.5
+    else:
+        memo[REACH] = min(2.0 * memo[REACH], MOST_REACH_MM)
+    memo[QX], memo[QY], memo[USED], memo[LOOKED] = x, y, 0.0, 0.0
+    nearest, count = _search(first, last, z_low, z_high, search)
+    if count == 0:  # nothing at this height: any height
+        nearest, count = _search(first, last, -math.inf, math.inf, search)
+    _keep(nearest, count, search)
+
+
+def _within(memo: Floats, x: Floats, y: Floats, low: int) -> int:
+    """How many of the points x, y (n,) from the row `low` on lie within ρ of q."""
+    qx, qy, square = memo[QX], memo[QY], memo[REACH] * memo[REACH]
+    beyond = 0
+    for k in range(low, len(x)):
+        off_x, off_y = x[k] - qx, y[k] - qy
+        beyond += 1 if off_x * off_x + off_y * off_y > square else 0
+    if beyond == 0:
+        return len(x) - low
+    k = low
+    while (x[k] - qx) * (x[k] - qx) + (y[k] - qy) * (y[k] - qy) <= square:
+        k += 1
+    return k - low
+
+
+def nearest_errors(
+    x: Floats,
+    y: Floats,
+    first: int,
+    last: int,
+    z_low: float,
+    z_high: float,
+    search: Search,
+    out: Floats,
+) -> None:
+    """The error of each of the points x, y (n,) against the nearest of the moves first:last whose
+    heights overlap z_low … z_high, signed as `lower_errors` does; inf where there is none. The
+    list serves the next call too."""
+    table, memo, found = search.table, search.memo, search.found
+    same = memo[MEMO_FIRST] == first and memo[MEMO_LAST] == last
+    same = same and memo[Z_LOW] == z_low and memo[Z_HIGH] == z_high and memo[REACH] >= 0.0
+    memo[MEMO_FIRST], memo[MEMO_LAST], memo[Z_LOW], memo[Z_HIGH] = first, last, z_low, z_high
+    done = 0
+    while done < len(x):
+        run = _within(memo, x, y, done) if same else 0
+        if run == 0:
+            _renew(x[done], y[done], first, last, z_low, z_high, search)
+            run, same = max(1, _within(memo, x, y, done)), True
+        here_x, here_y = x[done : done + run], y[done : done + run]
+        here = out[done : done + run]
+        count = int(memo[COUNT])
+        if count == 0:
+            for k in range(run):
+                here[k] = math.inf
+        for k in range(count):
+            lower_errors(table, found[k], here_x, here_y, here, k == 0)
+        memo[USED] += run
+        done += run
+
+
+# The points about a circle in bins of their angle, without an angle per point.
+#
+# A point p about the centre lies in bin b when it is to the left of the bin's first direction and
+# to the right of the next one's: two cross products. Points that follow each other mostly stay in
+# one bin, so the arc tangent is taken only when one leaves it. Of each bin are kept: how many
+# points, their sum, the nearest and the farthest with their places.
+
+
+ANGLE_BINS = 720
+"""Angle bins of a circle: half a degree each."""
+
+RUN = 64
+"""So many points are looked at together to find where the points of a bin end."""
+
+BIN_COLUMNS = 9
+"""Of a bin: count; sum x, y; least |p|², its x, y; largest |p|², its x, y."""
+
+
+def bin_directions() -> Floats:
+    """(721, 2) the directions between which the bins lie."""
+    angle = np.arange(ANGLE_BINS + 1) % ANGLE_BINS * (2.0 * np.pi / ANGLE_BINS)
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def empty_bins(count: int) -> Floats:
+    """(count, 720, 9) bins of circles that nothing went round."""
+    bins = np.zeros((count, ANGLE_BINS, BIN_COLUMNS))
+    bins[:, :, 3], bins[:, :, 6] = np.inf, -np.inf
+    return bins
+
+
+def _bin_of(x: float, y: float, directions: Floats) -> int:
+    """The bin of a point: by its angle, and on the edge of two bins by the cross products."""
+    turn = math.atan2(y, x) / (2.0 * math.pi)
+    turn = turn + 1.0 if turn < 0.0 else turn
+    which = int(turn * ANGLE_BINS)
+    which = min(which, ANGLE_BINS - 1)
+    if directions[which, 0] * y - directions[which, 1] * x < 0.0:
+        return (which + ANGLE_BINS - 1) % ANGLE_BINS
+    if x * directions[which + 1, 1] - y * directions[which + 1, 0] <= 0.0:
+        return (which + 1) % ANGLE_BINS
+    return which
+
+
+def _stay(
+    spoke_x: Floats, spoke_y: Floats, low: int, count: int, directions: Floats, which: int
+) -> int:
+    """How many of `count` points from the row `low` on lie in the bin `which`: at least one."""
+    k = low
+    while k < count:
+        # Some at once, as long as all of them do.
+        inside = _inside(spoke_x, spoke_y, k, min(k + RUN, count), directions, which)
+        k += inside
+        if inside < RUN:
+            break
+    return max(k - low, 1)
+
+
+def _inside(
+    spoke_x: Floats, spoke_y: Floats, low: int, high: int, directions: Floats, which: int
+) -> int:
+    """How many of the points low … high − 1 lie in the bin `which`, from the first on."""
+    from_x, from_y = directions[which, 0], directions[which, 1]
+    to_x, to_y = directions[which + 1, 0], directions[which + 1, 1]
+    outside = 0
+    for k in range(low, high):
+        px, py = spoke_x[k], spoke_y[k]
+        out = (from_x * py - from_y * px < 0.0) | (px * to_y - py * to_x <= 0.0)
+        outside += 1 if out else 0
+    if outside == 0:
+        return high - low
+    k = low
+    while True:
+        px, py = spoke_x[k], spoke_y[k]
+        if from_x * py - from_y * px < 0.0 or px * to_y - py * to_x <= 0.0:
+            return k - low
+        k += 1
+
+
+def fill_bins(
+    x: Floats,
+    y: Floats,
+    cx: float,
+    cy: float,
+    directions: Floats,
+    bins: Floats,
+    spoke_x: Floats,
+    spoke_y: Floats,
+    squares: Floats,
+) -> None:
+    """Put the points x, y (n,) about the centre (cx, cy) into `bins` (720, 9); there is room (n,)
+    for their spokes and the squares of these."""
+    _spokes(x, y, cx, cy, spoke_x, spoke_y, squares)
+    done = 0
+    while done < len(x):
+        which = _bin_of(spoke_x[done], spoke_y[done], directions)
+        stay = _stay(spoke_x, spoke_y, done, len(x), directions, which)
+        _add(spoke_x, spoke_y, squares, done, done + stay, bins, which)
+        done += stay
+
+
+def _spokes(
+    x: Floats,
+    y: Floats,
+    cx: float,
+    cy: float,
+    spoke_x: Floats,
+    spoke_y: Floats,
+    squares: Floats,
+) -> None:
+    for k in range(len(x)):
+        px, py = x[k] - cx, y[k] - cy
+        spoke_x[k], spoke_y[k] = px, py
+        squares[k] = px * px + py * py
+
+
+def _add(
+    spoke_x: Floats,
+    spoke_y: Floats,
+    squares: Floats,
+    low: int,
+    high: int,
+    bins: Floats,
+    which: int,
+) -> None:
+    """Put the points low … high − 1 into one bin."""
+    least, most = smallest(squares, low, high), largest(squares, low, high)
+    bins[which, 0] += high - low
+    bins[which, 1] += total(spoke_x, low, high)
+    bins[which, 2] += total(spoke_y, low, high)
+    if least < bins[which, 3]:
+        k = first_of(squares, low, least)
+        bins[which, 3], bins[which, 4], bins[which, 5] = least, spoke_x[k], spoke_y[k]
+    if most > bins[which, 6]:
+        k = first_of(squares, low, most)
+        bins[which, 6], bins[which, 7], bins[which, 8] = most, spoke_x[k], spoke_y[k]
+
+
+# The path of the slides, thinned as it comes: of so many samples of a row that with the largest
+# error, and each row's last.
+#
+# The pen holds what is not yet written: the largest of the present run, and the last sample.
+
+
+(
+    STRIDE,
+    WRITTEN,
+    ROOM,
+    ROW,
+    IN_RUN,
+    PEAK,
+    PEAK_X,
+    PEAK_Y,
+    LAST_ERROR,
+    LAST_X,
+    LAST_Y,
+    LAST_IS_WRITTEN,
+) = range(12)
+"""The pen, float64: samples of a run; points written, and how many may be besides the ends of
+rows; the row (−1: none yet); samples in the present run; its largest error and where; the last
+sample's error and where, and whether it is the largest of its run or written already."""
+
+PEN = 12
+"""Numbers of a pen."""
+
+
+def new_pen(stride: int, room: int) -> Floats:
+    """A pen that has written nothing."""
+    pen = np.zeros(PEN)
+    pen[STRIDE], pen[ROOM], pen[ROW], pen[PEAK] = stride, room, -1.0, -1.0
+    return pen
+
+
+def unwritten(pen: Floats) -> Floats:
+    """(0 to 2, 4) points that the pen still holds: x, y, error, row."""
+    peak, last = pen[[PEAK_X, PEAK_Y, PEAK, ROW]], pen[[LAST_X, LAST_Y, LAST_ERROR, ROW]]
+    held = [peak] if pen[IN_RUN] > 0.0 else []
+    if pen[ROW] >= 0.0 and not (pen[LAST_IS_WRITTEN] > 0.0):
+        held.append(last)
+    return np.array(held).reshape(-1, 4)
+
+
+def _write(pen: Floats, x: float, y: float, error: float, trace: Floats) -> None:
+    at = int(pen[WRITTEN])
+    trace[at, 0], trace[at, 1], trace[at, 2], trace[at, 3] = x, y, error, pen[ROW]
+    pen[WRITTEN] += 1.0
+
+
+def _end_run(pen: Floats, trace: Floats) -> None:
+    if pen[IN_RUN] > 0.0 and pen[WRITTEN] < pen[ROOM]:
+        _write(pen, pen[PEAK_X], pen[PEAK_Y], pen[PEAK], trace)
+    elif pen[IN_RUN] > 0.0:
+        pen[LAST_IS_WRITTEN] = 0.0
+    pen[IN_RUN], pen[PEAK] = 0.0, -1.0
+
+
+def end_row(pen: Floats, trace: Floats) -> None:
+    """Write what the pen holds."""
+    _end_run(pen, trace)
+    if pen[ROW] >= 0.0 and pen[LAST_IS_WRITTEN] == 0.0:
+        _write(pen, pen[LAST_X], pen[LAST_Y], pen[LAST_ERROR], trace)
+        pen[LAST_IS_WRITTEN] = 1.0
+
+
+def trace_block(
+    row: int,
+    x: Floats,
+    y: Floats,
+    error: Floats,
+    most: float,
+    pen: Floats,
+    trace: Floats,
+) -> None:
+    """Take points x, y (n,) of one row; `error` (n,) of them, the largest of which is `most`,
+    where that is above 0; else they have none. What is full of points takes only the ends of
+    rows."""
+    count = len(x)
+    if pen[ROW] != row:
+        end_row(pen, trace)
+        pen[ROW] = row
+    low = 0
+    while low < count:
+        left = int(pen[STRIDE] - pen[IN_RUN])
+        high = min(count, low + left)
+        at, peak = low, 0.0
+        if most > pen[PEAK] and most > 0.0:
+            peak = largest(error, low, high)
+            at = first_of(error, low, peak)
+        if peak > pen[PEAK]:
+            pen[PEAK], pen[PEAK_X], pen[PEAK_Y] = peak, x[at], y[at]
+            pen[LAST_IS_WRITTEN] = 1.0 if at == high - 1 else 0.0
+        else:
+            pen[LAST_IS_WRITTEN] = 0.0
+        pen[IN_RUN] += high - low
+        pen[LAST_X], pen[LAST_Y] = x[high - 1], y[high - 1]
+        pen[LAST_ERROR] = error[high - 1] if most > 0.0 else 0.0
+        if pen[IN_RUN] >= pen[STRIDE]:
+            _end_run(pen, trace)
+        low = high
+
+
+BLOCK = 768
+"""Samples that are judged together: their columns about fill a processor's first cache."""
+
+FARTHEST_MM = 1e9
+"""No slide is farther from zero (a thousand kilometres): squares of such positions and their sums
+stay finite, which all loops here and below take for granted. What judges steps on the way keeps to
+it by its own limits: five digits of micrometres, and the ranges of a machine file."""
+
+(
+    SAMPLES,
+    INNER_MAX,
+    INNER_SQUARES,
+    LAG_MAX,
+    LAG_SQUARES,
+    KNOWN,
+    TOTAL_MAX,
+    TOTAL_SQUARES,
+    TOTAL_SUM,
+    TOTAL_X,
+    TOTAL_Y,
+    LOW_X,
+    LOW_Y,
+    HIGH_X,
+    HIGH_Y,
+    END_X,
+    END_Y,
+    COMMANDED_X,
+    COMMANDED_Y,
+) = range(19)
+"""Columns of the rows: how many samples; of those of rows that cut the largest error and the sum
+of squares; how many have a total, that with its sum and its place; extents; last positions."""
+
+ROW_COLUMNS = 19
+"""How many columns."""
+
+OWN, FIRST, LAST, CIRCLE, SLOT = range(5)
+"""Columns of `Task.rows`."""
+
+
+class Task(NamedTuple):
+    """What N rows are judged by.
+
+    own (J, 16) moves of the rows that cut (`move_errors`), the K moves that are wanted; rows
+    (N, 5): which of `own` a row is, −1 where nothing is cut, first and last of the moves that it
+    is compared with, the circle that it goes round or −1, and the bins of that; window (N, 2)
+    between which heights moves are compared; off (N,) mm: how far what was drawn lies at most from
+    the moves that a row is compared with; centre (C, 2) mm of circles; directions (721, 2) of
+    `circle_bins`.
+    """
+
+    own: Floats
+    moves: Moves
+    rows: Ints
+    window: Floats
+    off: Floats
+    centre: Floats
+    directions: Floats
+
+
+class Sums(NamedTuple):
+    """What is found: rows (N, 19); histograms (2, 4 BINS) of interpolation and total, every
+    fourth sample in the same place of its four; bins (S, 720, 9); trace (T, 4) x, y, error, row,
+    and its pen; the list of near moves."""
+
+    rows: Floats
+    histograms: Ints
+    bins: Floats
+    trace: Floats
+    pen: Floats
+    near: Near
+
+
+class Judge:
+    """What blocks are judged by: the arrays of a task and its sums, and room for a block of
+    `BLOCK` samples: commanded and slides mm, their errors, the sizes of these, and the bins of
+    these."""
+
+    def __init__(self, task: Task, sums: Sums) -> None:
+        self.own, self.rows, self.window, self.off = task.own, task.rows, task.window, task.off
+        self.centre, self.directions = task.centre, task.directions
+        self.figures, self.histograms, self.bins = sums.rows, sums.histograms, sums.bins
+        self.trace, self.pen = sums.trace, sums.pen
+        self.search = Search(task.moves, sums.near)
+        self.x, self.y = np.empty(BLOCK), np.empty(BLOCK)
+        self.slide_x, self.slide_y = np.empty(BLOCK), np.empty(BLOCK)
+        size = np.empty(BLOCK)
+        self.errors, self.size, self.bits = np.empty(BLOCK), size, size.view(np.int64)
+        self.places = np.empty(BLOCK, dtype=np.int64)
+        self.spoke_x, self.spoke_y = np.empty(BLOCK), np.empty(BLOCK)
+        self.squares = np.empty(BLOCK)
+
+
+def _spread(
+    figures: Floats,
+    row: int,
+    x: Floats,
+    y: Floats,
+    slide_x: Floats,
+    slide_y: Floats,
+    squares: Floats,
+) -> tuple[float, float]:
+    """Extents of the slides; returns the largest square of mechanics and their sum."""
+    count = len(x)
+    for k in range(count):
+        off_x, off_y = slide_x[k] - x[k], slide_y[k] - y[k]
+        squares[k] = off_x * off_x + off_y * off_y
+    figures[row, LOW_X] = min(figures[row, LOW_X], smallest(slide_x, 0, count))
+    figures[row, HIGH_X] = max(figures[row, HIGH_X], largest(slide_x, 0, count))
+    figures[row, LOW_Y] = min(figures[row, LOW_Y], smallest(slide_y, 0, count))
+    figures[row, HIGH_Y] = max(figures[row, HIGH_Y], largest(slide_y, 0, count))
+    return largest(squares, 0, count), total(squares, 0, count)
+
+
+def _sizes(
+    errors: Floats, off: float, size: Floats, bits: Ints, places: Ints
+) -> tuple[float, float, float]:
+    """Sizes of errors, all `off` larger than they are alone, and their places in a histogram,
+    where four samples take turns so that none waits for the one before; returns the largest, the
+    sum of squares, and the sum of the errors alone with their signs. `bits` are those of `size`.
+    """
+    count = len(errors)
+    for k in range(count):
+        size[k] = abs(errors[k]) + off
+    for k in range(count):
+        leading = (bits[k] >> SHIFT) - BEFORE_FIRST
+        places[k] = 4 * min(max(leading, 0), BINS - 1) + (k & 3)
+    return largest(size, 0, count), square_total(size, 0, count), total(errors, 0, count)
+
+
+def _count(places: Ints, count: int, histograms: Ints, which: int) -> None:
+    for k in range(count):
+        histograms[which, places[k]] += 1
+
+
+def judge_block(row: int, count: int, judge: Judge) -> None:
+    """Judge the first `count` samples of the room, all of one row."""
+    if count == 0:
+        return
+    x, y, slide_x, slide_y = (
+        judge.x[:count],
+        judge.y[:count],
+        judge.slide_x[:count],
+        judge.slide_y[:count],
+    )
+    errors, size, bits, places = judge.errors[:count], judge.size[:count], judge.bits, judge.places
+    figures, rows, window, pen = judge.figures, judge.rows, judge.window, judge.pen
+    lag, lags = _spread(figures, row, x, y, slide_x, slide_y, judge.squares)
+    last = count - 1
+    figures[row, SAMPLES] += count
+    figures[row, END_X], figures[row, END_Y] = slide_x[last], slide_y[last]
+    figures[row, COMMANDED_X], figures[row, COMMANDED_Y] = x[last], y[last]
+    own, circle, shown = rows[row, OWN], rows[row, CIRCLE], 0.0
+    if own >= 0:
+        figures[row, LAG_MAX] = max(figures[row, LAG_MAX], math.sqrt(lag))
+        figures[row, LAG_SQUARES] += lags
+        lower_errors(judge.own, own, x, y, errors, True)
+        most, squares, signed = _sizes(errors, 0.0, size, bits, places)
+        figures[row, INNER_MAX] = max(figures[row, INNER_MAX], most)
+        figures[row, INNER_SQUARES] += squares
+        _count(places, count, judge.histograms, 0)
+        first, upto = rows[row, FIRST], rows[row, LAST]
+        z_low, z_high = window[row, 0], window[row, 1]
+        nearest_errors(slide_x, slide_y, first, upto, z_low, z_high, judge.search, errors)
+        if judge.search.memo[COUNT] > 0.0:
+            shown, squares, signed = _sizes(errors, judge.off[row], size, bits, places)
+            figures[row, TOTAL_SQUARES] += squares
+            figures[row, TOTAL_SUM] += signed
+            if shown > figures[row, TOTAL_MAX] or figures[row, KNOWN] == 0.0:
+                k = first_of(size, 0, shown)
+                figures[row, TOTAL_MAX] = shown
+                figures[row, TOTAL_X], figures[row, TOTAL_Y] = slide_x[k], slide_y[k]
+            figures[row, KNOWN] += count
+            _count(places, count, judge.histograms, 1)
+        if circle >= 0:
+            cx, cy = judge.centre[circle, 0], judge.centre[circle, 1]
+            fill_bins(
+                slide_x,
+                slide_y,
+                cx,
+                cy,
+                judge.directions,
+                judge.bins[rows[row, SLOT]],
+                judge.spoke_x,
+                judge.spoke_y,
+                judge.squares,
+            )
+    trace_block(row, slide_x, slide_y, size, shown, pen, judge.trace)
+
+
+def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> int:
+    """Judge K samples in order: row (K,), commanded and slide (K, 3) mm, whose Z is not looked at;
+    any number of rows. Returns the first sample that is no place within `FARTHEST_MM`, none of
+    which is judged from its block on, or −1."""
+    judge = Judge(task, sums)
+    x, y, slide_x, slide_y = judge.x, judge.y, judge.slide_x, judge.slide_y
+    done = 0
+    while done < len(row):
+        count = 0
+        while count < BLOCK and done + count < len(row) and row[done + count] == row[done]:
+            k = done + count
+            for axis in range(2):  # NaN fails too
+                near = abs(commanded[k, axis]) <= FARTHEST_MM
+                if not (near and abs(slide[k, axis]) <= FARTHEST_MM):
+                    return k
+            x[count], y[count] = commanded[k, 0], commanded[k, 1]
+            slide_x[count], slide_y[count] = slide[k, 0], slide[k, 1]
+            count += 1
+        judge_block(row[done], count, judge)
+        done += count
+    return -1
