@@ -198,11 +198,12 @@ def _replaced(
         if isinstance(top, ast.Import | ast.ImportFrom):
             if any((each.asname or each.name) in cimported for each in top.names):
                 found.append(top)
-        elif isinstance(top, ast.FunctionDef | ast.ClassDef):
-            for node in ast.walk(top):
-                constant = isinstance(node, ast.Name) and node.id in known
-                if constant or (isinstance(node, ast.Attribute) and _dotted(node) in NUMBERS):
-                    found.append(node)
+            continue
+        within = isinstance(top, ast.FunctionDef | ast.ClassDef)
+        for node in ast.walk(top):
+            constant = within and isinstance(node, ast.Name) and node.id in known
+            if constant or (isinstance(node, ast.Attribute) and _dotted(node) in NUMBERS):
+                found.append(node)
     yield from sorted(found, key=lambda node: (node.lineno, node.col_offset))
 
 

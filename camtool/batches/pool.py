@@ -42,12 +42,10 @@ FAILED_STARTS = 3
 
 @dataclass(frozen=True)
 class PoolOptions:
-    """`jobs` processes, each drawing in at most `timeout_s` (None: no limit). With `first_alone`,
-    the others start when the first one is ready: it compiles what they all load."""
+    """`jobs` processes, each drawing in at most `timeout_s` (None: no limit)."""
 
     jobs: int = 1
     timeout_s: float | None = None
-    first_alone: bool = False
 
 
 @dataclass(eq=False)
@@ -68,7 +66,6 @@ class LocalPool:
         self._options = options
         self._workers: list[_Worker] = []
         self._failed_starts = 0
-        self._warm = not options.first_alone
 
     def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
         """One result for each task, in any order, and None after each `TICK_S` without a result.
@@ -93,8 +90,6 @@ class LocalPool:
         """Start workers while there are tasks for them; give each free worker a task."""
         busy = sum(worker.task is not None for worker in self._workers)
         wanted = min(self._options.jobs, busy + len(queue))
-        if not self._warm:
-            wanted = min(wanted, 1)
         while len(self._workers) < wanted:
             self._workers.append(self._started())
         for worker in self._workers:
@@ -129,7 +124,7 @@ class LocalPool:
             return self._died(worker)
         self._failed_starts = 0
         if message == READY:
-            worker.ready = self._warm = True
+            worker.ready = True
             return None
         made, peak_mib = message
         task, worker.task = worker.task, None

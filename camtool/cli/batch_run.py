@@ -26,7 +26,6 @@ from camtool.batches.run import Made, Order, Outcome, Pool, State, Task, run_bat
 from camtool.cli.batch_messages import Display, Verbosity, display, say_summary, summary_json
 from camtool.cli.batch_work import SVG, JobOrder, PostWork
 from camtool.cli.files import is_foreign, refuse_same, write_all
-from camtool.cli.first_run import first_run, say_first_run
 from camtool.cli.messages import say
 from camtool.cli.options import JobFlags, own_job
 from camtool.errors import CamtoolError, OutputError
@@ -232,11 +231,9 @@ def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:
         return ClusterPool(work, running.scheduler, note)
     from camtool.batches.pool import LocalPool, PoolOptions
 
-    say_first_run(quiet=batch.verbosity.quiet, judging=work.check)
     options = PoolOptions(
         jobs=running.jobs or os.cpu_count() or 1,
         timeout_s=running.timeout,
-        first_alone=first_run(judging=work.check),
     )
     return LocalPool(work, options)
 

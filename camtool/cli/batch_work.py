@@ -11,11 +11,14 @@ from camtool import __version__
 from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
 from camtool.batches.run import Made, Task
 from camtool.cli.files import sealed
-from camtool.cli.first_run import SMALL_JOB
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.findings import Finding, Severity
 from camtool.plain import one_line
+
+SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">
+<circle cx="1" cy="1" r="0.2"/></svg>"""
+"""A drawing of one contour: nothing is to be put into an order."""
 
 if TYPE_CHECKING:
     from camtool.planning.job import Job
@@ -59,7 +62,7 @@ class PostWork:
         return tuple(each for each in made if each)
 
     def warm(self) -> None:
-        """Load what every drawing needs, and compile it on the first run."""
+        """Load what every drawing needs."""
         from camtool.importers.read import read_bytes
         from camtool.pipeline import post_drawing
         from camtool.planning.job import job_of

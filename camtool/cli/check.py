@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.files import STDOUT, check_places, write_all
-from camtool.cli.first_run import say_first_run
 from camtool.cli.messages import say_error, say_findings, show_facts
 from camtool.cli.options import DrawingFlags, SectionedCommand, drawing_options, talk_options
 from camtool.cli.picture_options import DRAWING, PictureFlags, picture_name, picture_options
@@ -54,7 +53,6 @@ def check(
         return one.checked(sources[0])
     if report is not None or preview is not None:
         raise click.UsageError("--json and --preview are of one drawing")
-    say_first_run(quiet=quiet)
     return max(one.tried(source) for source in sources)
 
 
@@ -80,7 +78,6 @@ class _Check:
     def checked(self, source: str) -> int:
         """The facts of one drawing, and whether any of them is an error."""
         check_places([source], [self.report, self.preview])
-        say_first_run(quiet=self.quiet)
         read = self.drawing.read(source)
         facts = _facts(read)
         files: dict[str, bytes] = {}

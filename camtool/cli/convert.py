@@ -5,7 +5,6 @@ from __future__ import annotations
 import click
 
 from camtool.cli.files import read_bytes, shown
-from camtool.cli.first_run import say_first_run
 from camtool.cli.options import MachineFlags, SectionedCommand, feed, talk_options
 from camtool.cli.picture_options import (
     RESULT,
@@ -77,7 +76,6 @@ def convert(
 
     from camtool.pipeline import convert_program
 
-    say_first_run(quiet=quiet, judging=not no_verify)
     run = convert_program(
         read_bytes(program),
         before,

@@ -45,7 +45,7 @@ def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) ->
     _progress(BEGUN)
     target = posting.load()
     posting = posting.of(source)
-    run = posting.make(source, target, quiet=quiet, on_read=lambda: _progress(READ))
+    run = posting.make(source, target, on_read=lambda: _progress(READ))
     _progress(MADE)
     code = finish(
         run,

@@ -8,7 +8,6 @@ from typing import Any
 import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
-from camtool.cli.first_run import say_first_run
 from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import (
     DrawingFlags,
@@ -59,7 +58,6 @@ def new(
     output = output or "job.toml"
     check_places([source, *machine.files()], [output])
     check_new(output)
-    say_first_run(quiet=quiet)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(source, target)
     write_all({output: job_template(read, target).encode()})

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.files import STDOUT, write_all
-from camtool.cli.first_run import compiled_beside
 from camtool.cli.messages import (
     REPORT_NAMES,
     report_marks,
@@ -92,7 +91,6 @@ class Posting:
         source: str,
         target: LoadedTarget,
         *,
-        quiet: bool,
         on_read: Callable[[], None] | None = None,
         preview: str | None = None,
     ) -> Run:
@@ -101,22 +99,20 @@ class Posting:
         from camtool.pictures.scene import points_for
         from camtool.pipeline import post_drawing
 
-        name, judging = target.machine.target.name, not self.no_verify
-        with compiled_beside(name, quiet=quiet, judging=judging):
-            wanted = self.job.job(self.drawing)
-            read = self.drawing.read(source, target.machine, wanted)
-            if on_read is not None:
-                on_read()
-            with self.job.blamed():
-                return post_drawing(
-                    read,
-                    wanted,
-                    target,
-                    check=not self.no_verify,
-                    compensate=self.compensate,
-                    gates=self.gates.gates(),
-                    trace_points=points_for(preview),
-                )
+        wanted = self.job.job(self.drawing)
+        read = self.drawing.read(source, target.machine, wanted)
+        if on_read is not None:
+            on_read()
+        with self.job.blamed():
+            return post_drawing(
+                read,
+                wanted,
+                target,
+                check=not self.no_verify,
+                compensate=self.compensate,
+                gates=self.gates.gates(),
+                trace_points=points_for(preview),
+            )
 
     def files(self, source: str) -> list[str]:
         """The files that a program is made of: drawing, job, its tool table, and machine."""
@@ -201,7 +197,7 @@ def post(
         reads = [*posting.files(source), str(target.file)]
         asked = Asked(source, output, outputs, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
-        run = posting.make(source, target, quiet=quiet, preview=preview)
+        run = posting.make(source, target, preview=preview)
         painter = picture.painter(lambda: scenes_of(run, before=before_after), quiet=quiet)
         return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.files import STDOUT, check_places, read_bytes, write_all
-from camtool.cli.first_run import say_first_run
 from camtool.cli.messages import say, say_findings
 from camtool.cli.options import (
     DrawingFlags,
@@ -89,7 +88,6 @@ def preview(
     # A viewer plays the program, which needs the times of the machine's model.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
-    say_first_run(quiet=quiet, judging=simulate)
     seen = Seen(machine, simulate, job, drawing, output)
     found = [seen.scene(name) for name in sources]
     painted = picture.painter(lambda: [scene for scene, _ in found], quiet=quiet)

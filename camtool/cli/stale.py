@@ -58,7 +58,7 @@ def stale(
             continue
         faults: list[Fault] = []
         for drawing in drawings:
-            expected = _posted(drawing, posting, target, quiet=quiet)
+            expected = _posted(drawing, posting, target)
             fault = _fault(drawing, name, expected, missing=missing)
             faults += [] if fault is None else [fault]
             if fault is None:  # of several drawings of one name, the program needs to match one
@@ -133,12 +133,10 @@ def _has_program(name: Path) -> bool:
     return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _beside(name))
 
 
-def _posted(
-    drawing: Path, posting: Posting, target: LoadedTarget, *, quiet: bool
-) -> Program | Fault:
+def _posted(drawing: Path, posting: Posting, target: LoadedTarget) -> Program | Fault:
     """The program that camtool writes for a drawing now, or why there is none."""
     try:
-        run = posting.of(str(drawing)).make(str(drawing), target, quiet=quiet)
+        run = posting.of(str(drawing)).make(str(drawing), target)
     except CamtoolError as error:
         return Fault(error.exit_code, str(error))
     program = run.program

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.files import STDOUT, read_bytes, shown, write_all
-from camtool.cli.first_run import say_first_run
 from camtool.cli.messages import (
     REPORT_NAMES,
     report_marks,
@@ -149,7 +148,6 @@ def verify(
         trace_points=points_for(preview),
     )
     target = machine.load()
-    say_first_run(quiet=quiet, judging=True)
     wanted = job.job(drawing)
     read = drawing.read(against, target.machine, wanted) if against else None
     case = Case(target, judging, read, wanted)

@@ -131,7 +131,7 @@ def touching_boxes(
     `asked` for (K,). No more than `most` pairs, and none of boxes that come late in a sweep that
     would look at more than MOST_LOOKS: both bound time and memory, far beyond any real drawing.
     """
-    from camtool.kernels.box_sweep import touching
+    from camtool.kernels.chaining import touching
 
     along_x, along_y = boxes, boxes[:, [1, 0, 3, 2]]
     work, turned, order = min(

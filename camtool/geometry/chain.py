@@ -615,7 +615,7 @@ def _spacing(points: Floats) -> float:
 
 def _nearest_ends(points: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
     """Rows (J,), the row of the nearest other point (J,) and how far it is (J,), within reach."""
-    from camtool.kernels.neighbours import nearest_others
+    from camtool.kernels.chaining import nearest_others
 
     spread = points.max(axis=0) - points.min(axis=0)
     spacing = float(np.sqrt(spread[0] * spread[1] / len(points)))

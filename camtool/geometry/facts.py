@@ -201,7 +201,7 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
     segments = _closed_segments(lines)
     if segments is None:
         return None
-    from camtool.kernels.closest import closest
+    from camtool.kernels.fits import closest
 
     boxes = segment_boxes(segments)
     # The tree wants paths numbered in the order in which they stand here.

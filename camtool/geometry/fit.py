@@ -21,7 +21,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.curves import Curve, Pieced, Pieces
 from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM
-from camtool.kernels.fit_limits import (
+from camtool.kernels.fits import (
     ACCEPTED_SHARE,
     ASIDE_FROM,
     ASIDE_TO,
@@ -123,7 +123,7 @@ def split_bulges(vertices: Floats, closed: bool) -> Floats:
 
 def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
     """Rational pieces, about their origin."""
-    from camtool.kernels.bezier import curve_rows, points_at
+    from camtool.kernels.fits import curve_rows, points_at
 
     if not np.abs(pieces.control).max() <= MAX_SIZE_MM:
         raise GeometryError("a point or a tangent of a curve is not finite")
@@ -159,7 +159,7 @@ def _fitted(
     A fit whose error turns out too large is done again over finer nodes, since errors peak
     between them; if that is not enough, with less of the tolerance as well.
     """
-    from camtool.kernels.fit_bezier import fit_nodes
+    from camtool.kernels.fits import fit_nodes
 
     target, steps, fineness = SEARCH_SHARE * tolerance, MIN_STEPS, tolerance
     for attempt in range(ATTEMPTS):
@@ -316,7 +316,7 @@ def _refine(
 
 def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: float) -> Bools:
     """Whether each step, of which some points (j, steps, 2) are given, must be halved."""
-    from camtool.kernels.biarc import step_errors
+    from camtool.kernels.fits import step_errors
 
     error = step_errors(nodes.point, nodes.leave, nodes.arrive, rows, probes)
     away = probes[0] - nodes.point[rows], probes[0] - nodes.point[rows + 1]

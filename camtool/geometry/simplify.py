@@ -50,7 +50,7 @@ def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
     lines stay. An arc of more than a half circle counts once, though it is written as two; so
     does a whole circle.
     """
-    from camtool.kernels.recognise import MIN_POINTS
+    from camtool.kernels.fits import MIN_POINTS
 
     if len(path.vertices) < MIN_POINTS:
         return path, 0
@@ -83,7 +83,7 @@ def _replaced(
     vertices: Floats, noise: float, tolerance_mm: float
 ) -> tuple[Floats, list[tuple[int, int]]]:
     """The open path with its arcs, and the first and last vertex of each before."""
-    from camtool.kernels.recognise import MIN_POINTS, find_runs, furthest_off
+    from camtool.kernels.fits import MIN_POINTS, find_runs, furthest_off
 
     keep = np.ones(len(vertices), dtype=np.bool_)
     found: list[tuple[int, int]] = []

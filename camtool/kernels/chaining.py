@@ -1,9 +1,7 @@
-"""Pairs of near ends, which of them are joined, and the chains that the joints make.
+"""Which of many ends, points and boxes are near each other, and the chains that ends make.
 
-The two ends of path i are 2i (its start) and 2i + 1 (its end), so `end ^ 1` is the other end of
-the same path. What makes it exact: nothing is rounded here but the cells of a grid, and cells are
-only asked for neighbours; distances are compared as they are. `tests/oracles/chaining.py` is the
-twin.
+Compiled, because each of many is compared with those beside it; C types stand in the .pxd beside
+this file. What each part does is said above it.
 """
 
 from __future__ import annotations
@@ -11,29 +9,30 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from camtool.kernels.compiled import inner, kernel
+from camtool.arrays import Bools, Floats, Ints
 
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
+# Pairs of near ends, which of them are joined, and the chains that the joints make.
+#
+# The two ends of path i are 2i (its start) and 2i + 1 (its end), so `end ^ 1` is the other end of
+# the same path. What makes it exact: nothing is rounded here but the cells of a grid, and cells
+# are only asked for neighbours; distances are compared as they are. `tests/oracles/chaining.py` is
+# the twin.
 
 
-@kernel
 def near_pairs(cells: Ints, points: Floats, reach: float, most: int) -> tuple[Ints, Ints]:
     """Rows (J,), (J,) of all points (E, 2) within `reach` of each other, each pair once.
 
     `cells` (E, 3): group, column and row of the grid cell of each point, `reach` wide, sorted.
     No point gets more than `most` pairs with points after it: that bounds time and memory.
     """
-    total = _pairs(cells, points, reach, most, np.empty(0, np.int64), np.empty(0, np.int64))
+    none = np.empty(0, np.int64)
+    total = _pairs(cells, points, reach, most, none, none)
     one, other = np.empty(total, np.int64), np.empty(total, np.int64)
     _pairs(cells, points, reach, most, one, other)
-    return one, other
+    return np.asarray(one), np.asarray(other)
 
 
-@inner
 def _pairs(cells: Ints, points: Floats, reach: float, most: int, one: Ints, other: Ints) -> int:
     """Counts the pairs, and writes them when there is room for them.
 
@@ -64,7 +63,6 @@ def _pairs(cells: Ints, points: Floats, reach: float, most: int, one: Ints, othe
     return count
 
 
-@inner
 def _before(cells: Ints, i: int, group: int, column: int, row: int) -> bool:
     if cells[i, 0] != group:
         return bool(cells[i, 0] < group)
@@ -73,7 +71,6 @@ def _before(cells: Ints, i: int, group: int, column: int, row: int) -> bool:
     return bool(cells[i, 2] < row)
 
 
-@inner
 def top(above: Ints, item: int) -> int:
     """The root of an item's set (union-find with path halving)."""
     while above[item] != item:
@@ -82,10 +79,9 @@ def top(above: Ints, item: int) -> int:
     return item
 
 
-@kernel
 def clusters(count: int, one: Ints, other: Ints) -> Ints:
     """(count,) the least end of all ends that pairs connect with each end."""
-    above = np.arange(count)
+    above = np.arange(count, dtype=np.int64)
     for k in range(len(one)):
         a, b = top(above, one[k]), top(above, other[k])
         if a < b:
@@ -94,10 +90,9 @@ def clusters(count: int, one: Ints, other: Ints) -> Ints:
             above[a] = b
     for i in range(count):
         above[i] = top(above, i)
-    return above
+    return np.asarray(above)
 
 
-@kernel
 def join(one: Ints, other: Ints, mates: Ints, above: Ints, segments: Ints, arcs: Ints) -> int:
     """Joins pairs of free ends in their order into `mates`; how many.
 
@@ -122,13 +117,11 @@ def join(one: Ints, other: Ints, mates: Ints, above: Ints, segments: Ints, arcs:
     return joined
 
 
-@inner
 def encloses(segments: int, arcs: int) -> bool:
     """False for a ring of so few segments that nothing lies inside."""
     return segments > 2 or (segments == 2 and arcs > 0)
 
 
-@kernel
 def walk(mates: Ints, wanted: Bools) -> tuple[Ints, Ints, Bools]:
     """The chains of the wanted paths, each begun at its first path, which is not turned.
 
@@ -137,10 +130,10 @@ def walk(mates: Ints, wanted: Bools) -> tuple[Ints, Ints, Bools]:
     """
     count = len(wanted)
     entries, begins = np.empty(count, np.int64), np.empty(count + 1, np.int64)
-    rings, seen = np.zeros(count, np.bool_), ~wanted
+    rings, seen = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     size, chains = 0, 0
     for index in range(count):
-        if seen[index]:
+        if seen[index] or not wanted[index]:
             continue
         begins[chains] = size
         end = first_end(mates, 2 * index)
@@ -155,10 +148,10 @@ def walk(mates: Ints, wanted: Bools) -> tuple[Ints, Ints, Bools]:
                 break
         chains += 1
     begins[chains] = size
-    return entries[:size], begins[: chains + 1], rings[:chains]
+    found = np.asarray(rings[:chains]).view(np.bool_)
+    return np.asarray(entries[:size]), np.asarray(begins[: chains + 1]), found
 
 
-@inner
 def first_end(mates: Ints, end: int) -> int:
     """The free end at which the chain that enters a path by `end` begins, `end` for a ring."""
     start = end
@@ -169,7 +162,6 @@ def first_end(mates: Ints, end: int) -> int:
     return end
 
 
-@kernel
 def split_loops(
     starts: Ints, mates: Ints, node: Ints, points: Floats, reach: float, weights: Ints
 ) -> int:
@@ -184,62 +176,156 @@ def split_loops(
     stack = np.empty(len(mates) // 2 + 1, np.int64)
     until = np.zeros((len(stack) + 1, 2), np.int64)
     made = 0
-    for start in starts:
-        rest = _ring_weight(start, mates, weights)
+    for index in range(len(starts)):
+        start = starts[index]
+        segments, arcs = _ring_weight(start, mates, weights)
         last = mates[start]
         height, end, done = 0, start, False
         while not done:
             label = node[end]
             if label >= 0 and where[label] >= 0:
                 k = where[label]
-                loop = until[height] - until[k]
+                less, fewer = until[height, 0] - until[k, 0], until[height, 1] - until[k, 1]
                 begin, close = stack[k], stack[height - 1] ^ 1
                 before = last if k == 0 else stack[k - 1] ^ 1
                 near = (
                     _apart(points, begin, close) <= reach and _apart(points, before, end) <= reach
                 )
-                if (
-                    near
-                    and encloses(loop[0], loop[1])
-                    and encloses(rest[0] - loop[0], rest[1] - loop[1])
-                ):
+                if near and encloses(less, fewer) and encloses(segments - less, arcs - fewer):
                     mates[begin], mates[close] = close, begin
                     mates[before], mates[end] = end, before
-                    rest = rest - loop
+                    segments, arcs = segments - less, arcs - fewer
                     made += 1
-                    _forget(stack[k:height], node, where, k)
+                    _forget(stack, k, height, node, where)
                     height = k
             stack[height] = end
-            until[height + 1] = until[height] + weights[end // 2]
+            for m in range(2):
+                until[height + 1, m] = until[height, m] + weights[end // 2, m]
             if label >= 0:
                 where[label] = height
             height += 1
             done = end ^ 1 == last
             end = mates[end ^ 1]
-        _forget(stack[:height], node, where, 0)
+        _forget(stack, 0, height, node, where)
     return made
 
 
-@inner
-def _ring_weight(start: int, mates: Ints, weights: Ints) -> Ints:
+def _ring_weight(start: int, mates: Ints, weights: Ints) -> tuple[int, int]:
     """Segments and arcs of a whole ring."""
-    total: Ints = weights[start // 2].copy()
+    segments, arcs = weights[start // 2, 0], weights[start // 2, 1]
     end = mates[start ^ 1]
     while end != start:
-        total += weights[end // 2]
+        segments += weights[end // 2, 0]
+        arcs += weights[end // 2, 1]
         end = mates[end ^ 1]
-    return total
+    return segments, arcs
 
 
-@inner
-def _forget(entries: Ints, node: Ints, where: Ints, begin: int) -> None:
-    """Takes these entries, the first of which stands at `begin`, out of `where` they stand."""
-    for m in range(len(entries)):
+def _forget(entries: Ints, low: int, high: int, node: Ints, where: Ints) -> None:
+    """Takes the entries low … high − 1 out of `where` they stand."""
+    for m in range(low, high):
         label = node[entries[m]]
-        if label >= 0 and where[label] == begin + m:
+        if label >= 0 and where[label] == m:
             where[label] = -1
 
 
-@inner
 def _apart(points: Floats, one: int, other: int) -> float:
     return math.hypot(points[one, 0] - points[other, 0], points[one, 1] - points[other, 1])
+
+
+# The nearest other point of each point, on a grid whose cells are looked at ring by ring.
+#
+# What makes it exact: after ring k of cells around a point's own, every point nearer than k cells
+# has been seen. `tests/oracles/chaining.py` is the twin.
+
+
+def nearest_others(
+    cells: Ints, points: Floats, size: float, least: float, reach: float
+) -> tuple[Ints, Floats]:
+    """For each point (P, 2) the row of the nearest one farther than `least`, and its distance.
+
+    `cells` (P, 2): column and row of the grid cell of each point, `size` wide, sorted. A point
+    with none within `reach` gets −1. Equal distances go to the first row.
+    """
+    count = len(points)
+    nearest = np.full(count, -1, np.int64)
+    distance = np.full(count, math.inf)
+    for i in range(count):
+        ring = 0
+        while (ring - 1) * size <= min(distance[i], reach):
+            for column in range(cells[i, 0] - ring, cells[i, 0] + ring + 1):
+                at_side = abs(column - cells[i, 0]) == ring
+                row = cells[i, 1] - ring
+                while row <= cells[i, 1] + ring:
+                    stop = cells[i, 1] + ring if at_side else row
+                    j = _first(cells, column, row)
+                    while j < count and cells[j, 0] == column and cells[j, 1] <= stop:
+                        apart = math.hypot(
+                            points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+                        )
+                        if least < apart <= reach and (
+                            apart < distance[i] or (apart == distance[i] and j < nearest[i])
+                        ):
+                            nearest[i], distance[i] = j, apart
+                        j += 1
+                    row = stop + 1 if at_side else row + 2 * ring
+            ring += 1
+    return np.asarray(nearest), np.asarray(distance)
+
+
+def _first(cells: Ints, column: int, row: int) -> int:
+    """The first sorted cell that is not before (column, row)."""
+    low, high = 0, len(cells)
+    while low < high:
+        middle = (low + high) // 2
+        if cells[middle, 0] < column or (cells[middle, 0] == column and cells[middle, 1] < row):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+# Pairs of boxes that touch, found by a sweep along one axis.
+#
+# Boxes are sorted by where they begin on that axis, so those that may touch a box follow it until
+# one begins beyond its end. What makes it exact: comparisons of the given numbers, nothing else.
+# `camtool.geometry.boxes` chooses the axis on which fewer boxes are looked at.
+
+
+def touching(
+    boxes: Floats, same: Ints, differ: Ints, asked: Bools, most: int
+) -> tuple[Ints, Ints]:
+    """Rows (J,), (J,) of boxes (K, 4) low, low, high, high that touch, each pair once.
+
+    `boxes` are sorted by their first column. Both of a pair have the same number in `same`,
+    different ones in `differ`, and at least one of them is `asked` for. No more than `most` pairs.
+    """
+    room = np.empty(0, np.int64)
+    count = _touching(boxes, same, differ, asked, most, room, room)
+    one, other = np.empty(count, np.int64), np.empty(count, np.int64)
+    _touching(boxes, same, differ, asked, most, one, other)
+    return np.asarray(one), np.asarray(other)
+
+
+def _touching(
+    boxes: Floats, same: Ints, differ: Ints, asked: Bools, most: int, one: Ints, other: Ints
+) -> int:
+    """Counts the pairs, and writes them when there is room for them."""
+    count = 0
+    for i in range(len(boxes)):
+        j = i + 1
+        while j < len(boxes) and boxes[j, 0] <= boxes[i, 2]:
+            if (
+                boxes[j, 1] <= boxes[i, 3]
+                and boxes[i, 1] <= boxes[j, 3]
+                and same[i] == same[j]
+                and differ[i] != differ[j]
+                and (asked[i] or asked[j])
+            ):
+                if count >= most:
+                    return count
+                if len(one) > 0:
+                    one[count], other[count] = i, j
+                count += 1
+            j += 1
+    return count

@@ -7,8 +7,8 @@ a reflex corner: there the normal turns while the point stays. The function
     g(p) = N·(p − A) − κ/2 |p − A|²
 
 is 0 on the element's line or circle, positive on its inner side, and its gradient m has the
-length 1 there. A disc that touches the boundary at p with the inner normal n, and whose middle is
-p + ρ n, touches that line or circle too when
+length 1 there. A disc that touches the boundary at p with the inner normal n, and whose middle
+is p + ρ n, touches that line or circle too when
 
     ρ = g(p) / (1 − n·m(p)),          and a point q when   ρ = |q − p|² / (2 n·(q − p)).
 
@@ -19,19 +19,15 @@ Neighbours: two elements that join smoothly are never touched by one disc of the
 circles touch each other already, one within the other or on two sides of their tangent), so a
 smooth neighbour is left out, and with it the quotient 0/0. A neighbour behind a reflex corner
 counts only where p is clearly on its inner side.
+
+C types stand in the .pxd beside this file.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
-from camtool.kernels.compiled import inner, kernel
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from camtool.arrays import Floats, Ints
 
 Place = tuple[float, float, float, float, float, float]
 """A point x, y, its inner normal, and the point as seen from the nearer end of its element."""
@@ -53,7 +49,6 @@ SMOOTH_RAD = 1e-5
 """A convex corner that turns by less is none: a disc of radius ρ reaches ρ/8 · turn² less far."""
 
 
-@kernel
 def largest_discs(
     boundary: tuple[Floats, Ints, Floats],
     row: Ints,
@@ -71,27 +66,28 @@ def largest_discs(
     the partner, looked at first. A disc that touches only its own arc, in whose centre it lies,
     has itself as partner.
     """
-    table, links, _ = boundary
+    table, links, boxes = boundary
     for k in range(len(row)):
         own = row[k]
         x, y, nx, ny = frame(table, own, t[k])
         corner = _at_convex_corner(links, own, t[k])
         if corner >= 0:
             result[k, 0], result[k, 1], result[k, 2] = x, y, 0.0
-            result[k, 3], partner[k] = 1.0 - t[k], corner
+            result[k, 3] = 1.0 - t[k]
+            partner[k] = corner
             continue
         if t[k] < 0.5:
-            sx, sy = _from_corner(table[own, TX], table[own, TY], table[own], t[k])
+            sx, sy = _from_corner(table[own, TX], table[own, TY], table, own, t[k])
         else:
-            sx, sy = _from_corner(-table[own, UX], -table[own, UY], table[own], t[k] - 1.0)
+            sx, sy = _from_corner(-table[own, UX], -table[own, UY], table, own, t[k] - 1.0)
         at = (x, y, nx, ny, sx, sy)
-        radius, best = _largest(boundary, own, guess[k], at, t[k] < 0.5)
+        radius, best = _largest(table, links, boxes, own, guess[k, 0], guess[k, 1], at, t[k] < 0.5)
         cx, cy = x + radius * nx, y + radius * ny
         result[k, 0], result[k, 1], result[k, 2] = cx, cy, radius
-        result[k, 3], partner[k] = _place(table, best, cx, cy), best
+        result[k, 3] = _place(table, best, cx, cy)
+        partner[k] = best
 
 
-@kernel
 def frame(table: Floats, own: int, t: float) -> tuple[float, float, float, float]:
     """The point x, y of an element at the part t of it, and its inner normal there."""
     tx, ty, length = table[own, TX], table[own, TY], table[own, LENGTH]
@@ -110,19 +106,17 @@ def frame(table: Floats, own: int, t: float) -> tuple[float, float, float, float
     return x, y, nx, ny
 
 
-@inner
-def _from_corner(tx: float, ty: float, element: Floats, t: float) -> tuple[float, float]:
+def _from_corner(tx: float, ty: float, table: Floats, own: int, t: float) -> tuple[float, float]:
     """A point of an element as seen from its start (t > 0), or from its end (t < 0, and t_x, t_y
     the direction back from there): without the rounding of far coordinates."""
-    half = 0.5 * element[SWEEP] * t
-    chord = element[LENGTH] * abs(t)
+    half = 0.5 * table[own, SWEEP] * t
+    chord = table[own, LENGTH] * abs(t)
     if half != 0.0:
         chord *= math.sin(half) / half
     cosine, sine = math.cos(half), math.sin(half)
     return chord * (tx * cosine - ty * sine), chord * (ty * cosine + tx * sine)
 
 
-@inner
 def _at_convex_corner(links: Ints, own: int, t: float) -> int:
     """The other element of the convex corner at which the point lies, −1 elsewhere."""
     if t == 0.0 and links[own, 2] == CONVEX:
@@ -132,23 +126,25 @@ def _at_convex_corner(links: Ints, own: int, t: float) -> int:
     return -1
 
 
-@inner
 def _largest(
-    boundary: tuple[Floats, Ints, Floats],
+    table: Floats,
+    links: Ints,
+    boxes: Floats,
     own: int,
-    guess: Ints,
+    guess: int,
+    other_guess: int,
     at: Place,
     at_start: bool,
 ) -> tuple[float, int]:
     """Radius and partner of the largest disc at a point with its normal."""
-    table, links, boxes = boundary
     x, y = at[0], at[1]
-    radius, best = np.inf, own
+    radius, best = math.inf, own
     if table[own, LENGTH] > 0.0 and table[own, SWEEP] > 0.0:
         radius = table[own, LENGTH] / table[own, SWEEP]
-    for other in guess:
+    for turn in range(2):
+        other = guess if turn == 0 else other_guess
         if other != own:
-            found = _limit((table, links), (own, other), at, radius, at_start)
+            found = _limit(table, links, own, other, at, radius, at_start)
             if found < radius:
                 radius, best = found, other
     home = own // BLOCK
@@ -161,51 +157,57 @@ def _largest(
         for other in range(block * BLOCK, min((block + 1) * BLOCK, len(table))):
             if other == own:
                 continue
-            found = _limit((table, links), (own, other), at, radius, at_start)
+            found = _limit(table, links, own, other, at, radius, at_start)
             if found < radius:
                 radius, best = found, other
     return radius, best
 
 
-@inner
 def _limit(
-    boundary: tuple[Floats, Ints], pair: tuple[int, int], at: Place, radius: float, at_start: bool
+    table: Floats,
+    links: Ints,
+    own: int,
+    other: int,
+    at: Place,
+    radius: float,
+    at_start: bool,
 ) -> float:
     """The radius to which another element limits the disc; inf where it does not, or not below
     `radius`."""
-    table, links = boundary
-    own, other = pair
     wx, wy = at[0] - table[other, AX], at[1] - table[other, AY]
     before, behind = links[own, 0] == other, links[own, 1] == other
-    found = np.inf
+    found = math.inf
     # Its corner, or the smooth joint at its start, as a point; not one of our own ends.
     corner = table[other, LENGTH] == 0.0
     ahead = -(at[2] * wx + at[3] * wy)
-    if (corner or links[other, 2] == SMOOTH) and not (behind or (before and corner)) and ahead > 0:
+    if (
+        (corner or links[other, 2] == SMOOTH)
+        and not (behind or (before and corner))
+        and ahead > 0.0
+    ):
         found = 0.5 * (wx * wx + wy * wy) / ahead
     if corner:
         return found
     if (before and links[own, 2] == SMOOTH) or (behind and links[other, 2] == SMOOTH):
-        return np.inf
+        return math.inf
     if table[own, LENGTH] == 0.0 and (before or behind):
-        return np.inf
+        return math.inf
     tx, ty = table[other, TX], table[other, TY]
     tilt = _turn(table, links, own if at_start else links[own, 1])
     turns = tilt + _turn(table, links, other), tilt + _turn(table, links, links[other, 1])
     # A neighbour behind a convex corner is seen from that corner.
     if before and at_start and links[own, 2] == CONVEX:
         sight = (table[other, UX], table[other, UY], at[4], at[5])
-        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0, turns))
+        return min(found, _touching(table, other, sight, at, min(radius, found), -1.0, turns))
     if behind and not at_start and links[other, 2] == CONVEX:
         sight = (tx, ty, at[4], at[5])
-        return min(found, _touching(table[other], sight, at, min(radius, found), -1.0, turns))
+        return min(found, _touching(table, other, sight, at, min(radius, found), -1.0, turns))
     least = _least(table, links, own, other)
     return min(
-        found, _touching(table[other], (tx, ty, wx, wy), at, min(radius, found), least, turns)
+        found, _touching(table, other, (tx, ty, wx, wy), at, min(radius, found), least, turns)
     )
 
 
-@inner
 def _turn(table: Floats, links: Ints, own: int) -> float:
     """By how many radians a smooth joint to the element before turns after all; 0 at others."""
     if links[own, 2] != SMOOTH:
@@ -215,7 +217,6 @@ def _turn(table: Floats, links: Ints, own: int) -> float:
     return float(abs(ux * table[own, TY] - uy * table[own, TX]))
 
 
-@inner
 def _least(table: Floats, links: Ints, own: int, other: int) -> float:
     """How far on the inner side of `other` a point must be: above 0 behind a reflex corner."""
     before, behind = links[own, 0], links[own, 1]
@@ -225,16 +226,16 @@ def _least(table: Floats, links: Ints, own: int, other: int) -> float:
     return TOUCH_MM if over else 0.0
 
 
-@inner
 def _touching(
-    element: Floats,
+    table: Floats,
+    own: int,
     sight: tuple[float, float, float, float],
     at: Place,
     radius: float,
     least: float,
     turns: tuple[float, float],
 ) -> float:
-    """The radius at which the disc touches the line or arc `element` within it; inf if it is not
+    """The radius at which the disc touches the line or arc `own` within it; inf if it is not
     below `radius` or touches beyond the ends.
 
     `sight`: the tangent at a point of the element, and how the disc's place is seen from there.
@@ -243,28 +244,27 @@ def _touching(
     the arc just there, and without it would seem to have room far beyond the arc's own radius.
     """
     tx, ty, wx, wy = sight
-    kappa = element[SWEEP] / element[LENGTH]
+    kappa = table[own, SWEEP] / table[own, LENGTH]
     g = wy * tx - wx * ty - 0.5 * kappa * (wx * wx + wy * wy)
     if least < 0.0:
         g = max(g, 0.0)
     elif g <= least:
-        return np.inf
+        return math.inf
     mx, my = -ty - kappa * wx, tx - kappa * wy
     # 1 − n·m without cancellation: |n − m|²/2 + (1 − |m|²)/2, and |m|² = 1 − 2κg.
     ex, ey = at[2] - mx, at[3] - my
     below = 0.5 * (ex * ex + ey * ey) + kappa * g
     if below <= 0.0 or g >= radius * below:
-        return np.inf
+        return math.inf
     found = g / below
     cx, cy = at[0] + found * at[2], at[1] + found * at[3]
-    after = (cx - element[AX]) * element[TX] + (cy - element[AY]) * element[TY]
-    still = (cx - element[BX]) * element[UX] + (cy - element[BY]) * element[UY]
+    after = (cx - table[own, AX]) * table[own, TX] + (cy - table[own, AY]) * table[own, TY]
+    still = (cx - table[own, BX]) * table[own, UX] + (cy - table[own, BY]) * table[own, UY]
     begins = after >= -TOUCH_MM - turns[0] * found
     ends = still <= TOUCH_MM + turns[1] * found
-    return found if begins and ends else np.inf
+    return found if begins and ends else math.inf
 
 
-@inner
 def _place(table: Floats, other: int, cx: float, cy: float) -> float:
     """At which part of an element a disc with this middle touches it."""
     wx, wy = cx - table[other, AX], cy - table[other, AY]

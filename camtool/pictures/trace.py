@@ -147,7 +147,7 @@ def exaggerated(points: Floats, wanted: Segments, times: float) -> Floats:
 
 def nearest_points(points: Floats, wanted: Segments) -> Floats:
     """(T, 2) mm: of the lines and arcs of `wanted`, the point nearest to each of the points."""
-    from camtool.kernels.closest import nearest_rows
+    from camtool.kernels.fits import nearest_rows
 
     boxes = segment_boxes(wanted)
     row = nearest_rows(points, wanted.start, wanted.end, wanted.bulge, boxes)

@@ -24,7 +24,7 @@ from camtool.planning.items import Contour, Item
 from camtool.planning.paths import flat, joints
 
 if TYPE_CHECKING:
-    from camtool.kernels.tour import Tour
+    from camtool.kernels.tours import Tour
 
 
 Point = tuple[float, float]
@@ -126,16 +126,14 @@ def best_order(
     """
     if len(choices) == 0:
         return np.empty(0, dtype=np.int64)
-    from camtool.kernels.tour_rows import best_rows
+    from camtool.kernels.tours import best_rows
 
     start = np.array(from_point, dtype=np.float64)
     goal = np.array((np.nan, np.nan) if to_point is None else to_point, dtype=np.float64)
     ends, first = np.column_stack([choices.entry, choices.exit]), choices.first
     if len(choices) == 1 and not len(before):
         return best_rows(ends, first, np.zeros(1, dtype=np.int64), start, goal)
-    from camtool.kernels.tour_search import kicked, settled
-    from camtool.kernels.tour_start import nearest_first
-    from camtool.kernels.tour_tree import tree_of
+    from camtool.kernels.tours import kicked, nearest_first, settled, tree_of
 
     after_first, after = _followers(before, len(choices))
     waits = np.bincount(after, minlength=len(choices))
@@ -156,9 +154,7 @@ def best_order(
 
 def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
     """The tour of these rows, with all that the search wants to know."""
-    from camtool.kernels.tour import Tour
-    from camtool.kernels.tour_start import neighbours
-    from camtool.kernels.tour_tree import tree_of
+    from camtool.kernels.tours import Tour, neighbours, tree_of
 
     count, variants = len(choices), len(choices.owner)
     turned = _turned(choices)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.kernels.legs import legs_fill
+from camtool.kernels.motion import legs_fill
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options, still_ledger

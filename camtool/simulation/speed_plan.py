@@ -33,7 +33,7 @@ class SpeedPlan:
     def entries(self, window: int) -> Floats:
         """(N + 1,) mm/s at the start of each block, and 0 after the last, for a planner with a
         buffer of `window` blocks, the current one included."""
-        from camtool.kernels.lookahead import entry_speeds
+        from camtool.kernels.motion import entry_speeds
 
         before = np.concatenate([[0.0], self.speed_mm_s[:-1]])
         highest = np.minimum(np.minimum(before, self.speed_mm_s), self.corner_mm_s)

@@ -180,7 +180,7 @@ def largest(errors: Floats, which: Bools) -> float:
 
 
 def _task(decoded: MoveIndex, goal: Goal, match: Match, slot: Ints) -> Task:
-    from camtool.kernels.judging import Task, bin_directions
+    from camtool.kernels.judging import Moves, Task, bin_directions
     from camtool.kernels.move_tree import move_tree
 
     own = move_table(decoded.cuts)

@@ -27,7 +27,15 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
-from camtool.kernels.timers import (
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
+from camtool.simulation.rows import check_positions, check_rows, placed, refuse
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import Dialect, FlashcutController
+from .steps import (
     HOME_X,
     HOME_Y,
     HOME_Z,
@@ -39,14 +47,6 @@ from camtool.kernels.timers import (
     Z,
     timers_fill,
 )
-from camtool.machine.model import Machine
-from camtool.simulation.controller import ControllerModel
-from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.rows import check_positions, check_rows, placed, refuse
-from camtool.toolpath.moves import Kind, Toolpath
-
-from .dialect import Dialect, FlashcutController
 from .timers import feeds_of, half_periods_ms, shortest_ms
 
 _Machine = Machine[FlashcutController, Dialect]

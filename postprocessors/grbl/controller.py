@@ -25,7 +25,6 @@ import numpy.typing as npt
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import MachineError, ProgramError
-from camtool.kernels.step_lines import step_lines_fill, steps_taken
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
@@ -36,6 +35,7 @@ from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect, GrblController
+from .steps import step_lines_fill, steps_taken
 
 _Machine = Machine[GrblController, Dialect]
 

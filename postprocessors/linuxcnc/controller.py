@@ -26,7 +26,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
@@ -43,6 +42,7 @@ from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
 from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath
 
 from .dialect import Dialect, LinuxcncController
+from .steps import merge_lines
 
 _Machine = Machine[LinuxcncController, Dialect]
 

@@ -25,7 +25,15 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
-from camtool.kernels.slave_record import (
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
+from camtool.simulation.rows import placed, refuse
+from camtool.toolpath.moves import Kind, Toolpath
+
+from .dialect import Dialect, MatlabRouterController
+from .steps import (
     COUNT,
     PLACE,
     SECOND_ROW,
@@ -36,16 +44,8 @@ from camtool.kernels.slave_record import (
     Account,
     Program,
     State,
+    slaves_fill,
 )
-from camtool.kernels.slaves import slaves_fill
-from camtool.machine.model import Machine
-from camtool.simulation.controller import ControllerModel
-from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.rows import placed, refuse
-from camtool.toolpath.moves import Kind, Toolpath
-
-from .dialect import Dialect, MatlabRouterController
 
 _Machine = Machine[MatlabRouterController, Dialect]
 

@@ -25,7 +25,6 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
-from camtool.kernels.valcnc_arcs import arc_angles
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import (
@@ -43,6 +42,7 @@ from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import Dialect, ValcncController
+from .steps import arc_angles
 
 _Machine = Machine[ValcncController, Dialect]
 

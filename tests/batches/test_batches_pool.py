@@ -91,16 +91,3 @@ def test_closing_ends_the_workers(tmp_path: Path) -> None:
         pass
     results.close()
     assert not multiprocessing.active_children()
-
-
-def test_the_first_is_ready_before_the_others_begin(tmp_path: Path) -> None:
-    for first_alone, order in ((True, ["begin", "end"]), (False, ["begin", "begin"])):
-        notes = tmp_path / f"notes-{first_alone}"
-        made = run(
-            tasks_of(tmp_path, "a", "sleep 1", "sleep 1"),
-            Obedient(notes=notes),
-            jobs=2,
-            first_alone=first_alone,
-        )
-        assert sorted(made) == list("012")
-        assert notes.read_text().split()[:2] == order

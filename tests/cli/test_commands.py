@@ -179,25 +179,3 @@ def test_annex_form(camtool: Run, samples: Path, tmp_path: Path) -> None:
     assert max(len(block) for block in blocks) == 35
     judged = camtool("verify", "a.pic", *flags, "--against", samples / "logo.dxf")
     assert judged.returncode == 0, judged.stderr.decode()
-
-
-def test_the_first_run_says_why_it_is_silent(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    import camtool.kernels
-    from camtool.cli.first_run import say_first_run
-
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setattr(camtool.kernels, "__file__", str(tmp_path / "__init__.py"))
-    say_first_run(quiet=False)
-    assert "compiling" in capsys.readouterr().err
-    say_first_run(quiet=True)
-    (tmp_path / "__pycache__").mkdir()
-    (tmp_path / "__pycache__" / "play.play_fill.nbi").touch()
-    say_first_run(quiet=False)
-    assert capsys.readouterr().err == ""
-    say_first_run(quiet=False, judging=True)
-    assert "compiling" in capsys.readouterr().err
-    (tmp_path / "__pycache__" / "judge.judge_samples.nbi").touch()
-    say_first_run(quiet=False, judging=True)
-    assert capsys.readouterr().err == ""

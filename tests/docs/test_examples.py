@@ -27,8 +27,6 @@ BLOCK = re.compile(r"^```(console|python|text)\n(.*?)^```$", re.DOTALL | re.MULT
 PYTHON_PAGES = {"python.md", "tutorial.md"}
 """Pages whose Python is run; others show parts of files."""
 
-NOISE = "camtool: first run: "
-
 
 def runnable(page: Path) -> bool:
     kinds = {match[1] for match in BLOCK.finditer(page.read_text(encoding="utf-8"))}
@@ -54,8 +52,7 @@ def shell(command: str, folder: Path, before: int) -> tuple[str, int]:
         text=True,
         check=False,
     )
-    lines = result.stdout.splitlines(keepends=True)
-    return "".join(line for line in lines if not line.startswith(NOISE)), result.returncode
+    return result.stdout, result.returncode
 
 
 def commands(block: str) -> Iterator[tuple[str, str]]:

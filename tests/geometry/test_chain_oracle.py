@@ -14,7 +14,7 @@ from camtool.geometry.chain import Chained, Kinds, chain
 from camtool.geometry.intersect import self_crossings_of
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, reverse, rotated
-from camtool.kernels.neighbours import nearest_others
+from camtool.kernels.chaining import nearest_others
 from tests.oracles.chaining import chained, nearest_other
 from tests.paths import mirrored, moved, scaled
 

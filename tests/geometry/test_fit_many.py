@@ -11,8 +11,7 @@ from camtool.errors import GeometryError
 from camtool.geometry.curves import BezierCurve, EllipseCurve, FunctionCurve, SplineCurve
 from camtool.geometry.fit import MIN_STEPS, curve_nodes, fit_curve
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.kernels.bezier import evaluate, points_at, speed
-from camtool.kernels.fit_limits import MAX_RADIUS_MM, SINGLE_TURN_RAD
+from camtool.kernels.fits import MAX_RADIUS_MM, SINGLE_TURN_RAD, evaluate, points_at, speed
 from tests.oracles import arcs
 from tests.oracles.curves import dense_parameters, fewest_arcs, fewest_chords, sharp_points
 

@@ -14,7 +14,7 @@ from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import sample, segment_lengths
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.geometry.simplify import NOISE_MM, recognise_arcs, rounding_noise, without_tiny
-from camtool.kernels.recognise import MAX_TURN_RAD, circle_of, find_runs
+from camtool.kernels.fits import MAX_TURN_RAD, circle_of, find_runs
 from tests.oracles import arcs
 from tests.oracles.recognise import explode, least_squares_circle, turns_about
 

@@ -1,11 +1,14 @@
 """The house's direction: rooms import only from below, and heavy packages only where used."""
 
 import ast
+import importlib
+import importlib.util
 import re
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -54,7 +57,6 @@ HEAVY = {
     "ezdxf",
     "fontTools",
     "HersheyFonts",
-    "numba",
     "resvg_py",
     "rich",
     "scipy",
@@ -212,19 +214,38 @@ def test_every_target_is_looked_at() -> None:
 @pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
 def test_heavy_packages_are_imported_where_they_are_used(path: Path) -> None:
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    allowed = {"numba"} if room_of_file(path) == "kernels" else set()
     top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
     tops = ast.Module(body=list(top), type_ignores=[])
     for line, module in imported(tops, neighbours=room_of_file(path) == "postprocessors"):
-        assert module.split(".")[0] not in HEAVY - allowed, f"line {line} imports {module}"
+        assert module.split(".")[0] not in HEAVY, f"line {line} imports {module}"
+
+
+def build_backend() -> Any:
+    """The module that builds the package."""
+    file = ROOT / "build_backend" / "camtool_build.py"
+    spec = importlib.util.spec_from_file_location("camtool_build", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def test_every_package_is_shipped() -> None:
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    listed = set(settings["tool"]["setuptools"]["packages"])
     ours = [*ROOT.glob("camtool/**/__init__.py"), *ROOT.glob("postprocessors/**/__init__.py")]
     there = {".".join(path.parent.relative_to(ROOT).parts) for path in ours}
-    assert listed == {re.sub("^postprocessors", "camtool_postprocessors", name) for name in there}
+    assert set(build_backend().settings()["packages"]) == {
+        re.sub("^postprocessors", "camtool_postprocessors", name) for name in there
+    }
+
+
+def test_every_loop_is_compiled_where_it_runs() -> None:
+    """A module of a checkout shadows the installed one; without its compiled form beside it, it
+    would run a hundred times slower and nobody would know why."""
+    for name in build_backend().compiled_modules():
+        file = importlib.import_module(name).__file__
+        assert file is not None
+        assert not file.endswith(".py"), f"{name}: pip install -e . compiles it"
 
 
 def loaded_by(*arguments: str) -> set[str]:

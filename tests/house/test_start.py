@@ -1,9 +1,8 @@
-"""What starting costs: the packages that a command loads, and the kernels that it compiles.
+"""What starting costs: the packages that a command loads.
 
-Both lists are here so that whoever drags more in has to say so; docs/benchmarks.md has the times.
+The lists are here so that whoever drags more in has to say so; docs/benchmarks.md has the times.
 """
 
-import os
 import re
 import subprocess
 import sys
@@ -17,14 +16,12 @@ HEAVY = {
     "defusedxml",
     "ezdxf",
     "HersheyFonts",
-    "numba",
     "numpy",
     "resvg_py",
     "rich",
     "scipy.linalg",
     "shapely",
     "svgpathtools",
-    "numba.np.arraymath",  # with it comes all that numba compiles with, and scipy.linalg
 }
 PIC = ("--target", "pic-mmh", "-q")
 
@@ -41,9 +38,8 @@ def modules_of(*arguments: str) -> set[str]:
     return set(result.stdout.rpartition("LOADED")[2].split())
 
 
-def warm(*arguments: str) -> set[str]:
-    """The heavy ones of a run whose kernels an earlier one has compiled."""
-    modules_of(*arguments)
+def loaded_heavy(*arguments: str) -> set[str]:
+    """The heavy ones of them."""
     return HEAVY & modules_of(*arguments)
 
 
@@ -53,25 +49,25 @@ def output(tmp_path: Path) -> str:
 
 
 def test_post_of_a_dxf_without_verification(output: str) -> None:
-    loaded = warm("post", "samples/logo.dxf", *PIC, "-o", output, "--no-verify")
-    assert loaded == {"ezdxf", "numba", "numpy"}
+    loaded = loaded_heavy("post", "samples/logo.dxf", *PIC, "-o", output, "--no-verify")
+    assert loaded == {"ezdxf", "numpy"}
 
 
 def test_post_and_verify(output: str) -> None:
-    loaded = warm("post", "samples/logo.dxf", *PIC, "-o", output)
-    assert loaded == {"ezdxf", "numba", "numpy"}
-    assert warm("verify", output, *PIC) == {"numba", "numpy"}
+    loaded = loaded_heavy("post", "samples/logo.dxf", *PIC, "-o", output)
+    assert loaded == {"ezdxf", "numpy"}
+    assert loaded_heavy("verify", output, *PIC) == {"numpy"}
 
 
 def test_post_of_an_svg(output: str) -> None:
-    loaded = warm("post", "samples/letter.svg", *PIC, "-o", output, "--no-verify")
-    assert loaded == {"defusedxml", "numba", "numpy"}
+    loaded = loaded_heavy("post", "samples/letter.svg", *PIC, "-o", output, "--no-verify")
+    assert loaded == {"defusedxml", "numpy"}
 
 
 def test_post_of_points(tmp_path: Path) -> None:
     output = str(tmp_path / "star.m")
-    loaded = warm("post", "samples/star.csv", "-t", "matlab-router", "-q", "-o", output)
-    assert loaded == {"numba", "numpy"}
+    loaded = loaded_heavy("post", "samples/star.csv", "-t", "matlab-router", "-q", "-o", output)
+    assert loaded == {"numpy"}
 
 
 def heavy_of(code: str) -> set[str]:
@@ -100,8 +96,8 @@ def test_text_of_an_svg_loads_the_fonts_that_it_needs(
     assert loaded & {"ezdxf", "HersheyFonts", "defusedxml"} == {"defusedxml"} | fonts
 
 
-def test_no_kernel_is_compiled_for_targets() -> None:
-    assert not warm("targets") & {"numba", "ezdxf", "shapely"}
+def test_targets_load_no_library_of_drawings() -> None:
+    assert not loaded_heavy("targets") & {"ezdxf", "shapely"}
 
 
 def test_a_short_run_does_not_look_for_garbage() -> None:
@@ -117,29 +113,3 @@ def test_a_short_run_does_not_look_for_garbage() -> None:
     seen = [sum(map(int, look.split())) for look in looks]
     assert seen, "Python tells of every look"
     assert sum(seen) < 5_000  # a hundred thousand, were it left as it is
-
-
-def compiled_by(cache: Path, *arguments: str) -> set[str]:
-    """The files of `camtool/kernels` of which a run compiled kernels, with an empty cache."""
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
-    command = [sys.executable, "-m", "camtool", *arguments]
-    subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, check=True)
-    return {file.name.partition(".")[0] for file in cache.rglob("*.nbi")}
-
-
-@pytest.mark.slow
-def test_kernels_of_a_drawing_of_lines(tmp_path: Path) -> None:
-    drawing, output = tmp_path / "square.csv", str(tmp_path / "square.pic")
-    drawing.write_text("0,0\n1,0\n1,1\n0,1\n0,0\n")
-    made = compiled_by(tmp_path / "cache", "post", str(drawing), *PIC, "-o", output, "--no-verify")
-    assert "tour_rows" in made
-    assert not made & {"arc_chain", "bezier", "biarc", "fit_bezier", "spans", "recognise"}
-    assert not {name for name in made if name.startswith(("offset_loops", "offset_meet", "discs"))}
-
-
-@pytest.mark.slow
-def test_kernels_of_a_program_judged(tmp_path: Path) -> None:
-    program = ROOT / "tests" / "golden" / "pic-mmh-example.pic"
-    made = compiled_by(tmp_path, "verify", str(program), *PIC)
-    assert "dda" in made
-    assert not {name for name in made if name.startswith(("tour", "offset_loops", "fit_"))}

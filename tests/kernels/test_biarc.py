@@ -8,8 +8,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from camtool.kernels.biarc import biarc, distance_to_arc, span_error
-from camtool.kernels.spans import longest_span
+from camtool.kernels.fits import biarc, distance_to_arc, longest_span, span_error
 from tests.oracles import arcs
 
 number = st.floats(-10.0, 10.0, allow_subnormal=False)
@@ -44,7 +43,7 @@ def test_a_biarc_is_tangent_at_its_ends_and_at_its_joint(a, b, leave, arrive):
     assume(math.dist(a, b) > 1e-2)
     out = np.array([math.cos(leave), math.sin(leave)])
     into = np.array([math.cos(arrive), math.sin(arrive)])
-    jx, jy, first, second = biarc(np.array(a), out, np.array(b), into)
+    jx, jy, first, second = biarc(*a, *out, *b, *into)
     assume(not math.isnan(jx))
     assume(math.dist(a, (jx, jy)) > 1e-3 < math.dist(b, (jx, jy)))
     ahead = (a[0] - out[0], a[1] - out[1], 0.0)
@@ -55,8 +54,8 @@ def test_a_biarc_is_tangent_at_its_ends_and_at_its_joint(a, b, leave, arrive):
 
 def test_no_biarc_between_equal_points_nor_over_more_than_half_circles():
     here, right, left = np.zeros(2), np.array([1.0, 0.0]), np.array([-1.0, 0.0])
-    assert math.isnan(biarc(here, right, here, left)[0])
-    assert math.isnan(biarc(here, left, right, left)[0])
+    assert math.isnan(biarc(*here, *right, *here, *left)[0])
+    assert math.isnan(biarc(*here, *left, *right, *left)[0])
 
 
 def test_the_longest_span_is_the_longest_one():

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from camtool.kernels.legs import legs_fill
+from camtool.kernels.motion import legs_fill
 from tests.oracles.valcnc_run import Place, counter, table_8
 
 UNIT = np.ones(3)

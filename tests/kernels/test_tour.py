@@ -9,11 +9,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.kernels.tour import Tour, gain_of_reversal, gain_of_swap, may_swap, reverse, turning
-from camtool.kernels.tour_rows import best_rows
-from camtool.kernels.tour_search import kicked, settled
-from camtool.kernels.tour_start import neighbours
-from camtool.kernels.tour_tree import nearest_owners, nearest_row, switch, tree_of
+from camtool.kernels.tours import (
+    Tour,
+    best_rows,
+    gain_of_reversal,
+    gain_of_swap,
+    kicked,
+    may_swap,
+    nearest_owners,
+    nearest_row,
+    neighbours,
+    reverse,
+    settled,
+    switch,
+    tree_of,
+    turning,
+)
 from camtool.planning.order import Choices, tour_of, travel_mm
 from tests.oracles import tours
 

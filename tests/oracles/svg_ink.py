@@ -11,7 +11,6 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 import numpy.typing as npt
 import resvg_py
@@ -80,27 +79,30 @@ def decode(data: bytes) -> npt.NDArray[np.uint8]:
     return _unfiltered(rows).reshape(height, width, 4)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _unfiltered(rows: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     """The filters of each row undone (PNG specification, §9.2), 4 bytes a pixel."""
-    height, width = rows.shape[0], rows.shape[1] - 1
-    out = np.zeros((height, width), np.uint8)
-    for y in range(height):
-        kind = rows[y, 0]
-        for x in range(width):
-            left = np.int64(out[y, x - 4]) if x >= 4 else 0
-            up = np.int64(out[y - 1, x]) if y > 0 else 0
-            corner = np.int64(out[y - 1, x - 4]) if x >= 4 and y > 0 else 0
-            guess = 0
-            if kind == 1:
-                guess = left
-            elif kind == 2:
-                guess = up
-            elif kind == 3:
-                guess = (left + up) // 2
-            elif kind == 4:
-                base = left + up - corner
-                a, b, c = abs(base - left), abs(base - up), abs(base - corner)
-                guess = left if a <= b and a <= c else (up if b <= c else corner)
-            out[y, x] = (np.int64(rows[y, x + 1]) + guess) & 255
+    out = np.zeros((len(rows), rows.shape[1] - 1), np.uint8)
+    above = np.zeros(out.shape[1], np.uint8)
+    for y, row in enumerate(rows):
+        kind, line = row[0], row[1:]
+        if kind == 1:
+            sums = line.reshape(-1, 4).astype(np.int64).cumsum(axis=0) & 255
+            line = sums.astype(np.uint8).reshape(-1)
+        elif kind == 2:
+            line = line + above
+        elif kind > 2:
+            line = np.frombuffer(_guessed(line.tolist(), above.tolist(), kind == 4), np.uint8)
+        out[y] = above = line
     return out
+
+
+def _guessed(line: list[int], above: list[int], paeth: bool) -> bytes:
+    """A row whose bytes are told from those to the left and above."""
+    for x, up in enumerate(above):
+        left, corner = (line[x - 4], above[x - 4]) if x >= 4 else (0, 0)
+        guess = (left + up) // 2
+        if paeth:
+            a, b, c = abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)
+            guess = left if a <= b and a <= c else (up if b <= c else corner)
+        line[x] = (line[x] + guess) & 255
+    return bytes(line)

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 import pytest
 from camtool_postprocessors.flashcut.dialect import FlashcutController
+from camtool_postprocessors.flashcut.steps import XY, Counters, Issued, Moves, Rules, timers_fill
 from camtool_postprocessors.flashcut.timers import steps_too_many
 
-from camtool.kernels.timers import XY, Counters, Issued, Moves, Rules, timers_fill
 from tests.oracles.flashcut_run import Pc
 
 STEP = 0.0019

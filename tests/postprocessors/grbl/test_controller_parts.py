@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from camtool_postprocessors.grbl.controller import as_read, targets_of
 from camtool_postprocessors.grbl.dialect import GrblController
+from camtool_postprocessors.grbl.steps import step_lines_fill, steps_taken
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.kernels.lookahead import entry_speeds
-from camtool.kernels.step_lines import step_lines_fill, steps_taken
+from camtool.kernels.motion import entry_speeds
 from camtool.simulation.speed_plan import SpeedPlan
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.gcode_machines import grbl_machine

@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 from camtool_postprocessors.linuxcnc.controller import merged
+from camtool_postprocessors.linuxcnc.steps import merge_lines
 from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.errors import MachineError, ProgramError
-from camtool.kernels.merge_lines import merge_lines
 from camtool.machine.model import Machine
 from camtool.simulation.motion import CHUNK_STEPS, Options
 from camtool.target.registry import load_target

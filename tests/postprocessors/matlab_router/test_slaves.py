@@ -5,10 +5,9 @@ import random
 
 import numpy as np
 import pytest
+from camtool_postprocessors.matlab_router.steps import Account, Program, State, slaves_fill
 from scipy.integrate import solve_ivp
 
-from camtool.kernels.slave_record import Account, Program, State
-from camtool.kernels.slaves import slaves_fill
 from tests.oracles.matlab_slaves import Motor, Slave, TextSlave, run, table
 
 X = (8.896, 12.2)

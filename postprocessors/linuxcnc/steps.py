@@ -1,56 +1,53 @@
 """Lines that lie on one line but for a tolerance, merged: LinuxCNC's naive cam detector.
 
 Points wait in a chain that begins at `base`. A new end joins it when every waiting point lies
-within the tolerance of the line from the base to the new end (as a line of that length); otherwise
-the chain is cut as one line to its last point, and a new one begins there (`see_segment`,
-`linkable` and `flush_segments` of emccanon.cc). Chains take `MOST_IN_CHAIN` points, and one never
-comes back to its base.
+within the tolerance of the line from the base to the new end (as a line of that length);
+otherwise the chain is cut as one line to its last point, and a new one begins there
+(`see_segment`, `linkable` and `flush_segments` of emccanon.cc). Chains take `MOST_IN_CHAIN`
+points, and one never comes back to its base.
 
-Compiled, because what joins depends on all that joined before.
+Compiled, because what joins depends on all that joined before. C types stand in the .pxd
+beside this file.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
-from camtool.kernels.compiled import inner, kernel
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from camtool.arrays import Bools, Floats, Ints
 
 MOST_IN_CHAIN = 101
 """A chain that has so many points takes no more."""
 
 
-@inner
-def _share(base: Floats, end: Floats, point: Floats) -> float:
+def _share(points: Floats, base: int, end: int, point: int) -> float:
     """Where on the line from base to end the point is nearest, as a share of it."""
     along, whole = 0.0, 0.0
     for axis in range(3):
-        along += (end[axis] - base[axis]) * (point[axis] - base[axis])
-        whole += (end[axis] - base[axis]) ** 2
+        way = points[end, axis] - points[base, axis]
+        along += way * (points[point, axis] - points[base, axis])
+        whole += way * way
     return min(max(along / whole, 0.0), 1.0)
 
 
-@inner
 def _joins(points: Floats, base: int, new: int, tolerance: float) -> bool:
     """Whether point `new` may be the end of the chain that begins at point `base`."""
-    if new - base - 1 >= MOST_IN_CHAIN or (points[new] == points[base]).all():
+    same = (
+        points[new, 0] == points[base, 0]
+        and points[new, 1] == points[base, 1]
+        and points[new, 2] == points[base, 2]
+    )
+    if new - base - 1 >= MOST_IN_CHAIN or same:
         return False
     for k in range(base + 1, new):
-        share = _share(points[base], points[new], points[k])
+        share = _share(points, base, new, k)
         square = 0.0
         for axis in range(3):
             on_line = points[base, axis] + share * (points[new, axis] - points[base, axis])
-            square += (points[k, axis] - on_line) ** 2
+            square += (points[k, axis] - on_line) * (points[k, axis] - on_line)
         if square > tolerance * tolerance:
             return False
     return True
 
 
-@kernel
 def merge_lines(
     points: Floats, apart: Bools, tolerance: Floats, chain: Ints, moved: Floats
 ) -> None:
@@ -65,13 +62,14 @@ def merge_lines(
         if k == 0 or apart[k] or not _joins(points, base, k + 1, tolerance[k]):
             number, base = number + 1, k
         chain[k] = number
-        moved[k] = points[k + 1]
+        for axis in range(3):
+            moved[k, axis] = points[k + 1, axis]
     base = 0
     for k in range(len(apart)):
         if k + 1 == len(apart) or chain[k + 1] != chain[k]:
             reached = 0.0
             for j in range(base, k):
-                reached = max(reached, _share(points[base], points[k + 1], points[j + 1]))
+                reached = max(reached, _share(points, base, k + 1, j + 1))
                 for axis in range(3):
                     whole = points[k + 1, axis] - points[base, axis]
                     moved[j, axis] = points[base, axis] + reached * whole

@@ -1,24 +1,23 @@
 """Lines of whole steps by Bresenham on the axis with the most of them.
 
-A block takes n_x, n_y, n_z steps in N = max(n) events. Each axis has a counter, N at the start of
-the block; at every event it grows by 2n, and where it exceeds 2N the axis takes a step and 2N are
-taken off. After k events the counter stands at N + 2nk − 2N·s in (0, 2N], so the steps taken are
+A block takes n_x, n_y, n_z steps in N = max(n) events. Each axis has a counter, N at the start
+of the block; at every event it grows by 2n, and where it exceeds 2N the axis takes a step and 2N
+are taken off. After k events the counter stands at N + 2nk − 2N·s in (0, 2N], so the steps taken
+are
 
     s = ⌈(N + 2nk) / 2N⌉ − 1 = ⌊(N + 2nk − 1) / 2N⌋ :
 
-the ideal n k / N rounded to the nearest, halves down. That is where a window into the middle of a
-block goes on from. Whole numbers throughout.
+the ideal n k / N rounded to the nearest, halves down. That is where a window into the middle of
+a block goes on from. Whole numbers throughout.
+
+C types stand in the .pxd beside this file.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from camtool.kernels.compiled import kernel
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
+from camtool.arrays import Floats, Ints
 
 
 def steps_taken(way: Ints, events: Ints) -> Ints:
@@ -29,7 +28,6 @@ def steps_taken(way: Ints, events: Ints) -> Ints:
     return np.asarray(np.sign(way) * taken)
 
 
-@kernel
 def step_lines_fill(
     blocks: tuple[Ints, Ints], first: tuple[int, int], step_mm: Floats, out: Floats
 ) -> None:
@@ -55,7 +53,7 @@ def step_lines_fill(
                 if counter > 2 * most:
                     counter -= 2 * most
                     position += sign
-                out[m, axis] = position * step_mm[axis]
+                out[m, axis] = float(position) * step_mm[axis]
         k += count
         block += 1
         event = 0

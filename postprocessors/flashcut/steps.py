@@ -1,8 +1,8 @@
 """Moves by timers that run each axis on its own, the method of the parallel-port machine.
 
-A displacement of n steps of the longer axis and m ≤ n of the shorter one ends when the longer one
-has made n. With the half period P of the longer axis, that of the shorter one is P·n/m, so that
-both should end together (thesis L1127-1129, L1188). But a timer fires at the first whole
+A displacement of n steps of the longer axis and m ≤ n of the shorter one ends when the longer
+one has made n. With the half period P of the longer axis, that of the shorter one is P·n/m, so
+that both should end together (thesis L1127-1129, L1188). But a timer fires at the first whole
 millisecond above its half period (reading "whole-ms"):
 
     longer:  every P + 1 ms        shorter:  every ⌊P·n/m⌋ + 1 ms
@@ -16,21 +16,17 @@ Exact, because times are integers (in the second reading those of a move are tak
 only the difference of the next two firings is carried along: below 2⁶² for all half periods and
 displacements below 2³¹. Lengths become steps as everywhere, by floor(length / step + a half and
 a guard); no position is summed up. Compiled, because a displacement may depend on what the one
-before it reached, and a part has millions of steps.
+before it reached, and a part has millions of steps. C types
+stand in the .pxd beside this file.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from camtool.kernels.compiled import inner, kernel
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
+from camtool.arrays import Floats, Ints
 
 XY, Z, HOME_X, HOME_Y, HOME_Z = range(5)
 """What moves: X and Y by their timers, one axis alone, or one to its sensor at machine zero."""
@@ -79,77 +75,90 @@ class Issued(NamedTuple):
     steps: Ints
 
 
-@inner
-def _displacement(axis: int, target: float, sensed: bool, rules: Rules, counters: Counters) -> int:
+class Timers:
+    """All of these as the loops read them, and where the axes are."""
+
+    def __init__(self, moves: Moves, rules: Rules, counters: Counters, issued: Issued) -> None:
+        self.what, self.target, self.half_period, self.move_row = moves
+        self.origin, self.step_mm, self.added, self.from_reached, self.late_longer = rules
+        self.steps, self.programmed, self.under_way = counters
+        self.commanded, self.row, self.duration_ms, self.steps_of_rows = issued
+        self.here = np.empty(3)
+
+
+def _displacement(axis: int, target: float, sensed: bool, timers: Timers) -> int:
     """Steps of an axis to its target, which then is where the program is."""
-    here = counters.programmed[axis]
-    if sensed or rules.from_reached:
-        here = rules.origin[axis] + counters.steps[axis] * rules.step_mm[axis]
-    counters.programmed[axis] = target
+    here = timers.programmed[axis]
+    if sensed or timers.from_reached:
+        here = timers.origin[axis] + float(timers.steps[axis]) * timers.step_mm[axis]
+    timers.programmed[axis] = target
     way = target - here
-    steps: int = math.floor(abs(way) / rules.step_mm[axis] + rules.added)
+    steps = int(abs(way) / timers.step_mm[axis] + timers.added)
     return -steps if way < 0.0 else steps
 
 
-@inner
-def _begin(what: int, target: Floats, half_period: int, rules: Rules, counters: Counters) -> None:
+def _begin(move: int, timers: Timers) -> None:
     """Set the timers of a move."""
+    what, half_period, under_way = timers.what[move], timers.half_period[move], timers.under_way
     longer, shorter, short_way = 2, -1, 0
     if what == XY:
-        along_x = _displacement(0, target[0], False, rules, counters)
-        along_y = _displacement(1, target[1], False, rules, counters)
+        along_x = _displacement(0, timers.target[move, 0], False, timers)
+        along_y = _displacement(1, timers.target[move, 1], False, timers)
         longer, shorter, long_way, short_way = 0, 1, along_x, along_y
         if abs(along_y) > abs(along_x):
             longer, shorter, long_way, short_way = 1, 0, along_y, along_x
     else:
         longer = 0 if what == HOME_X else 1 if what == HOME_Y else 2
-        long_way = _displacement(longer, target[longer], what != Z, rules, counters)
+        long_way = _displacement(longer, timers.target[move, longer], what != Z, timers)
     n, m = abs(long_way), abs(short_way)
     every, short_every = half_period + 1, 0
     if m == 0:
         shorter = -1
-    elif rules.late_longer:
+    elif timers.late_longer:
         every, short_every = every * m, half_period * n
     else:
         short_every = half_period * n // m + 1
-    counters.under_way[0], counters.under_way[1] = n, short_every - every
-    counters.under_way[2], counters.under_way[3] = longer, shorter
-    counters.under_way[4] = 1 if long_way >= 0 else -1
-    counters.under_way[5] = 1 if short_way >= 0 else -1
-    counters.under_way[6], counters.under_way[7] = every, short_every
+    under_way[0], under_way[1] = n, short_every - every
+    under_way[2], under_way[3] = longer, shorter
+    under_way[4] = 1 if long_way >= 0 else -1
+    under_way[5] = 1 if short_way >= 0 else -1
+    under_way[6], under_way[7] = every, short_every
 
 
-@inner
-def _run(rules: Rules, counters: Counters, row: int, k: int, issued: Issued) -> int:
+def _run(timers: Timers, row: int, first: int) -> int:
     """Let the timers run until the move ends or the samples are full; the samples then filled."""
-    left, gap, longer, shorter, sense, short_sense, every, short_every = counters.under_way
-    here = rules.origin + counters.steps * rules.step_mm
-    count, short_count = counters.steps[longer], counters.steps[max(shorter, 0)]
-    while left > 0 and k < len(issued.row):
+    under_way, step_mm = timers.under_way, timers.step_mm
+    steps, here, commanded, rows = timers.steps, timers.here, timers.commanded, timers.row
+    left, gap, longer, shorter = under_way[0], under_way[1], under_way[2], under_way[3]
+    sense, short_sense = under_way[4], under_way[5]
+    every, short_every = under_way[6], under_way[7]
+    for axis in range(3):
+        here[axis] = timers.origin[axis] + float(steps[axis]) * step_mm[axis]
+    count, short_count, k = steps[longer], steps[max(shorter, 0)], first
+    while left > 0 and k < len(rows):
         fires = shorter < 0 or gap >= 0
         if shorter >= 0 and gap <= 0:
             short_count += short_sense
-            here[shorter] = rules.origin[shorter] + short_count * rules.step_mm[shorter]
+            here[shorter] = timers.origin[shorter] + float(short_count) * step_mm[shorter]
             gap += short_every
         if fires:
             count += sense
-            here[longer] = rules.origin[longer] + count * rules.step_mm[longer]
+            here[longer] = timers.origin[longer] + float(count) * step_mm[longer]
             gap -= every
             left -= 1
         for axis in range(3):
-            issued.commanded[k, axis] = here[axis]
-        issued.row[k] = row
+            commanded[k, axis] = here[axis]
+        rows[k] = row
         k += 1
-    issued.steps[row, longer] += abs(count - counters.steps[longer])
-    counters.steps[longer] = count
+    timers.steps_of_rows[row, longer] += abs(count - steps[longer])
+    steps[longer] = count
     if shorter >= 0:
-        issued.steps[row, shorter] += abs(short_count - counters.steps[shorter])
-        counters.steps[shorter] = short_count
-    counters.under_way[0], counters.under_way[1] = left, gap
+        timers.steps_of_rows[row, shorter] += abs(short_count - steps[shorter])
+        steps[shorter] = short_count
+    under_way[0], under_way[1] = left, gap
     return k
 
 
-@kernel
 def timers_fill(
     moves: Moves, first: int, rules: Rules, counters: Counters, issued: Issued
 ) -> tuple[int, int]:
@@ -157,15 +166,16 @@ def timers_fill(
 
     Returns the move to go on with and the samples filled.
     """
+    timers = Timers(moves, rules, counters, issued)
     k, move = 0, first
-    while move < len(moves.what):
-        if counters.under_way[0] == 0:
-            _begin(moves.what[move], moves.target[move], moves.half_period[move], rules, counters)
-        row, before = moves.row[move], counters.under_way[0]
-        k = _run(rules, counters, row, k, issued)
-        done = before - counters.under_way[0]
-        issued.duration_ms[row] += done * (moves.half_period[move] + 1)
-        if counters.under_way[0] > 0:
+    while move < len(timers.what):
+        if timers.under_way[0] == 0:
+            _begin(move, timers)
+        row, before = timers.move_row[move], timers.under_way[0]
+        k = _run(timers, row, k)
+        done = before - timers.under_way[0]
+        timers.duration_ms[row] += done * (timers.half_period[move] + 1)
+        if timers.under_way[0] > 0:
             break
         move += 1
     return move, k

@@ -12,25 +12,20 @@ block starts, a hair beside the programmed end.
 
 Literal, in float64 and the order of the thesis. Compiled, because each arc may depend on the one
 before; its points do not, and are made where they are needed.
+
+C types stand in the .pxd beside this file.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
-from camtool.kernels.compiled import kernel
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
+from camtool.arrays import Floats, Ints
 
 CHORD_GUARD = 1e-9
 """Part of an arc's diameter: a chord longer by less is a diameter."""
 
 
-@kernel
 def arc_angles(turn: Ints, ends: Floats, offset: Floats, computed: bool, out: Floats) -> int:
     """Fill `out` (N, 5): centre x and y, R, θ and signed α of each arc; 0 in other rows.
 
@@ -41,7 +36,8 @@ def arc_angles(turn: Ints, ends: Floats, offset: Floats, computed: bool, out: Fl
     x, y = ends[0, 0], ends[0, 1]
     for n in range(len(turn)):
         end_x, end_y = ends[n + 1, 0], ends[n + 1, 1]
-        out[n] = 0.0
+        for column in range(5):
+            out[n, column] = 0.0
         if turn[n] != 0:
             i, j = offset[n, 0], offset[n, 1]
             centre_x, centre_y, radius = x + i, y + j, math.hypot(i, j)
@@ -53,9 +49,9 @@ def arc_angles(turn: Ints, ends: Floats, offset: Floats, computed: bool, out: Fl
             full = end_x == ends[n, 0] and end_y == ends[n, 1]
             if full:
                 alpha = 2.0 * math.pi
-            elif side * turn[n] < 0.0:
+            elif side * float(turn[n]) < 0.0:
                 alpha = 2.0 * math.pi - alpha
-            theta, alpha = math.atan2(-j, -i), turn[n] * alpha
+            theta, alpha = math.atan2(-j, -i), float(turn[n]) * alpha
             out[n, 0], out[n, 1], out[n, 2] = centre_x, centre_y, radius
             out[n, 3], out[n, 4] = theta, alpha
             if computed:
