@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.kernels.tours import (
+    Branches,
+    Route,
     Tour,
     best_rows,
     gain_of_reversal,
@@ -40,7 +42,7 @@ def test_the_nearest_of_those_that_are_on(
     points: list[tuple[int, int]], x: int, y: int, off: set[int]
 ) -> None:
     array = np.array(points, dtype=float)
-    tree, on = tree_of(array), np.ones(len(array), dtype=np.int64)
+    tree, on = Branches(tree_of(array)), np.ones(len(array), dtype=np.int64)
     for row in off & set(range(len(array))):
         on[row] = 0
         switch(tree, row, -1)
@@ -64,7 +66,10 @@ def test_the_nearest_owners(
         squared = round(float(((array[k] - array[row]) ** 2).sum()))
         apart[int(owner[k])] = min(squared, apart.get(int(owner[k]), squared))
     wanted = sorted(apart, key=lambda each: (apart[each], each))[:most]
-    assert nearest_owners(tree_of(array), owner, row, most, quarter).tolist() == wanted
+    found, squared_mm = np.empty(most, np.int64), np.empty(most)
+    tree = Branches(tree_of(array))
+    count = nearest_owners(tree, owner, row, most, quarter, found, squared_mm)
+    assert found[:count].tolist() == wanted
 
 
 def test_a_cluster_knows_of_other_clusters() -> None:
@@ -107,14 +112,15 @@ def length(choices: Choices, tour: Tour) -> float:
 def test_the_gain_of_a_reversal_is_what_it_gains(seed: int, a: int, b: int, stays: bool) -> None:
     choices, before, tour = made(seed, 12, stays=stays)
     low, high, was = min(a, b), max(a, b), length(choices, tour)
-    gain, longer = gain_of_reversal(tour, low, high), turning(tour, low, high)
+    route = Route(tour)
+    gain, longer = gain_of_reversal(route, low, high), turning(route, low, high)
     rows = tour.row.copy()
-    reverse(tour, low, high)
+    reverse(route, low, high)
     kept = tours.keeps(choices, tour.row[tour.item[1:-1]].tolist(), before.tolist())
     assert np.isfinite(longer) == kept
     if kept:
         assert was - length(choices, tour) == pytest.approx(gain - longer, abs=1e-9)
-    reverse(tour, low, high)
+    reverse(route, low, high)
     assert (tour.row == rows).all()
     assert (tour.item[tour.place] == np.arange(14)).all()
 
@@ -123,11 +129,12 @@ def test_the_gain_of_a_reversal_is_what_it_gains(seed: int, a: int, b: int, stay
 def test_the_gain_of_a_swap_is_what_it_gains(seed: int, cuts: set[int], flip: int) -> None:
     choices, before, tour = made(seed, 12)
     low, second, end = sorted(cuts)
+    route = Route(tour)
     gain, may = (
-        gain_of_swap(tour, low, second - 1, end - 1, flip),
-        may_swap(tour, low, second - 1, end - 1),
+        gain_of_swap(route, low, second - 1, end - 1, flip),
+        may_swap(route, low, second - 1, end - 1),
     )
-    longer = {0: 0.0, 1: turning(tour, low, second - 1), 2: turning(tour, second, end - 1)}[flip]
+    longer = {0: 0.0, 1: turning(route, low, second - 1), 2: turning(route, second, end - 1)}[flip]
     order, was = tour.item.copy(), length(choices, tour)
     one, two = order[low:second], order[second:end]
     turned = {0: [], 1: one, 2: two}[flip]
