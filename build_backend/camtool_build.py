@@ -149,7 +149,7 @@ def constants(module: str) -> dict[str, Any]:
     return {
         name: value
         for name, value in known.items()
-        if name.isupper() and all(_fits(part) for part in _parts(value))
+        if name.isupper() and all(isinstance(part, int | float) for part in _parts(value))
     }
 
 
@@ -157,9 +157,23 @@ def _parts(value: Any) -> tuple[Any, ...]:
     return value if isinstance(value, tuple) and value else (value,)
 
 
-def _fits(value: Any) -> bool:
-    """Whether a number may stand in C as it is; larger ones are variables of the .pxd."""
-    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 31)
+def large(value: Any) -> bool:
+    """Whether C needs to be told the type of a number; Cython would make a Python object of it."""
+    return isinstance(value, int) and abs(value) >= 1 << 31
+
+
+def named_in_c(known: dict[str, Any]) -> str:
+    """C's names of large numbers, for a .pxd."""
+    lines = []
+    for name, value in known.items():
+        if large(value):
+            sign = "unsigned " if value >= 1 << 63 else ""
+            define = f"#define CAMTOOL_{name} {value}{'U' if sign else ''}LL"
+            lines += ['    """', f"    {define}", '    """', f"    {sign}long long CAMTOOL_{name}"]
+    return "".join(
+        f"\n\ncdef extern from *:\n{chr(10).join(lines[k : k + 4])}"
+        for k in range(0, len(lines), 4)
+    )
 
 
 def as_text(value: Any) -> str:
@@ -178,7 +192,8 @@ def lowered(text: str, module: str, cimported: set[str]) -> str:
     for node in reversed(list(_replaced(tree, known, cimported))):
         low, high = node.lineno - 1, (node.end_lineno or node.lineno) - 1
         if isinstance(node, ast.Name):
-            new = as_text(known[node.id])
+            value = known[node.id]
+            new = f"CAMTOOL_{node.id}" if large(value) else as_text(value)
         elif isinstance(node, ast.Attribute):
             new = as_text(NUMBERS[_dotted(node)])
         else:
@@ -237,6 +252,7 @@ def lowered_copies(folder: Path) -> list[Extension]:
             (above / "__init__.py").touch()
         types = source.with_suffix(".pxd").read_text(encoding="utf-8")
         text = lowered(source.read_text(encoding="utf-8"), module, cimported_names(types))
+        types += named_in_c(constants(module)) + "\n"
         if CHECKED:
             # What is found wrong is raised, and not only said.
             types = types.replace(" noexcept", "")

@@ -16,10 +16,6 @@ from camtool.cli.picture_options import PictureFlags
 from camtool.findings import Finding, Severity
 from camtool.plain import one_line
 
-SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">
-<circle cx="1" cy="1" r="0.2"/></svg>"""
-"""A drawing of one contour: nothing is to be put into an order."""
-
 if TYPE_CHECKING:
     from camtool.planning.job import Job
     from camtool.run import Run
@@ -28,6 +24,10 @@ if TYPE_CHECKING:
 
 REMARKS = 20
 """The most findings of a drawing that its worker returns; there may be a hundred thousand."""
+
+SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">
+<circle cx="1" cy="1" r="0.2"/></svg>"""
+"""A drawing of one contour: nothing is to be put into an order."""
 
 SVG = ".svg"
 """The kind of picture that may have the name of a drawing."""

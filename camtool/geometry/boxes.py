@@ -158,7 +158,7 @@ def _looks(boxes: Floats) -> int:
 @dataclass(frozen=True, eq=False)
 class Curves:
     """`rows` (K, 11) of camtool.kernels.offsets, their `boxes` (K, 4) and the `tree` of
-    camtool.kernels.box_tree over these."""
+    camtool.kernels.offsets over these."""
 
     rows: Floats
     boxes: Floats

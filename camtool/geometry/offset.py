@@ -25,7 +25,7 @@ of their own, and loops come out with the region on their left.
 
 *Mitres.* Let N be all points nearer than d to the source, and K the *kites*: for each outer corner
 c with the normals n1 and n2, the points between the arc about c and the tangents at both its ends,
-and those nearer to c (camtool.kernels.offset_kites). The offset with mitres is what is left of the
+and those nearer to c (camtool.kernels.offsets). The offset with mitres is what is left of the
 region without N and K. Its boundary lies on shifted segments and on outer edges of kites, since
 the arc about a corner lies in its kite and the inner edges of a kite lie in N. So the elements are
 the shifted segments, with lines prolonged along the edges of kites, and lines beside arcs and
@@ -52,7 +52,7 @@ The result is exact up to these: each point is at the distance from the source w
 POSITION_EPS_MM, and all points that are so on that side are in the result. Loops come in the order
 of the first piece of the source that they run along, and begin there.
 
-All inner loops are compiled (camtool/kernels/offset_*.py) and ask trees of boxes, so the time
+All inner loops are compiled (camtool/kernels/offsets.py) and ask trees of boxes, so the time
 grows as n log n in the number of segments, and with the number of true meetings.
 """
 
@@ -254,7 +254,7 @@ def arcs_about(corners: Corners, rows: Ints, asked: Offset) -> tuple[Ints, Segme
 class Mitres:
     """`reach` (K,): how far the tangents go on beyond the shifted segments at each corner, mm, 0
     where there is no mitre; `cut` (K,) true where it is cut off; and the `kites` (J, 10) that
-    they cover (camtool.kernels.offset_kites).
+    they cover (camtool.kernels.offsets).
 
     At a corner where the path turns by 2h, the tangents of both shifted segments meet when they
     have gone on by d tan h, at d / cos h from the corner. Where that is more than the limit L
@@ -308,7 +308,7 @@ def _rotated(vectors: Floats, angle: Floats) -> Floats:
 class RawOffset:
     """`elements`: shifted segments and joins, in the order of travel. `source` (K,): the source
     segment of each, or the one before its corner; `join` (K,): true for what is put about a
-    corner. `kites` (J, 10): what mitres cover (camtool.kernels.offset_kites)."""
+    corner. `kites` (J, 10): what mitres cover (camtool.kernels.offsets)."""
 
     elements: Segments
     source: Ints

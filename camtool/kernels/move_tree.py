@@ -1,7 +1,7 @@
 """A tree of boxes over moves that lie about the plane in any order, as spirals and hatches do.
 
 The rows of a spiral that follow each other surround all that lies inside, so the upper nodes of a
-tree in their order (`camtool.kernels.box_tree`) all hold every point. Here the leaves take the
+tree in their order (`camtool.kernels.offsets`) all hold every point. Here the leaves take the
 moves along Hilbert's curve through their middles, which stays in a square until it is filled: what
 is near in the list is near in the plane. A node also knows the first and the last row below it.
 

@@ -5,8 +5,6 @@ from libc.stdint cimport uint64_t
 
 from camtool.kernels.types cimport Int
 
-cdef uint64_t GAMMA, MIXER, OTHER_MIXER, ALL_BITS
-
 @cython.overflowcheck(False)
 cdef uint64_t _mixed(uint64_t word) noexcept
 

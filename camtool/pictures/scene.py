@@ -88,7 +88,7 @@ class Scene:
 @dataclass(frozen=True, eq=False)
 class Round:
     """A circle (x, y) mm of this radius mm and direction, with its bins (B, 9) as
-    `camtool.kernels.circle_bins` fills them; circular error G, radial errors F max, F min and
+    `camtool.kernels.judging` fills them; circular error G, radial errors F max, F min and
     their mean D, and the reversal values B of X and Y, mm, NaN where unknown. `partner` is the
     number, from 1, of the same circle in the other direction, `both_circular_mm` the
     bi-directional circular error G(b) of the two."""

@@ -3,7 +3,7 @@
 An item may be cut in several variants (`Choices`): a closed contour from each of its vertices, an
 open one from either end. The order and the variants are searched together: nearest neighbours
 first, then reversals and moves of parts of the order as long as they make it shorter, and the best
-variants for that order, exactly, layer by layer (`camtool.kernels.tour`). Every step of the
+variants for that order, exactly, layer by layer (`camtool.kernels.tours`). Every step of the
 search keeps what must be cut before what (`must_precede`: a part is cut free after everything
 within it has been cut). The same input always gives the same order.
 """

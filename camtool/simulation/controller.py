@@ -28,7 +28,7 @@ class FusedRun(Protocol):
 
     def judge(self, low: int, high: int, task: Any, sums: Any) -> Ledger:
         """Run the rows low:high, which follow those of the last call, and judge them with the task
-        and sums of `camtool.kernels.judge`."""
+        and sums of `camtool.kernels.judging`."""
 
 
 class ControllerModel(ABC, Generic[ControllerT, DialectT]):

@@ -1,7 +1,7 @@
 """Full circles of a toolpath, their figures by ISO 230-4, and their reversals.
 
 On a programmed circle (centre c, radius R) the radius of the slides' path is recorded over the
-angle in bins of half a degree (`camtool.kernels.circle_bins`): for each bin the points with the
+angle in bins of half a degree (`camtool.kernels.judging`): for each bin the points with the
 least and the largest radius and the mean point. Memory does not grow with the steps.
 
     F max, F min = largest, least |p − c| − R           (radial error, programmed centre)
@@ -123,7 +123,7 @@ def _circle(toolpath: Toolpath, run: Ints, radius: float) -> Circle:
 
 
 def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
-    """G, F max, F min and D of the bins (720, 9) of `camtool.kernels.circle_bins`."""
+    """G, F max, F min and D of the bins (720, 9) of `camtool.kernels.judging`."""
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) < FEWEST_BINS:
         return UNSEEN
@@ -189,7 +189,7 @@ def least_squares_centre(points: Floats) -> Floats:
 # What a ball-bar shows of a circle: reversals, and both directions together.
 #
 # X reverses at 0° and 180°, Y at 90° and 270°. The error of an axis at its reversal lies along the
-# radius there. From the mean radii of the bins of half a degree (`camtool.kernels.circle_bins`):
+# radius there. From the mean radii of the bins of half a degree (`camtool.kernels.judging`):
 #
 # - the step at a reversal is the radius after it (in the direction of travel) less that before it,
 #   each from a straight line through the bins of its side;

@@ -7,7 +7,7 @@ What it does with a row of the toolpath, in the order of this file:
    `controller.goes_on_from` "reached", from where the steps issued so far have led.
 2. A displacement becomes steps of each axis by `controller.rounding`.
 3. The timers run until the longer axis has made its steps; the shorter one makes as many as its
-   own timer gives, at least what it should and often more (`camtool.kernels.timers`). With
+   own timer gives, at least what it should and often more (`steps`). With
    "programmed" the steps that are too many are never corrected in the rest of the program.
 4. The half period comes from the feed and is at least `controller.half_period_ms`, where one
    axis moves alone `controller.single_axis_half_period_ms`; a step takes

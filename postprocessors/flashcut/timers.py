@@ -44,7 +44,7 @@ def steps_too_many(
     longer: Ints, shorter: Ints, half_period: Ints, controller: FlashcutController
 ) -> Ints:
     """(N,) steps that the shorter axis makes beyond its own, of moves of `longer` ≥ `shorter` ≥ 0
-    steps; see `camtool.kernels.timers`, which makes them one by one."""
+    steps; see `steps`, which makes them one by one."""
     least = np.maximum(shorter, 1)
     if controller.clock == "late-longer":
         made = shorter * (half_period + 1) // half_period

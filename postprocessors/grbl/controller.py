@@ -4,10 +4,10 @@ What it does with a program, in the order of this file:
 
 1. Numbers become 32-bit floats, arcs the ends of chords.
 2. Targets become steps and blocks; each block is a Bresenham line in X, Y and Z
-   at once (`camtool.kernels.step_lines`). Its smoothing (AMASS) shifts steps of the slower axes
+   at once (`steps`). Its smoothing (AMASS) shifts steps of the slower axes
    within an event; at the end of each event the axes stand where they do without it.
 3. Speeds: limits of the axes, corners by junction deviation, the ring of blocks
-   (`camtool.kernels.lookahead`), trapezoids (`speed_plan`). They change times, not positions.
+   (`camtool.kernels.motion`), trapezoids (`speed_plan`). They change times, not positions.
 
 Positions are absolute: a row starts at the step where the one before ended, and no rounding adds
 up. Its numbers, 32-bit floats, are nearer than a hundredth of a step. grbl does not compensate

@@ -4,11 +4,11 @@ What it does with a program, in the order of this file:
 
 1. Each row has the path mode that the program says there (G61, G61.1, G64 P Q), or that of the
    machine file. In the mode "blend", lines that lie on one line but for a tolerance are merged
-   (`camtool.kernels.merge_lines`).
+   (`steps`).
 2. Corners: stops, bends that pass for straight, blends, as they come out at the programmed
    feed. No blend leaves its corner by more than the tolerance.
 3. Speeds: limits of the axes, turning in arcs, corners, so many moves ahead
-   (`camtool.kernels.lookahead`), trapezoids (`speed_plan`).
+   (`camtool.kernels.motion`), trapezoids (`speed_plan`).
 
 Positions are the trajectory's, in 64-bit floats. The step generator follows them to the nearest
 step, or an encoder to its count: half a step of each axis, which is not in the samples. Steps

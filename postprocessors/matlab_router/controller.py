@@ -7,7 +7,7 @@ What the machine does with the rows of a toolpath:
    (Y a little after X) and stop each by itself. Rows of one program line are one such order.
 2. Distances are differences: where an axis comes to stand beside its place, it goes on from there.
    Only homing brings it back to its zero.
-3. Each slave runs as `camtool.kernels.slaves` says. A line ends when all have had their counts;
+3. Each slave runs as `steps` says. A line ends when all have had their counts;
    the motors still coast then, and are sampled on until the next line begins.
 
 A sample is the place of all motors at a tick of 5 ms. `docs/controllers/matlab-router.md` has the

@@ -6,8 +6,6 @@ from libc.stdint cimport uint8_t
 
 from camtool.kernels.types cimport Int
 
-cdef Int NEVER, SIGN_OF_INT32, BITS_OF_INT32
-
 cdef class Slaves:
     cdef Int[:, ::1] lines, slaves
     cdef Int[::1] table, clock, loops

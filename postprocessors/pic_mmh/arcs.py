@@ -5,7 +5,7 @@ starts; by the strictest reading it stops only when it stands exactly on the end
 and centre are rounded each on its own: with such numbers nearly half of all arcs never stand
 there. So the writer follows the controller's own paths (camtool.kernels), one for each start of D,
 from the step where the controller will stand, and lets the block end on a step that all of them
-pass: there every reading stops (`camtool.kernels.arc_stops`). A line
+pass: there every reading stops (`steps`). A line
 closes the gap to the wanted end.
 
 Two such paths lie about circles whose radii differ by half a step at most. Each is the best of

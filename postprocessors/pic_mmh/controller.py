@@ -13,7 +13,7 @@ What it does with a row of the toolpath, in the order of this file:
 4. At each change of an axis's direction the compensation steps are issued, a period each.
 
 What the controller takes for the end of an arc is not documented (`controller.arc_end`,
-`camtool.kernels.arc_stops`); it goes on from where the arc stopped. By "equal" an arc that passes
+`steps`); it goes on from where the arc stopped. By "equal" an arc that passes
 its end without standing on it goes round again on the real machine, mostly for ever. Here its
 samples stop at the nearest approach to the end in the expected sweep, `ended` is False, and the
 next row goes on from the programmed end, without a reversal on the way there. An arc that starts
@@ -488,7 +488,7 @@ def arc_reach(arc: Arc, fill: Filler) -> tuple[int, bool]:
 
 # What each reading of the controller's stop test does to the arcs of a program.
 #
-# The readings are those of `camtool.kernels.arc_stops`, each with both values of D that the
+# The readings are those of `steps`, each with both values of D that the
 # controller may start with. An arc that stands on its end by the strictest of them, whatever D
 # was, stops there by all; of the others the machine's owner must know what may become of them.
 
@@ -526,7 +526,7 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, legs: Ints) -> tuple
 
 
 def _stops(arcs: Ints, rounded: bool, reading: int) -> Ints:
-    """(L, 4) of `camtool.kernels.arc_stops`, by direct search."""
+    """(L, 4) of `steps`, by direct search."""
     out = np.empty((len(arcs), loops.STOP_COLUMNS), dtype=np.int64)
     loops.arc_stops(np.ascontiguousarray(arcs), (loops.DSM, rounded, reading), out)
     return out

@@ -29,7 +29,7 @@ ArcEnd = Literal["equal", "final-quadrant", "nearest"]
 class PicMmhController(SlideStart, frozen=True, tag_field="model", tag="pic-mmh"):
     """The PIC18F8720's firmware; each option is a point on which its thesis leaves a choice.
 
-    `arc_end`: how an arc knows its end, see `camtool.kernels.arc_stops`.
+    `arc_end`: how an arc knows its end, see `steps`.
     """
 
     arcs: Interpolator = "dsm"

@@ -41,7 +41,7 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
 
 
 def legs_of(toolpath: Toolpath, places: Ints, centres: Ints, stops: Ints) -> Ints:
-    """(L, 14) legs of `camtool.kernels.judge_steps` of all rows; `places` (N + 1, 3) of
+    """(L, 14) legs of `steps` of all rows; `places` (N + 1, 3) of
     `positions`, `centres` (N, 2) steps, `stops` (N,) samples of arcs or −1."""
     count = len(toolpath)
     begin, way = places[:-1], np.diff(places, axis=0)

@@ -6,8 +6,6 @@ from camtool.kernels.judging cimport Judge, judge_block
 from camtool.kernels.play cimport play_block, way_of
 from camtool.kernels.types cimport Int
 
-cdef Int MOST_SQUARE
-
 cdef class Room:
     cdef Int[::1] path_x, path_y, state, other, tracker
     cdef double[::1] registers

@@ -788,7 +788,7 @@ def run_on(
 # Whole rows of the PIC18F8720's program, run and judged in one go, block by block.
 #
 # The positions of a leg  go to a small buffer, the slides follow
-# (`camtool.kernels.play_blocks`), and the block is judged (`camtool.kernels.judge`) before the
+# (`camtool.kernels.play`), and the block is judged (`camtool.kernels.judging`) before the
 # next one is made: nothing is kept of the steps themselves.
 #
 # An arc runs for as many samples as are known (`arc_stops`), or until it stands on

@@ -9,7 +9,7 @@ What it does with a row of the toolpath:
    its steps reaches those (CUENTA, L1234, Tabla 8). Z has no part in that; where a row moves Z
    along with X or Y (dialect.z_order "together"), it is counted in the same way.
 3. An arc is drawn as lines to points on the circle through its start (L1266-1330), see
-   `camtool.kernels.valcnc_arcs`. It ends where its angle leads, and the next row begins there.
+   `steps`. It ends where its angle leads, and the next row begins there.
 4. Every pass takes one delay of 166.667 µs (L1336): there are no ramps, feeds or faster rapids.
 
 It issues nothing at reversals; compensation in a machine file would be steps at the same rate.

@@ -77,7 +77,7 @@ def test_an_interrupted_run_leaves_whole_files_and_goes_on(
 
 def assert_little_is_loaded(folder: Path) -> None:
     """A batch that has nothing to do needs neither numbers nor drawings nor processes."""
-    heavy = {"numpy", "numba", "ezdxf", "shapely", "rich", "multiprocessing", "distributed"}
+    heavy = {"numpy", "ezdxf", "shapely", "rich", "multiprocessing", "distributed"}
     code = (
         "import sys\nfrom camtool.cli.main import main\n"
         f"try:\n    main()\nfinally:\n    print(sorted({heavy} & sys.modules.keys()))"

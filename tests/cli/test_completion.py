@@ -15,7 +15,7 @@ from camtool.cli.completion import VARIABLE, complete_values, dxf_layers
 from camtool.cli.main import cli
 
 LOGO = "samples/logo.dxf"
-HEAVY = {"numba", "ezdxf", "shapely", "scipy", "build123d"}
+HEAVY = {"ezdxf", "shapely", "scipy", "build123d"}
 
 
 @pytest.fixture(scope="module")

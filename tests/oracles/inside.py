@@ -1,4 +1,4 @@
-"""The literal oracle of camtool.kernels.inside: every point asked of every segment, at once."""
+"""The literal oracle of camtool.kernels.offsets: every point asked of every segment, at once."""
 
 from __future__ import annotations
 

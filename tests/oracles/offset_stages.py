@@ -65,7 +65,7 @@ def without_dead_ends(slices: Slices) -> Slices:
 
 
 def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
-    """Loops as camtool.kernels.offset_loops.traced gives them."""
+    """Loops as camtool.kernels.offsets.traced gives them."""
     frames = Frames.of(elements)[slices.element]
     leaving, arriving = frames.tangent_at(slices.t0), frames.tangent_at(slices.t1)
     outgoing: dict[int, list[int]] = defaultdict(list)
