@@ -51,23 +51,23 @@ cdef void fill_row(
 )
 cpdef curve_rows(double[:, :, ::1] pieces, Int steps, double tolerance)
 
-cpdef double distance_to_arc(
+cpdef inline double distance_to_arc(
     double px, double py, double ax, double ay, double bx, double by, double bulge
 ) noexcept
 
-cdef double half_angle(double ax, double ay, double bx, double by) noexcept
+cdef inline double half_angle(double ax, double ay, double bx, double by) noexcept
 
 cpdef (double, double, double, double) biarc(
     double start_x, double start_y, double leave_x, double leave_y, double end_x, double end_y,
     double arrive_x, double arrive_y
 ) noexcept
 
-cdef double distance_to_biarc(
+cdef inline double distance_to_biarc(
     double px, double py, double start_x, double start_y, double end_x, double end_y,
     (double, double, double, double) pair
 ) noexcept
 
-cdef (double, double, double, double) over(
+cdef inline (double, double, double, double) over(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
 ) noexcept
 
