@@ -8,8 +8,8 @@ plain Python, and runs uncompiled too. Cython is given a copy of both under buil
 - names that the .pxd cimports are not imported once more.
 
 Where there is no C compiler, zig's is asked for, a wheel from the package index. With
-CAMTOOL_CHECKED=1 in the environment every index and every sum of integers is checked, and the
-compiler's sanitizers are not needed for that.
+CAMTOOL_CHECKED=1 in the environment every index is checked, and gcc lets integers that overflow
+end the program.
 """
 
 from __future__ import annotations
@@ -43,7 +43,6 @@ DIRECTIVES = {
     "infer_types": True,
     "boundscheck": CHECKED,
     "initializedcheck": CHECKED,
-    "overflowcheck": CHECKED,
     "wraparound": False,
     "cdivision": True,  # as in C: 1/0 is inf, and // and % are for numbers that are not negative
     "cpow": True,
@@ -55,6 +54,13 @@ FLAGS = {
     "msvc": ["/O2", "/fp:precise"],
 }
 """No sum is fused with a product, so the same numbers come out everywhere."""
+
+if CHECKED:
+    FLAGS["unix"] += [
+        "-fno-wrapv",
+        "-fsanitize=signed-integer-overflow",
+        "-fsanitize-undefined-trap-on-error",
+    ]
 
 UNORDERED = "camtool.kernels.sums"
 """The one module whose sums may be taken in any order, of numbers that are finite."""
@@ -85,6 +91,9 @@ WIDE = """
 """
 """C for functions that a .pxd marks by a comment, `# wide`: machine code for three kinds of x86
 processors, of which they take the one that runs them. What is rounded is the same in all."""
+
+MARKED = "/* marked */ "
+"""How C begins in which functions are marked already."""
 
 NUMBERS = {
     ("math", "inf"): math.inf,
@@ -270,17 +279,21 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def widen(folder: Path, module: Extension) -> None:
-    """Gives the wide functions of a module their forms, in its C."""
+def mark_functions(folder: Path, module: Extension) -> None:
+    """Does in the C of a module what the comments `# inline` and `# wide` of its .pxd ask for."""
     types = folder.joinpath(*module.name.split(".")).with_suffix(".pxd")
-    names = re.findall(
-        r"(\w+)\([^()]*\) noexcept  # wide", types.read_text() if types.exists() else ""
-    )
     source = types.with_suffix(".c")
-    if not names or "WIDE_BODY" in (text := source.read_text(encoding="utf-8")):
+    if not types.exists() or (text := source.read_text(encoding="utf-8")).startswith(MARKED):
         return
     prefix = "__pyx_f_" + "".join(f"{len(part)}{part}_" for part in module.name.split("."))
-    for name in (prefix + name for name in names):
+    marks = re.findall(
+        r"(\w+)\([^()]*\) noexcept  # (inline|wide)$", types.read_text(), re.MULTILINE
+    )
+    for name, mark in ((prefix + name, mark) for name, mark in marks):
+        if mark == "inline":
+            pattern = rf"^static (?=[^\n;]* {name}\()"
+            text = re.sub(pattern, "static CYTHON_INLINE ", text, flags=re.MULTILINE)
+            continue
         head = re.search(rf"^static (.+) {name}\((.*)\) \{{$", text, re.MULTILINE)
         assert head, f"{module.name}: {name}"
         result, given = head.groups()
@@ -289,7 +302,7 @@ def widen(folder: Path, module: Extension) -> None:
         text = text[: head.start()] + body + text[head.end() :]
         text += f"\nWIDE({result}, {name}, ({given}), ({passed}))\n"
     text = text.replace('#include "Python.h"', '#include "Python.h"' + WIDE, 1)
-    source.write_text(text, encoding="utf-8")
+    source.write_text(MARKED + text, encoding="utf-8")
 
 
 class BuildKernels(build_ext):
@@ -323,7 +336,7 @@ class BuildKernels(build_ext):
         finally:
             os.chdir(before)
         for each in made:
-            widen(folder, each)
+            mark_functions(folder, each)
             each.sources = [str(folder / source) for source in each.sources]
             each._needs_stub = False
         self.extensions = made

@@ -17,7 +17,7 @@ cdef Int _pairs(
     Int[:, ::1] cells, double[:, ::1] points, double reach, Int most, Int[::1] one, Int[::1] other
 ) noexcept
 
-cdef inline bint _before(Int[:, ::1] cells, Int i, Int group, Int column, Int row) noexcept
+cdef bint _before(Int[:, ::1] cells, Int i, Int group, Int column, Int row) noexcept  # inline
 
 cdef Int top(Int[::1] above, Int item) noexcept
 
@@ -29,7 +29,7 @@ cpdef Int join(
     Int[::1] one, Int[::1] other, Int[::1] mates, Int[::1] above, Int[::1] segments, Int[::1] arcs
 ) noexcept
 
-cdef inline bint encloses(Int segments, Int arcs) noexcept
+cdef bint encloses(Int segments, Int arcs) noexcept  # inline
 
 @cython.locals(
     count=Int, index=Int, size=Int, chains=Int, end=Int, start=Int, entries=Int[::1],
@@ -56,7 +56,7 @@ cdef (Int, Int) _ring_weight(Int start, Int[::1] mates, Int[:, ::1] weights) noe
 @cython.locals(m=Int, label=Int)
 cdef void _forget(Int[::1] entries, Int low, Int high, Int[::1] node, Int[::1] where) noexcept
 
-cdef inline double _apart(double[:, ::1] points, Int one, Int other) noexcept
+cdef double _apart(double[:, ::1] points, Int one, Int other) noexcept  # inline
 
 @cython.locals(
     count=Int, i=Int, ring=Int, column=Int, row=Int, stop=Int, j=Int, nearest=Int[::1],

@@ -51,25 +51,25 @@ cdef void fill_row(
 )
 cpdef curve_rows(double[:, :, ::1] pieces, Int steps, double tolerance)
 
-cpdef inline double distance_to_arc(
+cpdef double distance_to_arc(
     double px, double py, double ax, double ay, double bx, double by, double bulge
-) noexcept
+) noexcept  # inline
 
-cdef inline double half_angle(double ax, double ay, double bx, double by) noexcept
+cdef double half_angle(double ax, double ay, double bx, double by) noexcept  # inline
 
 cpdef (double, double, double, double) biarc(
     double start_x, double start_y, double leave_x, double leave_y, double end_x, double end_y,
     double arrive_x, double arrive_y
 ) noexcept
 
-cdef inline double distance_to_biarc(
+cdef double distance_to_biarc(
     double px, double py, double start_x, double start_y, double end_x, double end_y,
     (double, double, double, double) pair
-) noexcept
+) noexcept  # inline
 
-cdef inline (double, double, double, double) over(
+cdef (double, double, double, double) over(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
-) noexcept
+) noexcept  # inline
 
 @cython.locals(i=Int, j=Int, a=Int, b=Int, out=double[::1])
 cpdef step_errors(

@@ -31,11 +31,11 @@ cdef bint _all_in_wedge(
     double[:, ::1] moves, Int row, double[::1] x, double[::1] y
 ) noexcept  # wide
 
-cdef inline double _depth(double from_start, double from_end, bint above_half) noexcept
+cdef double _depth(double from_start, double from_end, bint above_half) noexcept  # inline
 
-cdef inline double _off(double height, double over) noexcept
+cdef double _off(double height, double over) noexcept  # inline
 
-cdef inline double _outside(double px, double py, double radius, double half, double over) noexcept
+cdef double _outside(double px, double py, double radius, double half, double over) noexcept  # inline
 
 @cython.locals(k=Int, far=Int)
 cdef void _to_circle(
@@ -51,9 +51,9 @@ cpdef void lower_errors(
     double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
 ) noexcept
 
-cdef inline double smaller(double one, double other) noexcept
+cdef double smaller(double one, double other) noexcept  # inline
 
-cdef inline double larger(double one, double other) noexcept
+cdef double larger(double one, double other) noexcept  # inline
 
 @cython.locals(k=Int)
 cdef Int first_of(double[::1] values, Int low, double value) noexcept
@@ -71,7 +71,7 @@ cdef (double, Int) _search(
     Int first, Int last, double z_low, double z_high, Search search
 ) noexcept
 
-cdef inline double _looser(double limit) noexcept
+cdef double _looser(double limit) noexcept  # inline
 
 @cython.locals(
     kept=Int, k=Int, move=Int, found=Int[::1], table=double[:, ::1], memo=double[::1],

@@ -15,14 +15,14 @@ cdef void _widen(double[:, ::1] tree, Int node, double[:, ::1] boxes, Int row) n
 @cython.locals(leaves=Int, span=Int, low=Int)
 cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept
 
-cdef inline double apart_square(double[:, ::1] tree, Int node, double x, double y) noexcept
+cdef double apart_square(double[:, ::1] tree, Int node, double x, double y) noexcept  # inline
 
 @cython.locals(left=Int, right=Int)
 cdef Int wait_for_children(
     double[:, ::1] tree, Int node, double x, double y, Int[::1] stack, Int height
 ) noexcept
 
-cdef inline bint touch(double[:, ::1] one, Int i, double[:, ::1] other, Int j) noexcept
+cdef bint touch(double[:, ::1] one, Int i, double[:, ::1] other, Int j) noexcept  # inline
 
 @cython.locals(rows=double[:, ::1], i=Int)
 cpdef curve_rows(double[:, ::1] start, double[:, ::1] end, double[::1] bulge)
@@ -30,20 +30,20 @@ cpdef curve_rows(double[:, ::1] start, double[:, ::1] end, double[::1] bulge)
 @cython.locals(boxes=double[:, ::1], i=Int)
 cpdef curve_boxes(double[:, ::1] curves, double margin)
 
-cdef inline double gap_to(double[:, ::1] curves, Int i, double x, double y) noexcept
+cdef double gap_to(double[:, ::1] curves, Int i, double x, double y) noexcept  # inline
 
 @cython.locals(ahead=bint)
-cdef inline double distance_to(double[:, ::1] curves, Int i, double x, double y) noexcept
+cdef double distance_to(double[:, ::1] curves, Int i, double x, double y) noexcept  # inline
 
 @cython.locals(before=bint, half=double, chord=double)
 cpdef double along(double[:, ::1] curves, Int i, double x, double y) noexcept
 
-cpdef inline (double, double) point_on(double[:, ::1] curves, Int i, double t) noexcept
+cpdef (double, double) point_on(double[:, ::1] curves, Int i, double t) noexcept  # inline
 
 @cython.locals(boxes=double[:, ::1], i=Int)
 cpdef kite_boxes(double[:, ::1] kites)
 
-cdef inline double depth_in(double[:, ::1] kites, Int i, double x, double y) noexcept
+cdef double depth_in(double[:, ::1] kites, Int i, double x, double y) noexcept  # inline
 
 @cython.locals(leaves=Int, height=Int, node=Int, low=Int, row=Int)
 cpdef double deepest(
@@ -136,9 +136,9 @@ cdef Int _taken(
     double[:, ::1] found, Int at, Int count
 ) noexcept
 
-cdef inline double _fraction(double length, double whole, double eps) noexcept
+cdef double _fraction(double length, double whole, double eps) noexcept  # inline
 
-cdef inline (double, double) _tangent_after(double[:, ::1] curves, Int i, double length) noexcept
+cdef (double, double) _tangent_after(double[:, ::1] curves, Int i, double length) noexcept  # inline
 
 cdef (double, double, double, double) _common_points(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j
@@ -228,7 +228,7 @@ cdef bint is_inside(
 ) noexcept
 
 @cython.locals(crosses=bint, in_circle=bint, on_left=bint)
-cdef inline bint _counts(double[:, ::1] curves, Int i, double bulge, double x, double y) noexcept
+cdef bint _counts(double[:, ::1] curves, Int i, double bulge, double x, double y) noexcept  # inline
 
 @cython.locals(
     said=Int[::1], stack=Int[::1], n=Int, k=Int, curves=double[:, ::1],

@@ -5,18 +5,16 @@ from libc.stdint cimport uint64_t
 
 from camtool.kernels.types cimport Int
 
-@cython.overflowcheck(False)
-cdef inline uint64_t _mixed(uint64_t word) noexcept
+cdef uint64_t _mixed(uint64_t word) noexcept  # inline
 
 @cython.locals(k=Int, part=Int, key=uint64_t, total=uint64_t, word=uint64_t)
-@cython.overflowcheck(False)
 cdef double deviate(Int seed, Int stream, Int number) noexcept
 
-cdef inline (double, double, bint) turned(
+cdef (double, double, bint) turned(
     double position, double furthest, double direction, double least
-) noexcept
+) noexcept  # inline
 
-cdef inline double taken_along(double slide, double motor, double low, double high) noexcept
+cdef double taken_along(double slide, double motor, double low, double high) noexcept  # inline
 
 @cython.locals(axis=Int, run=Int, count=Int, k=Int, reversed_=bint)
 cpdef void play_fill(

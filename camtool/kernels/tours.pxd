@@ -23,9 +23,9 @@ cdef class Branches:
     cdef double[:, ::1] points, box
     cdef Int[::1] rows, begin, size, live, leaf, waiting
 
-cdef inline double gap(Route tour, Int one, Int other) noexcept
+cdef double gap(Route tour, Int one, Int other) noexcept  # inline
 
-cdef inline Int row_at(Route tour, Int position) noexcept
+cdef Int row_at(Route tour, Int position) noexcept  # inline
 
 @cython.locals(one=Int, other=Int)
 cpdef void reverse(Route tour, Int low, Int high) noexcept
@@ -53,7 +53,7 @@ cdef void undo(Route tour, Int[:, ::1] log, Int logged) noexcept
 @cython.locals(node=Int)
 cpdef void switch(Branches tree, Int row, Int change) noexcept
 
-cdef inline double _apart(Branches tree, Int node, double x, double y) noexcept
+cdef double _apart(Branches tree, Int node, double x, double y) noexcept  # inline
 
 @cython.locals(left_first=bint)
 cdef Int _halves_wait(
@@ -75,12 +75,12 @@ cpdef Int nearest_owners(
     double[::1] apart
 ) noexcept
 
-cdef inline bint _looks_to(Int quarter, double dx, double dy) noexcept
+cdef bint _looks_to(Int quarter, double dx, double dy) noexcept  # inline
 
 @cython.locals(at=Int, k=Int)
 cdef void _enter(Int[::1] found, double[::1] apart, Int most, Int owner, double distance) noexcept
 
-cdef inline bint _before(double distance, Int owner, Int[::1] found, double[::1] apart, Int at) noexcept
+cdef bint _before(double distance, Int owner, Int[::1] found, double[::1] apart, Int at) noexcept  # inline
 
 @cython.locals(
     branches=Branches, i=Int, rank=Int, count=Int, row=Int, chosen=Int, item=Int, k=Int, later=Int,

@@ -732,7 +732,7 @@ def kicked(tour: Tour, kicks: int, seed: int) -> float:
     """How much shorter the tour is when no step gains any more, and after so many kicks."""
     route, step, room = Route(tour), Step(), Step()
     items = len(tour.item) - 2
-    queue, waits = np.array(tour.item[1:-1]), np.ones(items, np.int64)
+    queue, waits = np.array(tour.item[1 : items + 1]), np.ones(items, np.int64)
     log = np.empty((LOG, 2), np.int64)
     waiting, may_undo = items, -1
     gained, kick = 0.0, -1

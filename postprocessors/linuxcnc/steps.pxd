@@ -6,7 +6,7 @@ from libc.stdint cimport uint8_t
 from camtool.kernels.types cimport Int
 
 @cython.locals(axis=Int, way=double, along=double, whole=double)
-cdef inline double _share(double[:, ::1] points, Int base, Int end, Int point) noexcept
+cdef double _share(double[:, ::1] points, Int base, Int end, Int point) noexcept  # inline
 
 @cython.locals(k=Int, axis=Int, same=bint, square=double)
 cdef bint _joins(double[:, ::1] points, Int base, Int new, double tolerance) noexcept

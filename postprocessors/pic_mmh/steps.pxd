@@ -11,7 +11,7 @@ cdef class Room:
     cdef double[::1] registers
 
 @cython.locals(turn=Int, sx=Int, sy=Int, along_x=Int, along_y=Int)
-cpdef inline (Int, Int) heading(Int x, Int y, bint clockwise) noexcept
+cpdef (Int, Int) heading(Int x, Int y, bint clockwise) noexcept  # inline
 
 cpdef Int rounded_radius(Int x, Int y) noexcept
 
@@ -28,9 +28,9 @@ cdef void scan(
 ) noexcept
 
 @cython.locals(only_x=Int, only_y=Int, both=Int, move_x=bint, move_y=bint)
-cdef inline (Int, Int, Int, Int, Int, Int, Int) _advance(
+cdef (Int, Int, Int, Int, Int, Int, Int) _advance(
     Int x, Int y, Int error, Int sx, Int sy, Int delta_x, Int delta_y
-) noexcept
+) noexcept  # inline
 
 @cython.locals(invariant=Int, diagonal=Int)
 cdef Int _run_length(Int m, Int n, Int way, Int error, Int room) noexcept
@@ -73,9 +73,9 @@ cdef (Int, Int, bint) _dda_line(
     Int a, Int b, double[::1] registers, Int[::1] counters, Int[::1] out_x, Int[::1] out_y
 ) noexcept
 
-cdef inline (Int, Int, Int, Int) _arc_pass(
+cdef (Int, Int, Int, Int) _arc_pass(
     Int grow, Int shrink, Int radius, Int in_grow, Int in_shrink
-) noexcept
+) noexcept  # inline
 
 @cython.locals(
     x=Int, y=Int, sx=Int, sy=Int, radius=Int, in_grow=Int, in_shrink=Int, filled=Int, passes=Int,
@@ -146,7 +146,7 @@ cdef (Int, Int) _ways(
     Int[::1] path_y
 ) noexcept
 
-cdef inline bint _is_near(Int low, Int high, Int end) noexcept
+cdef bint _is_near(Int low, Int high, Int end) noexcept  # inline
 
 @cython.locals(k=Int, entered=Int, last=Int, to_x=Int, to_y=Int, near=bint)
 cdef (Int, bint) _passed(
