@@ -317,8 +317,10 @@ class BuildKernels(build_ext):
         """From Python to C, and from there to machine code."""
         from Cython.Build import cythonize
 
-        before = Path.cwd()
-        folder = ROOT / "build" / ("checked" if CHECKED else "lowered")
+        before, mode = Path.cwd(), "checked" if CHECKED else "lowered"
+        folder, latest = ROOT / "build" / mode, ROOT / "build" / "latest"
+        # What the other kind of build left beside the sources is newer than what this one reads.
+        self.force = self.force or not latest.exists() or latest.read_text() != mode
         modules = lowered_copies(folder)
         os.chdir(folder)
         try:
@@ -341,6 +343,7 @@ class BuildKernels(build_ext):
             each._needs_stub = False
         self.extensions = made
         super().run()
+        latest.write_text(mode)
 
     def build_extensions(self) -> None:
         """With the flags of the compiler at hand."""
