@@ -92,8 +92,8 @@ WIDE = """
 """C for functions that a .pxd marks by a comment, `# wide`: machine code for three kinds of x86
 processors, of which they take the one that runs them. What is rounded is the same in all."""
 
-MARKED = "/* marked */ "
-"""How C begins in which functions are marked already."""
+MARKED = "/* marked */\n"
+"""How C ends in which functions are marked already; how it begins is known to Cython."""
 
 NUMBERS = {
     ("math", "inf"): math.inf,
@@ -283,7 +283,7 @@ def mark_functions(folder: Path, module: Extension) -> None:
     """Does in the C of a module what the comments `# inline` and `# wide` of its .pxd ask for."""
     types = folder.joinpath(*module.name.split(".")).with_suffix(".pxd")
     source = types.with_suffix(".c")
-    if not types.exists() or (text := source.read_text(encoding="utf-8")).startswith(MARKED):
+    if not types.exists() or (text := source.read_text(encoding="utf-8")).endswith(MARKED):
         return
     prefix = "__pyx_f_" + "".join(f"{len(part)}{part}_" for part in module.name.split("."))
     marks = re.findall(
@@ -302,7 +302,7 @@ def mark_functions(folder: Path, module: Extension) -> None:
         text = text[: head.start()] + body + text[head.end() :]
         text += f"\nWIDE({result}, {name}, ({given}), ({passed}))\n"
     text = text.replace('#include "Python.h"', '#include "Python.h"' + WIDE, 1)
-    source.write_text(MARKED + text, encoding="utf-8")
+    source.write_text(text + MARKED, encoding="utf-8")
 
 
 class BuildKernels(build_ext):
