@@ -35,7 +35,9 @@ cdef double _depth(double from_start, double from_end, bint above_half) noexcept
 
 cdef double _off(double height, double over) noexcept  # inline
 
-cdef double _outside(double px, double py, double radius, double half, double over) noexcept  # inline
+cdef double _outside(
+    double px, double py, double radius, double half, double over
+) noexcept  # inline
 
 @cython.locals(k=Int, far=Int)
 cdef void _to_circle(

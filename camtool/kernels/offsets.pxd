@@ -52,8 +52,7 @@ cpdef double deepest(
 ) noexcept
 
 @cython.locals(
-    leaves=Int, height=Int, node=Int, low=Int, row=Int, near=Int,
-    far=Int
+    leaves=Int, height=Int, node=Int, low=Int, row=Int, near=Int, far=Int
 )
 cdef double least_below(
     double[:, ::1] curves, double[:, ::1] tree, double x, double y, double best, double enough,
@@ -64,8 +63,8 @@ cdef double least_below(
 cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, ::1] tree)
 
 @cython.locals(
-    found=Int[:, ::1], more=Int[:, ::1], stack=Int[::1], i=Int, leaves=Int,
-    count=Int, height=Int, node=Int, low=Int, row=Int
+    found=Int[:, ::1], more=Int[:, ::1], stack=Int[::1], i=Int, leaves=Int, count=Int, height=Int,
+    node=Int, low=Int, row=Int
 )
 cpdef curves_within(
     double[:, ::1] points, double[::1] reach, double[:, ::1] curves, double[:, ::1] tree
@@ -82,46 +81,45 @@ cpdef Int gathered(
 @cython.locals(k=Int)
 cdef double _too_near(
     double[:, ::1] curves, double[:, ::1] tree, double[:, ::1] kites, double[:, ::1] kite_tree,
-    Int[::1] rows, Int count, double x, double y, double distance, double spare, double
-    enough, Int[::1] stack, double[::1] apart
+    Int[::1] rows, Int count, double x, double y, double distance, double spare, double enough,
+    Int[::1] stack, double[::1] apart
 ) noexcept
 
 @cython.locals(
     ends=double[:, ::1], curves=double[:, ::1], tree=double[:, ::1], kites=double[:, ::1],
-    kite_tree=double[:, ::1], i=Int, count=Int, way=Int, _=Int, rows=Int[::1],
-    stack=Int[::1], apart=double[::1]
+    kite_tree=double[:, ::1], i=Int, count=Int, way=Int, _=Int, rows=Int[::1], stack=Int[::1],
+    apart=double[::1]
 )
 cpdef trimmed_ends(double[:, ::1] elements, near, (double, double) limits)
 
-@cython.locals(places=double[::1], 
-    valid=uint8_t[::1], i=Int, last=Int, whole=Int, count=Int, k=Int,
-    row=Int, curves=double[:, ::1], tree=double[:, ::1], kites=double[:, ::1],
-    kite_tree=double[:, ::1], rows=Int[::1], stack=Int[::1], apart=double[::1]
+@cython.locals(
+    places=double[::1], valid=uint8_t[::1], i=Int, last=Int, whole=Int, count=Int, k=Int, row=Int,
+    curves=double[:, ::1], tree=double[:, ::1], kites=double[:, ::1], kite_tree=double[:, ::1],
+    rows=Int[::1], stack=Int[::1], apart=double[::1]
 )
 cpdef far_enough(
     double[:, ::1] elements, Int[::1] element, double[:, ::1] span, near, (double, double) limits
 )
 
-@cython.locals(first=Int, last=Int, other_first=Int, other_last=Int, 
-    pairs=Int[:, ::1], leaves=Int, other_leaves=Int, count=Int, height=Int,
-    i=Int, a=Int, b=Int, child=Int, low=Int, far_low=Int, j=Int,
-    far=Int, left=Int[::1], right=Int[::1]
+@cython.locals(
+    first=Int, last=Int, other_first=Int, other_last=Int, pairs=Int[:, ::1], leaves=Int,
+    other_leaves=Int, count=Int, height=Int, i=Int, a=Int, b=Int, child=Int, low=Int, far_low=Int,
+    j=Int, far=Int, left=Int[::1], right=Int[::1]
 )
 cpdef pairs_of(
-    double[:, ::1] boxes, double[:, ::1] tree, double[:, ::1] others, double[:, ::1] other_tree, bint
-    own
+    double[:, ::1] boxes, double[:, ::1] tree, double[:, ::1] others, double[:, ::1] other_tree,
+    bint own
 )
 
 @cython.locals(
-    room=Int, count=Int, k=Int, more=Int, m=Int, i=Int, j=Int,
-    rows=Int[:, ::1], found=double[:, ::1]
+    room=Int, count=Int, k=Int, more=Int, m=Int, i=Int, j=Int, rows=Int[:, ::1],
+    found=double[:, ::1]
 )
 cpdef meetings_of(double[:, ::1] a, double[:, ::1] b, Int[:, ::1] pairs, double eps)
 
 @cython.locals(count=Int, k=Int)
 cdef Int _meet(
-    double[:, ::1] a, double[:, ::1] b, Int i, Int j, double eps, double[:, ::1] found,
-    Int at
+    double[:, ::1] a, double[:, ::1] b, Int i, Int j, double eps, double[:, ::1] found, Int at
 ) noexcept
 
 @cython.locals(k=Int)
@@ -145,8 +143,8 @@ cdef (double, double, double, double) _common_points(
 ) noexcept
 
 @cython.locals(
-    group=Int[::1], first=Int[::1], node=Int[::1], i=Int, count=Int, j=Int,
-    root=Int, one=Int, hits=Int, other=Int, low=Int, high=Int
+    group=Int[::1], first=Int[::1], node=Int[::1], i=Int, count=Int, j=Int, root=Int, one=Int,
+    hits=Int, other=Int, low=Int, high=Int
 )
 cpdef merged(double[:, :] points, double[::1] skew, Int[::1] order, double eps)
 
@@ -156,51 +154,46 @@ cdef Int _root(Int[::1] group, Int i) noexcept
 cdef grouped(Int[::1] keys, Int count)
 
 @cython.locals(
-    key=Int, gap=Int, i=Int, row=Int, j=Int, rows=Int[::1],
-    begins=Int[::1], some=Int[::1]
+    key=Int, gap=Int, i=Int, row=Int, j=Int, rows=Int[::1], begins=Int[::1], some=Int[::1]
 )
 cpdef in_order(Int[::1] keys, double[::1] t, Int count)
 
 cdef bint _after(double[::1] t, Int one, Int other) noexcept
 
 @cython.locals(
-    keep=uint8_t[::1], near=Int[::1], from_node=Int[::1], to_node=Int[::1],
-    rows=Int[::1], begins=Int[::1], row=Int, node=Int, count=Int, k=Int,
-    far=Int, m=Int, other=Int
+    keep=uint8_t[::1], near=Int[::1], from_node=Int[::1], to_node=Int[::1], rows=Int[::1],
+    begins=Int[::1], row=Int, node=Int, count=Int, k=Int, far=Int, m=Int, other=Int
 )
 cpdef doubles_left(
     double[:, ::1] elements, Int[::1] element, double[::1] middle_t, ends, double eps
 )
 
-@cython.locals(ends_here=bint, first=Int, last=Int, 
-    keep=uint8_t[::1], node=Int, height=Int, k=Int, row=Int, end=Int,
-    side=Int,
-    stack=Int[::1], leaving=Int[::1], first_leaving=Int[::1], arriving=Int[::1],
+@cython.locals(
+    ends_here=bint, first=Int, last=Int, keep=uint8_t[::1], node=Int, height=Int, k=Int, row=Int,
+    end=Int, side=Int, stack=Int[::1], leaving=Int[::1], first_leaving=Int[::1], arriving=Int[::1],
     first_arriving=Int[::1], leave=Int[::1], arrive=Int[::1]
 )
 cpdef leading_on(Int[::1] from_node, Int[::1] to_node, Int count)
 
 @cython.locals(
-    unused=uint8_t[::1], seen=Int[::1], from_node=Int[::1], to_node=Int[::1],
-    leaving=Int[::1], first=Int[::1], path=Int[::1], rows=Int[::1],
-    begins=Int[::1], ways=Int[::1], node=Int, loops=Int, start=Int,
-    count=Int, length=Int, last=Int, chosen=Int, low=Int, k=Int
+    unused=uint8_t[::1], seen=Int[::1], from_node=Int[::1], to_node=Int[::1], leaving=Int[::1],
+    first=Int[::1], path=Int[::1], rows=Int[::1], begins=Int[::1], ways=Int[::1], node=Int,
+    loops=Int, start=Int, count=Int, length=Int, last=Int, chosen=Int, low=Int, k=Int
 )
 cpdef traced(double[:, ::1] elements, Int[::1] element, double[:, ::1] span, ends)
 
 @cython.locals(k=Int, best=Int, others=Int, way=Int)
 cdef Int _leftmost(
-    double[:, ::1] elements, Int[::1] element, double[:, ::1] span, Int last, uint8_t[::1]
-    unused, Int[::1] ways
+    double[:, ::1] elements, Int[::1] element, double[:, ::1] span, Int last, uint8_t[::1] unused,
+    Int[::1] ways
 ) noexcept
 
 cdef (double, double) _tangent(double[:, ::1] elements, Int i, double t) noexcept
 
 @cython.locals(
     vertices=double[:, ::1], span=double[:, ::1], offsets=Int[::1], element=Int[::1],
-    from_node=Int[::1], to_node=Int[::1], rows=Int[::1], begins=Int[::1],
-    ways=Int[::1], run=Int, first=Int, low=Int, count=Int, k=Int,
-    last=Int, row=Int, closed=uint8_t[::1]
+    from_node=Int[::1], to_node=Int[::1], rows=Int[::1], begins=Int[::1], ways=Int[::1], run=Int,
+    first=Int, low=Int, count=Int, k=Int, last=Int, row=Int, closed=uint8_t[::1]
 )
 cpdef written(slices, double[:, ::1] nodes, double[::1] sweeps, runs, double eps)
 
@@ -210,9 +203,8 @@ cdef bint _goes_on(Int[::1] element, double[:, ::1] span, Int last, Int row) noe
 cdef Int _first(Int[::1] element, double[:, ::1] span, Int[::1] ways) noexcept
 
 @cython.locals(
-    count=Int, left=Int, row=Int, place=Int, height=Int, following=Int,
-    earlier=Int, k=Int, there=uint8_t[::1], after=Int[::1], before=Int[::1],
-    stack=Int[::1]
+    count=Int, left=Int, row=Int, place=Int, height=Int, following=Int, earlier=Int, k=Int,
+    there=uint8_t[::1], after=Int[::1], before=Int[::1], stack=Int[::1]
 )
 cdef Int _cleaned(double[:, ::1] vertices, bint closed, double eps)
 
@@ -223,16 +215,16 @@ cpdef insides(double[:, ::1] points, double[:, ::1] curves, double[::1] bulge, d
 
 @cython.locals(leaves=Int, height=Int, node=Int, low=Int, row=Int, odd=bint)
 cdef bint is_inside(
-    double[:, ::1] curves, double[::1] bulge, double[:, ::1] tree, double x, double y, Int[::1]
-    stack
+    double[:, ::1] curves, double[::1] bulge, double[:, ::1] tree, double x, double y,
+    Int[::1] stack
 ) noexcept
 
 @cython.locals(crosses=bint, in_circle=bint, on_left=bint)
 cdef bint _counts(double[:, ::1] curves, Int i, double bulge, double x, double y) noexcept  # inline
 
 @cython.locals(
-    said=Int[::1], stack=Int[::1], n=Int, k=Int, curves=double[:, ::1],
-    tree=double[:, ::1], bulge=double[::1], apart=double[::1]
+    said=Int[::1], stack=Int[::1], n=Int, k=Int, curves=double[:, ::1], tree=double[:, ::1],
+    bulge=double[::1], apart=double[::1]
 )
 cpdef holds(double[:, ::1] points, Int[::1] begins, ring, Int[::1] paths, double eps)
 
