@@ -15,7 +15,7 @@ from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(include=["camtool", "ezdxf", "svgpathtools", "defusedxml"]):
+with atheris.instrument_imports(include=["camtool", "ezdxf", "defusedxml"]):
     import camtool.importers.dxf.reader
     import camtool.importers.points.reader
     import camtool.importers.svg.reader  # noqa: F401  (to be instrumented)

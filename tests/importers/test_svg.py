@@ -15,6 +15,7 @@ from camtool.geometry.measure import extents, path_lengths, signed_areas
 from camtool.geometry.polylines import Segments
 from camtool.importers.options import ReadOptions
 from camtool.importers.svg.reader import read
+from camtool.importers.svg.shapes import parse_path
 
 SPACES = (
     'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
@@ -378,6 +379,61 @@ CURVES = [
 def test_curves_are_svgpathtools_curves(data: str) -> None:
     # Its own arcs are rounded to some 1e-7 of their size.
     assert_on(path(data), curve_of(data), 0.0005 + 1e-5)
+
+
+COORDINATES = {"C": 6, "S": 4, "Q": 4, "T": 2}
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from("CcSsQqTt"),
+            st.integers(1, 3),
+            st.lists(st.floats(-1e3, 1e3), min_size=18, max_size=18),
+        ),
+        min_size=1,
+        max_size=6,
+    )
+)
+def test_control_points_are_svgpathtools_control_points(
+    commands: list[tuple[str, int, list[float]]],
+) -> None:
+    import svgpathtools
+
+    data = "M3 4"
+    for letter, curves, numbers in commands:
+        words = numbers[: curves * COORDINATES[letter.upper()]]
+        data += letter + " ".join(map(repr, words))
+    (subpath,), fault = parse_path(data)
+    assert not fault
+    wanted = [curve.bpoints()[1:] for curve in svgpathtools.parse_path(data)]
+    assert [segment.control.tolist() for segment in subpath.segments] == [
+        [[point.real, point.imag] for point in points] for points in wanted
+    ]
+
+
+@pytest.mark.parametrize(
+    ("data", "control"),
+    [
+        ("M1 2S5 6 7 8", [1, 2]),
+        ("M1 2T5 6", [1, 2]),
+        ("M0 0C1 1 2 3 4 4S5 6 7 8", [6, 5]),
+        ("M0 0Q2 3 4 4T7 8", [6, 5]),
+        ("M0 0Q2 3 4 4t1 1 1 1", [4, 5]),
+        ("M0 0Q2 3 4 4S5 6 7 8", [4, 4]),
+        ("M0 0C1 1 2 3 4 4T7 8", [4, 4]),
+        ("M0 0C1 1 2 3 4 4L5 5S5 6 7 8", [5, 5]),
+        ("M0 0C1 1 2 3 4 4A3 3 0 0 1 5 5S5 6 7 8", [5, 5]),
+        ("M0 0C1 1 2 3 4 4M5 5S5 6 7 8", [5, 5]),
+        ("M1 2C1 1 2 3 4 4ZS5 6 7 8", [1, 2]),
+    ],
+)
+def test_a_smooth_curve_reflects_only_a_curve_of_its_degree(
+    data: str, control: list[float]
+) -> None:
+    subpaths, fault = parse_path(data)
+    assert not fault
+    assert subpaths[-1].segments[-1].control[0].tolist() == control
 
 
 @given(

@@ -112,11 +112,10 @@ def _pair(z: complex) -> Floats:
 # Path data.
 #
 # The words of path data are checked here to the letter: what stands before the first wrong sign is
-# drawn, as the standard wants it, and the fault is reported. Lines and arcs are done with that;
-# the Bézier curves, with their smooth and relative forms, are svgpathtools' to make.
+# drawn, as the standard wants it, and the fault is reported.
 #
-# Source: Scalable Vector Graphics 1.1, chapter 8 (paths; 8.3.9 for their grammar) and appendix F.2
-# (drawing up to an error).
+# Source: Scalable Vector Graphics 1.1, chapter 8 (paths; 8.3.6 and 8.3.7 for smooth curves, 8.3.9
+# for their grammar) and appendix F.2 (drawing up to an error).
 
 MAX_PATH_CHARACTERS = 50_000_000
 """Longest path data of one element; longer ones would take more than some 3 GB for their
@@ -145,7 +144,7 @@ def parse_path(data: str) -> tuple[list[Subpath], str]:
     pen = _Pen()
     fault = _drawn(data, pen)
     pen.lift(closed=False)
-    return pen.subpaths(), fault
+    return pen.done, fault
 
 
 def _drawn(data: str, pen: _Pen) -> str:
@@ -199,17 +198,15 @@ def _odd(text: str) -> str:
 class _Pen:
     """Draws: the point where it stands, the open subpath, and what is done.
 
-    A subpath is listed as corners to go straight to, as arcs, and as counts of the next Béziers
-    of `_curves`, which svgpathtools makes all at once: one text in which each run of curve
-    commands has a moveto of its own, so that a smooth curve is reflected only in its own run.
+    The open subpath is its segments, and after them the corners of straight lines that are not
+    yet among them.
     """
 
     here: complex = 0j
     start: complex = 0j
     corners: list[complex] = field(default_factory=list)
-    items: list[list[complex] | Arc | int] = field(default_factory=list)
-    done: list[tuple[complex, list[list[complex] | Arc | int], bool]] = field(default_factory=list)
-    text: list[str] = field(default_factory=list)
+    segments: list[Segment] = field(default_factory=list)
+    done: list[Subpath] = field(default_factory=list)
 
     def command(self, letter: str, words: list[str]) -> None:
         """Any command but A, with whole sets of numbers; "M" without numbers draws nothing."""
@@ -238,35 +235,20 @@ class _Pen:
             self._to([end])
             return
         angle = math.radians(math.fmod(turn, 360.0))
-        self._add(arc_between(self.here, end, radii, angle, flags))
+        self._flush()
+        self.segments.append(arc_between(self.here, end, radii, angle, flags))
         self.here = end
 
     def lift(self, *, closed: bool) -> None:
         """Ends the subpath, if one is begun; the pen stands at its start when it is closed."""
         self._flush()
-        if self.items:
-            self.done.append((self.start, self.items, closed))
-            self.items = []
+        if self.segments:
+            self.done.append(Subpath(_point(self.start), tuple(self.segments), closed))
+            self.segments = []
         if closed:
             self.here = self.start
         else:
             self.start = self.here
-
-    def subpaths(self) -> list[Subpath]:
-        """All that was drawn."""
-        curves = _beziers(" ".join(self.text)) if self.text else []
-        found: list[Subpath] = []
-        used = 0
-        for start, items, closed in self.done:
-            segments: list[Segment] = []
-            for item in items:
-                if isinstance(item, int):
-                    segments += curves[used : used + item]
-                    used += item
-                else:
-                    segments.append(item if isinstance(item, Arc) else Lines(_pairs(item)))
-            found.append(Subpath(_point(start), tuple(segments), closed))
-        return found
 
     def _straight(self, kind: str, relative: bool, n: list[float]) -> None:
         """L, H, V, and the pairs after the first one of M."""
@@ -287,38 +269,35 @@ class _Pen:
         self.here = _bounded(ends[-1])
 
     def _curve(self, letter: str, words: list[str]) -> None:
-        """C, S, Q, T: counted here, made by svgpathtools."""
-        count = _COUNTS[letter.upper()]
+        """C, S, Q, T. The first control point of a smooth curve (S, T) is the last one of the
+        curve before it, reflected in the point between them; that point itself where no curve of
+        the same degree comes before it."""
+        kind, relative = letter.upper(), letter.islower()
         numbers = _floats(words)
-        xs, ys = numbers[count - 2 :: count], numbers[count - 1 :: count]
-        ends = list(map(complex, xs, ys))
-        if letter.islower():
-            ends = list(accumulate(ends, initial=self.here))[1:]
+        points = list(map(complex, numbers[::2], numbers[1::2]))
+        each = _COUNTS[kind] // 2
+        degree = 3 if kind in "CS" else 2
         self._flush()
-        if self.items and isinstance(self.items[-1], int):
-            self.items[-1] += len(ends)
-        else:
-            self.items.append(len(ends))
-            self.text.append(f"M {self.here.real!r} {self.here.imag!r}")
-        self.text.append(letter)
-        self.text += words
-        self.here = _bounded(ends[-1])
-
-    def _add(self, item: Arc) -> None:
-        self._flush()
-        self.items.append(item)
+        last = self.segments[-1] if self.segments else None
+        before = self.here
+        if isinstance(last, Bezier) and len(last.control) == degree:
+            before = complex(*last.control[-2])
+        controls: list[complex] = []
+        for at in range(0, len(points), each):
+            control = points[at : at + each]
+            if relative:
+                control = [self.here + point for point in control]
+            if kind in "ST":
+                control.insert(0, self.here + self.here - before)
+            controls += control
+            before, self.here = control[-2:]
+        self.segments += map(Bezier, _pairs(controls).reshape(-1, degree, 2))
+        self.here = _bounded(self.here)
 
     def _flush(self) -> None:
         if self.corners:
-            self.items.append(self.corners)
+            self.segments.append(Lines(_pairs(self.corners)))
             self.corners = []
-
-
-def _beziers(text: str) -> list[Bezier]:
-    """The curves of checked data, in order."""
-    import svgpathtools
-
-    return [Bezier(_pairs(curve.bpoints()[1:])) for curve in svgpathtools.parse_path(text)]
 
 
 def _floats(words: list[str]) -> list[float]:
@@ -339,7 +318,7 @@ def _point(z: complex) -> Floats:
     return np.array([z.real, z.imag])
 
 
-def _pairs(points: list[complex] | tuple[complex, ...]) -> Floats:
+def _pairs(points: list[complex]) -> Floats:
     return np.array(points, dtype=np.complex128).view(np.float64).reshape(-1, 2)
 
 
