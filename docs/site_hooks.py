@@ -43,7 +43,8 @@ def _helps(context: click.Context) -> Iterator[str]:
     yield f"{level} {context.command_path}\n\n```text\n{command.get_help(context)}\n```\n"
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
-            each = command.commands[name]
+            each = command.get_command(context, name)
+            assert each is not None
             yield from _helps(
                 click.Context(each, parent=context, info_name=name, **each.context_settings)
             )

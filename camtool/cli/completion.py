@@ -23,11 +23,9 @@ import click
 from click.shell_completion import CompletionItem, ShellComplete, add_completion_class
 from click.types import StringParamType
 
+from camtool.cli import COMPLETE
 from camtool.cli.targets import flat, target_items
 from camtool.errors import CamtoolError
-
-VARIABLE = "_CAMTOOL_COMPLETE"
-"""Where the shell says what it asks."""
 
 MAX_SCANNED_BYTES = 20_000_000
 """Layers of larger drawings are not looked for: the answer would take longer than typing."""
@@ -194,7 +192,7 @@ def completion(shell: str) -> int:
     zsh:  eval "$(camtool completion zsh)"                in ~/.zshrc, after compinit
     fish: camtool completion fish | source                in ~/.config/fish/config.fish
     """
-    click.echo(SHELLS[shell](click.Group(), {}, "camtool", VARIABLE).source(), nl=False)
+    click.echo(SHELLS[shell](click.Group(), {}, "camtool", COMPLETE).source(), nl=False)
     return 0
 
 
@@ -212,8 +210,11 @@ def complete_values(command: click.Command) -> None:
         if answer is not None and type(param.type) is StringParamType:
             param.type = _Completed(answer)
     if isinstance(command, click.Group):
-        for each in command.commands.values():
-            complete_values(each)
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            below = command.get_command(context, name)
+            if below is not None:
+                complete_values(below)
 
 
 class _Completed(StringParamType):

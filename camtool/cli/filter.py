@@ -22,11 +22,11 @@ BEGUN, READ, MADE, DONE = 1, 20, 95, 100
 """What the progress bar shows, per cent: begun, read, made and judged, written."""
 
 
-@click.command("filter", cls=SectionedCommand, short_help="LinuxCNC opens a drawing.")
+@click.command(cls=SectionedCommand, short_help="LinuxCNC opens a drawing.")
 @click.argument("source", metavar="FILE")
 @posting_options
 @talk_options
-def filter_command(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
+def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
     """Write the program of the drawing FILE to stdout, as [FILTER] of LinuxCNC's INI file wants.
 
     \b

@@ -16,25 +16,14 @@ import sys
 import threading
 import traceback
 from contextlib import suppress
+from importlib import import_module
 from typing import NoReturn, TextIO
 
 import click
 
 from camtool import __version__
-from camtool.cli.batch import batch
-from camtool.cli.calibrate import calibrate
-from camtool.cli.check import check
-from camtool.cli.completion import VARIABLE, answer_shells, completion
-from camtool.cli.convert import convert
-from camtool.cli.coupon import coupon
-from camtool.cli.filter import filter_command
-from camtool.cli.job import job
+from camtool.cli import COMPLETE
 from camtool.cli.messages import life_signs, say, say_error
-from camtool.cli.post import post
-from camtool.cli.preview import preview
-from camtool.cli.stale import stale
-from camtool.cli.targets import targets
-from camtool.cli.verify import verify
 from camtool.errors import CamtoolError, InputError, OutputError
 
 EXIT_BAD_INPUT = 2
@@ -55,7 +44,44 @@ GARBAGE_AFTER = 50_000
 of 700 suits programs that run long; loading the libraries makes half a million lasting objects."""
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+COMMANDS = (
+    "batch",
+    "calibrate",
+    "check",
+    "completion",
+    "convert",
+    "coupon",
+    "filter",
+    "job",
+    "post",
+    "preview",
+    "stale",
+    "targets",
+    "verify",
+)
+"""Each is a function of the same name in a module of the same name."""
+
+
+class _Commands(click.Group):
+    """The group of `COMMANDS`, each of which is loaded when it is called or shown."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Their names."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of this name. None where there is none; then all are loaded, since click
+        guesses from them what was meant."""
+        for name in [cmd_name] if cmd_name in COMMANDS else COMMANDS:
+            if name not in self.commands:
+                self.add_command(getattr(import_module(f"camtool.cli.{name}"), name))
+        return super().get_command(ctx, cmd_name)
+
+
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(__version__, prog_name="camtool")
 def cli() -> None:
     """Drawings in, the exact program of your machine out, its error known beforehand.
@@ -78,19 +104,14 @@ def cli() -> None:
     """
 
 
-for _command in (post, batch, verify, convert, preview, check, job, targets, coupon, calibrate):
-    cli.add_command(_command)
-cli.add_command(filter_command)
-cli.add_command(stale)
-cli.add_command(completion)
-
-
 def main() -> NoReturn:
     """Run the command line; never returns. One line on stderr for every error."""
     _keep_streams()
     _collect_seldom()
     sys.unraisablehook = _repeat_interrupt
-    if VARIABLE in os.environ:
+    if COMPLETE in os.environ:
+        from camtool.cli.completion import answer_shells
+
         answer_shells(cli)
     code = _code(debug="--debug" in sys.argv[1:])
     # All is done: an interruption now would only show a traceback while Python ends.
@@ -139,7 +160,7 @@ def _run() -> int:
         except click.exceptions.Exit as stop:
             code = stop.exit_code
         except SystemExit:
-            if VARIABLE in os.environ:  # the shell has its answer
+            if COMPLETE in os.environ:  # the shell has its answer
                 raise
             return EXIT_PIPE  # what click makes of EPIPE
         if sys.stdout is not None:

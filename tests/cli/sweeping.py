@@ -167,7 +167,10 @@ def _without(words: Sequence[str], name: str) -> list[str]:
 def flags_of(command: click.Command = cli, path: tuple[str, ...] = ()) -> Iterator[Flag]:
     """Every flag that takes a value, of every command."""
     if isinstance(command, click.Group):
-        for name, below in command.commands.items():
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            below = command.get_command(context, name)
+            assert below is not None
             yield from flags_of(below, (*path, name))
         if command is cli or not command.params:
             return

@@ -11,7 +11,8 @@ import click
 import pytest
 from click.shell_completion import CompletionItem, ShellComplete
 
-from camtool.cli.completion import VARIABLE, complete_values, dxf_layers
+from camtool.cli import COMPLETE
+from camtool.cli.completion import complete_values, dxf_layers
 from camtool.cli.main import cli
 
 LOGO = "samples/logo.dxf"
@@ -27,7 +28,7 @@ def told() -> click.Command:
 
 def items(told: click.Command, *line: str) -> list[CompletionItem]:
     """What may stand for the last word of the line."""
-    complete = ShellComplete(told, {}, "camtool", VARIABLE)
+    complete = ShellComplete(told, {}, "camtool", COMPLETE)
     return complete.get_completions(list(line[:-1]), line[-1])
 
 
@@ -140,7 +141,7 @@ def test_an_answer_loads_nothing_heavy() -> None:
         "from camtool.cli.main import main; main()"
     )
     asked = {
-        VARIABLE: "bash_complete",
+        COMPLETE: "bash_complete",
         "COMP_WORDS": f"camtool post {LOGO} --layer E",
     }
     result = subprocess.run(

@@ -188,7 +188,7 @@ def wrong_words(text: str) -> str:
         return f"{text}: {error}"
     command: click.Command = cli
     while isinstance(command, click.Group) and words and re.fullmatch(r"[a-z]+", words[0]):
-        found = command.commands.get(words[0])
+        found = command.get_command(click.Context(command), words[0])
         if found is None:
             return f"{text}: there is no command {words[0]}"
         command, words = found, words[1:]

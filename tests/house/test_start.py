@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from camtool.cli.main import COMMANDS
+
 ROOT = Path(__file__).parents[2]
 HEAVY = {
     "build123d",
@@ -99,6 +101,20 @@ def test_text_of_an_svg_loads_the_fonts_that_it_needs(
 
 def test_targets_load_no_library_of_drawings() -> None:
     assert not loaded_heavy("targets") & {"ezdxf", "shapely"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (("check", "samples/logo.dxf", "-q"), {"check"}),
+        (("targets", "--json"), {"targets"}),
+        (("verify", "samples/circle-30-steps.pic", "-t", "pic-mmh", "-q"), {"verify"}),
+        (("--version",), set()),
+    ],
+)
+def test_a_command_loads_no_other_command(arguments: tuple[str, ...], wanted: set[str]) -> None:
+    loaded = {module.removeprefix("camtool.cli.") for module in modules_of(*arguments)}
+    assert loaded & set(COMMANDS) == wanted
 
 
 def test_a_short_run_does_not_look_for_garbage() -> None:
