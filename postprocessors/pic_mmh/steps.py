@@ -787,7 +787,7 @@ def run_on(
 
 # Whole rows of the PIC18F8720's program, run and judged in one go, block by block.
 #
-# The positions of a leg  go to a small buffer, the slides follow
+# The positions of a leg go to a small buffer, the slides follow
 # (`camtool.kernels.play`), and the block is judged (`camtool.kernels.judging`) before the
 # next one is made: nothing is kept of the steps themselves.
 #
