@@ -53,7 +53,7 @@ FLAGS = {
     "unix": ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-g0", "-w"],
     "msvc": ["/O2", "/fp:precise"],
 }
-"""No sum is fused with a product, so the same numbers come out everywhere."""
+"""No sum is fused with a product, so every processor rounds alike; but see `UNORDERED`."""
 
 if CHECKED:
     FLAGS["unix"] += [
@@ -207,9 +207,11 @@ def lowered(text: str, module: str, cimported: set[str]) -> str:
             new = as_text(NUMBERS[_dotted(node)])
         else:
             new = _without(node, cimported)
+        whole = (
+            lines[low][: node.col_offset] + new.encode() + lines[high][node.end_col_offset or 0 :]
+        )
         # As many lines as before, so that Cython's messages point to the right ones.
-        after = new.encode() + b" \\\n" * 0 + lines[high][node.end_col_offset or 0 :]
-        lines[low : high + 1] = [lines[low][: node.col_offset] + after, *[b""] * (high - low)]
+        lines[low : high + 1] = [whole, *[b""] * (high - low)]
     return b"\n".join(lines).decode()
 
 
