@@ -1,7 +1,8 @@
 """One run of `camtool batch`: finds the drawings, makes those that are not up to date, and reports
 the outcome of each.
 
-It stands apart from the command, so that no other command loads what a batch needs.
+It stands apart from the command, so that `camtool --help`, which loads all commands, loads
+nothing of batches.
 """
 
 from __future__ import annotations
