@@ -87,10 +87,14 @@ def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
         return found
     from camtool.geometry.boxes import Curves
     from camtool.geometry.polylines import segment_rows
+    from camtool.kernels.move_tree import hilbert_order
     from camtool.kernels.offsets import curves_within, nearest_distances
 
-    curves = Curves.of(Segments.of(lines))
-    of = of[segment_rows(lines)]
+    segments = Segments.of(lines)
+    # What is near in the drawing need not be near in the file.
+    order = hilbert_order(0.5 * (segments.start + segments.end))
+    curves = Curves.of(segments[order])
+    of = of[segment_rows(lines)[order]]
     points = np.ascontiguousarray(_points(toolpath, rows))
     apart = nearest_distances(points, curves.rows, curves.tree)
     pairs = curves_within(points, apart + AS_NEAR_MM, curves.rows, curves.tree)
