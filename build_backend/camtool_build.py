@@ -53,7 +53,7 @@ FLAGS = {
     "unix": ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-g0", "-w"],
     "msvc": ["/O2", "/fp:precise"],
 }
-"""No sum is fused with a product, so every processor rounds alike; but see `UNORDERED`."""
+"""No sum is fused with a product: all processors round alike."""
 
 if CHECKED:
     FLAGS["unix"] += [
@@ -61,14 +61,6 @@ if CHECKED:
         "-fsanitize=signed-integer-overflow",
         "-fsanitize-undefined-trap-on-error",
     ]
-
-UNORDERED = "camtool.kernels.sums"
-"""The one module whose sums may be taken in any order, of numbers that are finite."""
-
-UNORDERED_FLAGS = {
-    "unix": ["-ffinite-math-only", "-fno-signed-zeros", "-fassociative-math"],
-    "msvc": ["/fp:fast"],
-}
 
 WIDE = """
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -351,8 +343,7 @@ class BuildKernels(build_ext):
         """With the flags of the compiler at hand."""
         kind = "msvc" if self.compiler.compiler_type == "msvc" else "unix"
         for each in self.extensions:
-            unordered = UNORDERED_FLAGS[kind] if each.name == UNORDERED else []
-            each.extra_compile_args = FLAGS[kind] + unordered
+            each.extra_compile_args = FLAGS[kind]
         super().build_extensions()
 
 

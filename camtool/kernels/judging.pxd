@@ -3,7 +3,6 @@
 cimport cython
 from libc cimport math
 from camtool.kernels.offsets cimport apart_square, wait_for_children
-from camtool.kernels.sums cimport largest, smallest, square_total, total
 from camtool.kernels.types cimport Int
 
 cdef class Search:
@@ -20,6 +19,21 @@ cdef class Judge:
     cdef double[::1] x, y, slide_x, slide_y, errors, size
     cdef double[::1] spoke_x, spoke_y, squares
     cdef Int[::1] bits, places
+
+@cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
+cpdef double total(double[::1] values, Int low, Int high) noexcept
+
+@cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
+cpdef double square_total(double[::1] values, Int low, Int high) noexcept
+
+@cython.locals(width=Int, lane=Int)
+cdef double sum_of_lanes(double* lanes) noexcept  # inline
+
+@cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
+cpdef double largest(double[::1] values, Int low, Int high) noexcept
+
+@cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
+cpdef double smallest(double[::1] values, Int low, Int high) noexcept
 
 @cython.locals(k=Int)
 cdef void _to_line(

@@ -26,7 +26,6 @@ from camtool.arrays import Floats, Ints
 from camtool.kernels.move_tree import FIRST as FIRST_BELOW
 from camtool.kernels.move_tree import LAST as LAST_BELOW
 from camtool.kernels.offsets import DEPTH, LEAF, apart_square, wait_for_children
-from camtool.kernels.sums import largest, smallest, square_total, total
 
 # Bins for the sizes of errors: those of a float's own bits. Plain numpy: no kernel.
 #
@@ -57,6 +56,94 @@ BEFORE_FIRST = ((1023 - 30) << MANTISSA_BITS) - 1
 
 BINS = ((1023 + 20) << MANTISSA_BITS) - BEFORE_FIRST + 1
 """How many bins; the last one is also for what is too large."""
+
+# Sums, largest and smallest numbers, of parts of arrays of finite numbers.
+#
+# `LANES` partial results take turns, so that the processor handles several numbers at once and
+# none waits for the one before. Which number goes to which is fixed: all processors round alike.
+
+
+LANES = 32
+"""How many partial results take turns; a power of two."""
+
+
+def total(values: Floats, low: int, high: int) -> float:
+    """The sum of values[low:high]."""
+    found, k = 0.0, low
+    if high - low >= LANES:
+        lanes = [0.0] * LANES
+        while k + LANES <= high:
+            for lane in range(LANES):
+                lanes[lane] += values[k + lane]
+            k += LANES
+        found = sum_of_lanes(lanes)
+    for j in range(k, high):
+        found += values[j]
+    return found
+
+
+def square_total(values: Floats, low: int, high: int) -> float:
+    """The sum of the squares of values[low:high]."""
+    found, k = 0.0, low
+    if high - low >= LANES:
+        lanes = [0.0] * LANES
+        while k + LANES <= high:
+            for lane in range(LANES):
+                lanes[lane] += values[k + lane] * values[k + lane]
+            k += LANES
+        found = sum_of_lanes(lanes)
+    for j in range(k, high):
+        found += values[j] * values[j]
+    return found
+
+
+def sum_of_lanes(lanes: list[float]) -> float:
+    """The sum of all partial sums, in pairs; they are changed."""
+    width = LANES // 2
+    while width > 0:
+        for lane in range(width):
+            lanes[lane] += lanes[lane + width]
+        width //= 2
+    return lanes[0]
+
+
+def largest(values: Floats, low: int, high: int) -> float:
+    """The largest of values[low:high], of which there is one at least."""
+    found, k = values[low], low
+    if high - low >= LANES:
+        lanes = [0.0] * LANES
+        for lane in range(LANES):
+            lanes[lane] = values[low + lane]
+        while k + LANES <= high:
+            for lane in range(LANES):
+                value = values[k + lane]
+                lanes[lane] = value if value > lanes[lane] else lanes[lane]
+            k += LANES
+        for lane in range(LANES):
+            found = lanes[lane] if lanes[lane] > found else found
+    for j in range(k, high):
+        found = values[j] if values[j] > found else found
+    return float(found)
+
+
+def smallest(values: Floats, low: int, high: int) -> float:
+    """The smallest of values[low:high], of which there is one at least."""
+    found, k = values[low], low
+    if high - low >= LANES:
+        lanes = [0.0] * LANES
+        for lane in range(LANES):
+            lanes[lane] = values[low + lane]
+        while k + LANES <= high:
+            for lane in range(LANES):
+                value = values[k + lane]
+                lanes[lane] = value if value < lanes[lane] else lanes[lane]
+            k += LANES
+        for lane in range(LANES):
+            found = lanes[lane] if lanes[lane] < found else found
+    for j in range(k, high):
+        found = values[j] if values[j] < found else found
+    return float(found)
+
 
 # How far points are from a move, with the side that they lie on: a line or an arc, many at once.
 #

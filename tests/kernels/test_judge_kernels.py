@@ -5,7 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from camtool.arrays import Floats
 from camtool.kernels.judging import (
     ANGLE_BINS,
     COUNT,
@@ -14,8 +17,12 @@ from camtool.kernels.judging import (
     Moves,
     bin_directions,
     empty_bins,
+    largest,
     new_pen,
     no_list,
+    smallest,
+    square_total,
+    total,
     trace_block,
     unwritten,
 )
@@ -30,6 +37,43 @@ from tests.oracles.kernel_doors import (
 from tests.oracles.near_moves import Arc, Line, Move, nearest, random_move
 
 EPS = 1e-12
+
+part_of_an_array = st.integers(0, 140).flatmap(
+    lambda size: st.tuples(
+        st.lists(st.floats(-1e9, 1e9), min_size=size, max_size=size).map(np.array),
+        st.integers(0, size),
+        st.integers(0, size),
+    )
+)
+
+
+@given(part_of_an_array)
+def test_sums_of_parts_of_arrays(drawn: tuple[Floats, int, int]) -> None:
+    """Against exact sums: n numbers, added one by one, round by at most n·2⁻⁵³ of their sizes."""
+    values, one, other = drawn
+    low, high = min(one, other), max(one, other)
+    part = values[low:high].tolist()
+    within = (high - low) * 2.0**-53
+    assert abs(total(values, low, high) - math.fsum(part)) <= within * math.fsum(map(abs, part))
+    squares = math.fsum(value * value for value in part)
+    assert abs(square_total(values, low, high) - squares) <= (within + 2.0**-52) * squares
+    if part:
+        assert largest(values, low, high) == max(part)
+        assert smallest(values, low, high) == min(part)
+
+
+def test_sums_are_the_same_on_every_processor() -> None:
+    """To the last bit what a loop in the same order finds."""
+    values = np.sin(np.arange(1.0, 1001.0) ** 2 % 97.0) * 1e3
+    lanes = [0.0] * 32
+    for k in range(992):
+        lanes[k % 32] += values[k]
+    while len(lanes) > 1:
+        half = len(lanes) // 2
+        lanes = [lanes[k] + lanes[k + half] for k in range(half)]
+    for k in range(992, 1000):
+        lanes[0] += values[k]
+    assert total(values, 0, 1000) == lanes[0]
 
 
 def test_errors_are_those_of_a_loop_with_angles() -> None:
