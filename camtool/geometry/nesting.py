@@ -7,15 +7,19 @@ as a hair up and to the right of it, the same way in both questions, so that no 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
-from camtool.geometry.boxes import Curves
+from camtool.geometry.boxes import BoxIndex, Curves
 from camtool.geometry.measure import path_extents, point_at, signed_areas
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, reverse
+
+HOLDERS_AT_A_TIME = 256
+"""For how many paths those within their boxes are found together: it bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +47,15 @@ def nesting(lines: Polylines, holds: Bools | None = None) -> Nesting:
     points, owner = _witnesses(lines, segments)
     first_point = np.searchsorted(owner, np.arange(count + 1))
     first_segment = np.searchsorted(segments.path, np.arange(count + 1))
-    waiting = np.ones(count, dtype=np.bool_)
     is_double = np.zeros(count, dtype=np.bool_)
     # From large to small: the last path found to hold another one is the smallest of them.
-    for j in sorted(np.flatnonzero(lines.closed).tolist(), key=lambda k: (-areas[k], k)):
-        waiting[j] = False
-        inner = np.flatnonzero(_box_in(boxes, boxes[j]) & (waiting | ~lines.closed))
-        if len(inner) == 0 or is_double[j] or not (holds is None or holds[j]):
+    closed = np.flatnonzero(lines.closed)
+    closed = closed[np.argsort(-areas[closed], kind="stable")]
+    rank = np.full(count, len(closed))
+    rank[closed] = np.arange(len(closed))
+    for j, within in _within(boxes, closed if holds is None else closed[holds[closed]]):
+        inner = within[rank[within] > rank[j]]
+        if len(inner) == 0 or is_double[j]:
             continue
         ring = segments[first_segment[j] : first_segment[j + 1]]
         held, on_line = _held(points, first_point, inner, ring)
@@ -79,11 +85,23 @@ def _witnesses(lines: Polylines, segments: Segments) -> tuple[Floats, Ints]:
     return np.concatenate([lines.vertices[:, :2], middles])[order], owner[order]
 
 
-def _box_in(boxes: Floats, box: Floats) -> Bools:
-    """(M,) true for the boxes (M, 2, 2) that do not reach out of this one."""
-    low = boxes[:, :, 0] >= box[:, 0] - POSITION_EPS_MM
-    high = boxes[:, :, 1] <= box[:, 1] + POSITION_EPS_MM
-    return np.asarray((low & high).all(axis=1))
+def _within(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
+    """Each of these paths in turn, and the paths whose boxes (M, 2, 2) do not reach out of its
+    own: their centres lie in it."""
+    low, high = boxes[:, :, 0], boxes[:, :, 1]
+    centres = 0.5 * (low + high)
+    index = BoxIndex(np.hstack([centres, centres]))
+    wide = np.hstack([low - 2.0 * POSITION_EPS_MM, high + 2.0 * POSITION_EPS_MM])
+    for begin in range(0, len(holders), HOLDERS_AT_A_TIME):
+        some = holders[begin : begin + HOLDERS_AT_A_TIME]
+        one, other = index.touching(wide[some])
+        holder = some[one]
+        inside = (low[other] >= low[holder] - POSITION_EPS_MM).all(axis=1)
+        inside &= (high[other] <= high[holder] + POSITION_EPS_MM).all(axis=1)
+        one, other = one[inside], other[inside]
+        ends = np.searchsorted(one, np.arange(len(some) + 1)).tolist()
+        for k, j in enumerate(some.tolist()):
+            yield j, other[ends[k] : ends[k + 1]]
 
 
 def _held(points: Floats, first_point: Ints, inner: Ints, ring: Segments) -> tuple[Ints, Ints]:

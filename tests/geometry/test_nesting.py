@@ -224,3 +224,18 @@ def test_many_vertices() -> None:
     ring = Polyline(np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle]), True)
     found = regions(Polylines.of([scaled(ring, 50.0), scaled(ring, 49.99), scaled(ring, 1.0)]))
     assert [len(each) for each in found] == [2, 1]
+
+
+def test_many_paths_nest_as_their_boxes_do() -> None:
+    # More than are looked at together, and than a box index keeps in their order.
+    rng = np.random.default_rng(5)
+    corners = rng.uniform(0.0, 100.0, (3000, 2))
+    sizes = 10.0 ** rng.uniform(-1.0, 1.7, (3000, 2))
+    low, high = corners, corners + sizes
+    paths = [_box(*a, *b) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+    inside = (low[:, None] >= low[None]).all(axis=2) & (high[:, None] <= high[None]).all(axis=2)
+    np.fill_diagonal(inside, False)
+    areas = np.where(inside, sizes.prod(axis=1), np.inf)
+    found = nesting(Polylines.of(paths))
+    assert found.depth.tolist() == inside.sum(axis=1).tolist()
+    assert found.parent.tolist() == np.where(inside.any(axis=1), areas.argmin(axis=1), -1).tolist()
