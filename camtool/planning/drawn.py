@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.measure import extents
+from camtool.geometry.measure import path_extents
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.planning.items import Contour, Fixed, Item, Step
@@ -129,8 +129,9 @@ def _edges(step: Step, placed: Drawing) -> Iterator[tuple[Item, tuple[Floats, Fl
     """Items that cut an edge, each with its nominal and its planned box."""
     items = list({id(owner): owner for owner in step.owners if _cuts_edge(owner)}.values())
     share = Counter(item.source for item in items)
-    for item in items:
-        nominal, planned = _boxes(item, placed)
+    drawn = path_extents(placed.paths)
+    for item, centre in zip(items, _centre_boxes(items), strict=True):
+        nominal, planned = _boxes(item, drawn[item.source], centre)
         yield item, (nominal if share[item.source] == 1 else planned, planned)
 
 
@@ -141,22 +142,34 @@ def _cuts_edge(item: Item) -> bool:
     return item.path.closed
 
 
-def _boxes(item: Item, placed: Drawing) -> tuple[Floats, Floats]:
-    """Nominal and planned box of the edge that an item cuts, as if its line were its own."""
-    drawn = extents(placed.paths.select([item.source]))
+def _centre_boxes(items: Sequence[Item]) -> Floats:
+    """(E, 2, 2) mm: the box of the tool's centre on each item."""
+    boxes = np.empty((len(items), 2, 2))
+    contours = {k: item.path for k, item in enumerate(items) if isinstance(item, Contour)}
+    boxes[list(contours)] = path_extents(Polylines.of(contours.values()))
+    for k, item in enumerate(items):
+        if isinstance(item, Fixed):
+            points = _points_of(item)[:, :2]
+            boxes[k] = np.column_stack([points.min(axis=0), points.max(axis=0)])
+    return boxes
+
+
+def _points_of(item: Fixed) -> Floats:
+    """(N, 3) x, y, z of all vertices of its runs."""
+    return np.concatenate([run.vertices[:, :3] for run in item.runs])
+
+
+def _boxes(item: Item, drawn: Floats, centre: Floats) -> tuple[Floats, Floats]:
+    """Nominal and planned box of the edge that an item cuts, as if its line were its own: those of
+    its line and of the tool's centre."""
     operation = item.setting.operation
     radius, allowance = operation.tool.radius_mm, operation.allowance_mm
-    if isinstance(item, Contour):
-        centre = extents(Polylines.of([item.path]))
-        if item.material_left is None:
-            return drawn, centre
-    else:
-        points = np.concatenate([run.vertices[:, :3] for run in item.runs])
-        if operation.kind == "vcarve":
-            from camtool.planning.carve import Cone
+    if isinstance(item, Contour) and item.material_left is None:
+        return drawn, centre
+    if isinstance(item, Fixed) and operation.kind == "vcarve":
+        from camtool.planning.carve import Cone
 
-            return drawn, _carved(points, Cone.of(operation))
-        centre = np.column_stack([points.min(axis=0), points.max(axis=0)])[:2]
+        return drawn, _carved(_points_of(item), Cone.of(operation))
     wider = np.array([-1.0, 1.0])
     more = np.diff(centre - drawn)[:, 0] - 2.0 * (radius + allowance)
     if isinstance(item, Fixed) or more.max() < -SAME_SIZE_MM:
