@@ -356,11 +356,14 @@ def _near(points: Floats, segments: Segments, times: float) -> tuple[Floats, Int
     """(P,) how far the nearest segment is from each point; and pairs (J,), (J,) of a point and a
     segment that is no farther from it than so many times that."""
     from camtool.geometry.boxes import Curves
+    from camtool.kernels.move_tree import hilbert_order
     from camtool.kernels.offsets import curves_within, nearest_distances
 
     points = np.ascontiguousarray(points)
-    curves = Curves.of(segments)
+    # Loose lines come in any order; those that follow one another in the index must be near.
+    order = hilbert_order(segments.start)
+    curves = Curves.of(segments[order])
     apart = nearest_distances(points, curves.rows, curves.tree)
     pairs = curves_within(points, times * apart + POSITION_EPS_MM, curves.rows, curves.tree)
     # Two positions nearer than that are one.
-    return np.where(apart > POSITION_EPS_MM, apart, 0.0), pairs[:, 0], pairs[:, 1]
+    return np.where(apart > POSITION_EPS_MM, apart, 0.0), pairs[:, 0], order[pairs[:, 1]]

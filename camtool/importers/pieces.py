@@ -27,7 +27,7 @@ class Unusable(Exception):
     """The entity gives no piece; the text is the reason."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Piece:
     """One entity: `vertices` (n, 3) of x, y, bulge in mm, and where it came from.
 

@@ -131,20 +131,31 @@ def dxf(count: int) -> bytes:
     return stream.getvalue().encode()
 
 
-@pytest.mark.benchmark(group="a DXF of 10,000 loose lines: at most 1.6 times ezdxf's loading")
+@pytest.mark.benchmark(group="a DXF of 10,000 loose lines: at most 1.3 times ezdxf's loading")
 @pytest.mark.parametrize("reader", ["ezdxf.readfile", "read_drawing"])
 def test_dxf(benchmark: Any, reader: str, tmp_path: Path) -> None:
+    read_dxf(benchmark, reader, tmp_path, 10_000)
+
+
+@pytest.mark.benchmark(group="a DXF of 100,000 loose lines: at most 1.3 times ezdxf's loading")
+@pytest.mark.parametrize("reader", ["ezdxf.readfile", "read_drawing"])
+def test_large_dxf(benchmark: Any, reader: str, tmp_path: Path) -> None:
+    read_dxf(benchmark, reader, tmp_path, 100_000)
+
+
+def read_dxf(benchmark: Any, reader: str, tmp_path: Path, count: int) -> None:
+    """So many lines read by either."""
     import ezdxf
 
     file = tmp_path / "lines.dxf"
-    file.write_bytes(dxf(10_000))
+    file.write_bytes(dxf(count))
     if reader == "read_drawing":
-        drawing = benchmark.pedantic(lambda: read_drawing(file), rounds=5, warmup_rounds=1)
-        assert len(drawing.paths) == 2_500
+        drawing = benchmark.pedantic(lambda: read_drawing(file), rounds=3, warmup_rounds=1)
+        assert len(drawing.paths) == count // 4
         assert drawing.paths.closed.all()
     else:
-        document = benchmark.pedantic(lambda: ezdxf.readfile(file), rounds=5, warmup_rounds=1)
-        assert len(document.modelspace()) == 10_000
+        document = benchmark.pedantic(lambda: ezdxf.readfile(file), rounds=3, warmup_rounds=1)
+        assert len(document.modelspace()) == count
 
 
 def svg(count: int) -> bytes:

@@ -37,7 +37,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     with without_collector():
         loaded = load(data, file)
         units, findings = units_of(loaded.header, options)
-        walk = Walk(loaded.document, file, options)
+        walk = Walk(loaded, file, options)
         with quiet():
             walk.space(_space(loaded.document, options.layout, file), units.mm_per_unit)
     return assemble(

@@ -166,7 +166,8 @@ def require(entity: Any, names: tuple[str, ...]) -> None:
 
 def numbers(values: Any) -> Floats:
     """Any numbers as an array; DrawingError when one of them is none."""
-    found = np.array(values if isinstance(values, list) else tuple(values), dtype=np.float64)
+    plain = isinstance(values, (list, np.ndarray))
+    found = np.array(values if plain else tuple(values), dtype=np.float64)
     if not np.isfinite(found).all():
         raise DrawingError(
             "has a coordinate that is not a finite number", mend="delete it or draw it again"

@@ -17,7 +17,8 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Mark
-from camtool.importers.dxf.load import printable
+from camtool.importers.dxf.bulk import Lines
+from camtool.importers.dxf.load import Loaded, printable
 from camtool.importers.dxf.shapes import (
     Frame,
     Reader,
@@ -43,6 +44,7 @@ MAX_NESTING = 50
 """Largest depth of blocks within blocks."""
 
 _NOWHERE = Piece(np.zeros((0, 3)), False, "", "", "")
+_NO_LINES = Lines([], np.zeros((0, 2, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,7 @@ class Scope:
 class Walk:
     """Visits entities and collects what they give."""
 
-    document: Any
+    loaded: Loaded
     file: str
     options: ReadOptions
     pieces: list[Piece] = field(default_factory=list)
@@ -74,16 +76,17 @@ class Walk:
     def __post_init__(self) -> None:
         self._inserted = 0
         self._visited = 0
-        self._sizes = BlockSizes(self.document.blocks)
-        self._looks = Looks.of(self.document)
+        self._sizes = BlockSizes(self.loaded.document.blocks)
+        self._looks = Looks.of(self.loaded.document)
 
     def space(self, space: Any, mm_per_unit: float) -> None:
         """All entities of a space; what other layouts hold is counted."""
         self._entities(space, Scope(Frame(mm_per_unit * np.eye(3), np.zeros(3))))
         self.pieces = [piece for piece in self.pieces if piece is not _NOWHERE]
-        for layout in self.document.layouts:
+        for layout in self.loaded.document.layouts:
             if layout.layout_key != space.layout_key:
-                count = sum(entity.dxftype() != "VIEWPORT" for entity in layout)
+                shown = (entity for entity in layout if entity.dxftype() != "VIEWPORT")
+                count = sum(map(self._count_with, shown))
                 if count:
                     where = "model space" if layout.is_modelspace else "paper space"
                     self.skipped["entity", f"is in {where}"] += count
@@ -100,11 +103,11 @@ class Walk:
                 if kind == "LINE":
                     require(entity, ("start", "end"))
                     lines.append((len(self.pieces), entity, look))
-                    self.pieces.append(_NOWHERE)
+                    self.pieces.extend([_NOWHERE] * self._count_with(entity))
                 else:
                     self._entity(entity, scope, look)
             except Unusable as reason:
-                self._skip(kind, reason)
+                self._skip(kind, reason, self._count_with(entity))
             except DrawingError as error:
                 raise self._placed(error, entity, look) from error
         if lines:
@@ -137,30 +140,53 @@ class Walk:
         else:
             raise Unusable(WHY_UNUSED.get(kind, OTHER))
 
+    def _following(self, entity: Any) -> Lines:
+        """The LINEs that follow this entity and are no entities of the document."""
+        return self.loaded.lines.get(entity.dxf.handle, _NO_LINES)
+
+    def _count_with(self, entity: Any) -> int:
+        """The entity and those that follow it."""
+        return 1 + len(self._following(entity).handles)
+
     def _lines(self, lines: list[tuple[int, Any, Look]], scope: Scope) -> None:
         """All LINEs of a scope, each into the place that was kept for it."""
+        following = [self._following(entity) for _, entity, _ in lines]
+        counts = np.array([1 + len(more.handles) for more in following])
+        first = np.cumsum(counts) - counts
+        is_first = np.zeros(counts.sum(), dtype=np.bool_)
+        is_first[first] = True
+        points = np.empty((len(is_first), 2, 3))
         ends = [(*entity.dxf.start, *entity.dxf.end) for _, entity, _ in lines]
-        points = np.array(ends, dtype=np.float64).reshape(-1, 2, 3)
+        points[is_first] = np.array(ends, dtype=np.float64).reshape(-1, 2, 3)
+        points[~is_first] = np.concatenate(
+            [_NO_LINES.ends, *(more.ends for more in following if more.handles)]
+        )
         finite = np.isfinite(points).all(axis=(1, 2))
         if not finite.all():
-            row = int(np.argmin(finite))
-            error = DrawingError(
-                "has a coordinate that is not a finite number", mend="delete it or draw it again"
+            at = int(np.argmin(finite))
+            of = int(np.searchsorted(first, at, side="right")) - 1
+            _, entity, look = lines[of]
+            handle = (entity.dxf.handle, *following[of].handles)[at - int(first[of])]
+            raise DrawingError(
+                "has a coordinate that is not a finite number",
+                file=self.file,
+                where=f"layer {look.layer}, LINE {handle}",
+                mend="delete it or draw it again",
             )
-            raise self._placed(error, *lines[row][1:])
         flat, is_flat = scope.frame.flat_each(points)
-        vertices = np.zeros((len(lines), 2, 3))
+        vertices = np.zeros((len(points), 2, 3))
         vertices[:, :, :2] = flat
-        for rows, usable, (place, entity, look) in zip(
-            vertices, is_flat.tolist(), lines, strict=True
-        ):
-            if usable:
-                source = scope.source or f"LINE {entity.dxf.handle}{scope.within}"
-                self.pieces[place] = Piece(
-                    rows, False, look.layer, look.colour, source, look.line_type
-                )
-            else:
-                self._skip("LINE", Unusable("is not flat"))
+        rows = iter(zip(vertices, is_flat.tolist(), strict=True))
+        for (place, entity, look), more in zip(lines, following, strict=True):
+            for k, handle in enumerate((entity.dxf.handle, *more.handles)):
+                row, usable = next(rows)
+                if usable:
+                    source = scope.source or f"LINE {handle}{scope.within}"
+                    self.pieces[place + k] = Piece(
+                        row, False, look.layer, look.colour, source, look.line_type
+                    )
+                else:
+                    self._skip("LINE", Unusable("is not flat"))
         if is_flat.any() and not scope.source:
             self.used["LINE"] += int(is_flat.sum())
 
@@ -259,8 +285,8 @@ class Walk:
         if not scope.source:
             self.used[entity.dxftype()] += 1
 
-    def _skip(self, kind: str, reason: Unusable) -> None:
-        self.skipped[kind, printable(str(reason))] += 1
+    def _skip(self, kind: str, reason: Unusable, count: int = 1) -> None:
+        self.skipped[kind, printable(str(reason))] += count
 
     def _placed(self, error: DrawingError, entity: Any, look: Look) -> DrawingError:
         """The error with file and place."""

@@ -1,0 +1,185 @@
+"""What a DXF file has in bulk, by columns: LINEs that differ in their ends alone, and vertices.
+
+ezdxf makes an object of each LINE, eight times as large as its text, and several of each vertex.
+It gets the first of the LINEs that follow one another and say the same of themselves (layer, line
+type, colour, owner and whatever else), and LWPOLYLINEs without their vertices:
+
+    tags ──Bulk.of──▶ others: the tags for ezdxf
+                 ├──▶ lines: ends and handles of the LINEs that follow one of ezdxf's
+                 └──▶ vertices of ezdxf's LWPOLYLINEs
+
+Where handles are missing or name two entities, all is left to ezdxf, which mends them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.importers.dxf.tags import Frame, Tags
+
+LEAST_VERTICES = 32
+"""LWPOLYLINEs of fewer vertices are ezdxf's alone."""
+
+_HANDLE, _HEIGHT, _SUBCLASS, _REFERENCE = 5, 30, 100, 330
+_HANDLES = (_HANDLE, 105)
+_START, _END = (10, 20, 30), (11, 21, 31)
+_OWN = (_HANDLE, *_START, *_END)
+"""The group codes in which LINEs that are read together differ."""
+
+_VERTEX = (10, 20, 40, 41, 42)
+"""The group codes of a vertex: x, y, both widths and the bulge."""
+
+_HATCHES = frozenset(("HATCH", "MPOLYGON"))
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """LINEs by columns: `ends` (K, 2, 3) in the units of the file."""
+
+    handles: list[str]
+    ends: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Bulk:
+    """`others` (N,): the tags that are left to ezdxf; the LINEs that follow the one of a handle;
+    the vertices (K, 5) of the LWPOLYLINE of a handle."""
+
+    others: Bools
+    lines: Mapping[str, Lines] = field(default_factory=dict)
+    vertices: Mapping[str, Floats] = field(default_factory=dict)
+
+    @classmethod
+    def none(cls, tags: Tags) -> Bulk:
+        """All tags are left to ezdxf."""
+        return cls(np.ones(len(tags.codes), dtype=np.bool_))
+
+    @classmethod
+    def of(cls, tags: Tags, frame: Frame) -> Bulk:
+        """What the section of entities has in bulk."""
+        part = next((each for each in frame.sections if each.name == "ENTITIES"), None)
+        if part is None or part.end is None or frame.faults:
+            return cls.none(tags)
+        first, last = np.searchsorted(tags.marks, [part.begin + 1, part.end]).tolist()
+        marks, kinds = tags.marks[first : last + 1], np.array(tags.kinds[first:last], dtype=object)
+        others = np.ones(len(tags.codes), dtype=np.bool_)
+        try:
+            lines = _lines(tags, marks, np.asarray(kinds == "LINE", dtype=np.bool_), others)
+            polylines = np.flatnonzero(kinds == "LWPOLYLINE")
+            vertices = _vertices(tags, marks[polylines], marks[polylines + 1], others)
+        except ValueError:  # a number that is none: ezdxf says where
+            return cls.none(tags)
+        found = cls(others, lines, vertices)
+        return found if found._is_plain(tags, frame) else cls.none(tags)
+
+    def _is_plain(self, tags: Tags, frame: Frame) -> bool:
+        """Whether handles name one entity each, and no hatch refers to a LINE that is left out."""
+        followers = {handle for each in self.lines.values() for handle in each.handles}
+        names = {*followers, *self.lines, *self.vertices}
+        held = np.isin(tags.codes, _HANDLES)
+        for section in frame.sections:
+            if section.name == "HEADER":
+                held[section.begin : section.end] = False
+        count = sum(len(each.handles) for each in self.lines.values())
+        count += len(self.lines) + len(self.vertices)
+        said = sum(handle in names for handle in tags.values(np.flatnonzero(held)))
+        if not len(names) == count == said:
+            return False
+        if _HATCHES.isdisjoint(tags.kinds):
+            return True
+        references = np.flatnonzero(self.others & (tags.codes == _REFERENCE))
+        return followers.isdisjoint(tags.values(references))
+
+
+def _lines(tags: Tags, marks: Ints, is_line: Bools, others: Bools) -> dict[str, Lines]:
+    """The LINEs that follow another one and say the same, by the handle of the first; their tags
+    leave `others`. Entity k stands from marks[k] to marks[k + 1]."""
+    sizes = np.diff(marks)
+    follows = np.zeros(len(sizes) + 1, dtype=np.bool_)
+    follows[1:-1] = is_line[1:] & is_line[:-1] & (sizes[1:] == sizes[:-1])
+    for size in np.unique(sizes[follows[:-1]]).tolist():
+        chosen = np.flatnonzero(follows[:-1] & (sizes == size))
+        follows[chosen] = _say_the_same(tags, marks[chosen], size)
+    firsts, lasts = (np.flatnonzero(np.diff(follows.astype(np.int8)) == step) for step in (1, -1))
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for row, first in enumerate(firsts.tolist()):
+        codes = tuple(tags.codes[marks[first] : marks[first + 1]].tolist())
+        alike.setdefault(codes, []).append(row)
+    found: dict[str, Lines] = {}
+    for codes, of in alike.items():
+        if not _is_simple(codes):
+            continue
+        heads, counts = firsts[of], (lasts - firsts)[of]
+        begins = np.cumsum(counts) - counts
+        rows = marks[np.arange(counts.sum()) + np.repeat(heads + 1 - begins, counts)]
+        ends = np.zeros((len(rows), 6))
+        for column, code in enumerate((*_START, *_END)):
+            if code in codes:
+                ends[:, column] = tags.numbers(rows + codes.index(code))
+        at = codes.index(_HANDLE)
+        handles = list(tags.values(rows + at))
+        for head, begin, count in zip(
+            tags.values(marks[heads] + at), begins.tolist(), counts.tolist(), strict=True
+        ):
+            part = slice(begin, begin + count)
+            found[head] = Lines(handles[part], ends[part].reshape(-1, 2, 3))
+        for k in range(len(codes)):
+            others[rows + k] = False
+    return found
+
+
+def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
+    """(K,) whether the entities of so many tags, which begin at these rows (K,), have the codes
+    and values of those just before them, save handle and ends."""
+    table = tags.codes[rows[:, None] + np.arange(size)]
+    same = np.asarray((table == tags.codes[rows[:, None] + np.arange(-size, 0)]).all(axis=1))
+    for k in range(size):
+        chosen = np.flatnonzero(same & ~np.isin(table[:, k], _OWN))
+        here, before = rows[chosen] + k, rows[chosen] + k - size
+        # Most of them stand before one and after another: each is looked up once.
+        asked = np.zeros(len(tags.codes), dtype=np.bool_)
+        asked[here] = asked[before] = True
+        place = np.cumsum(asked) - 1
+        values = np.array([*tags.raw(np.flatnonzero(asked)), None], dtype=object)
+        same[chosen] = values[place[here]] == values[place[before]]
+    return same
+
+
+def _is_simple(codes: tuple[int, ...]) -> bool:
+    """Whether a LINE of these group codes has one handle and two ends, each written in one go."""
+    if codes.count(_HANDLE) != 1 or _HANDLES[1] in codes:
+        return False
+    for point in (_START, _END):
+        if any(codes.count(code) > 1 for code in point) or point[0] not in codes:
+            return False
+        at = codes.index(point[0])
+        count = 3 if point[2] in codes else 2
+        if codes[at : at + count] != point[:count]:
+            return False
+    return True
+
+
+def _vertices(tags: Tags, begins: Ints, ends: Ints, others: Bools) -> dict[str, Floats]:
+    """The vertices (K, 5) of the larger ones of the LWPOLYLINEs that stand there, by their
+    handles; their tags leave `others`."""
+    found: dict[str, Floats] = {}
+    for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
+        codes = tags.codes[begin:end]
+        x, *more = (np.flatnonzero(codes == code) for code in _VERTEX)
+        handle, subclass = (np.flatnonzero(codes == code) for code in (_HANDLE, _SUBCLASS))
+        if len(x) < LEAST_VERTICES or not np.array_equal(x + 1, more[0]) or len(handle) != 1:
+            continue
+        first = min(at.min(initial=end) for at in (x, *more))
+        if first < x[0] or not len(subclass) or subclass[-1] > x[0] or (codes == _HEIGHT).any():
+            continue
+        rows = np.zeros((len(x), len(_VERTEX)))
+        rows[:, 0] = tags.numbers(begin + x)
+        for column, at in enumerate(more, 1):
+            rows[np.searchsorted(x, at) - 1, column] = tags.numbers(begin + at)
+        found[str(tags.value(begin + int(handle[0])))] = rows
+        others[begin + np.concatenate([x, *more])] = False
+    return found

@@ -1,0 +1,436 @@
+"""The bytes of a DXF file to its tags, and what the tags themselves say is damaged.
+
+A *tag* is a group code and a value: two lines of ASCII, or bytes of binary DXF. ezdxf's readers
+also accept "1_0" as a number, and find one in garbage ("x1y"); here whatever is no number ends
+the reading. `frame_of` finds the sections, and whether the file is whole.
+
+The values of ASCII stay in the bytes of the file until they are asked for: as strings they would
+take eight times as much memory.
+"""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.errors import DrawingError
+
+AGAIN = "export it again from the program that made it, best as DXF R2000 or later"
+
+LARGEST_CODE, UNUSED_CODES = 1071, range(482, 999)
+"""Group codes in files are 0 to 481 and 999 to 1071 (DXF reference)."""
+
+SECTIONS = frozenset(
+    ("HEADER", "CLASSES", "TABLES", "BLOCKS", "ENTITIES", "OBJECTS", "THUMBNAILIMAGE", "ACDSDATA")
+)
+"""Sections that the DXF reference names."""
+
+AT_ONCE = 65536
+"""So many values become Python objects together."""
+
+_LAYER, _VARIABLE, _POINT, _COUNT = 8, 9, 10, 90
+_UTF16_MARKS, _UTF8_MARK = (b"\xff\xfe", b"\xfe\xff"), b"\xef\xbb\xbf"
+_CODE = re.compile(rb"[ \t]*[0-9]{1,4}[ \t]*\r?")
+_NUMBER = re.compile(
+    r"[ \t]*[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|inf(?:inity)?)\s*", re.I
+)
+_VERSION = re.compile(rb"\$ACADVER\s+1\s+(AC\d{4})")
+_CODEPAGE = re.compile(rb"\$DWGCODEPAGE\s+3\s+(\w+)")
+_UTF8_SINCE = b"AC1021"
+_NOT_ASCII = 0x80
+_HEAD_BYTES = 65536  # the header's first variables name version and code page
+
+Codes = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Tags(ABC):
+    """The tags of a file, comments (999) included: `codes` (N,) and as many values.
+
+    `notes`: what is damaged without harm to the rest, one phrase each.
+    """
+
+    codes: Codes
+    notes: tuple[str, ...] = ()
+
+    is_text: ClassVar[bool]
+
+    @abstractmethod
+    def raw(self, rows: Ints) -> Iterator[Any]:
+        """The values of these tags as the file has them: of ASCII the bytes of their lines."""
+
+    @abstractmethod
+    def values(self, rows: Ints) -> Iterator[Any]:
+        """The values of these tags: of ASCII the text, of binary DXF strings, numbers, bytes."""
+
+    @abstractmethod
+    def code_as_said(self, row: int) -> str:
+        """The group code of a tag as the file has it, for messages."""
+
+    @abstractmethod
+    def ended(self, count: int) -> Tags:
+        """The first `count` tags and an end mark."""
+
+    def value(self, row: int) -> Any:
+        """The value of one tag."""
+        return next(self.values(np.array([row])))
+
+    def numbers(self, rows: Ints) -> Floats:
+        """(K,) the values of these tags as numbers; ValueError when one is none."""
+        return np.fromiter(map(float, self.raw(rows)), dtype=np.float64, count=len(rows))
+
+    def pairs(self, rows: Ints) -> Iterator[tuple[int, Any]]:
+        """Code and value of each of these tags."""
+        for some in lots(rows):
+            yield from zip(self.codes[some].tolist(), self.values(some), strict=True)
+
+    def where(self, row: int) -> str:
+        """The place of a tag for messages."""
+        return f"line {2 * row + 1}" if self.is_text else f"tag {row + 1}"
+
+    @cached_property
+    def marks(self) -> Ints:
+        """(M,) the tags that begin something: their code is 0."""
+        return np.flatnonzero(self.codes == 0)
+
+    @cached_property
+    def kinds(self) -> list[Any]:
+        """What begins at each of the `marks`."""
+        return list(self.values(self.marks))
+
+
+def lots(rows: Ints) -> Iterator[Ints]:
+    """The rows in lots of `AT_ONCE`."""
+    return (rows[first : first + AT_ONCE] for first in range(0, len(rows), AT_ONCE))
+
+
+@dataclass(frozen=True, eq=False)
+class BinaryTags(Tags):
+    """The tags of binary DXF."""
+
+    held: Sequence[Any] = ()
+
+    is_text = False
+
+    def raw(self, rows: Ints) -> Iterator[Any]:
+        """The values of these tags."""
+        return map(self.held.__getitem__, rows.tolist())
+
+    values = raw
+
+    def code_as_said(self, row: int) -> str:
+        """The group code of a tag."""
+        return str(self.codes[row])
+
+    def ended(self, count: int) -> Tags:
+        """The first `count` tags and an end mark."""
+        return BinaryTags(np.append(self.codes[:count], _MARK), (), [*self.held[:count], "EOF"])
+
+
+@dataclass(frozen=True, eq=False)
+class TextTags(Tags):
+    """The tags of ASCII DXF: line 2k of `data` is the code of tag k, line 2k + 1 its value; line j
+    begins at the byte `at[j]`. `escaped`: signs may be written as \\U+00D6 or \\M+1…"""
+
+    data: bytes = b""
+    at: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(1, dtype=np.int32))
+    encoding: str = "utf-8"
+    escaped: bool = False
+
+    is_text = True
+
+    def raw(self, rows: Ints) -> Iterator[bytes]:
+        """The lines of the values of these tags."""
+        data = self.data
+        for some in lots(rows):
+            ends = zip(self.at[2 * some + 1].tolist(), self.at[2 * some + 2].tolist(), strict=True)
+            yield from [data[begin : end - 1] for begin, end in ends]
+
+    def values(self, rows: Ints) -> Iterator[str]:
+        """The values of these tags."""
+        for some in lots(rows):
+            texts = [
+                line.decode(self.encoding, "surrogateescape").rstrip("\r")
+                for line in self.raw(some)
+            ]
+            yield from _without_escapes(texts) if self.escaped else texts
+
+    def code_as_said(self, row: int) -> str:
+        """The line of the group code of a tag."""
+        line = self.data[self.at[2 * row] : self.at[2 * row + 1] - 1]
+        return repr(line.decode(self.encoding, "surrogateescape").strip()[:20])
+
+    def ended(self, count: int) -> Tags:
+        """The first `count` tags and an end mark."""
+        lines = self.at[: 2 * count + 1]
+        return replace(
+            self,
+            codes=np.append(self.codes[:count], _MARK),
+            data=self.data[: lines[-1] - 1] + b"\n0\nEOF\n",
+            at=np.append(lines, lines[-1] + np.array([2, 6], dtype=np.int32)),
+        )
+
+    def values_with(self, letters: Bools) -> Ints:
+        """The tags whose values have one of these bytes (of `data`)."""
+        lines = np.searchsorted(self.at, np.flatnonzero(letters), side="right") - 1
+        rows = np.unique(lines[lines % 2 == 1] // 2)
+        return rows[rows < len(self.codes)]
+
+
+_MARK = np.zeros(1, dtype=np.int32)
+
+
+@dataclass(frozen=True)
+class Section:
+    """Tags `begin` (its 0 SECTION) to `end` (its 0 ENDSEC; None when that is missing)."""
+
+    name: str
+    begin: int
+    end: int | None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The sections, the index of the end mark (None when it is missing), and what is wrong."""
+
+    sections: tuple[Section, ...]
+    eof: int | None
+    faults: tuple[str, ...]
+
+    def whole(self, name: str) -> bool:
+        """Whether there is a section of this name, each with its end."""
+        ends = [part.end for part in self.sections if part.name == name]
+        return bool(ends) and None not in ends
+
+
+def binary_tags(data: bytes, file: str) -> Tags:
+    """The tags of binary DXF up to its end mark, or to where they end to be tags; DrawingError
+    when a group code is none."""
+    from ezdxf.lldxf.tagger import binary_tags_loader
+
+    codes: list[int] = []
+    values: list[Any] = []
+    # The reader raises different errors for bytes that are no tags. What it has read until then
+    # has no end mark, which is how the fault is found.
+    with suppress(Exception):
+        for tag in binary_tags_loader(data, errors="surrogateescape"):
+            codes.append(tag.code)
+            values.append(tag.value)
+            if tag.code == 0 and tag.value == "EOF":
+                break
+    tags = BinaryTags(np.array(codes, dtype=np.int32), held=values)
+    _check_codes(tags, file)
+    return tags
+
+
+def ascii_tags(data: bytes, file: str) -> Tags:
+    """The tags of ASCII DXF up to its end mark; DrawingError when a group code is none."""
+    data, encoding, notes = _plain_lines(data)
+    letters = np.frombuffer(data, dtype=np.uint8)
+    feeds = np.flatnonzero(letters == ord("\n")).astype(np.int32)
+    at = np.concatenate([[0], feeds + 1, [len(data) + 1]], dtype=np.int32)
+    count = (len(at) - 1) // 2
+    codes = np.empty(count, dtype=np.int32)
+    known: dict[bytes, int] = {}
+    for first in range(0, count, AT_ONCE):
+        last = min(first + AT_ONCE, count)
+        lines = data[at[2 * first] : at[2 * last] - 1].split(b"\n")[::2]
+        for line in {*lines} - known.keys():
+            known[line] = int(line) if _CODE.fullmatch(line) else -1
+        codes[first:last] = [known[line] for line in lines]
+    escaped = b"\\U+" in data or b"\\M+" in data
+    tags = TextTags(codes, notes, data, at, encoding, escaped)
+    said = zip(tags.marks.tolist(), tags.values(tags.marks), strict=True)
+    end = next((row for row, value in said if value == "EOF"), None)
+    if end is not None:
+        tags = replace(tags, codes=codes[: end + 1])
+    _check_codes(tags, file)
+    # What Python takes for a number and nobody else does.
+    check_numbers(tags, file, tags.values_with(letters == ord("_")))
+    if not data.isascii():
+        check_numbers(tags, file, tags.values_with(letters >= _NOT_ASCII))
+    return tags
+
+
+def frame_of(tags: Tags) -> Frame:
+    """Sections and end mark, and faults of their order."""
+    sections: list[Section] = []
+    faults: list[str] = []
+    begin: int | None = None
+    name, eof = "", None
+    for k, kind in zip(tags.marks.tolist(), tags.kinds, strict=True):
+        mark = str(kind).strip()
+        if mark == "SECTION":
+            if begin is not None:
+                faults.append(f"{tags.where(k)}: section {name} has no end (ENDSEC)")
+                sections.append(Section(name, begin, None))
+            begin, name = k, _section_name(tags, k)
+        elif mark == "ENDSEC":
+            if begin is None:
+                faults.append(f"{tags.where(k)}: the end of a section that has not begun")
+            else:
+                sections.append(Section(name, begin, k))
+            begin = None
+        elif mark == "EOF":
+            eof = k
+            break
+        elif begin is None:
+            faults.append(f"{tags.where(k)}: {mark[:20]} stands outside the sections")
+    if begin is not None:
+        faults.append(f"section {name} has no end (ENDSEC)")
+        sections.append(Section(name, begin, None))
+    return Frame(tuple(sections), eof, (*faults, *_wrong_names(tags, sections)))
+
+
+def lost(tags: Tags, frame: Frame) -> list[str]:
+    """What a damaged group code hides that is itself a group code, in words.
+
+    An entity that has two layers is two entities, the mark (0) of one being damaged.
+    """
+    found: list[str] = []
+    for section in frame.sections:
+        if section.name not in ("ENTITIES", "BLOCKS"):
+            continue
+        rows = np.flatnonzero(tags.codes[section.begin : section.end] == _LAYER) + section.begin
+        entity = np.searchsorted(tags.marks, rows, side="right")
+        twice = rows[1:][np.diff(entity) == 0]
+        found.extend(f"{tags.where(int(k))}: two entities run into one" for k in twice)
+    return found + _lost_vertices(tags)
+
+
+def _lost_vertices(tags: Tags) -> list[str]:
+    """LWPOLYLINEs that do not have the vertices that they count, in words."""
+    found: list[str] = []
+    vertices, counts = (np.flatnonzero(tags.codes == code) for code in (_POINT, _COUNT))
+    ends = [*tags.marks[1:].tolist(), len(tags.codes)]
+    for begin, end, kind in zip(tags.marks.tolist(), ends, tags.kinds, strict=True):
+        if str(kind).strip() == "LWPOLYLINE":
+            held = int(np.searchsorted(vertices, end) - np.searchsorted(vertices, begin))
+            at = int(np.searchsorted(counts, begin))
+            said = str(tags.value(int(counts[at]))).strip() if at < len(counts) else ""
+            if at < len(counts) and counts[at] < end and said != str(held):
+                where = tags.where(begin)
+                found.append(f"{where}: LWPOLYLINE counts {said[:9]} vertices and holds {held}")
+    return found
+
+
+def header_of(tags: Tags, frame: Frame) -> dict[str, Any]:
+    """The variables of the header that the file itself says, each with its first value."""
+    found: dict[str, Any] = {}
+    for section in frame.sections:
+        if section.name == "HEADER":
+            end = len(tags.codes) if section.end is None else section.end
+            rows = np.flatnonzero(tags.codes[section.begin : end - 1] == _VARIABLE) + section.begin
+            for name, value in zip(tags.values(rows), tags.values(rows + 1), strict=True):
+                found.setdefault(str(name).strip(), value)
+    return found
+
+
+def _plain_lines(data: bytes) -> tuple[bytes, str, tuple[str, ...]]:
+    """The same text with line feeds, in an encoding in which these are single bytes; and its
+    faults. The encoding is that of its mark, or of its header."""
+    notes: tuple[str, ...] = ()
+    if data.startswith(_UTF16_MARKS):
+        encoding, otherwise = "utf-16", "replace"
+    else:
+        encoding, otherwise = _encoding(data[:_HEAD_BYTES]), "surrogateescape"
+    try:
+        if not data.isascii():
+            data.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        notes = (f"line {line}: a byte is no text in {encoding}",)
+    if encoding == "utf-16":
+        data, encoding = data.decode("utf-16", otherwise).encode(), "utf-8"
+    elif encoding == "utf-8-sig":
+        data, encoding = data[len(_UTF8_MARK) :], "utf-8"
+    return data if b"\n" in data else data.replace(b"\r", b"\n"), encoding, notes
+
+
+def _encoding(head: bytes) -> str:
+    """Files since R2007 are UTF-8, older ones in the code page that they name."""
+    from ezdxf.tools.codepage import toencoding
+
+    version, codepage = _VERSION.search(head), _CODEPAGE.search(head)
+    if head.startswith(_UTF8_MARK):
+        return "utf-8-sig"
+    if version and version.group(1) >= _UTF8_SINCE:
+        return "utf-8"
+    return str(toencoding(codepage.group(1).decode("ascii") if codepage else "ANSI_1252"))
+
+
+def _check_codes(tags: Tags, file: str) -> None:
+    """DrawingError for the first group code that is none."""
+    codes = tags.codes
+    unused = (UNUSED_CODES.start <= codes) & (codes < UNUSED_CODES.stop)
+    odd = np.flatnonzero((codes < 0) | (codes > LARGEST_CODE) | unused)
+    if len(odd):
+        row = int(odd[0])
+        raise DrawingError(
+            f"{tags.code_as_said(row)} is no group code",
+            file=file,
+            where=tags.where(row),
+            mend=AGAIN,
+        )
+
+
+def check_numbers(tags: Tags, file: str, rows: Ints) -> None:
+    """DrawingError for a value of these tags that must be a number and is none."""
+    is_number = {code: _is_number(code) for code in np.unique(tags.codes[rows]).tolist()}
+    for row, (code, value) in zip(rows.tolist(), tags.pairs(rows), strict=True):
+        if is_number[code] and not _NUMBER.fullmatch(str(value)):
+            raise DrawingError(
+                f"{str(value).strip()[:20]!r} is no number",
+                file=file,
+                where=tags.where(row),
+                mend=AGAIN,
+            )
+
+
+def _is_number(code: int) -> bool:
+    """Whether values of this group code are numbers (DXF reference, group code value types)."""
+    from ezdxf.lldxf.types import POINT_CODES, TYPE_TABLE
+
+    return code in POINT_CODES or TYPE_TABLE.get(code, str) in (int, float)
+
+
+def _without_escapes(values: list[str]) -> list[str]:
+    """The signs that ASCII cannot say, written as \\U+00D6 or \\M+1…, as themselves."""
+    from ezdxf.lldxf.encoding import (
+        decode_dxf_unicode,
+        decode_mif_to_unicode,
+        has_dxf_unicode,
+        has_mif_encoding,
+    )
+
+    plain = [decode_dxf_unicode(value) if has_dxf_unicode(value) else value for value in values]
+    return [decode_mif_to_unicode(value) if has_mif_encoding(value) else value for value in plain]
+
+
+def _section_name(tags: Tags, begin: int) -> str:
+    """The name in the tag behind 0 SECTION; "" when that is no name."""
+    named = tags.codes[begin + 1 : begin + 2].tolist() == [2]
+    return str(tags.value(begin + 1)).strip() if named else ""
+
+
+def _wrong_names(tags: Tags, sections: list[Section]) -> list[str]:
+    """Sections that are unknown or stand twice, in words."""
+    faults: list[str] = []
+    seen: set[str] = set()
+    for section in sections:
+        name, where = section.name, tags.where(section.begin)
+        if name not in SECTIONS:
+            faults.append(f"{where}: section {name[:20]!r} is unknown and left out")
+        elif name in seen:
+            faults.append(f"{where}: section {name} stands twice")
+        seen.add(name)
+    return faults
