@@ -35,8 +35,20 @@ class Program:
         findings: Iterable[Finding],
     ) -> Program:
         """A program of lines of ASCII text, for a machine that calls its programs so."""
+        data = "".join(f"{line}\n" for line in lines).encode("ascii")
+        return cls.of_text(data, machine, row_of_block, findings)
+
+    @classmethod
+    def of_text(
+        cls,
+        data: bytes,
+        machine: Machine,
+        row_of_block: Sequence[int] | Ints,
+        findings: Iterable[Finding],
+    ) -> Program:
+        """A program of this text, for a machine that calls its programs so."""
         return cls(
-            data="".join(f"{line}\n" for line in lines).encode("ascii"),
+            data=data,
             extension=machine.target.extension,
             target=machine.target.name,
             row_of_block=np.array(row_of_block, dtype=np.int64),

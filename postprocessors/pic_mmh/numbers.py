@@ -55,20 +55,6 @@ MOST_TOOL: Final = 99
 """Tools that the two digits of T can hold (L3455-3464)."""
 
 
-def format_example(units: int) -> str:
-    """`02969.00`, `-00000.14`: five digits, a point, two digits; whole units in, so never `-0`."""
-    whole, rest = divmod(abs(units), 100)
-    return f"{'-' if units < 0 else ''}{whole:05d}.{rest:02d}"
-
-
-def format_annex(units: int) -> str:
-    """`+02969`, `-00001`: always a sign, then five digits."""
-    return f"{units:+06d}"
-
-
-FORMATS: Final = {"example": format_example, "annex": format_annex}
-
-
 @dataclass(frozen=True)
 class Grid:
     """The units of one form laid over the steps of one axis."""
@@ -111,31 +97,26 @@ class Grid:
         return np.asarray((np.sign(units) * np.floor(in_steps + 0.5)).astype(np.int64))
 
     def nearest_units(self, steps: Ints) -> Ints:
-        """The units nearest to these steps; `represents`: which of them really mean the step."""
+        """The units nearest to these steps; where any whole unit means a step, it is this one."""
         scaled = steps * (self.units_per_mm * self.step_mm)
         return np.asarray(np.rint(scaled).astype(np.int64))
-
-    def represents(self, steps: Ints) -> Bools:
-        """Which steps some whole unit means (the nearest one, if any does)."""
-        units = self.nearest_units(steps)
-        return np.asarray((self.steps(units) == steps) & (np.abs(units) <= self.most_units))
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """One item per row: ends (x, y, z) and centres (x, y) as units and as steps, feed words.
+    """Of N rows: ends (N, 3) and centres (N, 2) as units and as steps, and feeds (N,) in units of
+    the feed word.
 
-    `centre_*` are (0, 0) and `feed_words` "" where the row has none; a centre that cannot be
+    `centre_*` are (0, 0) and `feed_units` 0 where the row has none; a centre that cannot be
     written is none (`far_arcs`).
     """
 
     grids: tuple[Grid, Grid, Grid]
-    end_units: list[list[int]]
-    end_steps: list[list[int]]
-    centre_units: list[list[int]]
-    centre_steps: list[list[int]]
-    sweeps: list[float]
-    feed_words: list[str]
+    end_units: Ints
+    end_steps: Ints
+    centre_units: Ints
+    centre_steps: Ints
+    feed_units: Ints
     feed_finding: Finding | None
 
 
@@ -144,19 +125,18 @@ def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> 
     x, y, z = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     grids = (x, y, z)
     _check_coordinates(toolpath, grids)
-    words, finding = _feed_words(toolpath, machine)
+    feed_units, finding = _feed_units(toolpath, machine)
     centred = toolpath.is_arc & ~far_arcs(toolpath, machine, dialect)
     centres = np.where(centred[:, None], toolpath.centre, 0.0)
     end_units, end_steps = _both(toolpath.end, grids)
     centre_units, centre_steps = _both(centres, grids)
     return Numbers(
         grids=grids,
-        end_units=end_units.tolist(),
-        end_steps=end_steps.tolist(),
-        centre_units=centre_units.tolist(),
-        centre_steps=centre_steps.tolist(),
-        sweeps=toolpath.sweeps().tolist(),
-        feed_words=words,
+        end_units=end_units,
+        end_steps=end_steps,
+        centre_units=centre_units,
+        centre_steps=centre_steps,
+        feed_units=feed_units,
         feed_finding=finding,
     )
 
@@ -213,8 +193,8 @@ def far_arcs(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> Bo
     return np.asarray(toolpath.is_arc & ~(fits[0] & fits[1]))
 
 
-def _feed_words(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[list[str], Finding | None]:
-    """`F08` for each feed move, and what was lost by rounding down to the word's unit.
+def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Finding | None]:
+    """8 (`F08`) for each feed move, and what was lost by rounding down to the word's unit.
 
     The link carries one report per step and so bounds the step rate, feed / (60 · step)
     (L3196-3199); F00 would make the controller divide by 0.
@@ -236,15 +216,11 @@ def _feed_words(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[list[str], 
     refuse(toolpath, units < 1, lambda row: f"feed {feed[row]:g} mm/min would be F00", mend)
     lost = feed - units * unit
     rounded = lost > FEED_TOLERANCE * unit
-    known = {number: f"F{number:02d}" for number in np.unique(units).tolist()}
-    words = [
-        known[number] if is_used else ""
-        for number, is_used in zip(units.tolist(), used.tolist(), strict=True)
-    ]
+    units = np.where(used, units, 0)
     if not rounded.any():
-        return words, None
+        return units, None
     row = int(np.argmax(lost))
-    return words, FEED_ROUNDED(
+    return units, FEED_ROUNDED(
         where=toolpath.place(row),
         measured=lost[row],
         limit=unit,

@@ -44,24 +44,24 @@ cdef void _run(
     x=Int, y=Int, error=Int, sx=Int, sy=Int, room=Int, filled=Int, run=Int, _=Int, m=Int, n=Int,
     way=Int, upto=Int, delta_x=Int, delta_y=Int, at=Int, met=bint, by_x=bint
 )
-cdef (Int, bint) _direct_search(
+cdef (Int, bint) direct_search_run(
     Int[::1] state, Int end_x, Int end_y, Int[::1] out_x, Int[::1] out_y
 ) noexcept
 
-@cython.locals(iteration=Int, sx=Int, sy=Int, delta_x=Int, delta_y=Int, out=Int[:, ::1])
-cpdef direct_search_path(Int x, Int y, bint clockwise, Int first, Int count, Int error=*)
+@cython.locals(
+    x=Int, y=Int, error=Int, sx=Int, sy=Int, m=Int, n=Int, way=Int, run=Int, size=Int, _=Int,
+    invariant=Int, delta_x=Int, delta_y=Int, by_x=bint
+)
+cpdef void skip(Int[::1] state, Int count) noexcept
+
+@cython.locals(done=Int, apart=Int, run=Int)
+cpdef Int first_at(Int[::1] state, Int end_x, Int end_y, Int limit) noexcept
 
 @cython.locals(
-    iteration=Int, sx=Int, sy=Int, delta_x=Int, delta_y=Int, best=Int, least=Int, square=Int
+    done=Int, best=Int, least=Int, off_x=Int, off_y=Int, square=Int, run=Int, x=Int, y=Int,
+    error=Int, sx=Int, sy=Int
 )
-cpdef (Int, Int) direct_search_nearest(
-    Int x, Int y, bint clockwise, Int end_x, Int end_y, Int low, Int high, Int error=*
-) noexcept
-
-@cython.locals(iteration=Int, sx=Int, sy=Int, delta_x=Int, delta_y=Int)
-cpdef Int direct_search_hits(
-    Int x, Int y, bint clockwise, Int end_x, Int end_y, Int limit, Int error=*
-) noexcept
+cpdef (Int, Int) nearest_to(Int[::1] state, Int end_x, Int end_y, Int low, Int high) noexcept
 
 @cython.locals(x=Int, y=Int, error=Int, sx=Int, sy=Int, filled=Int, met=bint, x_grows=bint)
 cdef (Int, bint) _stairs(

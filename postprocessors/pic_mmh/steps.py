@@ -181,6 +181,9 @@ MOST_SQUARE = 1 << 48
 LEAST_RUN = 8
 """Fewer positions than these are iterated."""
 
+NOWHERE = 1 << 40
+"""Both coordinates of an end that no path meets."""
+
 
 def _advance(
     x: int, y: int, error: int, sx: int, sy: int, delta_x: int, delta_y: int
@@ -250,12 +253,12 @@ def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[
     stands where the rows end, so that the next call goes on.
     """
     path = np.empty((2, len(out)), dtype=np.int64)
-    filled, met = _direct_search(state, end_x, end_y, path[0], path[1])
+    filled, met = direct_search_run(state, end_x, end_y, path[0], path[1])
     out[:filled] = path[:, :filled].T
     return filled, met
 
 
-def _direct_search(
+def direct_search_run(
     state: Ints, end_x: int, end_y: int, out_x: Ints, out_y: Ints
 ) -> tuple[int, bool]:
     """As `direct_search_fill`, into one array for each axis."""
@@ -295,61 +298,89 @@ def _direct_search(
     return filled, met
 
 
-def direct_search_path(
-    x: int, y: int, clockwise: bool, first: int, count: int, error: int = 0
-) -> Ints:
-    """(count, 2) positions after the iterations first + 1 … first + count from (x, y) ≠ (0, 0)."""
-    sx, sy = heading(x, y, clockwise)
-    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
-    out = np.empty((count, 2), dtype=np.int64)
-    for iteration in range(first + count):
-        x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
-        if iteration >= first:
-            out[iteration - first, 0] = x
-            out[iteration - first, 1] = y
-    return np.asarray(out)
-
-
-def direct_search_nearest(
-    x: int,
-    y: int,
-    clockwise: bool,
-    end_x: int,
-    end_y: int,
-    low: int,
-    high: int,
-    error: int = 0,
-) -> tuple[int, int]:
-    """The iteration in low … high (both included) nearest to the end, the first one on ties, and
-    its squared distance in steps²; (−1, −1) when the range is empty."""
-    sx, sy = heading(x, y, clockwise)
-    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
-    best, least = -1, -1
-    for iteration in range(high + 1):
-        if iteration > 0:
+def skip(state: Ints, count: int) -> None:
+    """Run on by so many iterations: as `direct_search_fill`, but no position on the way is made
+    where the closed form gives the last one."""
+    x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
+    while count > 0:
+        by_x = abs(x) < abs(y)
+        m, n, way = (x, y, sx) if by_x else (y, x, sy)
+        run = _run_length(m, n, way, error, count)
+        if run >= LEAST_RUN:
+            invariant = m * m + n * n - error
+            m += way * run
+            size = int(math.sqrt(float(invariant - m * m)) + 0.5)
+            n = size if n > 0 else -size
+            error = m * m + n * n - invariant
+            x, y = (m, n) if by_x else (n, m)
+            if by_x and x == 0:
+                sy = -sy
+            elif y == 0 and not by_x:
+                sx = -sx
+            count -= run
+            continue
+        delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
+        run = min(LEAST_RUN, count)
+        for _ in range(run):
             x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
-        if iteration >= low:
-            square = (x - end_x) * (x - end_x) + (y - end_y) * (y - end_y)
-            if best < 0 or square < least:
-                best, least = iteration, square
-    return best, least
+        count -= run
+    state[0], state[1], state[2], state[3], state[4] = x, y, error, sx, sy
 
 
-def direct_search_hits(
-    x: int, y: int, clockwise: bool, end_x: int, end_y: int, limit: int, error: int = 0
-) -> int:
-    """The first iteration, 1 … limit, at which the position equals the end, or −1.
+def first_at(state: Ints, end_x: int, end_y: int, limit: int) -> int:
+    """The first iteration, 1 … limit, from `state` on at which the position equals the end, or −1;
+    `state` runs on to there.
 
     This is the controller's stop test, done after each iteration: an end at the start is met
-    after a whole turn.
+    after a whole turn. No coordinate changes by more than one an iteration, so the end is not
+    nearer than the larger of its two distances.
     """
-    sx, sy = heading(x, y, clockwise)
-    delta_x, delta_y = 2 * x * sx + 1, 2 * y * sy + 1
-    for iteration in range(1, limit + 1):
-        x, y, error, sx, sy, delta_x, delta_y = _advance(x, y, error, sx, sy, delta_x, delta_y)
-        if x == end_x and y == end_y:
-            return iteration
+    done = 0
+    while done < limit:
+        apart = int(max(abs(state[0] - end_x), abs(state[1] - end_y)))
+        run = min(max(apart, 1), limit - done)
+        skip(state, run)
+        done += run
+        if state[0] == end_x and state[1] == end_y:
+            return done
     return -1
+
+
+def nearest_to(state: Ints, end_x: int, end_y: int, low: int, high: int) -> tuple[int, int]:
+    """The iteration in low … high (both included) nearest to the end, the first one on ties, and
+    its squared distance in steps²; (−1, −1) when the range is empty. `state` runs on to `high`.
+
+    As in `first_at`; what is to be no farther than d has come nearer by apart − d. Long strides
+    show first how near it comes at least.
+    """
+    if high < low:
+        return -1, -1
+    skip(state, low)
+    x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
+    done, best, least = low, -1, -1
+    while True:
+        off_x, off_y = abs(state[0] - end_x), abs(state[1] - end_y)
+        square = off_x * off_x + off_y * off_y
+        if least < 0 or square < least:
+            least = square
+        if done == high:
+            break
+        run = min(max(off_x, off_y, 1), high - done)
+        skip(state, run)
+        done += run
+    state[0], state[1], state[2], state[3], state[4] = x, y, error, sx, sy
+    done = low
+    while True:
+        off_x, off_y = abs(state[0] - end_x), abs(state[1] - end_y)
+        square = off_x * off_x + off_y * off_y
+        if square < least or (best < 0 and square == least):
+            best, least = done, square
+        if done == high:
+            return best, least
+        run = max(off_x, off_y) - int(math.sqrt(float(least)))
+        run = min(max(run, 1), high - done)
+        skip(state, run)
+        done += run
 
 
 # Arcs by stairs (the incremental method): one axis per iteration.
@@ -601,7 +632,7 @@ def fill_leg(
     if method == DDA:
         return _dda_arc(state, leg[END_X], leg[END_Y], out_x, out_y)
     if method == DSM:
-        filled, met = _direct_search(state, leg[END_X], leg[END_Y], out_x, out_y)
+        filled, met = direct_search_run(state, leg[END_X], leg[END_Y], out_x, out_y)
     else:
         filled, met = _stairs(state, leg[END_X], leg[END_Y], out_x, out_y)
     return filled, filled, met

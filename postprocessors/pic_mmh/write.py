@@ -1,9 +1,12 @@
 """Writing pic-mmh: a Toolpath to the blocks that this controller decodes.
 
+    rows ──checked──▶ units and steps ──landings──▶ points ──those that move──▶ blocks
+
 Everything that can be refused by its numbers alone is refused before the first block is made
-(`numbers.py`). Then the rows are followed one by one, together with the controller's own
-step position: a block is sent only when it moves that position, and every arc is planned from it
-(`arcs.py`), so that it ends where the next row begins.
+(`numbers.py`). A row begins at the step where the row before it ended, whatever blocks that took;
+so every arc is planned from there by itself (`arcs.py`), and ends where the next row begins. A
+point is where one block may bring the tool: a block is sent only when it moves the controller's
+own step position.
 """
 
 from __future__ import annotations
@@ -15,25 +18,15 @@ from typing import Final, NoReturn
 
 import numpy as np
 
-from camtool.arrays import Floats
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.toolpath.lower import Lowered, arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
+from camtool.toolpath.words import Words, texts_of
 
-from .arcs import (
-    LEAST_RADIUS_STEPS,
-    LINE_SAGITTA,
-    Arc,
-    Landing,
-    chord_ends,
-    expected_turn_rad,
-    hits,
-    land,
-    turned_rad,
-    unwrapped_rad,
-)
+from .arcs import CLOCKWISE, ITERATION, land
 from .dialect import PicMmhMachine
 from .findings import (
     ARC_MENDED,
@@ -44,21 +37,23 @@ from .findings import (
     MOVE_SPLIT,
     VALUE_ROUNDED,
 )
-from .numbers import FORMATS, Grid, check_motion, event_words, far_arcs, numbers_of
-
-WORD: Final = {Kind.RAPID: "G00", Kind.LINE: "G01", Kind.ARC_CW: "G02", Kind.ARC_CCW: "G03"}
+from .numbers import Grid, check_motion, event_words, far_arcs, numbers_of
 
 BUFFER_CHARS: Final = 35
 """Characters of the thesis's buffer (L1740-1742), which cannot have taken its own sample block."""
 
-XY = tuple[int, int]
+LINE_SAGITTA: Final = 1.0
+"""A line that replaces a piece of arc may deviate from it by this many resolutions (the coarser of
+step and unit); it bounds how far before its end an arc may be left for its closing line."""
+
+_TURN: Final = 2.0 * math.pi
 
 
 def write_program(toolpath: Toolpath, machine: PicMmhMachine) -> Program:
     """The program of a toolpath; PostError names the move that cannot be written or done."""
     writer = _Writer(toolpath, machine)
-    writer.run()
-    return Program.of_lines(writer.blocks, machine, writer.rows, writer.findings())
+    data, rows = writer.blocks()
+    return Program.of_text(data, machine, rows, writer.findings(data))
 
 
 def _refuse_chords(where: str) -> NoReturn:
@@ -71,15 +66,12 @@ def _refuse_chords(where: str) -> NoReturn:
 
 
 class _Writer:
-    """The rows followed once; `units` and `steps` are where the controller stands (x, y, z)."""
+    """One toolpath, lowered to N rows, and what is changed on the way to its blocks."""
 
     def __init__(self, toolpath: Toolpath, machine: PicMmhMachine) -> None:
         dialect = machine.dialect
-        self.blocks: list[str] = []
-        self.rows: list[int] = []
         self._machine = machine
         self._dialect = dialect
-        self._format = FORMATS[dialect.form]
         self._wanted = toolpath
         self._changes = Changes()
         check_motion(toolpath, machine)
@@ -87,12 +79,16 @@ class _Writer:
         given = numbers_of(toolpath, machine, dialect)
         self._feed_finding = given.feed_finding
         lowered = self._lowered(given.grids[0])
-        self._toolpath, self._row = lowered.toolpath, lowered.row.tolist()
+        self._toolpath, self._row = lowered.toolpath, lowered.row
         self._numbers = numbers_of(lowered.toolpath, machine, dialect)
         self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
-        self._units = [0, 0, 0]
-        self._steps = [0, 0, 0]
-        self._starts = lowered.toolpath.starts[:, :2]
+        kind = lowered.toolpath.kind
+        # A program read back begins with the SET_ZERO of its own header.
+        self._first = 1 if len(kind) and kind[0] == Kind.SET_ZERO else 0
+        self._ended = len(kind) > 0 and kind[-1] == Kind.END
+        steps = self._numbers.end_steps
+        self._before = np.concatenate([np.zeros((1, 3), dtype=np.int64), steps])[: len(steps)]
+        self._before[: self._first + 1] = 0
 
     def _lowered(self, grid: Grid) -> Lowered:
         """Arcs whose centre cannot be written as lines, slopes as steps; `Changes` counts both."""
@@ -118,189 +114,382 @@ class _Writer:
         """X and Y are alike wherever arcs and their lines are concerned."""
         return self._numbers.grids[0]
 
-    def run(self) -> None:
-        """Make all blocks."""
-        kinds = [Kind(kind) for kind in self._toolpath.kind.tolist()]
-        # A program read back begins with the SET_ZERO of its own header.
-        first = 1 if kinds[:1] == [Kind.SET_ZERO] else 0
-        self._send("G54;", first - 1)
-        self._send("G90;", -1)
-        last = len(kinds) - 1 if kinds[-1:] == [Kind.END] else len(kinds)
-        for row in range(first, last):
-            kind = kinds[row]
-            if kind <= Kind.ARC_CCW:
-                self._motion(row, kind)
-            else:
-                self._event(row, kind)
-        self._send("M30;", last if last < len(kinds) else -1)
+    def blocks(self) -> tuple[bytes, Ints]:
+        """All blocks as text, and the row of the wanted toolpath of each, −1 for the dialect's
+        own."""
+        points = self._points()
+        events = self._events(points)
+        sent = points.sent
+        texts = texts_of(self._words(points), end=";\n")
+        rows = self._row[points.row[sent]]
+        starts = [(0, "G54;", self._row[0] if self._first else -1), (0, "G90;", -1)]
+        upto = np.concatenate([[0], np.cumsum(sent)])
+        between = [
+            (int(np.searchsorted(points.row, row)), block, int(self._row[row]))
+            for row, block in events
+        ]
+        ending = (len(points.row), "M30;", int(self._row[-1]) if self._ended else -1)
+        others = [*starts, *between, ending]
+        data = texts.with_lines((at, block) for at, block, _ in others)
+        places = [int(upto[at]) for at, _, _ in others]
+        return data, np.insert(rows, places, [row for _, _, row in others])
 
-    def findings(self) -> Iterator[Finding]:
+    def findings(self, data: bytes) -> Iterator[Finding]:
         """What was changed, one finding for each kind."""
         if self._feed_finding:
             yield self._feed_finding
         yield from self._changes.findings(self._grid.step_mm * 1000.0)
-        yield from too_long(self.blocks, self._dialect.buffer_chars)
+        yield from too_long(data, self._dialect.buffer_chars)
 
     def _place(self, row: int) -> str:
         """The given row that a row of the lowered toolpath came from."""
-        return self._wanted.place(self._row[row])
+        return self._wanted.place(int(self._row[row]))
 
-    def _send(self, block: str, row: int) -> None:
-        self.blocks.append(block)
-        self.rows.append(self._row[row] if row >= 0 else -1)
+    def _words(self, points: Points) -> list[Words]:
+        """The words of all points, none where nothing is sent."""
+        row, sent = points.row, points.sent
+        flat = sent & ~points.deep
+        arc = flat & points.is_arc
+        annex = self._dialect.form == "annex"
+        decimals = 0 if annex else 2
 
-    def _motion(self, row: int, kind: Kind) -> None:
-        """A block that moves XY or Z: no row moves both."""
-        x, y, z = self._numbers.end_steps[row]
-        if z != self._steps[2]:
-            self._send_z(row, kind)
-        elif kind >= Kind.ARC_CW:
-            self._arc(row, kind)
-        elif [x, y] != self._steps[:2]:
-            self._send_xy(row, WORD[kind], self._numbers.end_units[row], (x, y))
-        elif not self._split[self._row[row]]:  # parts of slopes and of far arcs may be small
-            self._changes.dropped += 1
+        def coordinate(letter: str, units: Ints, written: Bools) -> Words:
+            return Words(letter, units, written, decimals=decimals, digits=5, plus=annex)
 
-    def _send_z(self, row: int, kind: Kind) -> None:
-        word = "G00" if kind == Kind.RAPID else "G01"
-        self._units[2] = self._numbers.end_units[row][2]
-        self._steps[2] = self._numbers.end_steps[row][2]
-        self._send(f"{word}Z{self._format(self._units[2])}{self._numbers.feed_words[row]};", row)
+        kind = self._toolpath.kind[row]
+        code = np.where(arc, kind, np.where(kind == Kind.RAPID, 0, 1))
+        centre = self._numbers.centre_units[row]
+        feed = self._numbers.feed_units[row]
+        return [
+            Words("G", code, sent, digits=2),
+            coordinate("X", points.units[:, 0], flat),
+            coordinate("Y", points.units[:, 1], flat),
+            coordinate("Z", self._numbers.end_units[row, 2], sent & points.deep),
+            coordinate("I", centre[:, 0], arc),
+            coordinate("J", centre[:, 1], arc),
+            Words("F", feed, sent & (feed > 0), digits=2),
+        ]
 
-    def _send_xy(self, row: int, word: str, units: list[int], steps: XY, centre: str = "") -> None:
-        say = self._format
-        feed = self._numbers.feed_words[row]
-        self._units[:2] = units[:2]
-        self._steps[:2] = steps
-        self._send(f"{word}X{say(units[0])}Y{say(units[1])}{centre}{feed};", row)
+    # Where blocks may bring the tool.
 
-    def _arc(self, row: int, kind: Kind) -> None:
-        """An arc block that ends, and the line that is left; lines when it is too small."""
-        arc = self._in_steps(row, kind)
-        sweep = self._numbers.sweeps[row]
-        if arc.start == arc.end and arc.sweep_rad <= math.pi:
-            self._changes.dropped += 1  # as an arc it would become a full circle
-            return
-        landing = land(arc, self._grid) if arc.radius >= LEAST_RADIUS_STEPS else None
-        units = self._end_units(row, arc, landing) if landing else None
-        if landing is None or units is None:
-            self._changes.arcs_as_lines += 1
-            self._lines(row, self._starts[row], sweep)
-            return
-        i, j = self._numbers.centre_units[row]
-        centre = f"I{self._format(i)}J{self._format(j)}"
-        steps = (landing.at[0] + arc.centre[0], landing.at[1] + arc.centre[1])
-        self._send_xy(row, WORD[kind], units, steps, centre)
-        self._check_end(row, arc, landing)
-        if landing.at != arc.end:
-            self._mend(row, arc, landing)
+    def _points(self) -> Points:
+        """All points, and what of them is sent. The numbers of a step may differ by less than a
+        step, and so may the number that an arc starts from, whose landing may then be no landing:
+        as many passes as it takes until none is."""
+        arcs = self._arcs()
+        refused = np.zeros(len(arcs.row), dtype=np.bool_)
+        while True:
+            points = self._points_of(arcs, refused)
+            now = self._refused(arcs, points)
+            if (now == refused).all():
+                break
+            refused = now
+        self._check_ends(arcs, points)
+        self._count(arcs, points)
+        return points
 
-    def _in_steps(self, row: int, kind: Kind) -> Arc:
-        """The arc as this controller will take it from where it stands."""
-        cx, cy = self._numbers.centre_steps[row]
-        ex, ey, _ = self._numbers.end_steps[row]
-        x, y = self._steps[0] - cx, self._steps[1] - cy
-        return Arc(
-            start=(x, y),
-            end=(ex - cx, ey - cy),
-            centre=(cx, cy),
-            clockwise=kind == Kind.ARC_CW,
-            sweep_rad=abs(self._numbers.sweeps[row]),
+    def _arcs(self) -> Arcs:
+        """The arcs as this controller takes them from where it stands, and their landings."""
+        numbers, path = self._numbers, self._toolpath
+        deep = numbers.end_steps[:, 2] != self._before[:, 2]
+        rows = np.flatnonzero(path.is_arc & ~deep)
+        centre = numbers.centre_steps[rows]
+        start = self._before[rows, :2] - centre
+        end = numbers.end_steps[rows, :2] - centre
+        sweep = path.sweeps()[rows]
+        # As an arc it would become a full circle.
+        nothing = (start == end).all(axis=1) & (np.abs(sweep) <= math.pi)
+        clockwise = path.kind[rows] == Kind.ARC_CW
+        table = np.column_stack([start, end, centre, clockwise])[~nothing].astype(np.int64)
+        grid = self._grid
+        landing = land(
+            table,
+            np.abs(sweep[~nothing]),
+            grid.units_per_mm * grid.step_mm,
+            grid.most_units,
+            LINE_SAGITTA * grid.resolution_mm / grid.step_mm,
+        )
+        return Arcs(rows[~nothing], table, sweep[~nothing], landing, rows[nothing])
+
+    def _points_of(self, arcs: Arcs, refused: Bools) -> Points:
+        """All points when the landings of `refused` (J,) are none."""
+        numbers, path, grid = self._numbers, self._toolpath, self._grid
+        landed = arcs.landed & ~refused
+        chords = self._chords(arcs, landed)
+        count = np.ones(len(path), dtype=np.int64)
+        count[arcs.nothing] = 0
+        count[arcs.row] = landed + chords.count
+        row = np.repeat(np.arange(len(path)), count)
+        first = np.cumsum(count) - count
+        units = numbers.end_units[row, :2]
+        inner = first[arcs.row[chords.arc]] + landed[chords.arc] + chords.part
+        fits = grid.fits(chords.end).all(axis=1)
+        units[inner[fits]] = grid.units(chords.end[fits])
+        at_arc = first[arcs.row[landed]]
+        is_arc = np.zeros(len(row), dtype=np.bool_)
+        is_arc[at_arc] = True
+        units[at_arc] = np.where(
+            arcs.at_end[landed, None],
+            numbers.end_units[arcs.row[landed], :2],
+            grid.nearest_units(arcs.stop[landed]),
+        )
+        steps = grid.steps(units)
+        motion = path.is_motion[row]
+        home = path.kind[row] == Kind.HOME_XY
+        steps[home], units[home] = self._home((0, 1))
+        steps[row < self._first] = 0
+        deep = motion & (numbers.end_steps[row, 2] != self._before[row, 2])
+        earlier = np.concatenate([np.zeros((1, 2), dtype=np.int64), steps])[: len(steps)]
+        flat = motion & ~deep
+        sent = deep | is_arc | (flat & (steps != earlier).any(axis=1))
+        outside = (row < self._first) | (path.kind[row] == Kind.END)
+        # The very numbers of the start, so that it reads as a full circle.
+        back = np.zeros(len(row), dtype=np.bool_)
+        back[at_arc] = arcs.at_start[landed]
+        new = home | (sent & ~deep & ~back)
+        latest = np.maximum.accumulate(np.where(new & ~outside, np.arange(1, len(row) + 1), 0))
+        known = np.concatenate([np.zeros((1, 2), dtype=np.int64), units])
+        units = known[latest]
+        misfit = arcs.row[chords.arc[~fits]]
+        return Points(
+            row=row,
+            units=units,
+            before=np.concatenate([known[:1], units])[first[arcs.row]],
+            sent=sent & ~outside,
+            deep=deep,
+            is_arc=is_arc,
+            misfit=int(misfit[0]) if len(misfit) else len(path),
         )
 
-    def _end_units(self, row: int, arc: Arc, landing: Landing) -> list[int] | None:
-        """The units of the landing; None when a reader would take the block for another
-        arc: short arcs can turn into almost full circles by the rounding of their numbers."""
-        if landing.at == arc.start:
-            units = self._units[:2]  # the very numbers of the start, so that it reads as full
-        elif landing.at == arc.end:
-            units = self._numbers.end_units[row][:2]
-        else:
-            steps = np.array(landing.at) + np.array(arc.centre)
-            units = self._grid.nearest_units(steps).tolist()
-        start, end, centre = (
-            np.array(point, dtype=np.float64)
-            for point in (self._units[:2], units, self._numbers.centre_units[row])
+    def _refused(self, arcs: Arcs, points: Points) -> Bools:
+        """(J,) landings with which a reader would take the block for another arc: short arcs can
+        turn into almost full circles by the rounding of their numbers."""
+        numbers, grid = self._numbers, self._grid
+        units = np.where(
+            arcs.at_end[:, None],
+            numbers.end_units[arcs.row, :2],
+            grid.nearest_units(arcs.stop),
         )
-        read = turned_rad(start, end, centre, arc.clockwise)
-        meant = unwrapped_rad(read, expected_turn_rad(landing, arc.radius))
-        return units if read == meant else None
+        units = np.where(arcs.at_start[:, None], points.before, units)
+        centre = numbers.centre_units[arcs.row]
+        read = turned_rad(points.before - centre, units - centre, arcs.clockwise)
+        return np.asarray(arcs.landed & (full_turns(read, arcs.expected_rad) != 0.0))
 
-    def _check_end(self, row: int, arc: Arc, landing: Landing) -> None:
-        """The numbers just sent, taken as the controller takes them, must end the arc."""
-        x, y = self._grid.steps(np.array(self._units[:2])).tolist()
-        at = (x - arc.centre[0], y - arc.centre[1])
-        if hits(arc, at, landing.iteration, landing.iteration) != landing.iteration:
+    def _chords(self, arcs: Arcs, landed: Bools) -> Chords:
+        """Lines along the rest of each arc from its landing, or along all of it."""
+        path, grid = self._toolpath, self._grid
+        centre = path.centre[arcs.row]
+        at = np.where(landed[:, None], arcs.stop * grid.step_mm, path.starts[arcs.row, :2])
+        turn = turned_rad(path.starts[arcs.row, :2] - centre, at - centre, arcs.clockwise)
+        turn += _TURN * full_turns(turn, arcs.expected_rad)
+        left = np.maximum(np.abs(arcs.sweep_rad) - turn, 0.0)
+        sweep = np.where(landed, np.where(arcs.clockwise, -left, left), arcs.sweep_rad)
+        ends = chord_ends(at, centre, sweep, LINE_SAGITTA * grid.resolution_mm)
+        return ends.without(landed & arcs.at_end)
+
+    def _check_ends(self, arcs: Arcs, points: Points) -> None:
+        """The numbers of each arc, taken as the controller takes them, must be its landing."""
+        at = np.flatnonzero(points.is_arc & points.sent)
+        of = np.searchsorted(arcs.row, points.row[at])
+        wrong = (self._grid.steps(points.units[at]) != arcs.stop[of]).any(axis=1)
+        if wrong.any() and points.row[at[wrong.argmax()]] < points.misfit:
             raise PostError(
                 "internal fault: the arc as written would not end where it was planned to",
-                where=self._place(row),
+                where=self._place(int(points.row[at[wrong.argmax()]])),
             )
 
-    def _mend(self, row: int, arc: Arc, landing: Landing) -> None:
-        """The rest of an arc that was left at its landing."""
-        at = (np.array(landing.at) + np.array(arc.centre)) * self._grid.step_mm
-        turn = turned_rad(self._starts[row], at, self._toolpath.centre[row], arc.clockwise)
-        turn = unwrapped_rad(turn, expected_turn_rad(landing, arc.radius))
-        left = max(0.0, arc.sweep_rad - turn)
-        rest = math.dist(landing.at, arc.end) * self._grid.step_mm * 1000.0
-        self._changes.mended += 1
-        if rest > self._changes.remainder_um:
-            self._changes.remainder_um = rest
-            self._changes.remainder_place = self._place(row)
-        self._lines(row, at, -left if arc.clockwise else left)
+    def _count(self, arcs: Arcs, points: Points) -> None:
+        """What the arcs and the moves of less than a step lose."""
+        changes, path = self._changes, self._toolpath
+        landed = np.zeros(len(arcs.row), dtype=np.bool_)
+        landed[np.searchsorted(arcs.row, points.row[points.is_arc])] = True
+        changes.arcs_as_lines = int((~landed).sum())
+        still = path.is_motion[points.row] & ~points.sent & ~path.is_arc[points.row]
+        # Parts of slopes and of far arcs may be small.
+        still &= ~self._split[self._row[points.row]]
+        changes.dropped = int(still.sum()) + len(arcs.nothing)
+        mended = np.flatnonzero(landed & ~arcs.at_end)
+        changes.mended = len(mended)
+        if len(mended):
+            gap = (arcs.end - arcs.stop)[mended].astype(np.float64)
+            rest = np.hypot(gap[:, 0], gap[:, 1]) * self._grid.step_mm * 1000.0
+            changes.remainder_um = float(rest.max())
+            changes.remainder_place = self._place(int(arcs.row[mended[rest.argmax()]]))
 
-    def _lines(self, row: int, start: Floats, sweep_rad: float) -> None:
-        """Lines along an arc from `start` (2,) mm to the end of the row."""
-        grid = self._grid
-        sagitta = LINE_SAGITTA * grid.resolution_mm
-        ends = chord_ends(start, self._toolpath.centre[row], sweep_rad, sagitta)
-        if not grid.fits(ends[:-1]).all():
-            _refuse_chords(self._place(row))
-        units = [*grid.units(ends[:-1]).tolist(), self._numbers.end_units[row][:2]]
-        for point in units:
-            x, y = grid.steps(np.array(point)).tolist()
-            if [x, y] != self._steps[:2]:
-                self._send_xy(row, "G01", point, (x, y))
+    # Events, of which there are few.
 
-    def _event(self, row: int, kind: Kind) -> None:
-        """Events of the dialect; messages have no word in it and are not sent."""
+    def _events(self, points: Points) -> list[tuple[int, str]]:
+        """The blocks of all events, each with its row; PostError for the first row that cannot be
+        sent. Messages have no word in the dialect and are not sent."""
+        found = []
+        last = len(self._toolpath) - (1 if self._ended else 0)
+        for row in np.flatnonzero(~self._toolpath.is_motion).tolist():
+            if row > points.misfit:
+                break
+            if self._first <= row < last:
+                found += [(row, block) for block in self._event(row)]
+        if points.misfit < len(self._toolpath):
+            _refuse_chords(self._place(points.misfit))
+        return found
+
+    def _event(self, row: int) -> list[str]:
+        """The blocks of one event."""
+        kind, before = Kind(int(self._toolpath.kind[row])), self._before[row].copy()
+        blocks: list[str] = []
         if kind == Kind.END:
             raise PostError("moves follow the end of the program", where=self._place(row))
         if kind == Kind.HOME_XY:
-            self._send("G28X0Y0;", row)
-            self._home((0, 1))
+            blocks, before[:2] = ["G28X0Y0;"], self._home((0, 1))[0]
         elif kind == Kind.HOME_Z:
-            self._send("G28Z0;", row)
-            self._home((2,))
+            blocks, before[2:] = ["G28Z0;"], self._home((2,))[0]
         elif kind == Kind.SET_ZERO:
-            if any(self._steps):
+            if before.any():
                 raise PostError(
                     "part zero can only be set at part zero",
                     where=self._place(row),
                     mend="set it first, before any move",
                 )
-            self._send("G54;", row)
+            blocks = ["G54;"]
         elif kind != Kind.MESSAGE:
-            blocks, rounded = event_words(self._wanted, self._row[row])
-            for block in blocks:
-                self._send(block, row)
+            blocks, rounded = event_words(self._wanted, int(self._row[row]))
             if rounded:
                 self._changes.rounded += 1
                 self._changes.rounded_place = self._changes.rounded_place or self._place(row)
-        if self._numbers.end_steps[row] != self._steps:
+        if (self._numbers.end_steps[row] != before).any():
             raise PostError(
                 f"a {kind.name} cannot end at another place than where the controller stands then",
                 where=self._place(row),
                 mend="give the row the position of the tool (machine zero after homing)",
             )
+        return blocks
 
-    def _home(self, axes: tuple[int, ...]) -> None:
-        """The controller now stands at machine zero in these axes."""
-        for axis in axes:
-            grid = self._numbers.grids[axis]
-            zero = np.array([self._machine.controller.machine_zero_mm[axis]])
-            self._units[axis] = int(grid.units(zero)[0])
-            self._steps[axis] = int(grid.steps(grid.units(zero))[0])
+    def _home(self, axes: tuple[int, ...]) -> tuple[Ints, Ints]:
+        """Steps and units of machine zero in these axes."""
+        zero = self._machine.controller.machine_zero_mm
+        grids = [self._numbers.grids[axis] for axis in axes]
+        units = [
+            grid.units(np.array([zero[axis]])) for axis, grid in zip(axes, grids, strict=True)
+        ]
+        steps = [grid.steps(one) for grid, one in zip(grids, units, strict=True)]
+        return np.concatenate(steps), np.concatenate(units)
+
+
+@dataclass(frozen=True, eq=False)
+class Arcs:
+    """J arcs that are more than nothing: their rows; columns of `arcs` (J, 7) in steps; signed
+    sweeps rad; landings (J, 3). `nothing`: the rows of those whose end is their start."""
+
+    row: Ints
+    table: Ints
+    sweep_rad: Floats
+    landing: Ints
+    nothing: Ints
+
+    @property
+    def clockwise(self) -> Bools:
+        """(J,)"""
+        return np.asarray(self.table[:, CLOCKWISE] != 0)
+
+    @property
+    def end(self) -> Ints:
+        """(J, 2) steps."""
+        return self.table[:, 2:4] + self.table[:, 4:6]
+
+    @property
+    def stop(self) -> Ints:
+        """(J, 2) steps of the landing."""
+        return self.landing[:, :2] + self.table[:, 4:6]
+
+    @property
+    def landed(self) -> Bools:
+        """(J,) whether there is a landing."""
+        return np.asarray(self.landing[:, ITERATION] >= 0)
+
+    @property
+    def at_end(self) -> Bools:
+        """(J,) whether it is the wanted end."""
+        return np.asarray((self.landing[:, :2] == self.table[:, 2:4]).all(axis=1))
+
+    @property
+    def at_start(self) -> Bools:
+        """(J,) whether it is the start."""
+        return np.asarray((self.landing[:, :2] == self.table[:, :2]).all(axis=1))
+
+    @property
+    def expected_rad(self) -> Floats:
+        """(J,) about how far an arc has turned at its landing: n ≈ (2√2/π)·R·turn on the average
+        of all directions, and never off by more than a quarter of the turn."""
+        radius = np.hypot(self.table[:, 0].astype(np.float64), self.table[:, 1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = self.landing[:, ITERATION] * math.pi / (2.0 * math.sqrt(2.0) * radius)
+        return np.where(self.landed, turn, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """P points in order: their rows; X and Y in units (P, 2), as they stand behind the point;
+    whether a block is sent, whether it is one of Z, whether one of an arc. `before` (J, 2): the
+    units from which each arc starts; `misfit`: the first row with a point that cannot be written,
+    or else the number of rows."""
+
+    row: Ints
+    units: Ints
+    before: Ints
+    sent: Bools
+    deep: Bools
+    is_arc: Bools
+    misfit: int
+
+
+@dataclass(frozen=True, eq=False)
+class Chords:
+    """Lines for J arcs: `count` (J,) of them each; and all their ends but the last of each arc,
+    which is its own: `end` (K, 2) mm, the arc, and which of its chords, from 0."""
+
+    count: Ints
+    end: Floats
+    arc: Ints
+    part: Ints
+
+    def without(self, arcs: Bools) -> Chords:
+        """Without those of some arcs (J,)."""
+        kept = ~arcs[self.arc]
+        return Chords(
+            np.where(arcs, 0, self.count), self.end[kept], self.arc[kept], self.part[kept]
+        )
+
+
+def turned_rad(out: Floats | Ints, now: Floats | Ints, clockwise: Bools) -> Floats:
+    """(J,) the sweep from the arms `out` to the arms `now` ((J, 2) each), in (0, 2π]; a full turn
+    when the two are one."""
+    cross = out[:, 0] * now[:, 1] - out[:, 1] * now[:, 0]
+    dot = out[:, 0] * now[:, 0] + out[:, 1] * now[:, 1]
+    angle = np.mod(np.arctan2(np.where(clockwise, -cross, cross), dot), _TURN)
+    return np.where(angle == 0.0, _TURN, angle)
+
+
+def full_turns(turn_rad: Floats, expected_rad: Floats) -> Floats:
+    """How many full turns more bring each sweep nearest to the expected one."""
+    return np.asarray(np.rint((expected_rad - turn_rad) / _TURN))
+
+
+def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: float) -> Chords:
+    """The fewest equal chords within `sagitta_mm` of each arc.
+
+    `start`, `centre` (J, 2) mm; signed sweeps (J,). A chord over the angle a strays by
+    R (1 − cos(a/2)); no chord turns by more than a right angle.
+    """
+    out = start - centre
+    radius = np.hypot(out[:, 0], out[:, 1])
+    with np.errstate(divide="ignore"):
+        ratio = np.minimum(1.0, sagitta_mm / radius)
+    widest = np.minimum(math.pi / 2.0, 2.0 * np.arccos(1.0 - ratio))
+    count = np.maximum(np.ceil(np.abs(sweep_rad) / widest), 1.0).astype(np.int64)
+    arc = np.repeat(np.arange(len(count)), count - 1)
+    part = np.arange(len(arc)) - np.repeat(np.cumsum(count - 1) - (count - 1), count - 1)
+    angle = np.arctan2(out[:, 1], out[:, 0])[arc] + sweep_rad[arc] * (part + 1) / count[arc]
+    spoke = radius[arc, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return Chords(count, centre[arc] + spoke, arc, part)
 
 
 @dataclass
@@ -341,13 +530,16 @@ class Changes:
             yield VALUE_ROUNDED(where=self.rounded_place, count=self.rounded)
 
 
-def too_long(blocks: list[str], buffer_chars: int | None) -> Iterator[Finding]:
+def too_long(data: bytes, buffer_chars: int | None) -> Iterator[Finding]:
     """One BLOCK_TOO_LONG finding when blocks do not fit the controller's buffer: a remark where
     it is that of the thesis, which contradicts itself, and a warning where the user knows it."""
-    lengths = [len(block) for block in blocks]
+    ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+    lengths = np.diff(ends, prepend=-1) - 1
     limit = BUFFER_CHARS if buffer_chars is None else buffer_chars
-    if count := sum(length > limit for length in lengths):
-        longest = max(lengths)
+    if count := int((lengths > limit).sum()):
         yield (BLOCK_TOO_LONG_PERHAPS if buffer_chars is None else BLOCK_TOO_LONG)(
-            where=f"block {lengths.index(longest) + 1}", measured=longest, limit=limit, count=count
+            where=f"block {int(lengths.argmax()) + 1}",
+            measured=int(lengths.max()),
+            limit=limit,
+            count=count,
         )

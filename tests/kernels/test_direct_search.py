@@ -6,12 +6,15 @@ from itertools import islice
 import numpy as np
 import pytest
 from camtool_postprocessors.pic_mmh.steps import (
+    NOWHERE,
     direct_search_fill,
-    direct_search_hits,
-    direct_search_nearest,
-    direct_search_path,
     direct_search_start,
+    first_at,
+    nearest_to,
+    skip,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.oracles.controllers import direct_search
 
@@ -22,6 +25,18 @@ def twin(x: int, y: int, clockwise: bool, count: int, error: int = 0) -> np.ndar
     return np.array(points, dtype=np.int64).reshape(count, 2)
 
 
+def compiled(x: int, y: int, clockwise: bool, count: int, error: int = 0) -> np.ndarray:
+    """The first positions of the compiled search."""
+    out = np.empty((count, 2), dtype=np.int64)
+    direct_search_fill(direct_search_start(x, y, clockwise, error), NOWHERE, NOWHERE, out)
+    return out
+
+
+def hit(x: int, y: int, clockwise: bool, end: tuple[int, int], limit: int) -> int:
+    """The first iteration at the end, or −1."""
+    return int(first_at(direct_search_start(x, y, clockwise), *end, limit))
+
+
 def radial_error(points: np.ndarray, radius: float) -> float:
     """Greatest distance of the points from the circle."""
     return float(np.abs(np.hypot(points[:, 0], points[:, 1]) - radius).max())
@@ -30,8 +45,8 @@ def radial_error(points: np.ndarray, radius: float) -> float:
 @pytest.mark.parametrize("clockwise", [True, False])
 @pytest.mark.parametrize("start", [(0, 30), (30, 0), (0, -30), (-30, 0)])
 def test_circle_of_30_takes_168_iterations(start: tuple[int, int], clockwise: bool) -> None:
-    assert direct_search_hits(*start, clockwise, *start, 1000) == 168
-    assert radial_error(direct_search_path(*start, clockwise, 0, 168), 30.0) < 0.5
+    assert hit(*start, clockwise, start, 1000) == 168
+    assert radial_error(compiled(*start, clockwise, 168), 30.0) < 0.5
 
 
 @pytest.mark.parametrize("clockwise", [True, False])
@@ -43,7 +58,7 @@ def test_every_small_start_equals_the_literal_loop(clockwise: bool) -> None:
             count = int(6 * math.hypot(x, y)) + 12
             rounded = x * x + y * y - round(math.hypot(x, y)) ** 2
             for error in {0, rounded}:
-                got = direct_search_path(x, y, clockwise, 0, count, error)
+                got = compiled(x, y, clockwise, count, error)
                 assert np.array_equal(got, twin(x, y, clockwise, count, error)), (x, y, error)
 
 
@@ -54,7 +69,7 @@ def test_large_seeded_starts_equal_the_literal_loop() -> None:
         x, y = round(radius * math.cos(angle)), round(radius * math.sin(angle))
         clockwise = bool(rng.integers(2))
         count = min(6 * radius, 40_000)
-        got = direct_search_path(x, y, clockwise, 0, count)
+        got = compiled(x, y, clockwise, count)
         assert np.array_equal(got, twin(x, y, clockwise, count)), (x, y, clockwise)
 
 
@@ -66,19 +81,35 @@ def test_radial_error_is_below_half_a_step() -> None:
         radius = math.hypot(x, y)
         if radius == 0.0:
             continue
-        points = direct_search_path(x, y, bool(rng.integers(2)), 0, int(12 * radius) + 20)
+        points = compiled(x, y, bool(rng.integers(2)), int(12 * radius) + 20)
         assert radial_error(points, radius) < 0.5, (x, y)
 
 
-def test_path_starts_anywhere() -> None:
-    whole = direct_search_path(17, -29, False, 0, 200)
-    assert np.array_equal(direct_search_path(17, -29, False, 63, 50), whole[63:113])
-    assert direct_search_path(17, -29, False, 63, 0).shape == (0, 2)
+@given(
+    st.tuples(st.integers(-900, 900), st.integers(-900, 900)).filter(any),
+    st.booleans(),
+    st.booleans(),
+    st.lists(st.integers(0, 3000), max_size=5),
+)
+def test_skipped_iterations_are_as_if_they_were_run(
+    start: tuple[int, int], clockwise: bool, rounded: bool, counts: list[int]
+) -> None:
+    x, y = start
+    error = x * x + y * y - round(math.hypot(x, y)) ** 2 if rounded else 0
+    state = direct_search_start(x, y, clockwise, error)
+    for count in counts:
+        skip(state, count)
+    wanted = twin(x, y, clockwise, sum(counts) + 40, error)
+    at = wanted[sum(counts) - 1].tolist() if sum(counts) else [x, y]
+    assert state[:2].tolist() == at
+    out = np.empty((40, 2), dtype=np.int64)
+    direct_search_fill(state, NOWHERE, NOWHERE, out)
+    assert np.array_equal(out, wanted[-40:])
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 1000])
 def test_filling_goes_on_where_it_stopped(size: int) -> None:
-    whole = direct_search_path(17, -29, False, 0, 140)
+    whole = twin(17, -29, False, 140)
     end = (int(whole[-1, 0]), int(whole[-1, 1]))
     state, buffer = direct_search_start(17, -29, False), np.empty((size, 2), dtype=np.int64)
     parts, met = [], False
@@ -106,12 +137,9 @@ def filled(
     return np.concatenate(parts), met
 
 
-NOWHERE = (10**9, 10**9)
-
-
 @pytest.mark.parametrize("clockwise", [True, False])
 def test_runs_of_the_closed_form_equal_the_iterations(clockwise: bool) -> None:
-    """Every small start; the path that is compared with is itself that of the literal loop."""
+    """Every small start."""
     for x in range(-40, 41):
         for y in range(-40, 41):
             size = math.hypot(x, y)
@@ -119,8 +147,8 @@ def test_runs_of_the_closed_form_equal_the_iterations(clockwise: bool) -> None:
                 continue
             for error in {0, x * x + y * y - round(size) ** 2}:
                 count = int(6 * size) + 12
-                got, _ = filled((x, y), clockwise, error, NOWHERE, (count, 512))
-                wanted = direct_search_path(x, y, clockwise, 0, len(got), error)
+                got, _ = filled((x, y), clockwise, error, (NOWHERE, NOWHERE), (count, 512))
+                wanted = twin(x, y, clockwise, len(got), error)
                 assert np.array_equal(got, wanted), (x, y, error)
 
 
@@ -130,8 +158,9 @@ def test_runs_of_large_radii_equal_the_iterations() -> None:
         for axis in (0, 1, 2, 3, None):
             angle = rng.uniform(0.0, 2.0 * math.pi) if axis is None else axis * math.pi / 2
             x, y = round(radius * math.cos(angle)), round(radius * math.sin(angle))
-            got, _ = filled((x, y), bool(axis), 0, NOWHERE, (min(6 * radius, 200_000), 777))
-            assert np.array_equal(got, direct_search_path(x, y, bool(axis), 0, len(got)))
+            nowhere = NOWHERE, NOWHERE
+            got, _ = filled((x, y), bool(axis), 0, nowhere, (min(6 * radius, 200_000), 777))
+            assert np.array_equal(got, twin(x, y, bool(axis), len(got)))
 
 
 def test_runs_end_where_the_stop_test_ends_them() -> None:
@@ -141,14 +170,14 @@ def test_runs_end_where_the_stop_test_ends_them() -> None:
         radius, angle = 10.0 ** rng.uniform(1.0, 3.5), rng.uniform(0.0, 6.28)
         x, y = round(radius * math.cos(angle)), round(radius * math.sin(angle))
         count, clockwise = int(6 * radius), bool(number % 2)
-        path = direct_search_path(x, y, clockwise, 0, count)
+        path = compiled(x, y, clockwise, count)
         end = path[rng.integers(count)] + (rng.integers(-1, 2, 2) if number % 3 else 0)
-        hit = direct_search_hits(x, y, clockwise, int(end[0]), int(end[1]), count)
+        at = hit(x, y, clockwise, (int(end[0]), int(end[1])), count)
         size = int(rng.choice([1, 7, 64, 512]))
         got, met = filled((x, y), clockwise, 0, (int(end[0]), int(end[1])), (count, size))
-        assert (met and len(got) == hit) if hit > 0 else (not met or len(got) > count)
+        assert (met and len(got) == at) if at > 0 else (not met or len(got) > count)
         assert np.array_equal(got[:count], path[: len(got)])
-        missed += hit < 0
+        missed += at < 0
     assert 0 < missed < 400
 
 
@@ -161,21 +190,22 @@ def test_hits_and_nearest_agree_with_the_path() -> None:
             continue
         path = twin(x, y, True, 500)
         met = np.flatnonzero((path == (ex, ey)).all(axis=1))
-        assert direct_search_hits(x, y, True, ex, ey, 500) == (met[0] + 1 if len(met) else -1)
+        assert hit(x, y, True, (ex, ey), 500) == (met[0] + 1 if len(met) else -1)
         missed += len(met) == 0
         with_start = np.vstack([[(x, y)], path])
         squares = ((with_start - (ex, ey)) ** 2).sum(axis=1)
         low, high = 30, 400
         best = int(np.argmin(squares[low : high + 1])) + low
-        assert direct_search_nearest(x, y, True, ex, ey, low, high) == (best, squares[best])
+        state = direct_search_start(x, y, True)
+        assert nearest_to(state, ex, ey, low, high) == (best, squares[best])
     assert 0 < missed < 300
-    assert direct_search_nearest(5, 0, True, 0, 5, 0, 0) == (0, 50)
-    assert direct_search_nearest(5, 0, True, 0, 5, 3, 2) == (-1, -1)
+    assert nearest_to(direct_search_start(5, 0, True), 0, 5, 0, 0) == (0, 50)
+    assert nearest_to(direct_search_start(5, 0, True), 0, 5, 3, 2) == (-1, -1)
 
 
 def test_the_limit_of_hits_counts() -> None:
-    assert direct_search_hits(0, 30, True, 0, 30, 168) == 168
-    assert direct_search_hits(0, 30, True, 0, 30, 167) == -1
+    assert hit(0, 30, True, (0, 30), 168) == 168
+    assert hit(0, 30, True, (0, 30), 167) == -1
 
 
 @pytest.mark.parametrize("clockwise", [True, False])
@@ -183,10 +213,10 @@ def test_the_ties_never_decide(clockwise: bool) -> None:
     """A start turned by 90° (X and Y change places) gives the turned path; so does a mirror."""
     for x in range(60):
         for y in range(1, 60):
-            path = direct_search_path(x, y, clockwise, 0, 350)
-            turned = direct_search_path(-y, x, clockwise, 0, 350)
+            path = compiled(x, y, clockwise, 350)
+            turned = compiled(-y, x, clockwise, 350)
             assert np.array_equal(turned, np.column_stack([-path[:, 1], path[:, 0]])), (x, y)
-            mirrored = direct_search_path(-x, y, not clockwise, 0, 350)
+            mirrored = compiled(-x, y, not clockwise, 350)
             assert np.array_equal(mirrored, path * [-1, 1]), (x, y)
 
 
@@ -197,4 +227,4 @@ def test_whole_circles_close_from_every_start() -> None:
     starts += [(int(x), int(y)) for x, y in rng.integers(-3000, 3001, (300, 2))]
     for x, y in starts:
         turn = 4 * math.sqrt(2.0) * math.hypot(x, y)
-        assert direct_search_hits(x, y, True, x, y, int(turn) + 4) > turn - 4, (x, y)
+        assert hit(x, y, True, (x, y), int(turn) + 4) > turn - 4, (x, y)

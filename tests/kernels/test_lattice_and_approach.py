@@ -2,20 +2,20 @@
 
 import math
 from fractions import Fraction
+from itertools import islice
 
 import numpy as np
 import pytest
 from camtool_postprocessors.pic_mmh.steps import (
     approach_scan,
     approach_start,
-    direct_search_path,
     expected_quadrants,
     heading,
     rounded_radius,
 )
 
 from camtool.kernels.lattice import to_steps
-from tests.oracles.controllers import SIGNS, first_quadrant, x_grows
+from tests.oracles.controllers import SIGNS, direct_search, first_quadrant, x_grows
 
 
 def test_hundredths_of_a_micrometre_round_half_away_from_zero() -> None:
@@ -78,7 +78,7 @@ def test_an_end_at_the_centre_is_no_hang() -> None:
 def test_nearest_approach_is_on_the_right_turn() -> None:
     """An end just behind the start belongs to the end of the turn, one just before it to its
     begin; chunks do not matter."""
-    path = direct_search_path(100, 0, False, 0, 2000)
+    path = np.array(list(islice(direct_search(100, 0, False), 2000)))
     for end, around in [((103, -8), 558), ((103, 8), 8)]:
         expected = expected_quadrants(100, 0, False, *end)
         low, high = expected - 1, expected + 1

@@ -1,13 +1,13 @@
 """The play operator and the compensation against a literal loop and against mathematics."""
 
-from itertools import pairwise, product
+from itertools import islice, pairwise, product
 
 import numpy as np
 import pytest
-from camtool_postprocessors.pic_mmh.steps import direct_search_path
 
 from camtool.kernels.play import play_fill, play_limits, play_start
 from tests.oracles import controllers as twins
+from tests.oracles.controllers import direct_search
 from tests.oracles.mechanics import PulsedAxis
 
 STEP = 0.00014
@@ -112,7 +112,7 @@ def test_half_a_step_back_is_a_reversal_and_less_is_none(back: float, reversals:
 def test_circle_with_play_is_four_shifted_quarters() -> None:
     """X of a CW circle from the top: up to +R, down to −R, up to 0, with play and nothing else."""
     radius, play = 2000, 250 * STEP
-    path = np.vstack([[(0, radius)], direct_search_path(0, radius, True, 0, 11312)])
+    path = np.vstack([[(0, radius)], list(islice(direct_search(0, radius, True), 11312))])
     x = path[:, 0].copy()
     slide, reversals = run(x, play_limits(play, "preloaded", 1))
     first, second = int(np.argmax(x)), int(np.argmin(x))

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors.pic_mmh.numbers import FORMATS
 
 from camtool.errors import MachineError, PostError
 from camtool.findings import Code, Severity
@@ -27,11 +26,6 @@ def findings(path: ToolpathBuilder, *settings: str) -> dict[Code, str]:
     found = target.target.write(path.finish(), target.machine).findings
     assert len({finding.code for finding in found}) == len(found)
     return {finding.code: finding.message for finding in found}
-
-
-def test_numbers_are_said_as_in_the_block_of_the_thesis_and_in_its_annex() -> None:
-    assert [FORMATS["example"](units) for units in (296_900, -14)] == ["02969.00", "-00000.14"]
-    assert [FORMATS["annex"](units) for units in (2_969, -1)] == ["+02969", "-00001"]
 
 
 @pytest.mark.parametrize(
