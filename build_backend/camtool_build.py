@@ -8,8 +8,9 @@ plain Python, and runs uncompiled too. Cython is given a copy of both under buil
 - names that the .pxd cimports are not imported once more.
 
 Where there is no C compiler, zig's is asked for, a wheel from the package index. With
-CAMTOOL_CHECKED=1 in the environment every index is checked, and gcc lets integers that overflow
-end the program.
+CAMTOOL_CHECKED=1 in the environment every index is checked, and what C leaves undefined (integers
+that overflow, numbers that fit no integer, and so on) ends the program. CAMTOOL_CHECKED=address also
+checks each access of memory: it needs the compiler's libasan, loaded before Python (LD_PRELOAD).
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ ROOMS = {"camtool": "camtool", "camtool_postprocessors": "postprocessors"}
 SHARED = "camtool.kernels._memoryviews"
 """What all compiled modules need of Cython's memoryviews, once."""
 
-CHECKED = os.environ.get("CAMTOOL_CHECKED") == "1"
+CHECKED = os.environ.get("CAMTOOL_CHECKED", "")
 
 DIRECTIVES = {
     "language_level": 3,
     "annotation_typing": False,  # types stand in the .pxd
     "infer_types": True,
-    "boundscheck": CHECKED,
-    "initializedcheck": CHECKED,
+    "boundscheck": bool(CHECKED),
+    "initializedcheck": bool(CHECKED),
     "wraparound": False,
     "cdivision": True,  # as in C: 1/0 is inf, and // and % are for numbers that are not negative
     "cpow": True,
@@ -56,11 +57,9 @@ FLAGS = {
 """No sum is fused with a product: all processors round alike."""
 
 if CHECKED:
-    FLAGS["unix"] += [
-        "-fno-wrapv",
-        "-fsanitize=signed-integer-overflow",
-        "-fsanitize-undefined-trap-on-error",
-    ]
+    kinds = "undefined,float-cast-overflow" + (",address" if CHECKED == "address" else "")
+    FLAGS["unix"] += ["-O1", "-fno-wrapv", f"-fsanitize={kinds}"]
+    FLAGS["unix"] += ["-fsanitize-undefined-trap-on-error"]
 
 WIDE = """
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -311,7 +310,7 @@ class BuildKernels(build_ext):
         """From Python to C, and from there to machine code."""
         from Cython.Build import cythonize
 
-        before, mode = Path.cwd(), "checked" if CHECKED else "lowered"
+        before, mode = Path.cwd(), f"checked-{CHECKED}" if CHECKED else "lowered"
         folder, latest = ROOT / "build" / mode, ROOT / "build" / "latest"
         # What the other kind of build left beside the sources is newer than what this one reads.
         self.force = self.force or not latest.exists() or latest.read_text() != mode
