@@ -9,8 +9,8 @@ plain Python, and runs uncompiled too. Cython is given a copy of both under buil
 
 Where there is no C compiler, zig's is asked for, a wheel from the package index. With
 CAMTOOL_CHECKED=1 in the environment every index is checked, and what C leaves undefined (integers
-that overflow, numbers that fit no integer, and so on) ends the program. CAMTOOL_CHECKED=address also
-checks each access of memory: it needs the compiler's libasan, loaded before Python (LD_PRELOAD).
+that overflow, numbers that fit no integer, and so on) ends the program. CAMTOOL_CHECKED=address
+also checks each access of memory: it needs the compiler's libasan, loaded before Python.
 """
 
 from __future__ import annotations
