@@ -11,3 +11,36 @@ cpdef void put_words(
     Int[:, ::1] values, unsigned char[:, ::1] written, unsigned char[::1] fixed,
     Int[::1] fixed_ends, Int[:, ::1] styles, bint blanks, unsigned char[::1] out, Int[::1] ends
 ) noexcept
+
+cdef Int _column_of(Int sign) noexcept  # inline
+
+@cython.locals(
+    negative=bint, mantissa=Int, digits=Int, exact=Int, scale=double, point=bint, sign=Int,
+    value=double
+)
+cdef Int _number(
+    const unsigned char[::1] data, Int at, Int end, double[::1] numbers, Int column
+) noexcept
+
+@cython.locals(first=Int)
+cdef bint _is_comment(
+    const unsigned char[::1] data, Int at, Int end, bint parentheses, bint semicolon
+) noexcept
+
+@cython.locals(
+    words=Int, form=Int, mask=Int, one_blank=Int, blanks=Int, sign=Int, first=Int, column=Int,
+    code=double, plain_digits=bint
+)
+cdef Int _plain_line(
+    const unsigned char[::1] data, Int at, Int end, bint lower_case, bint numbered,
+    double[::1] numbers, Int[::1] facts
+) noexcept
+
+@cython.locals(
+    most_chars=Int, lower_case=bint, numbered=bint, parentheses=bint, semicolon=bint, rows=Int,
+    size=Int, end=Int, first=Int, words=Int
+)
+cpdef (Int, Int, Int) plain_lines(
+    const unsigned char[::1] data, Int at, Int line, (Int, bint, bint, bint, bint) rules,
+    double[:, ::1] numbers, Int[:, ::1] facts
+) noexcept

@@ -6,7 +6,7 @@ because a program has millions of digits; C types stand in the .pxd beside this 
 
 from __future__ import annotations
 
-from camtool.arrays import Ints, Octets
+from camtool.arrays import Floats, Ints, Octets
 
 DIGITS, DECIMALS, KEPT, PLUS = range(4)
 """Columns of a style: least digits before the point, decimals, how many of these stay where they
@@ -80,3 +80,175 @@ def put_words(
                 out[at] = fixed[k]
                 at += 1
         ends[row] = at
+
+
+# Reading. A plain line holds nothing but words of the letters G X Y Z I J F, each once at most,
+# and its G is G0 to G3; parts of it may be a block number in front and blanks between the words. A
+# number has no more digits than a float64 takes exactly, and the power of ten that divides it is
+# exact too: so the quotient is the nearest float64, as Python's own reading gives it.
+
+G_WORD, X_WORD, Y_WORD, Z_WORD, I_WORD, J_WORD, F_WORD = range(7)
+"""Columns of numbers; a word's bit in `MASK` is 1 << its column."""
+
+FORM, MASK, TWO_DIGITS, ONE_BLANK, BEGIN, LINE = range(6)
+"""Columns of facts: the letters in their order, each as column + 1, as digits of a number in base
+8; which there are; whether G has two digits and nothing else; whether words are parted by one
+blank each; where the line begins, and its number."""
+
+FACT_COLUMNS = 6
+"""How many columns."""
+
+MOST_DIGITS, MOST_EXACT_DIGITS = 22, 15
+"""Digits of a number, and of these without zeros in front; longer ones are not plain."""
+
+_CR, _LF, _TAB, _OPEN, _CLOSE, _SEMICOLON = 13, 10, 9, 40, 41, 59
+_BIG_M, _BIG_N, _SMALL_M, _SMALL_A, _SMALL_Z = 77, 78, 109, 97, 122
+
+
+def _column_of(sign: int) -> int:
+    """The column of a letter, −1 for others."""
+    if sign == 71:
+        return G_WORD
+    if 88 <= sign <= 90:
+        return X_WORD + sign - 88
+    if 73 <= sign <= 74:
+        return I_WORD + sign - 73
+    return F_WORD if sign == 70 else -1
+
+
+def _number(data: Octets, at: int, end: int, numbers: Floats, column: int) -> int:
+    """Read the number at `at`; where it ends, or −1 when there is none that is plain."""
+    negative = at < end and data[at] == _MINUS
+    if at < end and (data[at] == _MINUS or data[at] == _PLUS):
+        at += 1
+    mantissa, digits, exact, scale, point = 0, 0, 0, 1.0, False
+    while at < end and digits <= MOST_DIGITS:
+        sign = data[at]
+        if _ZERO <= sign < _ZERO + 10:
+            mantissa = mantissa * 10 + (sign - _ZERO)
+            digits += 1
+            if mantissa > 0:
+                exact += 1
+            if exact > MOST_EXACT_DIGITS:
+                return -1
+            if point:
+                scale *= 10.0
+        elif sign == _POINT and not point:
+            point = True
+        else:
+            break
+        at += 1
+    if digits == 0 or digits > MOST_DIGITS:
+        return -1
+    value = mantissa / scale
+    numbers[column] = -value if negative else value
+    return at
+
+
+def _is_comment(data: Octets, at: int, end: int, parentheses: bool, semicolon: bool) -> bool:
+    """Whether a line that begins so is a comment alone, and not one that begins with an M: that
+    may be a message."""
+    first = data[at]
+    if not ((first == _OPEN and parentheses) or (first == _SEMICOLON and semicolon)):
+        return False
+    at += 1
+    while at < end and (data[at] == _BLANK or data[at] == _TAB):
+        at += 1
+    if at < end and (data[at] == _BIG_M or data[at] == _SMALL_M):
+        return False
+    if first == _SEMICOLON:
+        return True
+    while at < end and data[at] != _OPEN and data[at] != _CLOSE:
+        at += 1
+    if at == end or data[at] == _OPEN:
+        return False
+    at += 1
+    while at < end and data[at] == _BLANK:
+        at += 1
+    return at == end
+
+
+def _plain_line(
+    data: Octets, at: int, end: int, lower_case: bool, numbered: bool, numbers: Floats, facts: Ints
+) -> int:
+    """Read a line; how many words it has, or −1 when it is not plain."""
+    words, form, mask, one_blank = 0, 0, 0, 1
+    facts[TWO_DIGITS] = 0
+    while True:
+        blanks = at
+        while at < end and data[at] == _BLANK:
+            at += 1
+        if at == end:
+            break
+        sign = data[at]
+        if lower_case and _SMALL_A <= sign <= _SMALL_Z:
+            sign -= 32
+        if sign == _BIG_N and numbered and words == 0:
+            numbered = False
+            first = at + 1
+            at = first
+            while at < end and _ZERO <= data[at] < _ZERO + 10:
+                at += 1
+            if at == first:
+                return -1
+            continue
+        column = _column_of(sign)
+        if column < 0 or (mask >> column) & 1 == 1:
+            return -1
+        if words > 0 and at - blanks != 1:
+            one_blank = 0
+        first = at + 1
+        at = _number(data, first, end, numbers, column)
+        if at < 0:
+            return -1
+        if column == G_WORD:
+            code = numbers[G_WORD]
+            if code != 0.0 and code != 1.0 and code != 2.0 and code != 3.0:
+                return -1
+            plain_digits = at - first == 2 and data[first] == _ZERO and data[first + 1] != _POINT
+            facts[TWO_DIGITS] = 1 if plain_digits else 0
+        mask |= 1 << column
+        form = form * 8 + column + 1
+        words += 1
+    facts[FORM], facts[MASK], facts[ONE_BLANK] = form, mask, one_blank
+    return words
+
+
+def plain_lines(
+    data: Octets,
+    at: int,
+    line: int,
+    rules: tuple[int, bool, bool, bool, bool],
+    numbers: Floats,
+    facts: Ints,
+) -> tuple[int, int, int]:
+    """Read lines from `at` on, which is the begin of the line of this number, up to the first that
+    is not plain: how many have words, and where and in which line it stopped.
+
+    `rules`: the most characters of a line; whether small letters count as capitals, whether blocks
+    may be numbered, and whether comments in parentheses and behind a semicolon are passed over, on
+    lines of their own. numbers (R, 7) and facts (R, 6) are filled, no more rows than these.
+    """
+    most_chars, lower_case, numbered, parentheses, semicolon = rules
+    rows, size = 0, len(data)
+    while at < size and rows < len(facts):
+        end = at
+        while end < size and data[end] != _LF and data[end] != _CR:
+            end += 1
+        if end - at > most_chars:
+            break
+        first = at
+        while first < end and data[first] == _BLANK:
+            first += 1
+        if first < end and not _is_comment(data, first, end, parentheses, semicolon):
+            words = _plain_line(data, first, end, lower_case, numbered, numbers[rows], facts[rows])
+            if words < 0:
+                break
+            if words > 0:
+                facts[rows, BEGIN], facts[rows, LINE] = at, line
+                rows += 1
+        at = end
+        if at < size:
+            at += 2 if data[at] == _CR and at + 1 < size and data[at + 1] == _LF else 1
+        line += 1
+    return rows, at, line

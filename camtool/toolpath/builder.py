@@ -1,17 +1,21 @@
-"""Building a Toolpath row by row."""
+"""Building a Toolpath row by row, or many moves at a time by columns."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
-from camtool.arrays import Ints
+from camtool.arrays import Floats, Ints
 from camtool.findings import Finding
-from camtool.toolpath.moves import Kind, PathMode, Toolpath
+from camtool.toolpath.moves import COLUMNS, WHOLE, Kind, PathMode, Toolpath
 
 Coordinate = float | None
+
+ROWS_AT_ONCE = 1 << 14
+"""So many rows are Python objects at a time, no more."""
 
 
 class ToolpathBuilder:
@@ -35,12 +39,12 @@ class ToolpathBuilder:
         """Index of the run in the plan for the rows that follow; −1: links between runs."""
         self._start = start
         self._rows: list[tuple[float, ...]] = []
-        self._runs: list[int] = []
+        self._columns: dict[str, list[Any]] = {name: [] for name in (*COLUMNS, "run")}
         self._texts: dict[str, int] = {}
         self._modes: dict[PathMode, int] = {}
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return sum(map(len, self._columns["kind"])) + len(self._rows)
 
     def rapid(
         self, x: Coordinate = None, y: Coordinate = None, z: Coordinate = None
@@ -82,23 +86,28 @@ class ToolpathBuilder:
         self.position = (x, y, z)
         return self
 
+    def moves(self, kind: Ints, end: Floats, centre: Floats, feed: Floats, block: Ints) -> None:
+        """K moves by columns as `Toolpath` has them; K is not 0."""
+        self._gather()
+        count = len(kind)
+        columns = {"kind": kind, "end": end, "centre": centre, "feed": feed, "block": block}
+        same = {"source": self._of_source(), "mode": self._of_mode(), "run": self.run}
+        columns |= {name: np.full(count, number) for name, number in same.items()}
+        columns["value"] = np.full(count, np.nan)
+        for name, column in columns.items():
+            self._columns[name].append(column)
+        x, y, z = end[-1].tolist()
+        self.position = (x, y, z)
+
     @property
     def runs(self) -> Ints:
         """(N,) index of the run of each row."""
-        return np.array(self._runs, dtype=np.int64)
+        return np.asarray(self._gathered("run"), dtype=np.int64)
 
     def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:
         """The rows so far as a Toolpath."""
-        table = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), 11)
         return Toolpath(
-            kind=table[:, 0].astype(np.int64),
-            end=table[:, 1:4],
-            centre=table[:, 4:6],
-            feed=table[:, 6],
-            value=table[:, 7],
-            source=table[:, 8].astype(np.int64),
-            block=table[:, 9].astype(np.int64),
-            mode=table[:, 10].astype(np.int64),
+            **{name: self._gathered(name) for name in COLUMNS},
             modes=tuple(self._modes),
             start=np.array(self._start, dtype=np.float64),
             texts=tuple(self._texts),
@@ -127,13 +136,39 @@ class ToolpathBuilder:
         value: float | None,
     ) -> ToolpathBuilder:
         number = math.nan if value is None else float(value)
-        source = self._index(self.source) if self.source else -1
-        mode = -1
-        if self.mode is not None:
-            mode = self._modes.setdefault(self.mode, len(self._modes))
-        self._runs.append(self.run)
-        self._rows.append((kind, *end, *centre, feed, number, source, self.block, mode))
+        of_all = self._of_source(), self.block, self._of_mode(), self.run
+        self._rows.append((kind, *end, *centre, feed, number, *of_all))
+        if len(self._rows) == ROWS_AT_ONCE:
+            self._gather()
         return self
+
+    def _of_source(self) -> int:
+        return self._index(self.source) if self.source else -1
+
+    def _of_mode(self) -> int:
+        return -1 if self.mode is None else self._modes.setdefault(self.mode, len(self._modes))
+
+    def _gather(self) -> None:
+        """Bring the rows so far into columns."""
+        if self._rows:
+            table = np.array(self._rows, dtype=np.float64)
+            self._rows = []
+            cut = np.split(table, [1, 4, 6, 7, 8, 9, 10, 11], axis=1)
+            for name, part in zip((*COLUMNS, "run"), cut, strict=True):
+                column = part if name in ("end", "centre") else part[:, 0]
+                self._columns[name].append(column)
+
+    def _gathered(self, name: str) -> Any:
+        """A column of all rows, as one array that a Toolpath need not copy."""
+        self._gather()
+        parts = self._columns[name]
+        if len(parts) != 1 or parts[0].flags.writeable:
+            shape = (0, *{"end": (3,), "centre": (2,)}.get(name, ()))
+            dtype = np.int64 if name in (*WHOLE, "run") else np.float64
+            whole = np.concatenate(parts or [np.empty(shape)], dtype=dtype, casting="unsafe")
+            whole.flags.writeable = False
+            parts[:] = [whole]
+        return parts[0]
 
     def _index(self, text: str) -> int:
         return self._texts.setdefault(text, len(self._texts))

@@ -125,10 +125,12 @@ class Toolpath:
         }
         for name, shape in shapes.items():
             dtype = np.int64 if name in WHOLE else np.float64
-            column = np.array(getattr(self, name), dtype=dtype)
+            column = getattr(self, name)
+            if not _is_own(column, dtype):
+                column = np.array(column, dtype=dtype)
+                column.flags.writeable = False
             if column.shape != shape:
                 raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
-            column.flags.writeable = False
             object.__setattr__(self, name, column)
         if self.drawn is not None and len(self.drawn.edge) != count:
             raise ValueError(f"drawn is of {len(self.drawn.edge)} rows, not of {count}")
@@ -217,6 +219,13 @@ class Toolpath:
                 source=self.text(row),
                 block=int(self.block[row]),
             )
+
+
+def _is_own(column: object, dtype: type) -> bool:
+    """Whether nobody can change this column, so that it need not be copied."""
+    if not isinstance(column, np.ndarray) or column.dtype != dtype:
+        return False
+    return bool(column.flags.owndata) and not column.flags.writeable
 
 
 def _triple(row: Floats) -> tuple[float, float, float]:

@@ -11,6 +11,9 @@ but no blocks. Lines end with LF, CR LF or CR, also mixed. N words in front are 
 where `Lexing.block_numbers` allows them. Columns are those of the file's own line, from 1, and
 are only worked out when something is wrong, so that words need not carry them.
 
+Blocks of moves alone, thousands in a row, are offered by columns (`PlainBlocks`) to readers that
+want them so.
+
 `Block.comments` holds the texts of the line's comments, without their delimiters; a line of
 comments alone is given too when `Lexing.comment_lines` (with no words and an index of −1).
 
@@ -20,11 +23,15 @@ Writers never use this module, readers never `format.py`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal, NoReturn
 
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
+from camtool.kernels import words
 from camtool.toolpath.program import Listing
 
 SHOWN_CHARS: Final = 32
@@ -33,12 +40,18 @@ SHOWN_CHARS: Final = 32
 LINE_CHARS: Final = 4096
 """A longer line is refused where the dialect itself has no limit: no machine reads such lines."""
 
+LEAST_RUN: Final = 24
+"""Fewer plain blocks in a row than these are read one by one."""
+
+ROWS_AT_ONCE: Final = 1 << 12
+"""So many plain blocks are read in one go."""
+
 # Possessive (++): a number is matched in one way only, so that no line costs more than its length.
 _NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?|\.\d++)"
 _COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
 _ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
 _CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
-_LINE_END: Final = re.compile(r"\r\n|\n|\r")
+_LINE_END: Final = re.compile(rb"\r\n|\n|\r")
 _NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
 _BLOCK_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
 
@@ -83,7 +96,7 @@ class Lexing:
 class Block:
     """One block: `words` [(letter, number text)], where it stands, and its `comments`."""
 
-    __slots__ = ("_lexing", "comments", "index", "line", "text", "words")
+    __slots__ = ("_lexing", "behind", "comments", "index", "line", "text", "words")
 
     def __init__(
         self,
@@ -93,9 +106,12 @@ class Block:
         words: list[tuple[str, str]],
         comments: tuple[str, ...],
         lexing: Lexing,
+        behind: int = 0,
     ) -> None:
         self.index = index
         self.line = line
+        self.behind = behind
+        """Where in the program's bytes the next line begins."""
         self.text = text
         """The file's own line."""
         self.words = words
@@ -126,12 +142,101 @@ class Block:
         self.fail(message, word=at[-1] if at else None, mend=mend)
 
 
-def blocks_of(data: bytes, lexing: Lexing) -> Iterator[Block]:
-    """The blocks of a program one by one; ProgramError at the first that is none."""
-    line_of_words, word = _patterns(lexing)
-    index = 0
-    for number, raw in enumerate(_lines(data, lexing), 1):
-        text = raw
+@dataclass(frozen=True, eq=False)
+class PlainBlocks:
+    """N blocks in a row whose lines hold nothing but words of G X Y Z I J F, each once at most, G
+    being G0 to G3: numbers (N, 7) and facts (N, 6) of `camtool.kernels.words`; `first`: the index
+    of the first of them. What a block has no word for is undefined in `numbers`."""
+
+    numbers: Floats
+    facts: Ints
+    first: int
+
+    def __len__(self) -> int:
+        return len(self.facts)
+
+    def behind(self, count: int) -> PlainBlocks:
+        """Without so many in front."""
+        return PlainBlocks(self.numbers[count:], self.facts[count:], self.first + count)
+
+    def has(self, column: int) -> Bools:
+        """(N,) whether a block has the word of this column."""
+        return np.asarray((self.facts[:, words.MASK] >> column) & 1 == 1)
+
+
+Take = Callable[[PlainBlocks], int]
+"""Takes blocks in a row, as many as it can by columns, and says how many these are."""
+
+
+def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[Block]:
+    """The blocks of a program one by one, but for those that `take` has taken; ProgramError at the
+    first that is none.
+
+    Where thousands of lines in a row are plain, Python objects for each of them would be most of
+    the time; all others, and whatever `take` does not want, are given here. So `take` need not
+    know any fault: it leaves the block.
+    """
+    _check_bytes(data, lexing)
+    reader = _Lines(data, lexing)
+    at, number, index = 0, 1, 0
+    while at < len(data):
+        if take is not None:
+            plain, at, number = reader.plain(at, number, index)
+            done, alone = 0, 1
+            while done < len(plain):
+                taken = take(plain.behind(done)) if len(plain) - done >= LEAST_RUN else 0
+                done += taken
+                # Where nothing is taken it is asked less and less often.
+                alone = 1 if taken else 2 * alone
+                for begin, line in plain.facts[done : done + alone, words.BEGIN :].tolist():
+                    block, _ = reader.block(begin, line, index + done)
+                    done += 1
+                    if block is not None:
+                        yield block
+            index += len(plain)
+        if at < len(data):
+            block, at = reader.block(at, number, index)
+            number += 1
+            if block is not None:
+                index += len(block.words) > 0
+                yield block
+
+
+class _Lines:
+    """The lines of a program, read from any of them on."""
+
+    def __init__(self, data: bytes, lexing: Lexing) -> None:
+        self._data, self._lexing = data, lexing
+        self._line_of_words, self._word = _patterns(lexing)
+        self._numbers = np.empty((0, 7))
+        self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
+        self._rules = (
+            lexing.line_chars,
+            lexing.lower_case,
+            lexing.block_numbers,
+            lexing.parentheses,
+            lexing.semicolon,
+        )
+
+    def plain(self, at: int, number: int, index: int) -> tuple[PlainBlocks, int, int]:
+        """The plain blocks from the line of this number on, which begins at `at`; and where they
+        end, in which line. They are good until the next are read."""
+        if not len(self._facts):
+            self._numbers = np.zeros((ROWS_AT_ONCE, 7))
+            self._facts = np.empty((ROWS_AT_ONCE, words.FACT_COLUMNS), dtype=np.int64)
+        octets = np.frombuffer(self._data, dtype=np.uint8)
+        rows, at, number = words.plain_lines(
+            octets, at, number, self._rules, self._numbers, self._facts
+        )
+        return PlainBlocks(self._numbers[:rows], self._facts[:rows], index), at, number
+
+    def block(self, at: int, number: int, index: int) -> tuple[Block | None, int]:
+        """The block in the line of this number, which begins at `at`, or a line of comments alone
+        where these are wanted; and where the next line begins."""
+        lexing = self._lexing
+        end = _LINE_END.search(self._data, at)
+        stop, behind = end.span() if end else (len(self._data), len(self._data))
+        raw = text = self._data[at:stop].decode("latin-1")
         comments: tuple[str, ...] = ()
         if "(" in text or ";" in text or ")" in text:
             comments = _comments(raw, index, number, lexing)
@@ -143,16 +248,16 @@ def blocks_of(data: bytes, lexing: Lexing) -> Iterator[Block]:
         if len(raw if lexing.counts_blanks else text) > lexing.line_chars:
             message = f"the line has more than {lexing.line_chars} characters"
             raise _error(message, index, number, lexing.line_chars + 1, "shorten it")
-        if not text.isascii() or line_of_words.fullmatch(text) is None:
+        if not text.isascii() or self._line_of_words.fullmatch(text) is None:
             raise _fault(raw, index, number, lexing)
-        words: list[tuple[str, str]] = word.findall(text)
-        if words and words[0][0] == "N" and lexing.block_numbers:
-            del words[0]
-        if words:
-            yield Block(index, number, raw, words, comments, lexing)
-            index += 1
-        elif comments and lexing.comment_lines:
-            yield Block(-1, number, raw, words, comments, lexing)
+        found: list[tuple[str, str]] = self._word.findall(text)
+        if found and found[0][0] == "N" and lexing.block_numbers:
+            del found[0]
+        if found:
+            return Block(index, number, raw, found, comments, lexing, behind), behind
+        if comments and lexing.comment_lines:
+            return Block(-1, number, raw, found, comments, lexing, behind), behind
+        return None, behind
 
 
 def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
@@ -165,21 +270,19 @@ def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
     return re.compile(line), re.compile(rf"([{letters}])({_NUMBER})")
 
 
-def _lines(data: bytes, lexing: Lexing) -> list[str]:
-    """The lines; ProgramError at the first byte that is no printable ASCII, tab or line end.
+def _check_bytes(data: bytes, lexing: Lexing) -> None:
+    """ProgramError at the first byte that is no printable ASCII, tab or line end.
 
     Where comments may hold other signs, each of their bytes stands as one: columns count bytes.
     """
     odd = (_CONTROL if lexing.foreign_comments else _ODD).search(data)
     if odd:
-        before = _LINE_END.split(data[: odd.start()].decode("latin-1"))
+        before = _LINE_END.split(data[: odd.start()])
         raise ProgramError(
             f"the byte 0x{data[odd.start()]:02x} belongs to no program",
             where=f"line {len(before)}, column {len(before[-1]) + 1}",
             mend="give a program of plain ASCII text",
         )
-    lines = _LINE_END.split(data.decode("latin-1"))
-    return lines if lines[-1] else lines[:-1]
 
 
 def _place(index: int, line: int, column: int) -> str:
@@ -263,7 +366,7 @@ def _explained(rest: str, before: str, lexing: Lexing) -> tuple[str, str, int]:
 def listing(data: bytes) -> Listing:
     """The blocks of a program that its reader takes, each as its line stands in the file: the
     lines with a word besides their number."""
-    lines = _LINE_END.split(data.decode("latin-1"))
+    lines = (line.decode("latin-1") for line in _LINE_END.split(data))
     return Listing(tuple(line.strip() for line in lines if _has_words(line)))
 
 

@@ -15,12 +15,16 @@ from enum import IntEnum
 from functools import partial
 from typing import Final
 
+import numpy as np
+
+from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
+from camtool.kernels import words
 from camtool.machine.model import Machine, exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
-from .blocks import Block
+from .blocks import Block, PlainBlocks
 from .findings import (
     FEED_ABOVE_LIMIT_IN_WORDS,
     NEVER_READ,
@@ -45,6 +49,9 @@ TURNS_TOLERANCE: Final = 1e-3
 
 MOST_TURNS: Final = 10_000
 """Largest number of turns of an arc, each of which is a move."""
+
+SURE_PART: Final = 0.999
+"""Part of a limit of the rule for arcs: what keeps to it does so however it is rounded."""
 
 _TURN: Final = 2.0 * math.pi
 
@@ -103,6 +110,7 @@ class Rules:
     `refused`: codes ("G55", "M6") that the controller knows but that have no place in a program
     here, and why. `first_motion`: the motion mode before the first motion word (None: none).
     `arc_fault`: why radii r1 and r2 (mm, at start and end) are no arc, "" if they are.
+    `sure_gap_mm`, `sure_radius_mm`: radii that are larger and differ by no more are an arc.
     `circle_without_end`: an arc that has only its centre is a full circle. `path_modes`: the
     group "path" sets how corners are met. `turns`: P is how many turns an arc begins.
     `forgets_feed`: G94 does, and G1 to G3 want a feed even where nothing moves.
@@ -117,6 +125,8 @@ class Rules:
     arc_fault: Callable[[float, float], str]
     full_turn_rad: float
     chord_slack_mm: float
+    sure_gap_mm: float
+    sure_radius_mm: float
     circle_without_end: bool = False
     path_modes: bool = False
     turns: bool = False
@@ -133,6 +143,8 @@ class ModalReader:
 
     def __init__(self, machine: Machine, rules: Rules) -> None:
         self.path = ToolpathBuilder()
+        self.empty = True
+        """Whether there has been no block yet."""
         self._rules = rules
         self._motion = rules.first_motion
         self._mm = 1.0
@@ -148,6 +160,7 @@ class ModalReader:
 
     def block(self, block: Block) -> None:
         """Decode one block; ProgramError where the controller would refuse it."""
+        self.empty = False
         if self._machine.ended:
             block.fail("a block after the end of the program", mend="remove it")
         self.path.block = block.index
@@ -173,6 +186,41 @@ class ModalReader:
             block.fail_at(letter, f"nothing in the block uses the {letter} word")
         if m_codes:
             self._machine.stop(block, m_codes)
+
+    def take(self, plain: PlainBlocks) -> int:
+        """Decode plain blocks by columns, up to the first that is no move which the controller
+        surely does, from any state: `block` decodes that one. How many were decoded."""
+        if self._machine.ended or not self._absolute or self._absolute_centres:
+            return 0
+        moves = PlainMoves(plain, self._state(), self._rules)
+        count = moves.count
+        rows = moves.moving[:count]
+        feeds = moves.feed[:count]
+        limit = self._findings.max_feed_mm_min
+        fast = np.flatnonzero(plain.has(words.F_WORD)[:count] & (feeds > limit)).tolist()
+        self._findings.fast += [
+            (plain.first + at, float(feeds[at])) for at in fast if exceeds(float(feeds[at]), limit)
+        ]
+        if count:
+            self.empty = False
+            last = int(moves.motion[count - 1])
+            self._motion = self._motion if last < 0 else last
+            self._feed = float(feeds[-1])
+        if rows.any():
+            self._moved = True
+            motion = moves.motion[:count][rows]
+            self.path.moves(
+                kind=KINDS[motion],
+                end=moves.end[:count][rows],
+                centre=np.where(motion[:, None] > G.LINE, moves.centre[:count][rows], np.nan),
+                feed=np.where(motion >= G.LINE, feeds[rows], np.nan),
+                block=plain.first + np.flatnonzero(rows),
+            )
+        return count
+
+    def _state(self) -> PlainState:
+        motion = -1 if self._motion is None or self._motion > G.ARC_CCW else self._motion
+        return PlainState(motion, self._feed, self._mm, self.path.position)
 
     def _carry_out(
         self, block: Block, modes: dict[str, int], m_codes: list[int], numbers: dict[str, float]
@@ -402,6 +450,89 @@ class ModalReader:
         if "I" not in numbers or "J" not in numbers:
             block.fail("with G90.1 an arc needs both I and J")
         return numbers.pop("I") * self._mm, numbers.pop("J") * self._mm
+
+
+# Plain blocks by columns.
+
+
+KINDS: Final = np.full(G.ARC_CCW + 1, -1)
+"""The kind of a move, by its G word tenfold."""
+KINDS[[0, 10, 20, 30]] = [Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW]
+
+
+@dataclass(frozen=True)
+class PlainState:
+    """What is in force before plain blocks: the motion (a G word tenfold, −1: none), the feed
+    (0: none), mm of a unit, and where the tool stands."""
+
+    motion: int
+    feed: float
+    mm: float
+    position: tuple[float, float, float]
+
+
+class PlainMoves:
+    """N plain blocks with absolute coordinates: for each the motion in force, the feed in force
+    (N,) mm/min, where the tool stands behind it (N, 3) mm, the centre of an arc (N, 2) mm, and
+    whether it moves. `count`: so many, from the first on, are surely what `ModalReader.block`
+    would make of them too; the others are not to be used."""
+
+    def __init__(self, plain: PlainBlocks, state: PlainState, rules: Rules) -> None:
+        has_g, has_feed = plain.has(words.G_WORD), plain.has(words.F_WORD)
+        has = [plain.has(column) for column in (words.X_WORD, words.Y_WORD, words.Z_WORD)]
+        has_i, has_j = plain.has(words.I_WORD), plain.has(words.J_WORD)
+        numbers = plain.numbers
+        self.motion = filled(
+            has_g, np.where(has_g, numbers[:, words.G_WORD] * 10.0, 0.0), state.motion
+        ).astype(np.int64)
+        self.feed = filled(has_feed, numbers[:, words.F_WORD] * state.mm, state.feed)
+        self.end = np.column_stack(
+            [
+                filled(has[axis], numbers[:, words.X_WORD + axis] * state.mm, state.position[axis])
+                for axis in range(3)
+            ]
+        )
+        start = np.concatenate([[state.position], self.end[:-1]])
+        self.moving = has[0] | has[1] | has[2]
+        centred = has_i | has_j
+        offset = np.column_stack(
+            [
+                np.where(has_i, numbers[:, words.I_WORD] * state.mm, 0.0),
+                np.where(has_j, numbers[:, words.J_WORD] * state.mm, 0.0),
+            ]
+        )
+        self.centre = start[:, :2] + offset
+        arc = self.motion > G.LINE
+        sure = ~(has_feed & ~(self.feed > 0.0))
+        sure &= self.moving | ~centred
+        sure &= ~self.moving | (self.motion >= 0)
+        sure &= ~(has_g | self.moving) | (self.motion == G.RAPID) | (self.feed > 0.0)
+        sure &= ~(has_g & arc) | self.moving
+        sure &= ~self.moving | (arc == centred)
+        arcs = np.flatnonzero(arc & self.moving & sure)
+        if rules.ends_in_plane:
+            sure[arcs] &= (has[0] | has[1])[arcs]
+        sure[arcs] &= sure_arcs(start[arcs, :2], self.end[arcs, :2], self.centre[arcs], rules)
+        self.count = len(sure) if sure.all() else int(sure.argmin())
+
+
+def filled(given: Bools, values: Floats, before: float) -> Floats:
+    """(N,) the value that was given last, `before` where none was yet."""
+    latest = np.maximum.accumulate(np.where(given, np.arange(1, len(given) + 1), 0))
+    return np.asarray(np.concatenate([[before], values])[latest])
+
+
+def sure_arcs(start: Floats, end: Floats, centre: Floats, rules: Rules) -> Bools:
+    """(K,) which arcs surely have one radius, and turn by more than what is taken for a full
+    circle or end where they start."""
+    out, back = start - centre, end - centre
+    r1, r2 = np.hypot(out[:, 0], out[:, 1]), np.hypot(back[:, 0], back[:, 1])
+    cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
+    turn = np.abs(np.arctan2(cross, (out * back).sum(axis=1)))
+    same = (start == end).all(axis=1)
+    sure = np.abs(r1 - r2) <= SURE_PART * rules.sure_gap_mm
+    sure &= SURE_PART * np.minimum(r1, r2) > rules.sure_radius_mm
+    return np.asarray(sure & (same | (SURE_PART * turn > rules.full_turn_rad)))
 
 
 SPINDLE: Final = {

@@ -70,11 +70,9 @@ def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
         counts_blanks=False,
     )
     reader = ModalReader(machine, rules_of(dialect))
-    empty = True
-    for block in blocks_of(data, lexing):
+    for block in blocks_of(data, lexing, reader.take):
         reader.block(block)
-        empty = False
-    if empty:
+    if reader.empty:
         raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
     path = reader.finish()
     return replace(path, findings=(*path.findings, *_too_slow(path, machine)))
@@ -125,6 +123,8 @@ def rules_of(dialect: Dialect) -> Rules:
         arc_fault=arc_fault,
         full_turn_rad=dialect.arc_full_turn_rad,
         chord_slack_mm=dialect.arc_chord_slack_mm,
+        sure_gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
+        sure_radius_mm=dialect.arc_least_radius_mm,
         ends_in_plane=True,
         m_codes={code: group for code, group in M_CODES.items() if code != MIST},
         tools="pause" if dialect.tool_change == "pause" else "none",

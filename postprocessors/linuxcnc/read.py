@@ -54,6 +54,12 @@ REFUSED: Final = {
 
 LINE_END: Final = re.compile(rb"\r\n|\n|\r")
 
+FRAME: Final = re.compile(rb"\s*%[ \t\v\f]*(?=[\r\n]|\Z)")
+"""All up to a lone % on the first line that is not blank."""
+
+FRAME_END: Final = re.compile(rb"[\r\n][ \t\v\f]*%[ \t\v\f]*(?=[\r\n]|\Z)")
+"""A line of a lone %, and the end of the line before it."""
+
 SAYS_SOMETHING: Final = re.compile(rb"\s*[^\s%(;]")
 """A line that is not blank, a % or a comment."""
 
@@ -73,46 +79,51 @@ def read_program(data: bytes, machine: LinuxcncMachine) -> Toolpath:
         foreign_comments=True,
     )
     reader = ModalReader(machine, rules_of(dialect))
-    lines = LINE_END.split(data)
-    end, framed = _unframed(lines)
-    empty = True
-    for block in blocks_of(b"\n".join(lines[:end]), lexing):
+    body, framed = _unframed(data)
+    at, line = len(body), 0
+    for block in blocks_of(body, lexing, reader.take):
         for text in block.comments:
             if text.lstrip()[:4].upper() == "MSG,":
                 reader.message(text.lstrip()[4:].strip())
         if block.words:
             reader.block(block)
-            empty = False
         if reader.ended:
-            end = block.line
+            at, line = block.behind, block.line
             break
-    if empty and not framed:
+    if reader.empty and not framed:
         raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
     if not (reader.ended or framed):
         raise ProgramError(
             "the file ends without an end of the program, which LinuxCNC reports as an error",
-            where=f"line {len(lines) if lines[-1] else max(len(lines) - 1, 1)}",
+            where=f"line {max(_lines_of(data), 1)}",
             mend="end with M2, or put a line of % before and behind the program",
         )
-    behind = [k for k, text in enumerate(lines[end:], end + 1) if SAYS_SOMETHING.match(text)]
-    reader.unread(behind)
+    if not reader.ended:
+        line = _lines_of(body)
+    behind = LINE_END.split(data[at:])
+    reader.unread([k for k, text in enumerate(behind, line + 1) if SAYS_SOMETHING.match(text)])
     return reader.finish()
 
 
-def _unframed(lines: list[bytes]) -> tuple[int, bool]:
-    """How many lines there are before the end that a % makes, and whether one does.
+def _lines_of(data: bytes) -> int:
+    """How many lines these are."""
+    ended = sum(1 for _ in LINE_END.finditer(data))
+    return ended + (not data.endswith((b"\r", b"\n")) and len(data) > 0)
+
+
+def _unframed(data: bytes) -> tuple[bytes, bool]:
+    """The file up to the end that a % makes, and whether one does.
 
     Where the first line that is not blank is a lone % (it becomes blank), the next such line ends
     the program; elsewhere % is no word.
     """
-    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
-    if lines[first].strip() != b"%":
-        return len(lines), False
-    lines[first] = b""
-    for k in range(first + 1, len(lines)):
-        if lines[k].strip() == b"%":
-            return k, True
-    return len(lines), False
+    first = FRAME.match(data)
+    if first is None:
+        return data, False
+    found = FRAME_END.search(data, first.end())
+    end = found.start() + 1 if found else len(data)
+    begin = max(data.rfind(b"\n", 0, first.end()), data.rfind(b"\r", 0, first.end())) + 1
+    return data[:begin] + b" " * (first.end() - begin) + data[first.end() : end], found is not None
 
 
 def rules_of(dialect: Dialect) -> Rules:
@@ -136,6 +147,8 @@ def rules_of(dialect: Dialect) -> Rules:
         arc_fault=arc_fault,
         full_turn_rad=dialect.arc_full_turn_rad,
         chord_slack_mm=dialect.arc_chord_slack_mm,
+        sure_gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
+        sure_radius_mm=dialect.arc_least_radius_mm,
         circle_without_end=True,
         path_modes=True,
         turns=True,
