@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.pictures.overlay import Overlay
     from camtool.planning.job import Job
+    from camtool.progress import Progress
     from camtool.simulation.motion import Effects
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import Toolpath
@@ -145,11 +146,18 @@ def compare_program(
     source: str,
     drawing: Drawing | None = None,
     job: Job | None = None,
+    progress: Progress | None = None,
 ) -> Comparison:
     """The program read and judged as each variant; raises as `verify_program` does."""
     runs = [
         verify_program(
-            data, each.target, source=source, drawing=drawing, job=job, judging=each.judging
+            data,
+            each.target,
+            source=source,
+            drawing=drawing,
+            job=job,
+            judging=each.judging,
+            progress=progress,
         )
         for each in variants
     ]

@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity, worst
+from camtool.progress import Progress
 from camtool.run import Run
 
 if TYPE_CHECKING:
@@ -32,6 +34,10 @@ if TYPE_CHECKING:
     from camtool.verification.conformance import Asked
     from camtool.verification.report import Before, Gates, PlannedOperation
     from camtool.verification.verify import Verification, VerifyOptions
+
+
+PLANNING = "planning"
+"""The stage in which a job becomes moves."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +80,20 @@ def post_drawing(
     compensate: bool = False,
     gates: Gates | None = None,
     trace_points: int | None = None,
+    progress: Progress | None = None,
 ) -> Run:
     """Plan, write, read back, simulate and judge.
 
     `check=False` leaves out the last two; `compensate` compensates what is written against the
     machine's mechanics; at most `trace_points` of the slides' path are kept (None: the default).
-    Raises OptionError, MachineError, and PostError for what the target cannot write.
+    `progress` is told of each stage. Raises OptionError, MachineError, and PostError for what the
+    target cannot write.
     """
     from camtool.planning.checks import doubtful_settings
     from camtool.planning.plan import planned
 
+    progress = progress or Progress()
+    progress.begin(PLANNING)
     plan = planned(drawing, job, target.machine)
     wanted = plan.toolpath
     run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
@@ -93,8 +103,7 @@ def post_drawing(
         return replace(run, findings=findings)
     compensation = _compensated(wanted, target.machine) if compensate else None
     written = wanted if compensation is None else compensation.toolpath
-    program = target.target.write(written, target.machine)
-    decoded = target.target.read(program.data, target.machine)
+    program, decoded = _written(written, target, progress)
     repeated = _repeated(program, decoded)
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if not check:
@@ -104,7 +113,7 @@ def post_drawing(
     from camtool.verification.report import Planned, certain
     from camtool.verification.verify import VerifyOptions
 
-    plain = _plain_run(drawing, job, target, compensate=compensate)
+    plain = _plain_run(drawing, job, target, progress, compensate=compensate)
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
     whole = plan
     if _plain(job) != job and compensation is None:
@@ -121,6 +130,7 @@ def post_drawing(
             kept=kept_of(whole.steps),
             trace_points=trace_points or TRACE_POINTS,
         ),
+        progress,
     )
     beyond = _beyond(verification, gates)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
@@ -150,6 +160,7 @@ def verify_program(
     drawing: Drawing | None = None,
     job: Job | None = None,
     judging: Judging | None = None,
+    progress: Progress | None = None,
 ) -> Run:
     """Any program of the target, simulated and judged, against `drawing` planned with `job` if it
     is given. ProgramError names file, block and column."""
@@ -158,7 +169,8 @@ def verify_program(
     from camtool.verification.case import TRACE_POINTS, WORST_LISTED, cone_of, tool_mm
     from camtool.verification.verify import VerifyOptions
 
-    judging = judging or Judging()
+    judging, progress = judging or Judging(), progress or Progress()
+    progress.begin(f"reading {PurePath(source).name}")
     run = read_program(data, target, source=source)
     decoded = run.decoded
     assert decoded is not None
@@ -169,6 +181,7 @@ def verify_program(
         from camtool.planning.plan import planned
 
         wanted, machine = job or Job(), target.machine
+        progress.begin(PLANNING)
         plan = planned(drawing, wanted, machine)
         compensation = _compensated(plan.toolpath, machine) if judging.compensated else None
         asked = _asked(wanted, target, plan.toolpath, compensation)
@@ -186,7 +199,7 @@ def verify_program(
         worst=WORST_LISTED if judging.worst is None else judging.worst,
         trace_points=judging.trace_points or TRACE_POINTS,
     )
-    found = _judged(data, decoded, target, goal, options)
+    found = _judged(data, decoded, target, goal, options, progress)
     beyond = _beyond(found, judging.gates)
     if beyond:
         found = found.with_findings((*found.findings, *beyond))
@@ -208,6 +221,7 @@ def convert_program(
     file: str,
     feed_mm_min: float | None = None,
     check: bool = True,
+    progress: Progress | None = None,
 ) -> Run:
     """A program of one target as the program of another, read back and judged against the first.
 
@@ -219,6 +233,8 @@ def convert_program(
     from camtool.toolpath.lower import at_feed, carried_over, within_feeds
     from camtool.verification.verify import VerifyOptions
 
+    progress = progress or Progress()
+    progress.begin(f"reading {PurePath(file).name}")
     decoded = _decoded(data, source, file)
     same = source.machine.target.dialect == target.machine.target.dialect
     wanted = decoded if same else carried_over(decoded)
@@ -229,14 +245,14 @@ def convert_program(
     run = Run(source=file, target=target, wanted=wanted)
     if worst(wanted.findings) >= Severity.ERROR:
         return replace(run, findings=wanted.findings)
-    program = target.target.write(wanted, target.machine)
-    again = target.target.read(program.data, target.machine)
+    program, again = _written(wanted, target, progress)
     repeated = _repeated(program, again)
     findings = _merged(wanted.findings, program.findings, again.findings, without=repeated)
     if not check:
         return replace(run, program=program, decoded=again, findings=findings)
     options = VerifyOptions(source=file)
-    judged = _judged(program.data, again, target, _Goal(wanted, written_from=wanted), options)
+    goal = _Goal(wanted, written_from=wanted)
+    judged = _judged(program.data, again, target, goal, options, progress)
     findings = _merged(findings, judged.findings, without=repeated)
     return replace(
         run,
@@ -268,6 +284,16 @@ def _decoded(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
         error.file = error.file or file
         raise
     return toolpath
+
+
+def _written(
+    moves: Toolpath, target: LoadedTarget, progress: Progress
+) -> tuple[Program, Toolpath]:
+    """The program of these moves, and what the target's controller decodes of it."""
+    progress.begin("writing")
+    program = target.target.write(moves, target.machine)
+    progress.begin("reading back")
+    return program, target.target.read(program.data, target.machine)
 
 
 def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
@@ -318,11 +344,13 @@ def _plain(job: Job) -> Job:
 
 
 def _plain_run(
-    drawing: Drawing, job: Job, target: LoadedTarget, *, compensate: bool
+    drawing: Drawing, job: Job, target: LoadedTarget, progress: Progress, *, compensate: bool
 ) -> Run | None:
     """The run of the job without measures against reversals and backlash; None without any."""
     plain = _plain(job)
-    return None if plain == job and not compensate else post_drawing(drawing, plain, target)
+    if plain == job and not compensate:
+        return None
+    return post_drawing(drawing, plain, target, progress=progress)
 
 
 def _before(plain: Run | None) -> Before | None:
@@ -339,11 +367,17 @@ def _before(plain: Run | None) -> Before | None:
 
 
 def _judged(
-    data: bytes, decoded: Toolpath, target: LoadedTarget, goal: _Goal, options: VerifyOptions
+    data: bytes,
+    decoded: Toolpath,
+    target: LoadedTarget,
+    goal: _Goal,
+    options: VerifyOptions,
+    progress: Progress,
 ) -> Verification:
     """The program simulated and compared with its goal."""
     from camtool.verification.verify import verify
 
+    progress.begin("simulating and judging", len(decoded))
     line_bytes = target.target.line_bytes(data, target.machine)
     stray_mm = target.target.stray_mm(target.machine)
     sized = replace(options, size_bytes=len(data), line_bytes=line_bytes, stray_mm=stray_mm)
@@ -356,6 +390,7 @@ def _judged(
         compensated=goal.compensated,
         asked=goal.asked,
         written_from=goal.written_from,
+        progress=progress,
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.plain import one_line, to_json
@@ -45,6 +46,7 @@ def calibrate(
     measured = read_measurements(Path(measurements))
     flags = MachineFlags(target or (None if machine else measured.target or None), machine, ())
     known = flags.load().machine
+    progress().begin("estimating")
     found = estimated(measured, known)
     files: dict[str, bytes] = {}
     if output is not None:

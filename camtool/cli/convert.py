@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from camtool.cli.files import read_bytes, shown
+from camtool.cli.life_signs import progress
 from camtool.cli.options import MachineFlags, SectionedCommand, feed, talk_options
 from camtool.cli.picture_options import (
     RESULT,
@@ -83,6 +84,7 @@ def convert(
         file=shown(program),
         feed_mm_min=feed_mm_min,
         check=not no_verify,
+        progress=progress(),
     )
     painter = picture.painter(lambda: [run.scene()], quiet=quiet)
     return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)

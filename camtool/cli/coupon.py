@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.life_signs import progress
 from camtool.cli.messages import say
 from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import OptionError
@@ -100,6 +101,7 @@ def coupon(
     known = machine.load().machine if machine.name() is not None else None
     made = sheet(cast("Kind", kind), size or _travel(known), regions, known)
     draw = coupons.svg if output.lower().endswith(".svg") else coupons.dxf
+    progress().begin("drawing the coupons")
     files = {output: draw(made)}
     if measurements is not None:
         files[measurements] = skeleton(made, known).encode()

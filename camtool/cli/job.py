@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import (
     DrawingFlags,
@@ -91,6 +92,7 @@ def check(
     job = JobFlags(file).job(drawing)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(against, target, job) if against is not None else None
+    progress().begin("planning")
     facts, findings = described(job, read, target)
     if report is not None:
         facts["findings"] = [

@@ -23,7 +23,8 @@ import click
 
 from camtool import __version__
 from camtool.cli import COMPLETE
-from camtool.cli.messages import life_signs, say, say_error
+from camtool.cli.life_signs import LifeSigns, life_signs
+from camtool.cli.messages import say, say_error
 from camtool.errors import CamtoolError, InputError, OutputError
 
 EXIT_BAD_INPUT = 2
@@ -125,8 +126,8 @@ def main() -> NoReturn:
 def _code(*, debug: bool) -> int:
     """The exit code of the command line."""
     try:
-        with life_signs(sys.stderr, sys.argv[1:]):
-            return _run()
+        with life_signs(sys.stderr, sys.argv[1:]) as signs:
+            return _run(signs)
     except click.ClickException as error:
         text = io.StringIO()
         error.show(text)
@@ -152,11 +153,11 @@ def _code(*, debug: bool) -> int:
         return EXIT_FAULT
 
 
-def _run() -> int:
+def _run(signs: LifeSigns) -> int:
     """Run the command, and flush stdout."""
     try:
         try:
-            code = cli.main(prog_name="camtool", standalone_mode=False)
+            code = cli.main(prog_name="camtool", standalone_mode=False, obj=signs)
         except click.exceptions.Exit as stop:
             code = stop.exit_code
         except SystemExit:

@@ -1,4 +1,4 @@
-"""What a command shows to people: messages and findings, summaries in colour, elapsed seconds.
+"""What a command shows to people: messages and findings, summaries in colour.
 
 Messages always go to stderr, so that stdout stays for machines. Streams that are no terminal get
 the same words without colours. Colours are click's and not rich's: loading rich takes a tenth of
@@ -12,14 +12,13 @@ import re
 import shutil
 import sys
 import textwrap
-import threading
-import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
 import click
 
+from camtool.cli.life_signs import hide_signs
 from camtool.errors import CamtoolError
 from camtool.findings import Finding, Severity, summed
 from camtool.plain import one_line
@@ -43,11 +42,13 @@ def show_text(text: str, *, err: bool = False) -> None:
     if err:
         _echo(text)
     else:
+        hide_signs()
         click.echo(text)
 
 
 def _echo(text: str) -> None:
     """Text on stderr; a full stderr is ignored, since there is nowhere to report it."""
+    hide_signs()
     with suppress(OSError):
         click.echo(text, err=True)
 
@@ -165,56 +166,3 @@ def _variant_line(line: str, row: ContrastRow, least: float | None) -> str:
         return click.style(line, fg="red")
     best = least is not None and row.total_max_um == least
     return click.style(line, fg="green") if best else line
-
-
-# Signs of life: on a terminal, a command that takes longer than a few seconds counts them, on a
-# line that the next one overwrites. The count stands still while one compiled loop runs, which is
-# seldom long: motion is judged in chunks.
-
-AFTER_S = 3.0
-"""No sign is shown before this."""
-
-EVERY_S = 1.0
-"""How often the sign changes."""
-
-_OWN = ("batch", "--watch")
-_QUIET = ("-q", "--quiet")
-
-
-@contextmanager
-def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[None]:
-    """While the block runs, show seconds on `stream` if that is a terminal, unless the `words` of
-    the command line ask for quiet, or the command has signs of its own."""
-    if stream is None or not _life_signs_wanted(stream, words):
-        yield
-        return
-    done = threading.Event()
-    teller = threading.Thread(target=_tell_seconds, args=(stream, done), daemon=True)
-    teller.start()
-    try:
-        yield
-    finally:
-        done.set()
-        teller.join()
-
-
-def _life_signs_wanted(stream: TextIO, words: Sequence[str]) -> bool:
-    if any(word in words for word in (*_OWN, *_QUIET)) or os.environ.get("TERM") == "dumb":
-        return False
-    with suppress(ValueError):  # closed
-        return stream.isatty()
-    return False
-
-
-def _tell_seconds(stream: TextIO, done: threading.Event) -> None:
-    begun, sign = time.monotonic(), ""
-    ended = done.wait(AFTER_S)
-    with suppress(OSError, ValueError):  # a terminal that goes away stops no command
-        while not ended:
-            sign = f"camtool: {time.monotonic() - begun:.0f} s"
-            stream.write(f"{sign}\r")
-            stream.flush()
-            ended = done.wait(EVERY_S)
-        if sign:
-            stream.write(f"{' ' * len(sign)}\r")
-            stream.flush()

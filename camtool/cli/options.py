@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
+from camtool.cli.life_signs import progress
 from camtool.errors import OptionError
 from camtool.importers.options import FORMATS, TEXTS
 from camtool.jobs.keys import FLAGS, Key, flag_name
@@ -314,6 +315,7 @@ class DrawingFlags:
         from camtool.jobs.drawing import read_for_job
 
         options = self._options(machine)
+        progress().begin(f"reading {Path(name).name}")
         data, file = content(Path(name)) if data is None else (data, name)
         if job is None:
             return read_bytes(data, file, options)

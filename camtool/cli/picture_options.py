@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camtool.cli.life_signs import progress
 from camtool.cli.messages import say
 from camtool.cli.options import Command, option, with_flags
 from camtool.errors import OptionError
@@ -263,6 +264,7 @@ class Painter:
     def __call__(self, name: str) -> bytes:
         """The picture, for a file of this name."""
         scenes, options = self.scenes, self.flags.options()
+        progress().begin("drawing the picture")
         if not _judged(scenes):  # the findings say why; the picture shows what there is
             options = replace(options, polar=None)
         if len(scenes) > 1:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.files import STDOUT, write_all
+from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import (
     REPORT_NAMES,
     report_marks,
@@ -96,7 +97,7 @@ class Posting:
     ) -> Run:
         """The drawing posted, for a picture of this name; `on_read` is called when it has been
         read."""
-        from camtool.pictures.scene import points_for
+        from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
 
         wanted = self.job.job(self.drawing)
@@ -112,6 +113,7 @@ class Posting:
                 compensate=self.compensate,
                 gates=self.gates.gates(),
                 trace_points=points_for(preview),
+                progress=progress(),
             )
 
     def files(self, source: str) -> list[str]:
@@ -316,7 +318,8 @@ def watch(
 
 def _tried(again: Callable[[], int]) -> None:
     try:
-        again()
+        with signs_of_command().counting():
+            again()
     except CamtoolError as error:
         say_error(error)
 

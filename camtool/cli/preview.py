@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.files import STDOUT, check_places, read_bytes, write_all
+from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings
 from camtool.cli.options import (
     DrawingFlags,
@@ -151,17 +152,19 @@ class Seen:
         return scene_of_drawing(read, Path(read.file).name), read.findings
 
     def _of_program(self, source: str, target: LoadedTarget) -> Scene:
-        from camtool.pictures.scene import points_for
+        from camtool.pictures.options import points_for
         from camtool.pipeline import Judging, read_program, verify_program
 
         data = read_bytes(source)
         if not self.simulate:
             return read_program(data, target, source=source).scene()
         judging = Judging(trace_points=points_for(self.output))
-        return verify_program(data, target, source=source, judging=judging).scene()
+        return verify_program(
+            data, target, source=source, judging=judging, progress=progress()
+        ).scene()
 
     def _of_job(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
-        from camtool.pictures.scene import points_for
+        from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
         from camtool.planning.plan import plan
         from camtool.run import Run
@@ -170,8 +173,15 @@ class Seen:
         read = self.drawing.read(source, target.machine, job)
         with self.job.blamed():
             if self.simulate:
-                run = post_drawing(read, job, target, trace_points=points_for(self.output))
+                run = post_drawing(
+                    read,
+                    job,
+                    target,
+                    trace_points=points_for(self.output),
+                    progress=progress(),
+                )
                 return run.scene(title), run.findings if run.failed else read.findings
+            progress().begin("planning")
             moves = plan(read, job, target.machine)
         run = Run(source=read.file, target=target, drawing=read, job=job, wanted=moves)
         return run.scene(title), read.findings

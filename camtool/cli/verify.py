@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.files import STDOUT, read_bytes, shown, write_all
+from camtool.cli.life_signs import progress
 from camtool.cli.messages import (
     REPORT_NAMES,
     report_marks,
@@ -136,7 +137,7 @@ def verify(
     wishes.outputs.check([program, against, beside, *machine.files(), *job.files()])
 
     from camtool.comparison import effects_without
-    from camtool.pictures.scene import points_for
+    from camtool.pictures.options import points_for
     from camtool.pipeline import Judging
 
     judging = Judging(
@@ -217,6 +218,7 @@ class Case:
             drawing=self.drawing,
             job=self.job,
             judging=self.judging,
+            progress=progress(),
         )
 
 
@@ -246,7 +248,12 @@ def _compare(file: str, variants: list[Variant], case: Case, wishes: Wishes) -> 
     from camtool.verification.contrast import to_json
 
     found = compare_program(
-        read_bytes(file), variants, source=shown(file), drawing=case.drawing, job=case.job
+        read_bytes(file),
+        variants,
+        source=shown(file),
+        drawing=case.drawing,
+        job=case.job,
+        progress=progress(),
     )
     files: dict[str, bytes] = {}
     if wishes.outputs.preview is not None:

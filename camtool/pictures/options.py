@@ -13,6 +13,10 @@ SMALLEST_PX, LARGEST_PX = 16, 20_000
 SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
 """Widths of pictures where none is given."""
 
+POINTS_OF_A_PAGE = 400_000
+"""Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and
+the largest error within each."""
+
 LEAST_TIMES, MOST_TIMES = 1.0, 1e6
 """Least and greatest factor of errors that are drawn larger."""
 
@@ -68,3 +72,8 @@ def check_width(width_px: int) -> None:
             f"a picture cannot be {width_px} pixels wide",
             mend=f"take {SMALLEST_PX} to {LARGEST_PX}",
         )
+
+
+def points_for(picture: str | None) -> int | None:
+    """How many points of the slides' path a picture of this name needs; None: as usual."""
+    return POINTS_OF_A_PAGE if (picture or "").lower().endswith(".html") else None

@@ -30,10 +30,6 @@ if TYPE_CHECKING:
 LINES_SHOWN = 200
 """Most lines of a table of the viewer; the JSON report has all of them."""
 
-POINTS_OF_A_PAGE = 400_000
-"""Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and
-the largest error within each."""
-
 NAME_WIDTH = 11
 """Width of the names at the left of the report's text, in characters."""
 
@@ -226,11 +222,6 @@ def scene_of(
         rounds=() if verification is None else rounds_of(verification),
         playback=_playback(toolpath, verification, machine, listing),
     )
-
-
-def points_for(picture: str | None) -> int | None:
-    """How many points of the slides' path a picture of this name needs; None: as usual."""
-    return POINTS_OF_A_PAGE if (picture or "").lower().endswith(".html") else None
 
 
 def rounds_of(verification: Verification) -> tuple[Round, ...]:

@@ -20,6 +20,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
+from camtool.progress import Progress
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.motion import Chunk, still_ledger
 from camtool.toolpath.moves import Toolpath
@@ -54,6 +55,10 @@ class SeenCircle:
     figures: CircleFigures
     reversing: Reversing
     bins: Floats
+
+
+ROWS_AT_ONCE = 16_384
+"""A fused run says after so many rows how far it is."""
 
 
 class SlidePass:
@@ -106,11 +111,13 @@ class SlidePass:
             mend="check its numbers, and the coded and real steps of the axes",
         )
 
-    def run(self, steps: FusedRun) -> None:
+    def run(self, steps: FusedRun, progress: Progress) -> None:
         """All rows of a controller that is judged as it is simulated."""
-        for low, high in pairwise(self._bounds(0, steps.rows)):
+        parts = {*self._bounds(0, steps.rows), *range(0, steps.rows, ROWS_AT_ONCE)}
+        for low, high in pairwise(sorted(parts)):
             self._close(low)
             add_ledger(self._ledger, steps.judge(low, high, self._task, self._sums))
+            progress.done = high
 
     def finish(self) -> None:
         """End of the motion: evaluate the remaining circles."""

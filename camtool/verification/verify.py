@@ -23,6 +23,7 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
+from camtool.progress import Progress
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk
@@ -110,21 +111,26 @@ def verify(
     compensated: Compensated | None = None,
     asked: Asked | None = None,
     written_from: Toolpath | None = None,
+    progress: Progress | None = None,
 ) -> Verification:
     """Simulate `decoded` on the target's machine and judge it, against `wanted` if it is given.
 
     `drawing` gives its findings; `compensated`, `asked` and `written_from` are as in `Case`.
+    `progress` is told how many rows are judged.
     Toolpaths are in the work frame. Raises what `LoadedTarget.simulate` raises.
     """
     options = options or VerifyOptions()
     case = Case(decoded, target, wanted, drawing, options, compensated, asked, written_from)
     target.check_options(case.simulation)
     fused = target.model.fused_run(decoded, target.machine, case.simulation)
-    return judge(case, fused or target.simulate(decoded, case.simulation))
+    return judge(case, fused or target.simulate(decoded, case.simulation), progress)
 
 
-def judge(case: Case, motion: Iterable[Chunk] | FusedRun) -> Verification:
+def judge(
+    case: Case, motion: Iterable[Chunk] | FusedRun, progress: Progress | None = None
+) -> Verification:
     """Judge a case by the chunks of its motion, or by a run that is judged as it is simulated."""
+    progress = progress or Progress()
     # Where the wanted moves have no motion in Z, all feed moves cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
     quantised = case.target.model.quantised(case.decoded, case.machine)
@@ -144,8 +150,9 @@ def judge(case: Case, motion: Iterable[Chunk] | FusedRun) -> Verification:
     if isinstance(motion, Iterable):
         for chunk in motion:
             slides.add(chunk)
+            progress.done = int(chunk.row[-1]) + 1 if len(chunk.row) else progress.done
     else:
-        slides.run(motion)
+        slides.run(motion, progress)
     slides.finish()
     rows = slides.rows
     tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)

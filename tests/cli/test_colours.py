@@ -17,7 +17,7 @@ GREEN = b"\x1b[32m"
 BOLD = b"\x1b[1m"
 COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
 ESCAPE = b"\x1b["
-SIGNS = re.compile(rb"camtool: \d+ s\r| +\r")
+SIGNS = re.compile(rb"camtool: [^\r\n]*\d s *\r| +\r")
 """What is said of a command that takes long: the machine is busy."""
 
 WRONG = ("post", "samples/logo.dxf", "-t", "pic-mnh")

@@ -1,12 +1,19 @@
 """Signs of life: on terminals, for commands that take long, and gone when they end."""
 
 import io
+import os
+import pty
+import re
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 
-from camtool.cli import messages
-from camtool.cli.messages import life_signs
+from camtool.cli import life_signs as module
+from camtool.cli.life_signs import LifeSigns, life_signs
+from camtool.progress import Progress
 
 
 class Terminal(io.StringIO):
@@ -28,23 +35,151 @@ class Terminal(io.StringIO):
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(messages, "AFTER_S", 0.0)
-    monkeypatch.setattr(messages, "EVERY_S", 0.0)
+    monkeypatch.setattr(module, "AFTER_S", 0.0)
+    monkeypatch.setattr(module, "EVERY_S", 0.0)
 
 
-def test_seconds_are_told_and_wiped_out_at_the_end() -> None:
+def test_the_stage_is_shown_and_wiped_out_at_the_end() -> None:
     stream = Terminal()
-    with life_signs(stream, ["post", "a.dxf"]):
+    with life_signs(stream, ["post", "a.dxf"]) as signs:
+        signs.progress.begin("planning")
         assert stream.seen.wait(60.0)
-    signs = stream.getvalue().split("\r")
-    assert signs[0] == "camtool: 0 s"
-    assert signs[-1] == ""
-    assert set(signs[-2]) == {" "}
-    assert len(signs[-2]) >= len(signs[0])
+    lines = stream.getvalue().split("\r")
+    assert lines[0] in ("camtool: 0 s", "camtool: planning, 0 s")
+    assert lines[-1] == ""
+    assert set(lines[-2]) == {" "}
+    assert len(lines[-2]) >= len(lines[-3].rstrip())
+
+
+def test_a_line_shows_stage_share_and_seconds_and_covers_the_one_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    stream, progress = io.StringIO(), Progress()
+    signs = LifeSigns(stream, progress)
+    progress.begin("simulating", 8)
+    progress.done = 2
+    signs.show()
+    progress.begin("\n" + "x" * 60)
+    signs.show()
+    signs.hide()
+    signs.hide()
+    first, second, last, end = stream.getvalue().split("\r")
+    assert first == "camtool: simulating, 25 %, 0 s"
+    assert second == "camtool: \\n" + "x" * 28
+    assert last == " " * 39
+    assert end == ""
+
+
+def test_nothing_is_shown_between_two_runs_of_one_command() -> None:
+    stream = io.StringIO()
+    signs = LifeSigns(stream, Progress())
+    with signs.counting():
+        signs.show()
+    assert stream.getvalue() == f"camtool: 0 s\r{' ' * 12}\r"
+    signs.show()
+    assert stream.getvalue().count("camtool") == 1
+
+
+def test_a_share_is_known_where_the_count_is() -> None:
+    progress = Progress()
+    assert progress.share is None
+    progress.begin("judging", 4)
+    progress.done = 5
+    assert progress.share == 1.0
+    progress.begin("drawing")
+    assert progress.share is None
+
+
+SLOWLY = """
+import sys
+from camtool.cli import life_signs
+life_signs.AFTER_S, life_signs.EVERY_S = 0.0, 0.001
+from camtool.cli.main import main
+sys.argv[0] = "camtool"
+main()
+"""
+"""camtool as if every second were a thousandth."""
+
+
+def on_terminal(*arguments: str, folder: Path) -> bytes:
+    """What a command writes to a terminal, signs and all."""
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-c", SLOWLY, *arguments]
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "100"}
+    with subprocess.Popen(
+        command, stdout=theirs, stderr=theirs, env=environment, cwd=folder
+    ) as process:
+        os.close(theirs)
+        written = b""
+        while True:
+            try:
+                part = os.read(ours, 65536)
+            except OSError:  # Linux: the other end is closed
+                break
+            if not part:
+                break
+            written += part
+    os.close(ours)
+    assert process.returncode == 0
+    return written
+
+
+def shown_after(written: bytes) -> list[str]:
+    """What stands on the screen at the end, line by line."""
+    lines = []
+    for line in (
+        re.sub(rb"\x1b\[[0-9;]*m", b"", written).decode().replace("\r\n", "\n").split("\n")
+    ):
+        cells = ""
+        for part in line.split("\r"):
+            cells = part + cells[len(part) :]
+        lines.append(cells.rstrip())
+    return lines
+
+
+@pytest.mark.parametrize(
+    ("line", "stages"),
+    [
+        ("post {logo} -t grbl -o a.nc", ["reading logo.dxf", "planning", "judging"]),
+        ("post {logo} -t grbl -o a.nc --preview a.svg", ["drawing the picture"]),
+        ("check {logo}", ["reading logo.dxf"]),
+        ("preview {logo} -o a.svg", ["reading logo.dxf"]),
+        ("verify {program} -t grbl", ["judging"]),
+        ("convert {program} --from grbl --to linuxcnc -o b.ngc", ["judging"]),
+        ("stale {logo} -t grbl", ["reading logo.dxf", "planning"]),
+        ("job new {logo} -o new.toml", ["reading logo.dxf"]),
+    ],
+)
+def test_each_command_shows_its_stages_on_a_terminal_and_leaves_none_of_them(
+    line: str, stages: list[str], samples: Path, tmp_path: Path
+) -> None:
+    logo = samples / "logo.dxf"
+    places = {"logo": str(logo), "program": str(tmp_path / "logo.nc")}
+    if "stale" in line:
+        (tmp_path / "logo.dxf").write_bytes(logo.read_bytes())
+        places["logo"] = str(tmp_path / "logo.dxf")
+    if "{program}" in line or "stale" in line:
+        make = [sys.executable, "-m", "camtool", "post", str(logo), "-t", "grbl", "-q"]
+        subprocess.run([*make, "-o", places["program"]], check=True, stderr=subprocess.PIPE)
+    words = [word.format(**places) for word in line.split()]
+    written = on_terminal(*words, folder=tmp_path)
+    for stage in stages:
+        assert stage in written.decode(), written
+    left = shown_after(written)
+    assert not [row for row in left if re.search(r"camtool: .*\d s$", row)], left
+    (tmp_path / "new.toml").unlink(missing_ok=True)
+    piped = subprocess.run(
+        [sys.executable, "-c", SLOWLY, *words],
+        capture_output=True,
+        check=True,
+        cwd=tmp_path,
+    )
+    assert b"\r" not in piped.stderr + piped.stdout
 
 
 def test_a_short_run_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(messages, "AFTER_S", 1e6)
+    monkeypatch.setattr(module, "AFTER_S", 1e6)
     stream = Terminal()
     with life_signs(stream, ["post"]):
         pass
@@ -58,7 +193,6 @@ def test_a_short_run_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         (Terminal(), ["post", "-q"]),
         (Terminal(), ["post", "--quiet"]),
         (Terminal(), ["batch", "x"]),
-        (Terminal(), ["post", "--watch"]),
     ],
 )
 def test_who_wants_no_signs_gets_none(stream: Terminal, words: list[str]) -> None:

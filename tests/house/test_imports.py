@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BASE = {"arrays", "plain", "errors", "units", "findings", "patterns", "tables"}
+BASE = {"arrays", "plain", "errors", "units", "findings", "patterns", "progress", "tables"}
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
 TARGETS = SHARED | {"simulation", "target"}
 JUDGE = TARGETS | {"importers", "planning"}
@@ -27,6 +27,7 @@ ALLOWED = {
     "findings": {"plain"},
     "arrays": set(),
     "patterns": set(),
+    "progress": set(),
     "tables": {"errors", "patterns"},
     "geometry": BASE | {"kernels"},
     "kernels": BASE,
