@@ -39,6 +39,7 @@ def lines(draw: st.DrawFn, odd: bool) -> list[tuple[int, str]]:
     """LINEs in a row, of which some are alike; `odd`: with numbers, codes and handles amiss."""
     tags: list[tuple[int, str]] = []
     look, axes = draw(LOOKS), draw(st.sampled_from(AXES))
+    late = odd and draw(st.booleans())
     for k in range(draw(st.integers(1, 8))):
         if draw(st.integers(0, 3)) == 0:
             look, axes = draw(LOOKS), draw(st.sampled_from(AXES))
@@ -49,7 +50,10 @@ def lines(draw: st.DrawFn, odd: bool) -> list[tuple[int, str]]:
             handle = draw(st.sampled_from([[], [(5, "A0")], [(5, "A0"), (5, "A9")]]))
         if odd and draw(st.integers(0, 9)) == 0:
             own = draw(st.permutations(own))
-        tags += [(0, "LINE"), *handle, (100, "AcDbEntity"), *look, (100, "AcDbLine"), *own]
+        # Some programs write the handle where ezdxf does not look for it.
+        first, second = ((), handle) if late else (handle, ())
+        tags += [(0, "LINE"), *first, (100, "AcDbEntity"), *look, *second]
+        tags += [(100, "AcDbLine"), *own]
     return tags
 
 

@@ -26,6 +26,7 @@ LEAST_VERTICES = 32
 
 _HANDLE, _HEIGHT, _SUBCLASS, _REFERENCE = 5, 30, 100, 330
 _HANDLES = (_HANDLE, 105)
+_DIVISIONS = frozenset((_SUBCLASS, 102))  # ezdxf takes no handle from behind them
 _START, _END = (10, 20, 30), (11, 21, 31)
 _OWN = (_HANDLE, *_START, *_END)
 """The group codes in which LINEs that are read together differ."""
@@ -153,6 +154,8 @@ def _is_simple(codes: tuple[int, ...]) -> bool:
     """Whether a LINE of these group codes has one handle and two ends, each written in one go."""
     if codes.count(_HANDLE) != 1 or _HANDLES[1] in codes:
         return False
+    if not {*codes[: codes.index(_HANDLE)]}.isdisjoint(_DIVISIONS):
+        return False
     for point in (_START, _END):
         if any(codes.count(code) > 1 for code in point) or point[0] not in codes:
             return False
@@ -172,6 +175,8 @@ def _vertices(tags: Tags, begins: Ints, ends: Ints, others: Bools) -> dict[str, 
         x, *more = (np.flatnonzero(codes == code) for code in _VERTEX)
         handle, subclass = (np.flatnonzero(codes == code) for code in (_HANDLE, _SUBCLASS))
         if len(x) < LEAST_VERTICES or not np.array_equal(x + 1, more[0]) or len(handle) != 1:
+            continue
+        if not {*codes[: handle[0]].tolist()}.isdisjoint(_DIVISIONS):
             continue
         first = min(at.min(initial=end) for at in (x, *more))
         if first < x[0] or not len(subclass) or subclass[-1] > x[0] or (codes == _HEIGHT).any():

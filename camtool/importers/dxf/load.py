@@ -194,6 +194,8 @@ def _plain(tags: Tags, bulk: Bulk, said: list[str]) -> Any:
     except Exception as error:
         said.append(_reason(error))
         return None
+    if not all(handle in document.entitydb for handle in bulk.lines):
+        raise RuntimeError("LINEs that are read in bulk follow none of the document")
     for handle, vertices in bulk.vertices.items():
         document.entitydb[handle].lwpoints.values = vertices
     return document
