@@ -13,14 +13,16 @@ from typing import Final
 
 import numpy as np
 
+from camtool.arrays import Ints
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity
+from camtool.kernels import words
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import Block, Lexing, blocks_of
+from ..gcode.blocks import SURE_PART, Block, Lexing, PlainBlocks, blocks_of, filled, form_of
 from .dialect import MOST_MM, STOP_TEXT, Dialect, FlashcutController, FlashcutMachine
 from .findings import EXECUTED_OTHERWISE, FEED_ABOVE_LIMIT, FEED_HELD, FEED_HELD_ALONE
 from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
@@ -65,7 +67,7 @@ NOT_INCHES: Final = frozenset({"G20", "G21", "G30", "G31"})
 def read_program(data: bytes, machine: FlashcutMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block, line and column when it is none."""
     reader = _Reader(machine)
-    for block in blocks_of(data, LEXING):
+    for block in blocks_of(data, LEXING, reader.take):
         reader.block(block)
     if not reader.blocks:
         raise ProgramError("the program is empty", mend="a program has blocks such as M30")
@@ -81,6 +83,12 @@ class _Excess:
     most: float = 0.0
     where: str = ""
 
+    def add(self, index: int, feed: float) -> None:
+        """The block of this index, from 0."""
+        self.where = self.where or f"block {index + 1}"
+        self.count += 1
+        self.most = max(self.most, feed)
+
 
 class _Reader:
     """Blocks in, rows out; knows the feed in force and whether the program has ended."""
@@ -95,6 +103,14 @@ class _Reader:
         if self._dialect.feed_words == "everywhere":
             for code, forms in MORE_FEEDS.items():
                 self._templates[code] |= set(forms)
+        self._plain_keys = np.array(
+            [
+                4 * form_of(f"G{form}") + int(code[1:])
+                for code, forms in self._templates.items()
+                if code in MOTIONS
+                for form in forms
+            ]
+        )
         self._feed = math.nan
         self._ended = ""
         self._fast = _Excess()
@@ -104,17 +120,16 @@ class _Reader:
         self.blocks += 1
         if self._ended:
             block.fail(f"a block after {self._ended}, the end of the program", mend="remove it")
-        words = block.words
-        code = words[0][0] + words[0][1]
-        form = "".join([letter for letter, _ in words[1:]])
+        code = block.words[0][0] + block.words[0][1]
+        form = "".join([letter for letter, _ in block.words[1:]])
         if form not in self._templates.get(code, ()):
             self._refuse(block, code, form)
         text = block.text.strip(" ")
-        if text.count(" ") != len(words) - 1 or "  " in text or "\t" in text:
+        if text.count(" ") != len(block.words) - 1 or "  " in text or "\t" in text:
             _refuse_spacing(block)
         self.path.block = block.index
         if code in MOTIONS:
-            self._motion(block, code, form, [float(number) for _, number in words[1:]])
+            self._motion(block, code, form, [float(number) for _, number in block.words[1:]])
         elif code in SPINDLE:
             self.path.event(SPINDLE[code])
         elif code == "M00":
@@ -122,6 +137,33 @@ class _Reader:
         else:
             self.path.event(Kind.END)
             self._ended = code
+
+    def take(self, plain: PlainBlocks) -> int:
+        """Decode moves by columns, up to the first that is not surely what `block` would make of
+        it; how many were decoded."""
+        if self._ended:
+            return 0
+        moves = PlainMoves(
+            plain, self._plain_keys, (*self.path.position, self._feed), self._dialect
+        )
+        count = moves.count
+        if count == 0:
+            return 0
+        self.blocks += count
+        for at in np.flatnonzero(plain.has(words.F_WORD)[:count]).tolist():
+            if exceeds(float(moves.feed[at]), self._max_feed):
+                self._fast.add(plain.first + at, float(moves.feed[at]))
+        self._feed = float(moves.feed[count - 1])
+        rows = np.flatnonzero(moves.moving[:count])
+        if len(rows):
+            self.path.moves(
+                kind=moves.kind[rows],
+                end=moves.end[rows],
+                centre=np.where(moves.is_arc[rows, None], moves.centre[rows], np.nan),
+                feed=np.where(moves.kind[rows] == Kind.RAPID, np.nan, moves.feed[rows]),
+                block=plain.first + rows,
+            )
+        return count
 
     def findings(self) -> Iterator[Finding]:
         """What goes beyond the machine's limits."""
@@ -160,9 +202,7 @@ class _Reader:
         if feed <= 0.0:
             block.fail("a feed must be above 0", word=word, mend="write F3.0")
         if exceeds(feed, self._max_feed):
-            self._fast.where = self._fast.where or f"block {block.index + 1}"
-            self._fast.count += 1
-            self._fast.most = max(self._fast.most, feed)
+            self._fast.add(block.index, feed)
         self._feed = feed
 
     def _arc(self, block: Block, code: str, numbers: list[float]) -> None:
@@ -204,6 +244,55 @@ class _Reader:
             if not any(one.startswith(form[: at + 1]) for one in forms):
                 block.fail(f"{letter} has no place here", word=at + 1, mend=f"write only {wanted}")
         block.fail(f"{code} lacks a word", word=len(form), mend=f"write {wanted}")
+
+
+class PlainMoves:
+    """N plain blocks: kind (N,), where the tool stands behind each (N, 3) mm, centre (N, 2) mm,
+    feed in force (N,) mm/min, which are arcs, and which move (N,). `count`: so many, from the
+    first on, are surely what `_Reader.block` would make of them; the others are not to be used."""
+
+    def __init__(
+        self,
+        plain: PlainBlocks,
+        keys: Ints,
+        state: tuple[float, float, float, float],
+        dialect: Dialect,
+    ) -> None:
+        *position, feed = state
+        numbers, facts = plain.numbers, plain.facts
+        sign = 1.0 if dialect.z_up == "+" else -1.0
+        has_feed = plain.has(words.F_WORD)
+        has_code = plain.has(words.G_WORD)
+        self.kind = np.where(has_code, numbers[:, words.G_WORD], 0.0).astype(np.int64)
+        self.is_arc = self.kind >= Kind.ARC_CW
+        self.feed = filled(has_feed, numbers[:, words.F_WORD], feed)
+        x, y = numbers[:, words.X_WORD], numbers[:, words.Y_WORD]
+        z = sign * numbers[:, words.Z_WORD] + 0.0
+        self.end = np.column_stack(
+            [
+                filled(plain.has(words.X_WORD + axis), values, position[axis])
+                for axis, values in enumerate((x, y, z))
+            ]
+        )
+        start = np.concatenate([[position], self.end[:-1]])
+        offset = numbers[:, words.I_WORD : words.J_WORD + 1]
+        self.centre = start[:, :2] + np.where(self.is_arc[:, None], offset, 0.0)
+        same = (self.end[:, :2] == start[:, :2]).all(axis=1)
+        # A G01 with F to where the tool is sets the feed, no more.
+        self.moving = ~((facts[:, words.FORM] == form_of("GXYF")) & same)
+        sure = np.isin(4 * facts[:, words.FORM] + self.kind, keys)
+        sure &= (facts[:, words.TWO_DIGITS] == 1) & (facts[:, words.ONE_BLANK] == 1)
+        for column in range(words.X_WORD, words.F_WORD + 1):
+            sure &= ~plain.has(column) | (np.abs(numbers[:, column]) <= MOST_MM)
+        sure &= ~has_feed | (self.feed > 0.0)
+        sure &= (self.kind == Kind.RAPID) | ~np.isnan(self.feed)
+        radius = np.hypot(*(start[:, :2] - self.centre).T)
+        other = np.hypot(*(self.end[:, :2] - self.centre).T)
+        fine = (radius > 0.0) & (np.abs(radius - other) <= SURE_PART * dialect.arc_spread_mm)
+        if dialect.full_circles == "halves":
+            fine &= ~same
+        sure &= ~self.is_arc | fine
+        self.count = len(sure) if sure.all() else int(sure.argmin())
 
 
 def _refuse_spacing(block: Block) -> None:

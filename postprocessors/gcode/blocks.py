@@ -46,6 +46,12 @@ LEAST_RUN: Final = 24
 ROWS_AT_ONCE: Final = 1 << 12
 """So many plain blocks are read in one go."""
 
+LETTERS: Final = "GXYZIJF"
+"""Those of plain blocks, by column."""
+
+SURE_PART: Final = 0.999
+"""Part of a limit of a rule for arcs: what keeps to it does so however it is rounded."""
+
 # Possessive (++): a number is matched in one way only, so that no line costs more than its length.
 _NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?|\.\d++)"
 _COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
@@ -162,6 +168,20 @@ class PlainBlocks:
     def has(self, column: int) -> Bools:
         """(N,) whether a block has the word of this column."""
         return np.asarray((self.facts[:, words.MASK] >> column) & 1 == 1)
+
+
+def filled(given: Bools, values: Floats, before: float) -> Floats:
+    """(N,) the value that was given last, `before` where none was yet."""
+    latest = np.maximum.accumulate(np.where(given, np.arange(1, len(given) + 1), 0))
+    return np.asarray(np.concatenate([[before], values])[latest])
+
+
+def form_of(letters: str) -> int:
+    """The number that stands for these letters in this order (`words.FORM`)."""
+    number = 0
+    for letter in letters:
+        number = number * 8 + LETTERS.index(letter) + 1
+    return number
 
 
 Take = Callable[[PlainBlocks], int]

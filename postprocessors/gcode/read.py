@@ -24,7 +24,7 @@ from camtool.machine.model import Machine, exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
-from .blocks import Block, PlainBlocks
+from .blocks import SURE_PART, Block, PlainBlocks, filled
 from .findings import (
     FEED_ABOVE_LIMIT_IN_WORDS,
     NEVER_READ,
@@ -49,9 +49,6 @@ TURNS_TOLERANCE: Final = 1e-3
 
 MOST_TURNS: Final = 10_000
 """Largest number of turns of an arc, each of which is a move."""
-
-SURE_PART: Final = 0.999
-"""Part of a limit of the rule for arcs: what keeps to it does so however it is rounded."""
 
 _TURN: Final = 2.0 * math.pi
 
@@ -514,12 +511,6 @@ class PlainMoves:
             sure[arcs] &= (has[0] | has[1])[arcs]
         sure[arcs] &= sure_arcs(start[arcs, :2], self.end[arcs, :2], self.centre[arcs], rules)
         self.count = len(sure) if sure.all() else int(sure.argmin())
-
-
-def filled(given: Bools, values: Floats, before: float) -> Floats:
-    """(N,) the value that was given last, `before` where none was yet."""
-    latest = np.maximum.accumulate(np.where(given, np.arange(1, len(given) + 1), 0))
-    return np.asarray(np.concatenate([[before], values])[latest])
 
 
 def sure_arcs(start: Floats, end: Floats, centre: Floats, rules: Rules) -> Bools:

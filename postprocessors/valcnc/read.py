@@ -13,12 +13,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
+import numpy as np
+
+from camtool.arrays import Ints
 from camtool.errors import ProgramError
 from camtool.findings import Finding
+from camtool.kernels import words
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import Block, Lexing, blocks_of
+from ..gcode.blocks import SURE_PART, Block, Lexing, PlainBlocks, blocks_of, form_of
 from .dialect import ValcncMachine, scales_of
 from .findings import ARC_MISSES_END, COORDINATES_SCALED_READ
 
@@ -44,7 +48,7 @@ Point = tuple[float, float, float]
 def read_program(data: bytes, machine: ValcncMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block, line and column when it is none."""
     reader = _Reader(machine)
-    for block in blocks_of(data, reader.lexing):
+    for block in blocks_of(data, reader.lexing, reader.take):
         reader.block(block)
     if not reader.blocks:
         raise ProgramError(
@@ -83,11 +87,10 @@ class _Reader:
     def block(self, block: Block) -> None:
         """One block."""
         self.blocks += 1
-        words = block.words
-        code, letters = words[0][1], "".join([letter for letter, _ in words])
+        code, letters = block.words[0][1], "".join([letter for letter, _ in block.words])
         if letters not in PLAIN or code not in CODES or "\t" in block.text:
             self._check_words(block, letters)
-        values = {letter: float(text) for letter, text in words[1:]}
+        values = {letter: float(text) for letter, text in block.words[1:]}
         if not max(map(abs, values.values()), default=0.0) <= MOST_UNITS:
             at = next(at for at, value in enumerate(values.values(), 1) if abs(value) > MOST_UNITS)
             block.fail(f"a number beyond ±{MOST_UNITS:g}", word=at, mend="check the units")
@@ -101,6 +104,52 @@ class _Reader:
         else:
             self._line(block, code, values, end)
         self._at = end
+
+    def take(self, plain: PlainBlocks) -> int:
+        """Decode plain blocks by columns, up to the first that is not surely what `block` would
+        make of it: one with all words of a line or an arc in their order, which moves Z by itself,
+        and whose arc has one radius and less than `NEARLY_DIAMETER`. How many were decoded."""
+        numbers, form = plain.numbers, plain.facts[:, words.FORM]
+        line, arc = form == form_of("GXYZ"), form == form_of("GXYZIJ")
+        kind = np.where(line | arc, numbers[:, words.G_WORD], 0.0).astype(np.int64)
+        sure = (line & (kind <= Kind.LINE)) | (arc & (kind >= Kind.ARC_CW) & self._alike)
+        sure &= plain.facts[:, words.TWO_DIGITS] == 1
+        ends, offset = (
+            numbers[:, words.X_WORD : words.Z_WORD + 1],
+            numbers[:, words.I_WORD :][:, :2],
+        )
+        sure &= (np.abs(ends) <= MOST_UNITS).all(axis=1)
+        sure &= line | (np.abs(offset) <= MOST_UNITS).all(axis=1)
+        start = np.concatenate([[self._at], ends[:-1]])
+        travel = ends - start
+        flat, deep = (travel[:, :2] != 0.0).any(axis=1), travel[:, 2] != 0.0
+        sure &= ~deep | (line & (~flat | (self._dialect.z_order == "together")))
+        radius, length = np.hypot(*offset.T), np.hypot(*travel[:, :2].T)
+        spread = np.abs(radius - np.hypot(*(travel[:, :2] - offset).T)) / self._scales[0]
+        fine = (length > 0.0) & (length <= SURE_PART * NEARLY_DIAMETER * 2.0 * radius)
+        sure &= line | (fine & (spread <= SURE_PART * self._dialect.arc_spread_mm))
+        count = len(sure) if sure.all() else int(sure.argmin())
+        if count:
+            self._send(plain, kind, count)
+        return count
+
+    def _send(self, plain: PlainBlocks, kind: Ints, count: int) -> None:
+        """The moves of the first so many blocks."""
+        numbers, kind = plain.numbers[:count], kind[:count]
+        end = numbers[:, words.X_WORD : words.Z_WORD + 1]
+        self._at = end[-1, 0].item(), end[-1, 1].item(), end[-1, 2].item()
+        end = end / self._scales + 0.0
+        start = np.concatenate([[self.path.position], end[:-1]])[:, :2]
+        arc = (kind >= Kind.ARC_CW)[:, None]
+        offset = np.where(arc, numbers[:, words.I_WORD : words.J_WORD + 1], np.nan)
+        self.blocks += count
+        self.path.moves(
+            kind=kind,
+            end=end,
+            centre=start + offset / self._scales[:2],
+            feed=np.where(kind == Kind.RAPID, np.nan, self._feed),
+            block=np.arange(plain.first, plain.first + count),
+        )
 
     def _check_words(self, block: Block, letters: str) -> None:
         """ProgramError for an unknown code, for a word that stands twice, and for tabs."""
