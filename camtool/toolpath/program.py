@@ -27,18 +27,6 @@ class Program:
     findings: tuple[Finding, ...] = ()
 
     @classmethod
-    def of_lines(
-        cls,
-        lines: Iterable[str],
-        machine: Machine,
-        row_of_block: Sequence[int] | Ints,
-        findings: Iterable[Finding],
-    ) -> Program:
-        """A program of lines of ASCII text, for a machine that calls its programs so."""
-        data = "".join(f"{line}\n" for line in lines).encode("ascii")
-        return cls.of_text(data, machine, row_of_block, findings)
-
-    @classmethod
     def of_text(
         cls,
         data: bytes,

@@ -69,6 +69,12 @@ class Texts:
         return b"".join([*parts, self.data[done:]])
 
 
+def line_lengths(data: bytes) -> Ints:
+    """(L,) characters of each line of a program, line ends not counted."""
+    ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+    return np.asarray(np.diff(ends, prepend=-1) - 1)
+
+
 def texts_of(columns: Sequence[Words], *, blanks: bool = False, end: str = "\n") -> Texts:
     """The lines of M blocks, each with the words that it has in this order; `blanks` part them."""
     pieces = [*(each.letter for each in columns), end]

@@ -21,10 +21,10 @@ from camtool.toolpath.lower import MAX_PARTS, Lowered
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
+from camtool.toolpath.words import Words, texts_of
 
 from ..gcode.checks import feed_units
 from ..gcode.dialect import feed_decimals
-from ..gcode.format import CODE, NumberStyle, format_units
 from ..gcode.plain import (
     ArcRules,
     PlainRows,
@@ -58,8 +58,7 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
     rows = plain_rows(lowered.toolpath, rules)
     of_row = lowered.row[rows.row]
     _check_reach(toolpath, rows, of_row, dialect)
-    writer = _Writer(rows, dialect, machine)
-    writer.run(_event_words(toolpath), of_row, feeds[of_row])
+    blocks = _Blocks(rows, feeds[of_row], dialect)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
     first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
     findings = [
@@ -68,10 +67,21 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
         *arc_findings(rows, first),
         *_event_findings(toolpath, dialect),
     ]
-    return Program.of_lines(
-        [*writer.blocks, dialect.program_end],
+    words = _event_words(toolpath)
+    others = [
+        (at, words[row], row)
+        for at, row in zip(
+            blocks.events.tolist(), of_row[rows.kind > Kind.ARC_CCW].tolist(), strict=True
+        )
+        if row in words
+    ]
+    others.append((len(blocks.row), dialect.program_end, len(toolpath) - 1 if ended else -1))
+    texts = texts_of(blocks.words(dialect, feed_decimals(machine)), blanks=True)
+    places, ends, their_rows = zip(*others, strict=True)
+    return Program.of_text(
+        texts.with_lines(zip(places, ends, strict=True)),
         machine,
-        [*writer.rows, len(toolpath) - 1 if ended else -1],
+        np.insert(of_row[blocks.row], places, their_rows),
         findings,
     )
 
@@ -132,20 +142,6 @@ def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: Dia
     )
 
 
-def _texts(units: Ints, dialect: Dialect) -> list[str]:
-    """Column of units (M,) as texts: "1.0", "-0.25"; zero has no minus."""
-    texts = format_units(units, NumberStyle(dialect.decimals))
-    if dialect.trailing_zeros:
-        return texts
-    return [text if text[-1] != "0" else _short(text) for text in texts]
-
-
-def _short(text: str) -> str:
-    """Without its last zeros, but for the first decimal."""
-    short = text.rstrip("0")
-    return f"{short}0" if short[-1] == "." else short
-
-
 def _event_words(toolpath: Toolpath) -> dict[int, str]:
     """The block of each event that has one, by row."""
     words = {}
@@ -171,81 +167,50 @@ def _event_findings(toolpath: Toolpath, dialect: Dialect) -> Iterator[Finding]:
         yield from left_out(toolpath, [Kind.SPINDLE_OFF], EVENT_LEFT_OUT_STOP)
 
 
-class _Writer:
-    """Blocks one by one; knows which feed is in force."""
+class _Blocks:
+    """The P blocks of all moves: `row` (P,) of the table, and what of it a block has. `events`
+    (E,): before which of them each event of the table stands."""
 
-    def __init__(self, rows: PlainRows, dialect: Dialect, machine: FlashcutMachine) -> None:
-        self.blocks: list[str] = []
-        self.rows: list[int] = []
-        self._table = rows
-        self._dialect = dialect
-        self._feed_decimals = max(1, feed_decimals(machine))
-        self._feed_scale = 10 ** feed_decimals(machine)
-        self._feed_texts: dict[int, str] = {}
-        self._feed = 0
+    def __init__(self, table: PlainRows, feeds: Ints, dialect: Dialect) -> None:
+        """`feeds` (M,) of the rows of the table in units of F."""
+        self._table, self._feeds = table, feeds
+        begin, end, moves = table.starts, table.end, table.moves
+        rapid, arc = table.kind == Kind.RAPID, table.is_arc
+        in_xy = (end[:, :2] != begin[:, :2]).any(axis=1)
+        both = (end[:, :2] != begin[:, :2]).all(axis=1)
+        # The part along X of a rapid of both axes, before that along Y.
+        corner = moves & rapid & both & (end[:, 2] >= 0) & (dialect.rapids == "one-axis")
+        cuts = np.flatnonzero(moves & ~rapid)
+        changes = np.zeros(len(moves), dtype=np.bool_)
+        changes[cuts] = np.diff(feeds[cuts], prepend=0) != 0
+        # A block in front that sets the feed where its own cannot.
+        ahead = changes & ~(in_xy & ~arc) & (dialect.feed_words == "syntax")
+        count = moves * (1 + corner.astype(np.int64) + ahead)
+        self.row = np.repeat(np.arange(len(moves)), count)
+        self.events = (np.cumsum(count) - count)[table.kind > Kind.ARC_CCW]
+        last = np.append(self.row[1:] != self.row[:-1], True)[: len(self.row)]
+        self._corner = corner[self.row] & ~last
+        self._ahead = ahead[self.row] & ~last
+        self._arc = arc[self.row] & last
+        self._flat = self._corner | self._ahead | (in_xy | arc)[self.row]
+        self._feed = self._ahead | ((changes & ~ahead)[self.row] & last)
 
-    def run(self, events: dict[int, str], of_row: Ints, feeds: Ints) -> None:
-        """All blocks; `of_row` (M,) names the toolpath's rows, `feeds` (M,) in units of F."""
-        table, dialect = self._table, self._dialect
-        sign = 1 if dialect.z_up == "+" else -1
-        xy = self._xy_texts(table.end)
-        z = _texts(table.end[:, 2] * sign, dialect)
-        arc = table.is_arc
-        i, j = (iter(_texts(table.offset[arc, axis], dialect)) for axis in (0, 1))
-        begin = table.starts
-        flat = (table.end[:, :2] != begin[:, :2]).any(axis=1)
-        columns = zip(
-            table.kind.tolist(),
-            table.moves.tolist(),
-            flat.tolist(),
-            of_row.tolist(),
-            feeds.tolist(),
-            strict=True,
-        )
-        cornered = (table.end[:, 2] >= 0) & (dialect.rapids == "one-axis")
-        at = self._xy_texts(table.start[None, :])[0]
-        for index, (kind, moves, in_xy, row, feed) in enumerate(columns):
-            if kind > Kind.ARC_CCW:
-                if row in events:
-                    self._send(events[row], row)
-            elif moves:
-                target = xy[index] if in_xy or kind >= Kind.ARC_CW else f"Z{z[index]}"
-                if kind >= Kind.ARC_CW:
-                    target += f" I{next(i)} J{next(j)}"
-                if kind == Kind.RAPID and in_xy and cornered[index]:
-                    self._corner(at, target, row)
-                self._move(CODE[kind], target, row, feed, at)
-            at = xy[index]
-
-    def _xy_texts(self, units: Ints) -> list[str]:
-        x, y = (_texts(units[:, axis], self._dialect) for axis in (0, 1))
-        return [f"X{one} Y{two}" for one, two in zip(x, y, strict=True)]
-
-    def _corner(self, at: str, target: str, row: int) -> None:
-        """The part along X of a rapid of both axes, before that along Y."""
-        corner = f"{target.partition(' ')[0]} {at.partition(' ')[2]}"
-        if corner not in (at, target):
-            self._send(f"{CODE[Kind.RAPID]} {corner}", row)
-
-    def _move(self, word: str, target: str, row: int, feed: int, at: str) -> None:
-        """One move, and a block in front that sets the feed where its own cannot."""
-        tail = ""
-        if word != "G00" and feed != self._feed:
-            tail = f" {self._feed_word(feed)}"
-            self._feed = feed
-            here = word == "G01" and target[0] == "X"
-            if not here and self._dialect.feed_words == "syntax":
-                self._send(f"G01 {at}{tail}", row)
-                tail = ""
-        self._send(f"{word} {target}{tail}", row)
-
-    def _feed_word(self, units: int) -> str:
-        word = self._feed_texts.get(units)
-        if word is None:
-            word = f"F{units / self._feed_scale:.{self._feed_decimals}f}"
-            self._feed_texts[units] = word
-        return word
-
-    def _send(self, block: str, row: int) -> None:
-        self.blocks.append(block)
-        self.rows.append(row)
+    def words(self, dialect: Dialect, decimals: int) -> list[Words]:
+        """The words of the blocks; `decimals` of a feed."""
+        table, row = self._table, self.row
+        kept = None if dialect.trailing_zeros else 1
+        before, end = table.starts[row], table.end[row]
+        x = np.where(self._ahead, before[:, 0], end[:, 0])
+        y = np.where(self._ahead | self._corner, before[:, 1], end[:, 1])
+        z = end[:, 2] * (1 if dialect.z_up == "+" else -1)
+        i, j = table.offset[row].T
+        columns = [("X", x, self._flat), ("Y", y, self._flat), ("Z", z, ~self._flat)]
+        columns += [("I", i, self._arc), ("J", j, self._arc)]
+        kind = np.where(self._ahead, int(Kind.LINE), table.kind[row])
+        shown = max(1, decimals)
+        feed = self._feeds[row] * 10 ** (shown - decimals)
+        return [
+            Words("G", kind, np.ones(len(row), dtype=np.bool_), digits=2),
+            *(Words(name, units, has, dialect.decimals, kept) for name, units, has in columns),
+            Words("F", feed, self._feed, shown),
+        ]

@@ -2,10 +2,10 @@
 words, lines that fit. Shared by the dialects that write words of a letter and a number.
 
     units = units_of(values_mm, 3)             whole thousandths, half away from zero
-    format_units(units, NumberStyle(3))        ["1.500", "-0.020"], never "-0.000"
-    format_column(values, NumberStyle(3, strip=True))   both at once: ["1.5", "-0.02"]
+    word_of("X", units, written, NumberStyle(3))         a column of words, "X1.500", "X-0.020"
+    format_column(values, NumberStyle(3, strip=True))   ["1.5", "-0.02"], never "-0"
     comment("logo (v2).dxf")                   "(logo _v2_.dxf)"
-    first_too_long(lines, 80)                    index of the first line over the limit, or −1
+    first_too_long(data, 80)                   index of the first line over the limit, or −1
 
 Readers never use this module, writers never `blocks.py`.
 """
@@ -13,14 +13,13 @@ Readers never use this module, writers never `blocks.py`.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from camtool.arrays import Floats, Ints
-from camtool.toolpath.moves import Kind
+from camtool.arrays import Bools, Floats, Ints
+from camtool.toolpath.words import Words, line_lengths
 
 MOST_UNITS: Final = 10**15
 """Whole units beyond this are not written: their decimals would no longer be exact in a float."""
@@ -32,15 +31,6 @@ COMMENT_CHARS: Final = 60
 # line ends, which end comments or programs; , which makes a comment active in LinuxCNC (MSG, …);
 # $ ! ? ~ which grbl obeys wherever they stand; # [ ] < > " which begin parameters and strings.
 _UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ._+:/=-]")
-
-
-CODE: Final[dict[int, str]] = {
-    Kind.RAPID: "G00",
-    Kind.LINE: "G01",
-    Kind.ARC_CW: "G02",
-    Kind.ARC_CCW: "G03",
-}
-"""The codes of moves where they have two digits."""
 
 
 @dataclass(frozen=True)
@@ -68,20 +58,23 @@ def values_of(units: Ints, decimals: int) -> Floats:
     return np.asarray(units / 10.0**decimals)
 
 
-def format_units(units: Ints, style: NumberStyle) -> list[str]:
-    """Whole units (N,) as N texts; zero has no minus."""
-    values = values_of(units, style.decimals).tolist()
-    # One formatting of the whole column: several times as fast as one per number.
-    texts = "\n".join([f"%.{style.decimals}f"] * len(values)) % tuple(values)
-    column = texts.split("\n") if values else []
-    if style.strip and style.decimals > 0:
-        return [text.rstrip("0").rstrip(".") for text in column]
-    return column
+def word_of(letter: str, units: Ints, written: Bools, style: NumberStyle) -> Words:
+    """The words of a letter, with numbers of whole units (M,), in the blocks that have it (M,)."""
+    return Words(letter, units, written, style.decimals, 0 if style.strip else None)
 
 
 def format_column(values: Floats, style: NumberStyle) -> list[str]:
-    """Values (N,) rounded to the style's decimals, as N texts; ValueError as `units_of`."""
-    return format_units(units_of(values, style.decimals), style)
+    """Values (N,) rounded to the style's decimals, as N texts; ValueError as `units_of`. Zero has
+    no minus."""
+    return [
+        _shown(value, style)
+        for value in values_of(units_of(values, style.decimals), style.decimals)
+    ]
+
+
+def _shown(value: float, style: NumberStyle) -> str:
+    text = f"{value:.{style.decimals}f}"
+    return text.rstrip("0").rstrip(".") if style.strip and style.decimals > 0 else text
 
 
 def format_number(value: float, style: NumberStyle) -> str:
@@ -100,10 +93,11 @@ def comment(text: str) -> str:
     return f"({_UNSAFE.sub('_', flat)[:COMMENT_CHARS].strip()})"
 
 
-def first_too_long(lines: Sequence[str], most_chars: int) -> int:
-    """Index of the first line of more than `most_chars` characters (line end not counted), or −1
-    when all of them fit."""
-    for index, line in enumerate(lines):
-        if len(line) > most_chars:
-            return index
-    return -1
+def first_too_long(data: bytes, most_chars: int) -> tuple[int, int]:
+    """Index and characters of the first line of more than `most_chars` characters (line end not
+    counted), or −1 and 0 when all of them fit."""
+    lengths = line_lengths(data)
+    if not (lengths > most_chars).any():
+        return -1, 0
+    index = int((lengths > most_chars).argmax())
+    return index, int(lengths[index])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
@@ -25,6 +25,7 @@ from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, toolpath_extents
 from camtool.toolpath.program import Program
+from camtool.toolpath.words import Words, texts_of
 
 from .arcs import ArcCounts, Arcs, arcs_of
 from .checks import check, feed_units
@@ -36,11 +37,9 @@ from .format import (
     first_too_long,
     format_column,
     format_number,
-    format_units,
     values_of,
+    word_of,
 )
-
-MOTION_WORDS: Final = np.array([" G0", " G1", " G2", " G3"], dtype=object)
 
 VALUE: Final = NumberStyle(3, strip=True)
 """Spindle speeds and dwells are written to a thousandth."""
@@ -79,26 +78,33 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
     sent = sent_rows(toolpath, arcs, feeds)
-    texts = block_texts(sent, dialect, feed_decimals(machine))
+    frame = [style.frame] if style.frame else []
     first_mode, changes = _path_modes(toolpath, sent, style)
-    blocks, of_row = _in_order(sent, texts, events, changes)
-    header = (*style.header, *first_mode)
-    footer = _footer(toolpath, events, dialect)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
-    of_row = [*[-1] * len(header), *of_row, *[-1] * len(footer)]
-    of_row[-1] = len(toolpath) - 1 if ended else -1
-    blocks = [*header, *blocks, *footer]
-    if dialect.block_numbers:
-        blocks = [f"N{index} {block}" for index, block in enumerate(blocks, 1)]
-    lines = [
-        *_header(toolpath, machine, dialect),
-        *_with_comments(toolpath, blocks, of_row, style),
-    ]
-    if style.frame:
-        lines = [style.frame, *lines, style.frame]
-    _check_length(lines, dialect)
-    return Program.of_lines(
-        lines,
+    order = Order(sent.is_motion)
+    order.add(0, [*style.header, *first_mode])
+    for at, row in sent.others(events):
+        order.add(at, [events.blocks[row]], row)
+    for at, block in changes.items():
+        order.add(at, [block])
+    footer = _footer(toolpath, events, dialect)
+    order.add(len(sent.row), footer[:-1])
+    order.add(len(sent.row), footer[-1:], len(toolpath) - 1 if ended else -1)
+    of_row = order.rows(sent.row)
+    comments = _comments(toolpath, of_row, style)
+    data = b"".join(
+        [
+            *(
+                f"{line}\n".encode("ascii")
+                for line in [*frame, *_header(toolpath, machine, dialect)]
+            ),
+            order.text(sent, dialect, feed_decimals(machine), comments),
+            *(f"{line}\n".encode("ascii") for line in frame),
+        ]
+    )
+    _check_length(data, dialect)
+    return Program.of_text(
+        data,
         machine,
         of_row,
         (
@@ -125,23 +131,58 @@ def _path_modes(
     return (written[asked[0]],), {int(moving[k]): written[asked[k]] for k in turns.tolist()}
 
 
-def _in_order(
-    sent: Sent, texts: list[str], events: Events, modes: dict[int, str]
-) -> tuple[list[str], list[int]]:
-    """Blocks of motions and events, with changes of the path mode before them, and the row of
-    each."""
-    blocks, rows = [], []
-    motions = iter(texts)
-    pairs = zip(sent.is_motion.tolist(), sent.row.tolist(), strict=True)
-    for at, (is_motion, row) in enumerate(pairs):
-        if at in modes:
-            blocks.append(modes[at])
-            rows.append(-1)
-        block = next(motions) if is_motion else events.blocks.get(row, "")
-        if block:
-            blocks.append(block)
-            rows.append(row)
-    return blocks, rows
+class Order:
+    """The blocks of motions, which are texts by columns, and all others between them."""
+
+    def __init__(self, is_motion: Bools) -> None:
+        """`is_motion` (M,): the rows that are sent as motions; the others have no text there."""
+        self._before = np.concatenate([[0], np.cumsum(is_motion)])
+        self._is_motion = is_motion
+        self._others: list[tuple[int, str, int]] = []
+
+    def add(self, at: int, blocks: Sequence[str], row: int = -1) -> None:
+        """Blocks in front of row `at` of those that are sent, with the toolpath's row."""
+        self._others += [(at, block, row) for block in blocks]
+
+    def _sorted(self) -> tuple[list[tuple[int, str, int]], Ints]:
+        """The others in order, and how many motions are in front of each."""
+        others = sorted(self._others, key=lambda other: other[0])
+        return others, self._before[[at for at, _, _ in others]]
+
+    def rows(self, row: Ints) -> Ints:
+        """(B,) the toolpath's row of each block; `row` (M,) of those that are sent."""
+        others, before = self._sorted()
+        return np.insert(row[self._is_motion], before, [one for _, _, one in others])
+
+    def text(
+        self,
+        sent: Sent,
+        dialect: GcodeDialect,
+        feed_decimals: int,
+        comments: Mapping[int, Sequence[str]],
+    ) -> bytes:
+        """All blocks, with lines of comments before block k (from 0)."""
+        others, before = self._sorted()
+        at = np.array([at for at, _, _ in others], dtype=np.int64)
+        number = before + np.arange(1, len(others) + 1)
+        columns = motion_words(sent, dialect, feed_decimals)
+        if dialect.block_numbers:
+            every = np.arange(len(sent.row))
+            mine = self._before[1:] + np.searchsorted(at, every, side="right")
+            columns.insert(0, Words("N", mine, sent.is_motion))
+        lines = []
+        for (row, block, _), own in zip(others, number.tolist(), strict=True):
+            lines += [(row, 0, comment) for comment in comments.get(own - 1, ())]
+            lines.append((row, 0, f"N{own} {block}" if dialect.block_numbers else block))
+        motions = np.flatnonzero(self._is_motion)
+        blocks = self._before[motions] + np.searchsorted(at, motions, side="right")
+        known = np.array(list(comments), dtype=np.int64)
+        place = np.searchsorted(blocks, known)
+        for block, k in zip(known.tolist(), place.tolist(), strict=True):
+            if k < len(blocks) and blocks[k] == block:
+                lines += [(int(motions[k]), 1, comment) for comment in comments[block]]
+        lines.sort(key=lambda line: line[:2])
+        return texts_of(columns, blanks=True).with_lines((row, text) for row, _, text in lines)
 
 
 def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[str]:
@@ -181,10 +222,9 @@ def _digest(machine: Machine) -> str:
     return hashlib.sha256(msgspec.json.encode(machine)).hexdigest()[:8]
 
 
-def _with_comments(
-    toolpath: Toolpath, blocks: list[str], of_row: list[int], style: Style
-) -> list[str]:
-    """The blocks with messages, and the name of each contour, on lines of their own before."""
+def _comments(toolpath: Toolpath, of_row: Ints, style: Style) -> dict[int, list[str]]:
+    """Messages, and the name of each contour, as lines before blocks (by index, from 0); of_row
+    (B,) the rows of the blocks."""
     wanted: dict[int, list[str]] = {}
     if style.dialect.comments == "contours":
         motions = np.flatnonzero(toolpath.is_motion)
@@ -194,19 +234,13 @@ def _with_comments(
             wanted.setdefault(row, []).append(comment(toolpath.text(row)))
     for row in np.flatnonzero(toolpath.kind == Kind.MESSAGE).tolist():
         wanted.setdefault(row, []).append(_message(toolpath, row, style))
-    if not wanted:
-        return blocks
+    rows = sorted(wanted)
     # The comments of a row that was left out stand before the next block that is sent.
-    waiting = sorted(wanted)
-    lines: list[str] = []
-    following = 0
-    for index, (block, row) in enumerate(zip(blocks, of_row, strict=True)):
-        last = index == len(blocks) - 1
-        while following < len(waiting) and (waiting[following] <= row or last):
-            lines += wanted[waiting[following]]
-            following += 1
-        lines.append(block)
-    return lines
+    blocks = np.searchsorted(np.maximum.accumulate(of_row), rows)
+    found: dict[int, list[str]] = {}
+    for row, block in zip(rows, np.minimum(blocks, len(of_row) - 1).tolist(), strict=True):
+        found.setdefault(block, []).extend(wanted[row])
+    return found
 
 
 def _message(toolpath: Toolpath, row: int, style: Style) -> str:
@@ -218,12 +252,12 @@ def _message(toolpath: Toolpath, row: int, style: Style) -> str:
     return f"({style.message}{text[1:]}"
 
 
-def _check_length(lines: list[str], dialect: GcodeDialect) -> None:
+def _check_length(data: bytes, dialect: GcodeDialect) -> None:
     """PostError for a line that the controller's buffer does not take."""
-    index = first_too_long(lines, dialect.line_chars)
+    index, length = first_too_long(data, dialect.line_chars)
     if index >= 0:
         raise PostError(
-            f"a line of {len(lines[index])} characters, the controller takes {dialect.line_chars}",
+            f"a line of {length} characters, the controller takes {dialect.line_chars}",
             where=f"line {index + 1}",
             mend="use fewer decimals, or no block numbers",
         )
@@ -269,6 +303,13 @@ class Sent:
     def is_motion(self) -> Bools:
         """(M,) true for motions."""
         return np.asarray(self.kind <= Kind.ARC_CCW)
+
+    def others(self, events: Events) -> Iterator[tuple[int, int]]:
+        """The places of events that have a block, and their rows of the toolpath."""
+        for at in np.flatnonzero(~self.is_motion).tolist():
+            row = int(self.row[at])
+            if row in events.blocks:
+                yield at, row
 
 
 def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
@@ -326,32 +367,24 @@ def _at_motions(homes: Ints, motion: Bools) -> Ints:
     return np.maximum.accumulate(np.where(motion, homes, 0)) if len(homes) else homes
 
 
-def block_texts(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[str]:
-    """The blocks of the motions among the rows."""
-    take = sent.is_motion
-    kind, end, written = sent.kind[take], sent.end[take], sent.written[take]
+def motion_words(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[Words]:
+    """The words of the motions among the rows."""
+    motion = sent.is_motion
+    rows = np.flatnonzero(motion)
     number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
-    is_arc = kind >= Kind.ARC_CW
-    is_feed = kind >= Kind.LINE
-    feed = sent.feed[take]
-    columns = [
-        _motion_words(kind, (np.diff(kind, prepend=-1) != 0) | sent.forget[take]),
+    turns = np.zeros(len(motion), dtype=bool)
+    turns[rows] = np.diff(sent.kind[rows], prepend=-1) != 0
+    is_arc = motion & (sent.kind >= Kind.ARC_CW)
+    feed = _changes(sent.feed, motion & (sent.kind >= Kind.LINE))
+    return [
+        Words("G", sent.kind, turns | (sent.forget & motion)),
         *(
-            _column_words(f" {axis}", end[:, at], written[:, at], number)
+            word_of(axis, sent.end[:, at], sent.written[:, at], number)
             for at, axis in enumerate("XYZ")
         ),
-        *(
-            _column_words(f" {axis}", sent.offset[take][:, at], is_arc, number)
-            for at, axis in enumerate("IJ")
-        ),
-        _column_words(" F", feed, _changes(feed, is_feed), NumberStyle(feed_decimals, strip=True)),
+        *(word_of(axis, sent.offset[:, at], is_arc, number) for at, axis in enumerate("IJ")),
+        word_of("F", sent.feed, feed, NumberStyle(feed_decimals, strip=True)),
     ]
-    return ["".join(words)[1:] for words in zip(*columns, strict=True)]
-
-
-def _motion_words(kind: Ints, written: Bools) -> list[str]:
-    words: list[str] = np.where(written, MOTION_WORDS[kind], "").tolist()
-    return words
 
 
 def _changes(values: Ints, counts: Bools) -> Bools:
@@ -360,15 +393,6 @@ def _changes(values: Ints, counts: Bools) -> Bools:
     changed = np.zeros(len(values), dtype=bool)
     changed[rows] = np.diff(values[rows], prepend=-1) != 0
     return changed
-
-
-def _column_words(letter: str, units: Ints, written: Bools, style: NumberStyle) -> list[str]:
-    """(M,) the word of a letter where it is written, "" elsewhere."""
-    rows = np.flatnonzero(written)
-    words = [""] * len(units)
-    for row, text in zip(rows.tolist(), format_units(units[rows], style), strict=True):
-        words[row] = letter + text
-    return words
 
 
 # Events, as the blocks that grbl and linuxcnc both know.

@@ -24,7 +24,7 @@ from camtool.findings import Finding
 from camtool.toolpath.lower import Lowered, arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
-from camtool.toolpath.words import Words, texts_of
+from camtool.toolpath.words import Words, line_lengths, texts_of
 
 from .arcs import CLOCKWISE, ITERATION, land
 from .dialect import PicMmhMachine
@@ -533,8 +533,7 @@ class Changes:
 def too_long(data: bytes, buffer_chars: int | None) -> Iterator[Finding]:
     """One BLOCK_TOO_LONG finding when blocks do not fit the controller's buffer: a remark where
     it is that of the thesis, which contradicts itself, and a warning where the user knows it."""
-    ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
-    lengths = np.diff(ends, prepend=-1) - 1
+    lengths = line_lengths(data)
     limit = BUFFER_CHARS if buffer_chars is None else buffer_chars
     if count := int((lengths > limit).sum()):
         yield (BLOCK_TOO_LONG_PERHAPS if buffer_chars is None else BLOCK_TOO_LONG)(

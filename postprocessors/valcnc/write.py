@@ -23,8 +23,9 @@ from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
+from camtool.toolpath.words import Words, texts_of
 
-from ..gcode.format import CODE, NumberStyle, first_too_long, format_units
+from ..gcode.format import NumberStyle, first_too_long, word_of
 from ..gcode.plain import (
     ArcRules,
     PlainRows,
@@ -62,18 +63,13 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     rules = ArcRules(dialect.decimals, "halves", MOST_UNITS, chord_fits=True)
     rows = plain_rows(_scaled(lowered.toolpath, scales), rules)
     of_row = lowered.row[rows.row]
-    sent = rows.moves
-    blocks = [
-        block
-        for block, wanted in zip(_blocks(rows, dialect), sent.tolist(), strict=True)
-        if wanted
-    ]
-    _check_length(blocks, dialect)
+    data = _text(rows, dialect)
+    _check_length(data, dialect)
     first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
-    return Program.of_lines(
-        blocks,
+    return Program.of_text(
+        data,
         machine,
-        of_row[sent],
+        of_row[rows.moves],
         (
             *_scale_finding(dialect),
             *split,
@@ -120,25 +116,24 @@ def _scaled(toolpath: Toolpath, scales: Floats) -> Toolpath:
     )
 
 
-def _blocks(rows: PlainRows, dialect: Dialect) -> list[str]:
-    """The block of each row, without a code for events."""
+def _text(rows: PlainRows, dialect: Dialect) -> bytes:
+    """The blocks of all rows that move."""
     style = NumberStyle(dialect.decimals)
-    x, y, z = (format_units(rows.end[:, axis], style) for axis in range(3))
-    words = [CODE.get(kind, "") for kind in rows.kind.tolist()]
-    blocks = [f"{w} X{a} Y{b} Z{c}" for w, a, b, c in zip(words, x, y, z, strict=True)]
-    arcs = np.flatnonzero(rows.is_arc)
-    i, j = (format_units(rows.offset[arcs, axis], style) for axis in range(2))
-    for row, a, b in zip(arcs.tolist(), i, j, strict=True):
-        blocks[row] += f" I{a} J{b}"
-    return blocks
+    sent = rows.moves
+    arc = sent & rows.is_arc
+    columns = [
+        Words("G", rows.kind, sent, digits=2),
+        *(word_of(axis, rows.end[:, at], sent, style) for at, axis in enumerate("XYZ")),
+        *(word_of(axis, rows.offset[:, at], arc, style) for at, axis in enumerate("IJ")),
+    ]
+    return texts_of(columns, blanks=True).data
 
 
-def _check_length(blocks: list[str], dialect: Dialect) -> None:
-    index = first_too_long(blocks, dialect.block_chars)
+def _check_length(data: bytes, dialect: Dialect) -> None:
+    index, length = first_too_long(data, dialect.block_chars)
     if index >= 0:
         raise PostError(
-            f"a block of {len(blocks[index])} characters, the controller takes "
-            f"{dialect.block_chars}",
+            f"a block of {length} characters, the controller takes {dialect.block_chars}",
             where=f"block {index + 1}",
             mend="use fewer decimals, or check the units",
         )

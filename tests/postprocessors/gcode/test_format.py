@@ -88,5 +88,5 @@ def test_no_text_ends_its_comment(text: str) -> None:
 
 
 def test_the_first_line_that_is_too_long() -> None:
-    assert first_too_long(["a" * 5, "b" * 6, "c" * 7], 5) == 1
-    assert first_too_long(["a" * 5], 5) == -1
+    assert first_too_long(b"aaaaa\nbbbbbb\nccccccc\n", 5) == (1, 6)
+    assert first_too_long(b"aaaaa\n", 5) == (-1, 0)
