@@ -281,14 +281,19 @@ def reverse(p: Polyline) -> Polyline:
     return Polyline(vertices, p.closed)
 
 
-def lines_reversed(lines: Polylines) -> Polylines:
-    """Every path travelled backwards, as `reverse` does."""
+def lines_reversed(lines: Polylines, which: Bools | None = None) -> Polylines:
+    """Every path (or those of `which` (M,)) travelled backwards, as `reverse` does."""
     counts = np.diff(lines.offsets)
     low, count = np.repeat(lines.offsets[:-1], counts), np.repeat(counts, counts)
     place = np.arange(len(low)) - low
-    order = np.where(np.repeat(lines.closed, counts), count - place, count - 1 - place) % count
-    vertices = lines.vertices[low + order]
-    vertices[:, 2] = 0.0 - lines.vertices[low + (order - 1) % count, 2]
+    back = np.where(np.repeat(lines.closed, counts), count - place, count - 1 - place) % count
+    bulge = 0.0 - lines.vertices[low + (back - 1) % count, 2]
+    if which is not None:
+        turned = np.repeat(which, counts)
+        back = np.where(turned, back, place)
+        bulge = np.where(turned, bulge, lines.vertices[:, 2])
+    vertices = lines.vertices[low + back]
+    vertices[:, 2] = bulge
     return Polylines._trusted(vertices, lines.offsets, lines.closed)
 
 
@@ -305,6 +310,16 @@ def rolled(p: Polyline, start_index: int) -> Polyline:
     if not p.closed:
         raise GeometryError("an open path can only begin at an end")
     return Polyline(np.roll(p.vertices, -start_index, axis=0), True)
+
+
+def lines_rolled(lines: Polylines, begins: Ints) -> Polylines:
+    """Paths begun at these of their vertices (M,), as `rolled` does; 0 for open ones."""
+    if not (lines.closed | (begins == 0)).all():
+        raise GeometryError("an open path can only begin at an end")
+    counts = np.diff(lines.offsets)
+    low, count = np.repeat(lines.offsets[:-1], counts), np.repeat(counts, counts)
+    place = (np.arange(len(low)) - low + np.repeat(begins, counts)) % count
+    return Polylines._trusted(lines.vertices[low + place], lines.offsets, lines.closed)
 
 
 # Points that are one: taken out of paths, whatever made them coincide (a drawing that repeats

@@ -1,6 +1,6 @@
 """A contour, its start and direction chosen, as runs of the tool: how it goes in, down and out.
 
-    path ─MeasuredPath─▶ lengths ─ramps─▶ profile of z ─tabs.raised─▶ lifted ─leads─▶ CutRun
+    paths ─MeasuredPaths─▶ lengths ─ramps─▶ profile of z ─tabs.raised─▶ lifted ─leads─▶ CutRun
 
 A closed contour is one run: down, round and round, the overlap. With leads it is one run for each
 pass, from the lead-in to the lead-out; where it ramps down, it stays one run, and goes out and
@@ -11,17 +11,18 @@ each pass. So the leads of a contour are cut step by step, as the contour itself
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import ENTRY_CHANGED, Finding
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
-from camtool.planning.items import Bridge, Contour, CutRun
-from camtool.planning.leads import KeepOut, Leads, leads_of
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
+from camtool.planning.items import Bridge, Contour, CutRun, Feeds
+from camtool.planning.leads import NO_LEADS, KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place
-from camtool.planning.paths import MeasuredPath
+from camtool.planning.paths import MeasuredPath, MeasuredPaths
 from camtool.planning.ramps import (
     MOST_LAPS,
     ZProfile,
@@ -46,41 +47,76 @@ Heights = tuple[float | None, list[Tab]]
 
 
 @dataclass(frozen=True, eq=False)
-class CutContour:
-    """The runs that cut a contour, what did not go as the operation asks, and the bridges that
-    its tabs leave."""
+class CutContours:
+    """The runs that cut M contours, one contour after the other, and how many of each, `counts`
+    (M); what did not go as the operation asks, and the bridges that their tabs leave."""
 
     runs: tuple[CutRun, ...]
+    counts: tuple[int, ...]
     findings: tuple[Finding, ...]
     bridges: tuple[Bridge, ...]
 
 
-def runs_of(contour: Contour, path: Polyline, keep_out: KeepOut) -> CutContour:
-    """How a contour is cut.
+@dataclass(frozen=True, eq=False)
+class _Pass:
+    """A run as it is to be made: along the path, with the heights of these parts of it, each of
+    which ends where the next one begins, and with these leads."""
 
-    `path` is the contour's path from the chosen start in the chosen direction. On its leads
-    the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
+    along: MeasuredPath
+    parts: list[ZProfile]
+    leads: Leads
+
+
+def runs_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -> CutContours:
+    """How M contours of one operation are cut.
+
+    `paths` (M) are those of the contours, from the chosen starts in the chosen directions. On its
+    leads the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
     OptionError for impossible tabs.
     """
-    along = MeasuredPath.of(path)
-    angle, findings = _slope(contour, along)
-    tabs, left_out = tabs_of(contour, along)
-    made = _round if path.closed else _along
-    paths, leads = made(contour, along, (angle, tabs), keep_out)
-    feeds = contour.setting.feeds
-    runs = [
-        CutRun(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, contour.name)
-        for vertices in paths
+    passes: list[_Pass] = []
+    counts: list[int] = []
+    findings: list[Finding] = []
+    bridges: list[Bridge] = []
+    for contour, along in zip(contours, MeasuredPaths(paths), strict=True):
+        angle, changed = _slope(contour, along)
+        tabs, left_out = tabs_of(contour, along)
+        made, leads = (_round if along.closed else _along)(contour, along, (angle, tabs), keep_out)
+        passes += made
+        counts.append(len(made))
+        findings += [*changed, *left_out, *leads.findings]
+        bridges += bridges_of(along, tabs, contour.setting.operation.tool, contour.name)
+    names = [
+        contour.name for contour, count in zip(contours, counts, strict=True) for _ in range(count)
     ]
-    findings += [*left_out, *leads.findings]
-    bridges = bridges_of(along, tabs, contour.setting.operation.tool, contour.name)
-    return CutContour(tuple(runs), tuple(findings), tuple(bridges))
+    runs = _runs(passes, contours[0].setting.feeds, names) if passes else []
+    return CutContours(tuple(runs), tuple(counts), tuple(findings), tuple(bridges))
+
+
+def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> list[CutRun]:
+    """The runs of these names, lifted all at once where their paths lie in the same columns."""
+    owner = [k for k, each in enumerate(passes) for _ in each.parts]
+    parts = [part for each in passes for part in each.parts]
+    columns: dict[int, list[int]] = {}
+    for row, k in enumerate(owner):
+        columns.setdefault(id(passes[k].along.paths), []).append(row)
+    followed: list[list[Floats]] = [[] for _ in passes]
+    for rows in columns.values():
+        paths = passes[owner[rows[0]]].along.paths
+        index = [passes[owner[row]].along.index for row in rows]
+        lifts = lifted(paths, index, [parts[row] for row in rows])
+        for row, vertices in zip(rows, lifts, strict=True):
+            followed[owner[row]].append(vertices)
+    led = [_with_leads(each, one.leads) for each, one in zip(followed, passes, strict=True)]
+    table = np.concatenate(led)
+    first = np.concatenate([[0], np.cumsum([len(each) for each in led])])
+    return CutRun.many(table, feeds_along(table, feeds), first, feeds.plunge_mm_min, names)
 
 
 def _round(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
-) -> tuple[list[Floats], Leads]:
-    """The runs (n, 4) round a closed contour."""
+) -> tuple[list[_Pass], Leads]:
+    """The runs round a closed contour."""
     angle, tabs = heights
     levels, overlap = contour.setting.levels_mm, contour.setting.operation.overlap_mm
     total = along.total_mm
@@ -97,12 +133,8 @@ def _round(
         leads = leads_of(contour, along, (profiles[0][0][0], ends[1]), keep_out)
     elif len(leads.away) == len(leads.to) == 0:
         profiles = [laps(total, levels, overlap)]
-    paths = []
-    for profile in profiles:
-        points = raised(profile, tabs, total)
-        parts = [lifted(along, part) for part in _split(points, stops)]
-        paths.append(_with_leads(parts, leads))
-    return paths, leads
+    parts = [_split(raised(profile, tabs, total), stops) for profile in profiles]
+    return [_Pass(along, each, leads) for each in parts], leads
 
 
 def _split(points: ZProfile, stops: list[float]) -> list[ZProfile]:
@@ -119,6 +151,8 @@ def _split(points: ZProfile, stops: list[float]) -> list[ZProfile]:
 def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
     """The run (n, 4) along parts (n, 4) of a contour: the lead-in before the first of them, the
     lead-out behind the last, and out and back between two."""
+    if len(leads.to) == len(leads.away) == 0:
+        return parts[0]
     rows = [np.insert(leads.to[:-1], 2, parts[0][0, 2], axis=1)]
     for part in parts[:-1]:
         out = np.insert(leads.away[1:], 2, part[-1, 2], axis=1)
@@ -132,22 +166,26 @@ def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
 
 def _along(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
-) -> tuple[list[Floats], Leads]:
-    """The runs (n, 4) along an open contour."""
+) -> tuple[list[_Pass], Leads]:
+    """The runs along an open contour, whose leads are parts of its path."""
     angle, tabs = heights
     levels = contour.setting.levels_mm
     leads = leads_of(contour, along, (0.0, along.total_mm), keep_out)
-    vertices = along.path.vertices.copy()
-    vertices[-1, 2] = leads.away[0, 2] if len(leads.away) else 0.0
-    track = MeasuredPath.of(Polyline(np.concatenate([leads.to[:-1], vertices, leads.away[1:]])))
-    before = float(track.reach[len(leads.to[:-1])])
-    stand = [tab.moved(before) for tab in tabs]
+    track = along
+    if len(leads.to) or len(leads.away):
+        vertices = along.path.vertices.copy()
+        vertices[-1, 2] = leads.away[0, 2] if len(leads.away) else 0.0
+        rows = [leads.to[:-1], vertices, leads.away[1:]]
+        track = MeasuredPath.of(Polyline(np.concatenate(rows)))
+        before = float(track.reach[len(leads.to[:-1])])
+        tabs = [tab.moved(before) for tab in tabs]
     above = (0.0, *levels)
     passes = [levels] if contour.reversible else [(z,) for z in levels]
     profiles = [
         to_and_fro(track.total_mm, each, above[turn], angle) for turn, each in enumerate(passes)
     ]
-    return [lifted(track, raised(profile, stand, None)) for profile in profiles], leads
+    parts = [raised(profile, tabs, None) for profile in profiles]
+    return [_Pass(track, [each], NO_LEADS) for each in parts], leads
 
 
 def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Finding]]:
@@ -191,7 +229,7 @@ def with_starts(
         around = np.abs(along.segments.radius - tool_radius_mm) <= POSITION_EPS_MM
         return path, np.flatnonzero(turns | around)
     length = _midpoint(along) if isinstance(rule, str) else along.nearest_to(rule)
-    begun, start = _with_vertex(along, length)
+    begun, start = _with_vertex(path, along, length)
     return begun, np.array([start], dtype=np.int64)
 
 
@@ -203,15 +241,15 @@ def _midpoint(along: MeasuredPath) -> float:
     return float(0.5 * (along.reach[row] + along.reach[row + 1]))
 
 
-def _with_vertex(along: MeasuredPath, length: float) -> tuple[Polyline, int]:
-    """The path with a vertex at this length, and its index."""
+def _with_vertex(path: Polyline, along: MeasuredPath, length: float) -> tuple[Polyline, int]:
+    """A measured path with a vertex at this length, and its index."""
     off = np.abs(along.reach - length)
     vertex = int(off.argmin())
     if off[vertex] <= START_SNAP_MM:
-        return along.path, vertex % len(along.path)
+        return path, vertex % len(path)
     row = int(np.searchsorted(along.reach, length)) - 1
     begin, end = along.reach[row : row + 2]
     first = along.piece(begin, length)
     second = along.piece(length, end)
-    parts = [along.path.vertices[:row], first[:1], second[:1], along.path.vertices[row + 1 :]]
+    parts = [path.vertices[:row], first[:1], second[:1], path.vertices[row + 1 :]]
     return Polyline(np.concatenate(parts), True), row + 1

@@ -9,7 +9,9 @@ stock: it goes down at its first point and comes up at its last one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -63,6 +65,31 @@ class CutRun:
             raise ValueError(f"{len(self.feed_mm_min)} feeds for {count} vertices")
         if not np.isfinite(self.vertices).all():
             raise ValueError("a vertex is not finite")
+
+    @classmethod
+    def many(
+        cls,
+        vertices: Floats,
+        feed_mm_min: Floats,
+        first: Ints,
+        plunge: float,
+        names: Sequence[str],
+    ) -> list[CutRun]:
+        """R runs of columns: run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices`
+        (N, 4), and the feeds between them of `feed_mm_min` (N−1,); all plunge at one feed."""
+        cls(vertices, feed_mm_min, plunge, "")  # checked as a whole
+        ends = first.tolist()
+        made = []
+        for name, (begin, end) in zip(names, pairwise(ends), strict=True):
+            run = object.__new__(cls)
+            run.__dict__.update(
+                vertices=vertices[begin:end],
+                feed_mm_min=feed_mm_min[begin : end - 1],
+                plunge_mm_min=plunge,
+                name=name,
+            )
+            made.append(run)
+        return made
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,14 +113,17 @@ class Leads:
     findings: tuple[Finding, ...]
 
 
+NO_LEADS = Leads(np.empty((0, 3)), np.empty((0, 3)), ())
+"""The tool goes down and up at the contour itself."""
+
+
 def leads_of(
     contour: Contour, along: MeasuredPath, ends: tuple[float, float], keep_out: KeepOut
 ) -> Leads:
     """The leads of a contour that is cut as `along` from one length to another, its `ends`."""
     operation = contour.setting.operation
-    nothing = np.empty((0, 3))
     if operation.lead_in.kind == operation.lead_out.kind == "none":
-        return Leads(nothing, nothing, ())
+        return NO_LEADS
     border = Border.of(contour, keep_out)
     side = contour.material_left
     if side is not None and runs_back(contour.path, along.path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -17,6 +16,9 @@ from camtool.toolpath.moves import Kind, Toolpath
 ROUNDED_DECIMALS = 10
 """Positions are rounded to this many decimals of a mm: far coarser than the noise of doubles, and
 far finer than any machine or tolerance."""
+
+_NO_FEED = np.array([np.nan])
+"""Behind the last vertex of a run."""
 
 Approach = Callable[[CutRun], tuple[float, float] | None]
 """Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
@@ -62,11 +64,8 @@ def link(
             approach = approaches() if approaches is not None else None
         tool = operation.tool
         speed = _spin(builder, speed, operation.spindle_rpm)
-        for run in runs:
-            builder.run = done
-            _cut_one(builder, run, safe_z_mm, approach)
-            done += 1
-        builder.run = -1
+        _cut(builder, runs, done, safe_z_mm, approach)
+        done += len(runs)
     builder.source = ""
     _spin(builder, speed, None)
     return builder.rapid(0.0, 0.0).event(Kind.END)
@@ -84,23 +83,53 @@ def _spin(builder: ToolpathBuilder, speed: float | None, wanted: float | None) -
     return wanted
 
 
-def _cut_one(
-    builder: ToolpathBuilder, run: CutRun, safe_z_mm: float, approach: Approach | None
+def _cut(
+    builder: ToolpathBuilder,
+    runs: Sequence[CutRun],
+    before: int,
+    safe_z_mm: float,
+    approach: Approach | None,
 ) -> None:
-    builder.source = run.name
-    x, y, z, _ = run.vertices[0].tolist()
-    before = approach(run) if approach is not None else None
-    if before is not None:
-        builder.rapid(*before)
-    builder.rapid(x, y).line(z=z, feed=run.plunge_mm_min)
-    for cut in cuts(run.vertices, run.feed_mm_min):
-        x, y, z = cut.end
-        if math.isnan(cut.feed):
-            builder.rapid(x, y, z)
-        elif cut.centre is None:
-            builder.line(x, y, z, feed=cut.feed)
-        else:
-            builder.arc(x, y, z=z, centre=cut.centre, ccw=cut.ccw, feed=cut.feed)
-    if run.dwell_s > 0.0:
-        builder.event(Kind.DWELL, run.dwell_s)
-    builder.rapid(z=safe_z_mm)
+    """Add the moves of runs, of which there were so many before: each from safe z and back to it.
+
+    (the approach) · across · down · the cuts · (the dwell) · up
+    """
+    vertices = np.concatenate([run.vertices for run in runs])
+    counts = np.array([len(run.vertices) for run in runs])
+    first = np.concatenate([[0], np.cumsum(counts)])
+    feed = np.concatenate([each for run in runs for each in (run.feed_mm_min, _NO_FEED)])
+    cut = cuts(vertices, feed, first)
+    dwell = np.array([run.dwell_s for run in runs])
+    come = [] if approach is None else [approach(run) for run in runs]
+    places = [place for place in come if place is not None]
+    # Where each part of a run stands among all rows.
+    approached = np.zeros(len(runs), dtype=np.bool_)
+    approached[: len(come)] = [place is not None for place in come]
+    dwells = dwell > 0.0
+    cuts_each = np.bincount(cut.run, minlength=len(runs))
+    begin = np.concatenate([[0], np.cumsum(approached + cuts_each + dwells + 3)])
+    across = begin[:-1] + approached
+    up = begin[1:] - 1
+    rank = np.arange(len(cut.run)) - np.repeat(np.cumsum(cuts_each) - cuts_each, cuts_each)
+    cutting = across[cut.run] + 2 + rank
+    count = int(begin[-1])
+    kind = np.full(count, Kind.RAPID, dtype=np.int64)
+    end, centre = np.full((count, 3), safe_z_mm), np.full((count, 2), np.nan)
+    speed, value = np.full(count, np.nan), np.full(count, np.nan)
+    end[begin[:-1][approached], :2] = np.array(places).reshape(-1, 2)
+    end[across, :2] = vertices[first[:-1], :2]
+    down = across + 1
+    kind[down], end[down] = Kind.LINE, vertices[first[:-1], :3]
+    speed[down] = [run.plunge_mm_min for run in runs]
+    is_arc = np.isfinite(cut.centre[:, 0]) & np.isfinite(cut.feed)
+    turning = np.where(cut.ccw, Kind.ARC_CCW, Kind.ARC_CW)
+    straight = np.where(np.isnan(cut.feed), Kind.RAPID, Kind.LINE)
+    kind[cutting] = np.where(is_arc, turning, straight)
+    end[cutting], speed[cutting] = cut.end, cut.feed
+    centre[cutting[is_arc]] = cut.centre[is_arc]
+    rests = up[dwells] - 1
+    kind[rests], value[rests], end[rests] = Kind.DWELL, dwell[dwells], end[rests - 1]
+    end[up, :2] = end[up - 1, :2]
+    number = np.repeat(np.arange(len(runs)), np.diff(begin))
+    source = builder.provenance(run.name for run in runs)[number]
+    builder.moves(kind, end, centre, speed, value=value, source=source, run=before + number)

@@ -12,14 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
+from camtool.geometry.polylines import Polyline, Polylines, lines_reversed, lines_rolled
 from camtool.planning.items import Contour, Item
 from camtool.planning.paths import flat, joints
 
@@ -87,24 +88,32 @@ def choices_of(items: Sequence[Item]) -> Choices:
     A closed contour may begin at its `starts` or at any joint, and ends there; its direction
     changes nothing. An open one runs as drawn, or from its end too when reversible.
     """
-    ends = [_ends(item) for item in items]
-    owner = np.repeat(np.arange(len(items)), [len(each) for each in ends])
-    both = np.concatenate([np.empty((0, 4)), *ends])
-    return Choices(owner, both[:, :2], both[:, 2:])
+    columns = [_fixed_ends(items), *_contour_ends(items)]
+    owner, ends = (np.concatenate(each) for each in zip(*columns, strict=True))
+    order = np.argsort(owner, kind="stable")
+    return Choices(owner[order], ends[order, :2], ends[order, 2:])
 
 
-def chosen_path(items: Sequence[Item], choices: Choices, row: int) -> Polyline:
-    """The path of the contour that owns this row, begun where it says and in that direction.
+def chosen_paths(items: Sequence[Item], choices: Choices, rows: Ints) -> Polylines:
+    """The paths of the contours that own these rows (R,), in that order: begun where the row
+    says, and in that direction.
 
-    TypeError when the row is of an item that is cut as it is.
+    TypeError when a row is of an item that is cut as it is.
     """
-    index = int(choices.owner[row])
-    item, rank = items[index], row - int(np.searchsorted(choices.owner, index))
-    if not isinstance(item, Contour):
-        raise TypeError(f"{item.name} is cut as it is")
-    if item.path.closed:
-        return rolled(item.path, int(_begins(item)[rank]))
-    return reverse(item.path) if rank else item.path
+    owners = choices.owner[rows]
+    chosen: list[Contour] = []
+    for index in owners.tolist():
+        item = items[index]
+        if not isinstance(item, Contour):
+            raise TypeError(f"{item.name} is cut as it is")
+        chosen.append(item)
+    rank = rows - choices.first[owners]
+    lines = Polylines.of(item.path for item in chosen)
+    # The places in each closed path where it may begin, the first, the second, and so on.
+    begins = np.flatnonzero(_begins(chosen, lines))
+    place = np.searchsorted(begins, lines.offsets[:-1]) + np.where(lines.closed, rank, 0)
+    start = np.where(lines.closed, begins[place] - lines.offsets[:-1], 0)
+    return lines_reversed(lines_rolled(lines, start), ~lines.closed & (rank > 0))
 
 
 def drawn(choices: Choices) -> Ints:
@@ -243,25 +252,47 @@ def _circle(left: set[int]) -> OptionError:
     )
 
 
-def _ends(item: Item) -> Floats:
-    """(R, 4): x and y where the tool goes down and where it comes up, variant by variant."""
-    if not isinstance(item, Contour):
-        start, end = item.runs[0].vertices[0, :2], item.runs[-1].vertices[-1, :2]
-        return np.concatenate([start, end])[None]
-    if item.path.closed:
-        places = item.path.vertices[_begins(item), :2]
-        return np.column_stack([places, places])
-    ends = np.concatenate([item.path.start, item.path.end])
+Ends = tuple[Ints, Floats]
+"""Rows of variants: the items (R,) that they are of, ascending, and (R, 4) the x and y where the
+tool goes down and where it comes up."""
+
+
+def _fixed_ends(items: Sequence[Item]) -> Ends:
+    """The one variant of each item that is cut as it is."""
+    fixed = [(k, item.runs) for k, item in enumerate(items) if not isinstance(item, Contour)]
+    ends = [[runs[0].vertices[0, :2], runs[-1].vertices[-1, :2]] for _, runs in fixed]
+    return np.array([k for k, _ in fixed], dtype=np.int64), np.array(ends).reshape(-1, 4)
+
+
+def _contour_ends(items: Sequence[Item]) -> Iterator[Ends]:
+    """The variants of contours: of closed ones, of open ones as they run, and of those turned."""
+    index = [k for k, item in enumerate(items) if isinstance(item, Contour)]
+    contours = [item for item in items if isinstance(item, Contour)]
+    lines, owner = Polylines.of(item.path for item in contours), np.array(index, dtype=np.int64)
+    begins = _begins(contours, lines) & np.repeat(lines.closed, np.diff(lines.offsets))
+    of = np.repeat(owner, np.diff(lines.offsets))
+    yield of[begins], np.tile(lines.vertices[begins, :2], 2)
+    opens = np.flatnonzero(~lines.closed)
+    start, end = (
+        lines.vertices[lines.offsets[opens], :2],
+        lines.vertices[lines.offsets[opens + 1] - 1, :2],
+    )
+    turns = np.array([contours[k].reversible for k in opens.tolist()], dtype=np.bool_)
     # Passes to and fro leave the tool where it went down when their number is even.
-    back = item.reversible and len(item.setting.levels_mm) % 2 == 0
-    ends = np.tile(ends[:2], 2) if back else ends
-    turned = np.tile(item.path.end, 2) if back else np.roll(ends, 2)
-    return np.stack([ends, turned] if item.reversible else [ends])
+    even = [len(contours[k].setting.levels_mm) % 2 == 0 for k in opens.tolist()]
+    back = (turns & np.array(even, dtype=np.bool_))[:, None]
+    yield owner[opens], np.hstack([start, np.where(back, start, end)])
+    yield owner[opens[turns]], np.hstack([end, np.where(back, end, start)])[turns]
 
 
-def _begins(item: Contour) -> Ints:
-    """Vertices at which a closed contour may begin."""
-    return item.starts if len(item.starts) else np.flatnonzero(joints(item.path))
+def _begins(contours: Sequence[Contour], lines: Polylines) -> Bools:
+    """(N,) the vertices of contours, whose paths are the `lines`, at which they may begin."""
+    found = joints(lines)
+    for item, (begin, end) in zip(contours, pairwise(lines.offsets.tolist()), strict=True):
+        if len(item.starts):
+            found[begin:end] = False
+            found[begin + item.starts] = True
+    return found
 
 
 def must_precede(items: Sequence[Item]) -> Ints:

@@ -1,12 +1,8 @@
 """Paths by the length along them, pieces cut out of them exactly, and arcs put together again.
 
-A piece of a line or an arc keeps to it: with the bulge b of the whole, the part f of it has
-
-    bulge = tan(f · atan b),
-
-because the bulge is tan(sweep/4) and the part f of the length has the part f of the sweep.
-Lengths may run below 0 and beyond the whole of a closed path: that is further round. Arcs that
-were split, since a polyline holds half circles at most, become one arc again (`joints`, `cuts`).
+Pieces of lines and arcs keep to them (`camtool.kernels.passes`). Lengths may run below 0 and
+beyond the whole of a closed path: that is further round. Arcs that were split, since a polyline
+holds half circles at most, become one arc again (`joints`, `cuts`).
 """
 
 from __future__ import annotations
@@ -21,7 +17,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turned
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 
 QUARTER = math.tan(math.pi / 8.0)
 """The bulge of a quarter of a circle."""
@@ -34,21 +30,62 @@ SLOPE_EPS = 1e-9
 """Parts of a helix whose slopes (mm per mm) differ by no more than this are joined."""
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredPath:
-    """A path with the length `reach` (n+1,) mm from its start to the start of each segment, and
-    to its end: `total_mm`."""
+class MeasuredPaths:
+    """Paths in columns with the lengths along them: `lines`, their `segments`, and the `tracks` of
+    camtool.kernels.passes, which know the `reach` mm to the start of each segment and to the end
+    of each path. It gives the single ones in turn, each a `MeasuredPath`."""
 
-    path: Polyline
-    segments: Segments
-    reach: Floats
+    def __init__(self, lines: Polylines) -> None:
+        from camtool.kernels.passes import Tracks, reaches
+
+        self.lines, self.segments = lines, Segments.of(lines)
+        self.first = np.concatenate([[0], np.cumsum(np.diff(lines.offsets) - ~lines.closed)])
+        self.reach = reaches(segment_lengths(self.segments), self.first)
+        self.tracks = Tracks(
+            np.ascontiguousarray(self.segments.start),
+            np.ascontiguousarray(self.segments.end),
+            np.ascontiguousarray(self.segments.bulge),
+            self.first,
+            lines.closed.astype(np.int64),
+            self.reach,
+        )
+        self.total_mm = self.reach[self.first[1:] + np.arange(len(lines))]
+        """(M,) the length of each path."""
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __iter__(self) -> Iterator[MeasuredPath]:
+        return (MeasuredPath(self, index) for index in range(len(self)))
+
+
+class MeasuredPath:
+    """One path of many with the lengths along it: path `index` of `paths`."""
+
+    def __init__(self, paths: MeasuredPaths, index: int) -> None:
+        self.paths, self.index = paths, index
 
     @classmethod
     def of(cls, path: Polyline) -> MeasuredPath:
         """The path, measured."""
-        segments = Segments.of(path)
-        reach = np.concatenate([[0.0], np.cumsum(segment_lengths(segments))])
-        return cls(path, segments, reach)
+        return cls(MeasuredPaths(Polylines.of([path])), 0)
+
+    @cached_property
+    def path(self) -> Polyline:
+        """The path itself."""
+        return self.paths.lines[self.index]
+
+    @cached_property
+    def segments(self) -> Segments:
+        """The n lines and arcs of the path."""
+        first = self.paths.first
+        return self.paths.segments[first[self.index] : first[self.index + 1]]
+
+    @cached_property
+    def reach(self) -> Floats:
+        """(n+1,) mm from the start of the path to the start of each segment, and to its end."""
+        first, index = self.paths.first, self.index
+        return self.paths.reach[first[index] + index : first[index + 1] + index + 1]
 
     @cached_property
     def turns(self) -> Floats:
@@ -58,14 +95,19 @@ class MeasuredPath:
         before = np.roll(frames.tangent_at(np.ones(len(self.segments))), 1, axis=0)
         cross = dot(turned(before), frames.tangent)
         turns = np.arctan2(cross, dot(before, frames.tangent))
-        if not self.path.closed:
+        if not self.closed:
             turns[0] = 0.0
         return turns
 
     @property
+    def closed(self) -> bool:
+        """Whether the path is closed."""
+        return bool(self.paths.lines.closed[self.index])
+
+    @property
     def total_mm(self) -> float:
         """The length of the path."""
-        return float(self.reach[-1])
+        return float(self.paths.total_mm[self.index])
 
     def at(self, lengths: Floats) -> Floats:
         """(J, 2) the places at these lengths (J,) mm."""
@@ -106,32 +148,10 @@ class MeasuredPath:
 
         Vertices nearer than POSITION_EPS_MM to an end are that end. The last bulge is 0.
         """
-        if end < begin:
-            return backwards(self.piece(end, begin))
-        rows, low, high = self._spans(begin, end)
-        whole = self.segments.bulge[rows]
-        part = high - low
-        bulge = np.where(part == 1.0, whole, np.tan(part * np.arctan(whole)))
-        vertices = np.column_stack([point_at(self.segments, rows, low), bulge])
-        last = point_at(self.segments, rows[-1:], high[-1:])
-        return np.concatenate([vertices, np.column_stack([last, [0.0]])])
+        from camtool.kernels.passes import piece
 
-    def _spans(self, begin: float, end: float) -> tuple[Ints, Floats, Floats]:
-        """The segments between two lengths in order, and the part of each where it begins and
-        ends."""
-        total, count = self.total_mm, len(self.segments)
-        laps = (math.floor(begin / total), math.floor(end / total)) if self.path.closed else (0, 0)
-        rows = np.arange(laps[0] * count, (laps[1] + 1) * count)
-        lap, row = np.divmod(rows, count)
-        start = lap * total + self.reach[row]
-        length = self.reach[row + 1] - self.reach[row]
-        keep = (start + length > begin + POSITION_EPS_MM) & (start < end - POSITION_EPS_MM)
-        if not keep.any():  # shorter than POSITION_EPS_MM: a piece of the one there
-            keep = np.arange(len(rows)) == np.searchsorted(start, begin, side="right") - 1
-        start, length, row = start[keep], length[keep], row[keep]
-        low = np.where(begin - start > POSITION_EPS_MM, (begin - start) / length, 0.0)
-        high = np.where(start + length - end > POSITION_EPS_MM, (end - start) / length, 1.0)
-        return row, low, high
+        found = piece(self.paths.tracks, self.index, begin, end)
+        return np.ascontiguousarray(found[:, [0, 1, 3]])
 
     def _where(self, lengths: Floats, ahead_mm: float) -> tuple[Ints, Floats]:
         """The segment that is so far ahead of each length, and the part of it at the length.
@@ -139,7 +159,7 @@ class MeasuredPath:
         Ends of open paths reach no further.
         """
         inside = lengths
-        if self.path.closed:
+        if self.closed:
             inside = np.mod(lengths + ahead_mm, self.total_mm) - ahead_mm
         row = np.searchsorted(self.reach, inside + ahead_mm, side="right") - 1
         row = np.clip(row, 0, len(self.segments) - 1)
@@ -183,46 +203,86 @@ def flat(vertices: Floats) -> Polyline | None:
     return Polyline(np.array(kept)) if len(kept) > 1 else None
 
 
-@dataclass(frozen=True)
-class Cut:
-    """One line or arc to cut: where it ends, (x, y, z) mm; for arcs the centre (x, y) and the
-    direction; its feed in mm/min, NaN for a rapid."""
+@dataclass(frozen=True, eq=False)
+class Cuts:
+    """C lines and arcs to cut, in order: the `run` (C,) of each; where it ends, `end` (C, 3) mm;
+    of arcs the `centre` (C, 2) mm, NaN for lines, and the direction `ccw` (C,); the `feed` (C,)
+    in mm/min, NaN for a rapid."""
 
-    end: tuple[float, float, float]
-    centre: tuple[float, float] | None
-    ccw: bool
-    feed: float
+    run: Ints
+    end: Floats
+    centre: Floats
+    ccw: Bools
+    feed: Floats
 
 
-def joints(p: Polyline) -> Bools:
-    """(n,) for a closed path, the vertices where one move ends and another begins.
+def joints(lines: Polylines) -> Bools:
+    """(N,) for closed paths, the vertices where one move ends and another begins.
 
-    For a circle every vertex is as good, and all are true.
+    For a circle every vertex is as good, and all are true; so are those of open paths.
     """
-    segments = Segments.of(p)
-    before = np.roll(np.arange(len(segments)), 1)
-    split = ~_same_arc(segments[before], segments)
-    return split if split.any() else np.ones(len(segments), dtype=np.bool_)
+    found = np.ones(len(lines.vertices), dtype=np.bool_)
+    rows = np.flatnonzero(np.repeat(lines.closed, np.diff(lines.offsets)))
+    segments = Segments.of(lines)
+    segments = segments[lines.closed[segments.path]]
+    first = np.searchsorted(segments.path, segments.path)
+    last = np.searchsorted(segments.path, segments.path, side="right") - 1
+    here = np.arange(len(segments))
+    split = ~_same_arc(segments[np.where(here == first, last, here - 1)], segments)
+    parts = np.bincount(segments.path[split], minlength=len(lines))
+    found[rows] = split | (parts[segments.path] == 0)
+    return found
 
 
-def cuts(vertices: Floats, feed_mm_min: Floats) -> Iterator[Cut]:
-    """The lines and arcs of a run in order, arcs of one circle that follow each other as one.
+def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
+    """The lines and arcs of R runs, arcs of one circle that follow each other as one.
 
-    `vertices` (n, 4) of x, y, z, bulge and `feed_mm_min` (n−1,) as in a Run. A circle becomes a
-    single arc that ends where it starts, a helix one arc for each turn.
+    Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4), x, y, z, bulge, and
+    of `feed_mm_min` (N,), that of the move which leaves the vertex. A circle becomes a single arc
+    that ends where it starts, a helix one arc for each turn.
     """
-    segments = Segments.between(vertices[:-1, :2], vertices[1:, :2], vertices[:-1, 3])
-    goes_on = _goes_on(segments, vertices, feed_mm_min)
-    begin, swept = 0, 0.0
-    for row, sweep in enumerate(segments.sweep.tolist()):
-        if row > begin and goes_on[row - 1] and _within(segments, begin, row, swept + sweep):
+    leaves = np.ones(len(vertices), dtype=np.bool_)
+    leaves[first[1:] - 1] = False
+    rows = np.flatnonzero(leaves)
+    run = np.repeat(np.arange(len(first) - 1), np.diff(first) - 1)
+    segments = Segments.between(vertices[rows, :2], vertices[rows + 1, :2], vertices[rows, 3], run)
+    z, end_z, feed = vertices[rows, 2], vertices[rows + 1, 2], feed_mm_min[rows]
+    heads = np.flatnonzero(_begins(segments, _goes_on(segments, end_z - z, feed)))
+    if len(heads) == 0:
+        return Cuts(run, np.empty((0, 3)), np.empty((0, 2)), np.empty(0, dtype=np.bool_), feed)
+    # The longest arc of those that are one knows the centre best.
+    size = np.abs(segments.sweep)
+    counts = np.diff(np.append(heads, len(rows)))
+    longest = np.flatnonzero(size == np.repeat(np.maximum.reduceat(size, heads), counts))
+    best = longest[np.searchsorted(longest, heads)]
+    last = heads + counts - 1
+    bulge, begin, end = segments.bulge[best], segments.start[heads], segments.end[last]
+    apart = np.hypot(end[:, 0] - begin[:, 0], end[:, 1] - begin[:, 1])
+    round_ = (bulge != 0.0) & (apart <= POSITION_EPS_MM)
+    return Cuts(
+        run=run[heads],
+        end=np.column_stack([np.where(round_[:, None], begin, end), end_z[last]]),
+        centre=segments.centre[best],
+        ccw=bulge > 0.0,
+        feed=feed[heads],
+    )
+
+
+def _begins(segments: Segments, goes_on: Bools) -> Bools:
+    """(n,) true for the segments with which a move begins, `goes_on` (n−1,) where one may go on
+    in the next: an arc sweeps no more than one may, or a whole circle."""
+    begins = np.ones(len(segments), dtype=np.bool_)
+    begin, swept, last = 0, 0.0, -1
+    for row in (np.flatnonzero(goes_on) + 1).tolist():
+        if row - 1 != last:
+            begin, swept = row - 1, float(segments.sweep[row - 1])
+        last, sweep = row, float(segments.sweep[row])
+        if _within(segments, begin, row, swept + sweep):
+            begins[row] = False
             swept += sweep
-            continue
-        if row > begin:
-            yield _cut(segments, slice(begin, row), vertices[row], feed_mm_min[begin])
-        begin, swept = row, sweep
-    if len(segments):
-        yield _cut(segments, slice(begin, None), vertices[-1], feed_mm_min[begin])
+        else:
+            begin, swept = row, sweep
+    return begins
 
 
 def _within(segments: Segments, begin: int, last: int, swept: float) -> bool:
@@ -233,26 +293,12 @@ def _within(segments: Segments, begin: int, last: int, swept: float) -> bool:
     return bool(np.hypot(*apart) <= POSITION_EPS_MM and abs(swept) <= 2.0 * np.pi + SLOPE_EPS)
 
 
-def _goes_on(segments: Segments, vertices: Floats, feed: Floats) -> Bools:
-    """(n−2,) true where a segment goes on in the next: one circle, one slope, one feed."""
+def _goes_on(segments: Segments, rise: Floats, feed: Floats) -> Bools:
+    """(n−1,) true where a segment goes on in the next: one run, circle, slope and feed."""
     length = np.where(segments.is_arc, segments.radius, 0.0) * np.abs(segments.sweep)
-    slope = np.diff(vertices[:, 2]) / np.where(segments.is_arc, length, 1.0)
+    slope = rise / np.where(segments.is_arc, length, 1.0)
     same = _same_arc(segments[:-1], segments[1:]) & (np.abs(np.diff(slope)) <= SLOPE_EPS)
-    return np.asarray(same & (feed[:-1] == feed[1:]))
-
-
-def _cut(segments: Segments, rows: slice, end: Floats, feed: float) -> Cut:
-    """One move over these rows; the longest arc among them knows the centre best."""
-    best = int(np.abs(segments.sweep[rows]).argmax()) + rows.start
-    x, y, z = end[:3].tolist()
-    if segments.bulge[best] == 0.0:
-        return Cut((x, y, z), None, False, float(feed))
-    if np.hypot(x - segments.start[rows.start, 0], y - segments.start[rows.start, 1]) <= (
-        POSITION_EPS_MM
-    ):
-        x, y = segments.start[rows.start].tolist()
-    centre_x, centre_y = segments.centre[best].tolist()
-    return Cut((x, y, z), (centre_x, centre_y), bool(segments.bulge[best] > 0.0), float(feed))
+    return np.asarray(same & (feed[:-1] == feed[1:]) & (np.diff(segments.path) == 0))
 
 
 def _same_arc(one: Segments, other: Segments) -> Bools:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from pathlib import PurePath
 
 import numpy as np
@@ -34,7 +35,7 @@ from camtool.planning.drawn import drawn_of
 from camtool.planning.drill import drill
 from camtool.planning.engrave import engrave
 from camtool.planning.gouges import side_findings
-from camtool.planning.items import Bridge, Chosen, Contour, CutRun, Item, Setting, Step, Work
+from camtool.planning.items import Chosen, Contour, CutRun, Item, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link, rounded
@@ -43,7 +44,7 @@ from camtool.planning.order import (
     Point,
     best_order,
     choices_of,
-    chosen_path,
+    chosen_paths,
     drawn,
     must_precede,
     travel_mm,
@@ -176,17 +177,17 @@ def _step(
         choices = choices_of(items)
     _refuse_endless(items, setting)
     rows = best_order(choices, must_precede(items), *ends)
-    keep_out = _walls(placed, job, setting.operation)
+    chosen_items = [items[k] for k in choices.owner[rows].tolist()]
+    contours = [item for item in chosen_items if isinstance(item, Contour)]
+    are_contours = np.array([isinstance(item, Contour) for item in chosen_items], dtype=np.bool_)
+    paths = chosen_paths(items, choices, rows[are_contours])
+    cut = runs_of(contours, paths, _walls(placed, job, setting.operation))
+    of_contours, counts = iter(cut.runs), iter(cut.counts)
     runs: list[CutRun] = []
-    bridges: list[Bridge] = []
     owners: list[Item] = []
-    for row in rows.tolist():
-        item = items[int(choices.owner[row])]
+    for item in chosen_items:
         if isinstance(item, Contour):
-            cut = runs_of(item, chosen_path(items, choices, row), keep_out)
-            findings += cut.findings
-            runs += cut.runs
-            bridges += cut.bridges
+            runs += islice(of_contours, next(counts))
         else:
             runs += item.runs
         owners += [item] * (len(runs) - len(owners))
@@ -196,10 +197,10 @@ def _step(
         chosen=chosen,
         runs=tuple(runs),
         owners=tuple(owners),
-        findings=tuple(findings),
+        findings=(*findings, *cut.findings),
         rapid_drawn_mm=before,
         rapid_mm=travel_mm(choices, rows, *ends),
-        bridges=tuple(bridges),
+        bridges=cut.bridges,
     )
 
 

@@ -273,7 +273,7 @@ def _starts(path: Polyline, plain: Polyline | None) -> Ints:
     if plain is None:
         return np.empty(0, dtype=np.int64)
     own = {tuple(place) for place in plain.vertices[:, :2].tolist()}
-    joint = joints(path)
+    joint = joints(Polylines.of([path]))
     places = enumerate(path.vertices[:, :2].tolist())
     return np.array([k for k, place in places if joint[k] and tuple(place) in own], dtype=np.int64)
 

@@ -32,9 +32,9 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.geometry.measure import segment_lengths
-from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.geometry.polylines import Segments
 from camtool.planning.items import Feeds
-from camtool.planning.paths import MeasuredPath
+from camtool.planning.paths import MeasuredPaths
 
 ZProfile = list[tuple[float, float]]
 
@@ -120,21 +120,18 @@ def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> 
     return [(leg % 2 * ramp / legs, above_mm - leg * drop) for leg in range(legs)] + [(0.0, z_mm)]
 
 
-def lifted(along: MeasuredPath, points: ZProfile) -> Floats:
-    """(n, 4) x, y, z, bulge of the path with this profile."""
-    length, z = points[0]
-    rows = [np.array([[*along.at(np.array([length]))[0], z, 0.0]])]
-    for (begin, z_begin), (end, z_end) in pairwise(points):
-        if abs(end - begin) <= POSITION_EPS_MM:
-            if abs(z_end - z_begin) > POSITION_EPS_MM:
-                rows.append(np.array([[*rows[-1][-1, :2], z_end, 0.0]]))
-            continue
-        piece = along.piece(begin, end)
-        done = np.cumsum(_lengths(piece))
-        rows[-1][-1, 3] = piece[0, 2]
-        heights = z_begin + (z_end - z_begin) * done / done[-1]
-        rows.append(np.column_stack([piece[1:, :2], heights, piece[1:, 2]]))
-    return np.concatenate(rows)
+def lifted(
+    paths: MeasuredPaths, index: Sequence[int], profiles: Sequence[ZProfile]
+) -> list[Floats]:
+    """(n, 4) each: x, y, z, bulge of the paths of these indices (R,) with these profiles (R,)."""
+    from camtool.kernels.passes import lifted as lift
+
+    first = np.concatenate([[0], np.cumsum([len(points) for points in profiles])])
+    points = np.array([point for points in profiles for point in points]).reshape(-1, 2)
+    length, z = np.ascontiguousarray(points.T)
+    vertices, runs = lift(paths.tracks, np.array(index, dtype=np.int64), first, length, z)
+    ends = runs.tolist()
+    return [vertices[begin:end] for begin, end in pairwise(ends)]
 
 
 def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:

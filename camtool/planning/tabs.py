@@ -440,7 +440,7 @@ def _raised(
         tabs += own
     if not tabs:
         return run
-    made = lifted(along, raised(points, tabs, None))
+    (made,) = lifted(along.paths, [along.index], [raised(points, tabs, None)])
     return replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
 
 

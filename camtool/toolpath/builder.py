@@ -86,18 +86,26 @@ class ToolpathBuilder:
         self.position = (x, y, z)
         return self
 
-    def moves(self, kind: Ints, end: Floats, centre: Floats, feed: Floats, block: Ints) -> None:
-        """K moves by columns as `Toolpath` has them; K is not 0."""
+    def moves(
+        self, kind: Ints, end: Floats, centre: Floats, feed: Floats, **others: Ints | Floats
+    ) -> None:
+        """K rows by columns as `Toolpath` has them; K is not 0. `others`: the columns `block`,
+        `value`, `source` (as `provenance` gives it) and `run` that are not as they would be for
+        moves one by one."""
         self._gather()
         count = len(kind)
-        columns = {"kind": kind, "end": end, "centre": centre, "feed": feed, "block": block}
+        columns = {"kind": kind, "end": end, "centre": centre, "feed": feed, **others}
         same = {"source": self._of_source(), "mode": self._of_mode(), "run": self.run}
-        columns |= {name: np.full(count, number) for name, number in same.items()}
-        columns["value"] = np.full(count, np.nan)
+        for name, number in {"value": math.nan, "block": self.block, **same}.items():
+            columns.setdefault(name, np.full(count, number))
         for name, column in columns.items():
             self._columns[name].append(column)
         x, y, z = end[-1].tolist()
         self.position = (x, y, z)
+
+    def provenance(self, texts: Iterable[str]) -> Ints:
+        """Index of each of these texts for a column `source`; −1 for an empty one."""
+        return np.array([self._index(text) if text else -1 for text in texts], dtype=np.int64)
 
     @property
     def runs(self) -> Ints:

@@ -11,9 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, segment_lengths
-from camtool.geometry.polylines import Polyline, Segments, reverse
-from camtool.planning.paths import Cut, joints
-from camtool.planning.paths import cuts as cuts_of_run
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse
+from camtool.planning.paths import cuts as cuts_of_runs
+from camtool.planning.paths import joints
+from tests.oracles import passes
+from tests.oracles.passes import Cut
 from tests.strategies import polylines
 
 
@@ -34,7 +36,25 @@ def cuts(path: Polyline, rise: float = 0.0) -> list[Cut]:
     segments = Segments.of(path)
     share = np.cumsum(np.concatenate([[0.0], segment_lengths(segments)]))
     vertices[:, 2] = rise * share / share[-1]
-    return list(cuts_of_run(vertices, np.full(len(vertices) - 1, 5.0)))
+    return cuts_of_run(vertices, np.full(len(vertices) - 1, 5.0))
+
+
+def cuts_of_run(*runs: np.ndarray) -> list[Cut]:
+    """The cuts of runs, each its vertices and then its feeds, all found together."""
+    vertices, feeds = runs[::2], runs[1::2]
+    first = np.concatenate([[0], np.cumsum([len(each) for each in vertices])])
+    feed = np.concatenate([np.append(each, np.nan) for each in feeds])
+    found = cuts_of_runs(np.concatenate(vertices), feed, first)
+    return [
+        Cut(tuple(end), None if np.isnan(centre[0]) else tuple(centre), ccw, each)
+        for end, centre, ccw, each in zip(
+            found.end.tolist(),
+            found.centre.tolist(),
+            found.ccw.tolist(),
+            found.feed.tolist(),
+            strict=True,
+        )
+    ]
 
 
 @pytest.mark.parametrize("sweeps", [[180, 180], [120, 120, 120], [90, 180, 90], [20] * 18])
@@ -46,13 +66,13 @@ def test_a_circle_is_one_arc_that_ends_where_it_starts(sweeps: list[float], turn
     assert cut.end == (3.0, 1.0, 0.0)
     assert cut.centre == pytest.approx((1.0, 1.0))
     assert cut.ccw is not turned
-    assert joints(path).all()
+    assert joints(Polylines.of([path])).all()
 
 
 def test_parts_of_one_arc_are_one_and_others_stay() -> None:
     first = _arcs([90, 90, 45])
     other = Polyline(np.concatenate([first.vertices, [[9.0, 9.0, 0.0]]]))
-    found = list(cuts(other))
+    found = cuts(other)
     assert [cut.centre is None for cut in found] == [False, True]
     assert found[0].end == pytest.approx((*first.end, 0.0))
 
@@ -68,11 +88,11 @@ def test_parts_of_one_arc_are_one_and_others_stay() -> None:
     ],
 )
 def test_no_others_are_put_together(vertices: list[list[float]]) -> None:
-    assert len(list(cuts(Polyline(np.array(vertices, dtype=float))))) == 2
+    assert len(cuts(Polyline(np.array(vertices, dtype=float)))) == 2
 
 
 def test_an_open_path_round_and_round_is_never_a_whole_circle_by_mistake() -> None:
-    found = list(cuts(_arcs([150, 150, 59.999, 150, 150])))
+    found = cuts(_arcs([150, 150, 59.999, 150, 150]))
     assert len(found) == 3
     ends = [(3.0, 1.0), *[cut.end[:2] for cut in found]]
     for start, end in pairwise(ends):
@@ -83,7 +103,7 @@ def test_a_closed_path_is_not_merged_across_its_start() -> None:
     slot = Polyline(
         np.array([[2.0, 0, math.tan(math.pi / 8)], [1, 1, 0], [-9, 1, 0], [1, -1, 0.4]])
     )
-    assert len(list(cuts(Polyline(slot.vertices, closed=True)))) == 4
+    assert len(cuts(Polyline(slot.vertices, closed=True))) == 4
 
 
 @given(polylines(), st.integers(1, 4))
@@ -91,7 +111,7 @@ def test_cuts_run_from_vertex_to_vertex_and_are_as_long_as_the_path(
     path: Polyline, parts: int
 ) -> None:
     split = _split(path, parts)
-    found = list(cuts(split))
+    found = cuts(split)
     assert len(found) <= len(split)
     assert found[-1].end == pytest.approx((*path.end, 0.0))
     at = tuple(path.start.tolist())
@@ -138,7 +158,7 @@ def test_a_helix_is_one_arc_for_each_turn() -> None:
     once = _arcs([180, 180], closed=True).vertices
     vertices = np.insert(np.concatenate([once, once, once[:1]]), 2, 0.0, axis=1)
     vertices[:, 2] = [0.0, -1.0, -2.0, -3.0, -4.0]
-    found = list(cuts_of_run(vertices, np.full(4, 5.0)))
+    found = cuts_of_run(vertices, np.full(4, 5.0))
     assert [cut.end for cut in found] == [(3.0, 1.0, -2.0), (3.0, 1.0, -4.0)]
 
 
@@ -154,4 +174,39 @@ def test_arcs_of_other_slopes_and_feeds_stay(
     z: list[float], feed: list[float], count: int
 ) -> None:
     vertices = np.insert(_arcs([60, 60]).vertices, 2, z, axis=1)
-    assert len(list(cuts_of_run(vertices, np.array(feed)))) == count
+    assert len(cuts_of_run(vertices, np.array(feed))) == count
+
+
+@given(st.lists(st.tuples(polylines(), st.integers(1, 4), st.booleans()), max_size=5))
+def test_many_runs_are_cut_as_each_by_itself(drawn: list[tuple[Polyline, int, bool]]) -> None:
+    runs: list[np.ndarray] = []
+    for path, parts, sinks in drawn:
+        split = _split(path, parts)
+        vertices = np.insert(split.vertices, 2, np.arange(len(split.vertices)) * -sinks, axis=1)
+        feeds = np.where(np.arange(len(vertices) - 1) % 3 == 2, np.nan, 5.0)
+        runs += [vertices, feeds]
+    wanted = [cut for one in zip(runs[::2], runs[1::2], strict=True) for cut in passes.cuts(*one)]
+    found = cuts_of_run(*runs) if runs else []
+    assert len(found) == len(wanted)
+    for one, other in zip(found, wanted, strict=True):
+        assert (one.end, one.centre, one.ccw) == (other.end, other.centre, other.ccw)
+        assert one.feed == pytest.approx(other.feed, nan_ok=True)
+
+
+@given(st.lists(st.tuples(polylines(), st.integers(1, 3)), min_size=1, max_size=5))
+def test_joints_of_many_paths_are_those_of_each(drawn: list[tuple[Polyline, int]]) -> None:
+    paths = [_split(path, parts) for path, parts in drawn]
+    found = np.split(joints(Polylines.of(paths)), np.cumsum([len(p.vertices) for p in paths]))
+    for path, mine in zip(paths, found, strict=False):
+        if not path.closed:
+            assert mine.all()
+            continue
+        twice = np.concatenate([path.vertices, path.vertices, path.vertices[:1]])
+        level = np.insert(twice, 2, 0.0, axis=1)
+        count = len(path.vertices)
+        same = [
+            len(list(passes.cuts(level[k : k + 3], np.ones(2)))) == 1
+            for k in range(count - 1, 2 * count - 1)
+        ]
+        split = ~np.array(same)
+        assert mine.tolist() == (split if split.any() else ~split).tolist()

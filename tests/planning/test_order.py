@@ -11,20 +11,21 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Ints
 from camtool.errors import OptionError
-from camtool.geometry.polylines import Polyline
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
 from camtool.planning.items import Contour, CutRun, Feeds, Fixed, Item, Setting
 from camtool.planning.job import Operation
 from camtool.planning.order import (
     Choices,
     best_order,
     choices_of,
-    chosen_path,
+    chosen_paths,
     drawn,
     must_precede,
     travel_mm,
 )
+from camtool.planning.paths import joints
 from tests.oracles import tours
-from tests.strategies import coordinates
+from tests.strategies import coordinates, polylines
 
 SETTING = Setting(Operation(), Feeds(60.0, 30.0), (-1.0,), 2.0)
 NONE: Ints = np.empty((0, 2), dtype=np.int64)
@@ -133,7 +134,7 @@ def test_an_arc_of_a_run_is_seen_as_an_arc() -> None:
 def test_open_paths_are_travelled_from_the_nearer_end() -> None:
     items: list[Item] = [line(9, 0, 1, 0), line(9, 1, 1, 1)]
     choices = choices_of(items)
-    first, second = (chosen_path(items, choices, row) for row in best_order(choices, NONE))
+    first, second = chosen_paths(items, choices, best_order(choices, NONE))
     assert (first.start.tolist(), first.end.tolist()) == ([1, 0], [9, 0])
     assert (second.start.tolist(), second.end.tolist()) == ([9, 1], [1, 1])
 
@@ -141,8 +142,8 @@ def test_open_paths_are_travelled_from_the_nearer_end() -> None:
 def test_what_may_not_be_turned_runs_as_drawn() -> None:
     items: list[Item] = [line(9, 0, 1, 0, reversible=False)]
     choices = choices_of(items)
-    (row,) = best_order(choices, NONE)
-    assert chosen_path(items, choices, row).start.tolist() == [9, 0]
+    (path,) = chosen_paths(items, choices, best_order(choices, NONE))
+    assert path.start.tolist() == [9, 0]
 
 
 def test_to_and_fro_in_two_passes_ends_at_the_start() -> None:
@@ -155,21 +156,55 @@ def test_closed_paths_begin_at_the_nearest_place_allowed() -> None:
     square = box(-9, -9, -1, -1)
     for item, start in ((square, [-1, -1]), (replace(square, starts=np.array([1, 3])), [-1, -9])):
         choices = choices_of([item])
-        (row,) = best_order(choices, NONE)
-        assert chosen_path([item], choices, row).start.tolist() == start
+        (path,) = chosen_paths([item], choices, best_order(choices, NONE))
+        assert path.start.tolist() == start
 
 
 def test_no_path_begins_within_an_arc_that_was_split() -> None:
     # A slot whose right cap is two quarters; the vertex between them is nearest to the tool.
     slot = closed((-5, -1), (-2, -1, QUARTER), (-1, 0, QUARTER), (-2, 1), (-5, 1, 1))
     choices = choices_of([slot])
-    (row,) = best_order(choices, NONE)
-    assert chosen_path([slot], choices, row).start.tolist() == [-2, -1]
+    (path,) = chosen_paths([slot], choices, best_order(choices, NONE))
+    assert path.start.tolist() == [-2, -1]
 
 
 def test_what_is_cut_as_it_is_has_no_path_to_choose() -> None:
     with pytest.raises(TypeError, match="hole is cut as it is"):
-        chosen_path([hole(0, 0)], choices_of([hole(0, 0)]), 0)
+        chosen_paths([hole(0, 0)], choices_of([hole(0, 0)]), np.array([0]))
+
+
+@given(st.lists(st.tuples(polylines(), st.booleans(), st.booleans()), max_size=6))
+def test_each_variant_of_many_items_is_that_of_the_item(
+    drawn_items: list[tuple[Polyline, bool, bool]],
+) -> None:
+    items: list[Item] = []
+    for path, reversible, begins in drawn_items:
+        starts = np.arange(begins and path.closed, dtype=np.int64)
+        one = Contour(path, SETTING, "one", 0, reversible and not path.closed, starts)
+        items += [one, hole(*path.start.tolist())] if begins else [one]
+    choices = choices_of(items)
+    rows = [
+        row
+        for row, owner in enumerate(choices.owner.tolist())
+        if isinstance(items[owner], Contour)
+    ]
+    wanted: list[Polyline] = []
+    for item in items:
+        if not isinstance(item, Contour):
+            continue
+        if item.path.closed:
+            own = np.flatnonzero(joints(Polylines.of([item.path])))
+            own = item.starts if len(item.starts) else own
+            wanted += [rolled(item.path, k) for k in own.tolist()]
+        else:
+            wanted += [item.path, reverse(item.path)] if item.reversible else [item.path]
+    found = chosen_paths(items, choices, np.array(rows, dtype=np.int64)[::-1])
+    assert len(found) == len(wanted)
+    for one, other in zip(found, reversed(wanted), strict=True):
+        assert one.closed == other.closed
+        assert one.vertices.tolist() == other.vertices.tolist()
+    assert choices.entry[rows].tolist() == [path.start.tolist() for path in wanted]
+    assert choices.exit[rows].tolist() == [path.end.tolist() for path in wanted]
 
 
 def test_drawn_is_each_item_in_turn_in_its_first_way() -> None:

@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline
-from camtool.planning.paths import MeasuredPath, backwards
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
+from camtool.planning.paths import MeasuredPath, MeasuredPaths, backwards
+from camtool.planning.ramps import lifted
+from tests.oracles import passes
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours, open_contours, polylines
 
@@ -115,3 +117,45 @@ def test_nearest_to_is_as_near_as_any_sample(path: Polyline, x: float, y: float)
     rows = _closed_rows(path)
     least = chain_distances(where[None], rows)[0]
     assert math.dist(found, where) == pytest.approx(least, abs=1e-9)
+
+
+lengths = st.floats(-1.5, 2.5)
+
+
+@given(polylines(), lengths, lengths)
+def test_a_piece_is_that_of_the_plain_way(path: Polyline, begin: float, end: float) -> None:
+    along = MeasuredPath.of(path)
+    if not path.closed:
+        begin, end = (min(max(each, 0.0), 1.0) for each in (begin, end))
+    if begin == end:
+        return
+    found = along.piece(begin * along.total_mm, end * along.total_mm)
+    wanted = passes.piece(path, begin * along.total_mm, end * along.total_mm)
+    assert found.shape == wanted.shape
+    assert found == pytest.approx(wanted, rel=1e-12, abs=1e-12)
+
+
+@given(
+    st.lists(
+        st.tuples(polylines(), st.lists(st.tuples(lengths, st.floats(-3.0, 0.0)), min_size=1)),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_many_paths_are_lifted_as_each_by_itself(
+    drawn: list[tuple[Polyline, list[tuple[float, float]]]],
+) -> None:
+    paths = MeasuredPaths(Polylines.of(path for path, _ in drawn))
+    profiles = []
+    for along, (_, points) in zip(paths, drawn, strict=True):
+        shares = [s if along.closed else min(max(s, 0.0), 1.0) for s, _ in points]
+        profiles.append(
+            [(s * along.total_mm, z) for s, (_, z) in zip(shares, points, strict=True)]
+        )
+    index = range(len(drawn))
+    found = lifted(paths, [*index, *index], [*profiles, *(each[::-1] for each in profiles)])
+    for k, vertices in enumerate(found):
+        path, points = drawn[k % len(drawn)][0], profiles[k % len(drawn)]
+        wanted = passes.lifted(path, points if k < len(drawn) else points[::-1])
+        assert vertices.shape == wanted.shape
+        assert vertices == pytest.approx(wanted, rel=1e-12, abs=1e-11)

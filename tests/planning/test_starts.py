@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -100,8 +101,11 @@ def test_one_more_vertex_changes_nothing(path: Polyline, x: float, y: float) -> 
     assert length(made) == pytest.approx(length(path), rel=1e-9)
     assert signed_area(made) == pytest.approx(signed_area(path), rel=1e-9)
     ring = np.concatenate([path.vertices, path.vertices[:1]])
-    points = chain_points(np.concatenate([made.vertices, made.vertices[:1]]), 7)
-    assert chain_distances(points, ring).max() <= 1e-7  # of shallow arcs, the twin knows no better
+    rows = np.concatenate([made.vertices, made.vertices[:1]])
+    whole = {(*a, *b[:2]) for a, b in pairwise(ring.tolist())}
+    for a, b in pairwise(rows.tolist()):
+        if (*a, *b[:2]) not in whole:  # of shallow arcs, the twin knows no better
+            assert chain_distances(chain_points(np.array([a, b]), 7), ring).max() <= 1e-7
     least = chain_distances(np.array([[x, y]]), ring)[0]
     assert math.dist(made.vertices[start, :2], (x, y)) <= least + START_SNAP_MM
 
