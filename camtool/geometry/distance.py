@@ -23,12 +23,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.boxes import box_pairs
+from camtool.geometry.boxes import Curves, box_pairs
 from camtool.geometry.measure import path_extents, segment_boxes
 from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.kernels.move_tree import hilbert_order
 
-POINTS_AT_A_TIME = 256
-"""How many neighbouring points `nearest` handles at a time: it bounds the memory."""
+POINTS_AT_A_TIME = 1 << 14
+"""How many points `nearest` handles at a time: it bounds the memory."""
+
+NEAREST_SPARE_MM = 1e-9
+"""Segments that are farther than the nearest one by no more than this are measured again ..."""
+
+NEAREST_SPARE = 1e-9
+"""... and by no more than this part of the distance."""
 
 PAIRS_AT_A_TIME = 1 << 18
 """How many pairs of segments `approach` holds at a time: it bounds the memory."""
@@ -62,27 +69,30 @@ def point_to_segment(points: Floats, segments: Segments) -> Floats:
 
 
 def nearest(points: Floats, segments: Segments) -> Nearest:
-    """The nearest segment to each point (P, 2); quick when neighbours in the list are near.
+    """The nearest segment to each point (P, 2), the first of several; ValueError when there are
+    no segments.
 
-    POINTS_AT_A_TIME are handled together. Let r be the largest distance of one of them from their
-    middle m: a segment farther from m than  least distance of m + 2r  is nearest to
-    none of them, and is left out. ValueError when there are no segments.
+    A tree over the segments gives those that are hardly farther than the nearest one, and the
+    formula above decides among them.
     """
+    from camtool.kernels.offsets import curves_within, nearest_distances
+
     if len(segments) == 0:
         raise ValueError("no segments to be near to")
+    order = hilbert_order(0.5 * (segments.start + segments.end))
+    curves, rows = Curves.of(segments[order]), _Rows.of(segments)
     distance = np.empty(len(points))
     segment = np.empty(len(points), dtype=np.int64)
-    rows = _Rows.of(segments)
     for begin in range(0, len(points), POINTS_AT_A_TIME):
-        some = points[begin : begin + POINTS_AT_A_TIME]
-        middle = 0.5 * (some.min(axis=0) + some.max(axis=0))
-        reach = np.hypot(*(some - middle).T).max()
-        from_middle = _distance(middle, rows)
-        near = np.flatnonzero(from_middle <= from_middle.min() + 2.0 * reach)
-        table = _distance(some[:, None, :], rows[near])
-        best = table.argmin(axis=1)
+        some = np.ascontiguousarray(points[begin : begin + POINTS_AT_A_TIME])
+        reach = nearest_distances(some, curves.rows, curves.tree)
+        reach += NEAREST_SPARE_MM + NEAREST_SPARE * reach
+        point, near = curves_within(some, reach, curves.rows, curves.tree).T
+        near = order[near]
+        apart = _distance(some[point], rows[near])
+        best = np.lexsort((near, apart, point))[np.searchsorted(point, np.arange(len(some)))]
+        distance[begin : begin + POINTS_AT_A_TIME] = apart[best]
         segment[begin : begin + POINTS_AT_A_TIME] = near[best]
-        distance[begin : begin + POINTS_AT_A_TIME] = table[np.arange(len(some)), best]
     return Nearest(distance, segment)
 
 

@@ -106,6 +106,21 @@ def test_the_nearest_segment_is_that_of_the_whole_table(
     assert table[rows, found.segment].tolist() == found.distance.tolist()
 
 
+@given(polylines(max_points=40), st.integers(0, 2**32 - 1))
+def test_the_nearest_segment_is_the_first_of_those_that_are_as_near(
+    path: Polyline, seed: int
+) -> None:
+    segments = Segments.of(path)
+    again = segments[np.tile(np.arange(len(segments)), 2)]
+    rng = np.random.default_rng(seed)
+    ends = np.concatenate([segments.start, 0.5 * (segments.start + segments.end)])
+    points = np.concatenate([ends, rng.uniform(-30.0, 30.0, (40, 2))])
+    table = points_to_segments(points, again)
+    found = nearest(points, again)
+    assert found.segment.tolist() == table.argmin(axis=1).tolist()
+    assert found.distance.tolist() == table.min(axis=1).tolist()
+
+
 def test_no_segments_have_no_nearest_one() -> None:
     nothing = Segments.of(_line(0, 0, 1, 0))[np.array([], dtype=np.int64)]
     with pytest.raises(ValueError, match="no segments"):
