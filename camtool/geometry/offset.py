@@ -59,6 +59,7 @@ grows as n log n in the number of segments, and with the number of true meetings
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -66,9 +67,24 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
-from camtool.geometry.boxes import Curves, curve_rows_of
-from camtool.geometry.measure import Frames, dot, path_lengths, point_at, signed_areas, turned
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, lines_reversed
+from camtool.geometry.boxes import BoxIndex, Curves, curve_rows_of
+from camtool.geometry.measure import (
+    Frames,
+    dot,
+    path_extents,
+    path_lengths,
+    point_at,
+    signed_areas,
+    turned,
+)
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+    lines_reversed,
+)
+from camtool.kernels.move_tree import hilbert_order
 
 NODE_EPS_MM = 1e-8
 """Ends and intersections of raw elements nearer than this become one node."""
@@ -104,6 +120,40 @@ def offset_shape(
     GeometryError for an open path and for a distance that is not finite, OptionError for joins
     that do not exist and a mitre limit below 1.
     """
+    asked = _asked(lines, distance_mm, joins, mitre_limit)
+    return lines if asked is None or len(lines) == 0 else _moved(lines, distance_mm, asked)[0]
+
+
+def offset_each(
+    lines: Polylines, distance_mm: float, *, joins: str = "round", mitre_limit: float = 2.0
+) -> tuple[Polylines, Ints]:
+    """The same for each closed path as a region of its own, whatever the others are; and the path
+    that each of the J loops is of (J,), ascending.
+
+    Paths that lie so far apart that their offsets cannot meet are offset together.
+    """
+    asked = _asked(lines, distance_mm, joins, mitre_limit)
+    if asked is None or len(lines) == 0:
+        return lines, np.arange(len(lines))
+    longest = 1.0 if math.isinf(asked.limit) else max(asked.limit, 1.0)
+    boxes = path_extents(lines).transpose(0, 2, 1).reshape(-1, 4)
+    made: list[Polyline] = []
+    owners: list[Ints] = []
+    for rows in _far_apart(boxes, longest * asked.distance_mm + POSITION_EPS_MM):
+        some = lines.select(rows)
+        meets = np.zeros(len(rows), dtype=np.bool_)
+        meets[np.unique(_met(some))] = True
+        for each in (rows[~meets], *rows[meets][:, None]):
+            loops, of = _moved(lines.select(each), distance_mm, asked)
+            made += loops
+            owners.append(each[of])
+    owner = np.concatenate(owners)
+    order = np.argsort(owner, kind="stable")
+    return Polylines.of(made).select(order), owner[order]
+
+
+def _asked(lines: Polylines, distance_mm: float, joins: str, mitre_limit: float) -> Offset | None:
+    """What is asked of closed paths, checked; None where they stay as they are."""
     if joins not in JOINS:
         raise OptionError(f"unknown joins {joins!r}", mend=f"use one of {', '.join(JOINS)}")
     if joins == "mitre" and not 1.0 <= mitre_limit < math.inf:
@@ -114,12 +164,39 @@ def offset_shape(
         raise GeometryError("an open path has no inside", where=where, mend="close it")
     if not math.isfinite(distance_mm):
         raise GeometryError(f"an offset of {distance_mm} mm is not finite")
-    if abs(distance_mm) <= POSITION_EPS_MM or len(lines) == 0:
-        return lines
+    if abs(distance_mm) <= POSITION_EPS_MM:
+        return None
     limit = {"round": math.inf, "sharp": SHARP_LIMIT}.get(joins, mitre_limit)
-    asked = Offset(abs(float(distance_mm)), limit)
+    return Offset(abs(float(distance_mm)), limit)
+
+
+PATHS_AT_A_TIME = 64
+"""For how many paths those near to them are found together: it bounds the memory."""
+
+
+def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
+    """Groups of rows of boxes (M, 4) no two of which come within twice the reach of each other;
+    those of a group in the order of the plane, so that neighbours are near in it."""
+    order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))
+    wide = boxes + reach_mm * np.array([-1.0, -1.0, 1.0, 1.0])
+    index, group = BoxIndex(wide), np.full(len(boxes), -1)
+    for begin in range(0, len(order), PATHS_AT_A_TIME):
+        some = order[begin : begin + PATHS_AT_A_TIME]
+        one, other = index.touching(wide[some])
+        ends = np.searchsorted(one, np.arange(len(some) + 1)).tolist()
+        for k, row in enumerate(some.tolist()):
+            taken = np.bincount(group[other[ends[k] : ends[k + 1]]] + 1)[1:]
+            group[row] = np.append(taken, 0).argmin()
+    for each in range(int(group.max()) + 1):
+        yield order[group[order] == each]
+
+
+def _moved(lines: Polylines, distance_mm: float, asked: Offset) -> tuple[Polylines, Ints]:
+    """The boundary of the region of closed paths moved, and the path that each loop (J,) mostly
+    begins along."""
     if distance_mm < 0.0:
-        return lines_reversed(_left_of(lines_reversed(lines), asked))
+        moved, of = _left_of(lines_reversed(lines), asked)
+        return lines_reversed(moved), of
     return _left_of(lines, asked)
 
 
@@ -132,9 +209,13 @@ class Offset:
     limit: float = math.inf
 
 
-def _left_of(lines: Polylines, asked: Offset) -> Polylines:
+def _left_of(lines: Polylines, asked: Offset) -> tuple[Polylines, Ints]:
+    """The offset to the left, and the path that each of its loops (J,) begins along."""
     stages = shape_stages(lines, asked)
-    return paths_of(stages.loops, stages.kept, stages.trimmed.elements)
+    moved, kept = paths_of(stages.loops, stages.kept, stages.trimmed.elements)
+    begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[kept]
+    source = stages.trimmed.source[stages.kept.element[begins]]
+    return moved, Segments.of(lines).path[source]
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,16 +260,22 @@ def source_arrays(source: Segments, kites: Floats) -> Arrays:
 
 def _meets_itself(lines: Polylines) -> bool:
     """Whether closed paths have common points, other than between neighbours."""
+    return len(_met(lines)) > 0
+
+
+def _met(lines: Polylines) -> Ints:
+    """(J,) for each common point of closed paths, other than between neighbours, one of them."""
     from camtool.kernels.offsets import TA, TB, meetings_of, pairs_of
 
-    curves = Curves.of(Segments.of(lines), margin_mm=POSITION_EPS_MM)
+    segments = Segments.of(lines)
+    curves = Curves.of(segments, margin_mm=POSITION_EPS_MM)
     pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
     met, at = meetings_of(curves.rows, curves.rows, pairs, POSITION_EPS_MM)
     one, other = met.T
     following = _next_rows(lines)
     a_first = (following[one] == other) & (at[:, TA] == 1.0) & (at[:, TB] == 0.0)
     b_first = (following[other] == one) & (at[:, TA] == 0.0) & (at[:, TB] == 1.0)
-    return not bool((a_first | b_first).all())
+    return np.asarray(segments.path[one[~(a_first | b_first)]])
 
 
 def _next_rows(lines: Polylines) -> Ints:
@@ -540,8 +627,9 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
     return sorted(rolled, key=lambda loop: int(loop[0]))
 
 
-def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> Polylines:
-    """Clean closed paths of loops of slices; slices of one element become one.
+def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Polylines, Ints]:
+    """Clean closed paths of loops of slices, and the loop of each; slices of one element become
+    one.
 
     Segments up to POSITION_EPS_MM go. A path of which nothing is left goes, and so does one whose
     mean width, area over half the length, is no more than that.
@@ -557,4 +645,5 @@ def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> Polylines
     there = np.diff(offsets) > 0
     lines = Polylines(vertices, np.concatenate([[0], offsets[1:][there]]), closed[there])
     wide = np.abs(signed_areas(lines)) > 0.5 * eps * path_lengths(lines)
-    return lines if wide.all() else lines.select(np.flatnonzero(wide))
+    loop = np.flatnonzero(there)
+    return (lines, loop) if wide.all() else (lines.select(np.flatnonzero(wide)), loop[wide])

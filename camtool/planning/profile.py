@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,7 +32,13 @@ from camtool.findings import (
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+    lines_reversed,
+)
 from camtool.planning.items import Chosen, Contour, Setting, Work
 from camtool.planning.naming import at_place, shortened_list, tool_name
 from camtool.planning.paths import joints, midpoints
@@ -79,14 +86,13 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     elif operation.side == "auto":
         _together(chosen, closed, setting, found)
     else:
-        for k in closed:
-            _alone(chosen, k, setting, found)
+        _each(chosen, closed, setting, found)
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if operation.joins != "round":
         found.findings += shortened_list(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
-    items = [_beside(line, chosen, setting) for line in found.lines]
+    items = _beside(found.lines, chosen, setting)
     items += [_on_line(chosen, k, setting) for k in opens]
     return Work(tuple(sorted(items, key=lambda item: item.source)), tuple(found.findings))
 
@@ -117,41 +123,64 @@ def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> No
 
     lines = chosen.lines.select(of)
     ccw = signed_areas(lines) > 0.0
-    turned = zip(lines, (ccw == chosen.rim[of]).tolist(), strict=True)
-    shape = Polylines.of(path if right else reverse(path) for path, right in turned)
+    shape = lines_reversed(lines, ccw != chosen.rim[of])
     before = len(found.lines)
     _round(chosen, of, shape, setting, found)
     made = found.lines[before:]
     joined = [each for line in made for each in _joined(chosen, line.of, setting)]
     found.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
-    free = Polylines.of(reverse(path) for path in shape)
+    free = lines_reversed(shape)
     as_wide = any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
     hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
     found.findings += unreached_findings(free, setting, hair_mm=hair_mm)
 
 
-def _alone(chosen: Chosen, k: int, setting: Setting, found: _Found) -> None:
-    """Round or within one path, whatever the others are."""
-    path = chosen.lines[k]
-    ccw = bool(signed_areas(chosen.lines.select([k]))[0] > 0.0)
-    shape = Polylines.of([path if ccw == chosen.rim[k] else reverse(path)])
-    _round(chosen, [k], shape, setting, found)
+def _each(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
+    """Round or within each of the closed paths, whatever the others are."""
+    from camtool.geometry.offset import offset_each
+
+    lines = chosen.lines.select(closed)
+    shapes = lines_reversed(lines, (signed_areas(lines) > 0.0) != chosen.rim[closed])
+    operation = setting.operation
+    paths, of = offset_each(
+        shapes, -_away(setting), joins=operation.joins, mitre_limit=operation.mitre_limit
+    )
+    ends = np.searchsorted(of, np.arange(len(closed) + 1)).tolist()
+    for place, k in enumerate(closed):
+        found.lines += (
+            _Line(paths[row], True, (k,)) for row in range(ends[place], ends[place + 1])
+        )
+        if ends[place] == ends[place + 1]:
+            _missing(chosen, [k], shapes.select([place]), {0}, setting, found)
 
 
 def _round(
     chosen: Chosen, of: list[int], shape: Polylines, setting: Setting, found: _Found
 ) -> None:
     """Lines round a shape (on the left of its paths, which are these of the chosen ones)."""
-    for path in _offset(shape, -_away(setting), setting):
-        found.lines.append(_Line(path, True, tuple(of[k] for k in _sources(path, shape))))
-    reached = {k for line in found.lines for k in line.of}
-    missing = {place for place, k in enumerate(of) if k not in reached}
+    paths = _offset(shape, _away(setting), setting)
+    sources = _sources(paths, shape)
+    for path, along in zip(paths, sources, strict=True):
+        found.lines.append(_Line(path, True, tuple(of[k] for k in along)))
+    missing = set(range(len(of))).difference(*sources)
     missing -= {place for place in missing if _is_double(shape, place)}
-    if not missing:
-        return
+    if missing:
+        _missing(chosen, of, shape, missing, setting, found)
+
+
+def _missing(
+    chosen: Chosen,
+    of: list[int],
+    shape: Polylines,
+    missing: set[int],
+    setting: Setting,
+    found: _Found,
+) -> None:
+    """Lines along paths of a shape where a tool that is thinner by a hair has room, and findings
+    for the others."""
     # What is as wide as the tool has room for one that is thinner by a hair.
-    for path in _offset(shape, -max(_away(setting) - SLOT_TOLERANCE_MM, 0.0), setting):
-        along = _sources(path, shape)
+    paths = _offset(shape, max(_away(setting) - SLOT_TOLERANCE_MM, 0.0), setting)
+    for path, along in zip(paths, _sources(paths, shape), strict=True):
         if missing.issuperset(along):
             missing.difference_update(along)
             found.lines.append(_Line(path, True, tuple(of[k] for k in along)))
@@ -160,13 +189,12 @@ def _round(
     found.findings += (_no_room(chosen, of[k], bool(ccw[k]), setting) for k in sorted(missing))
 
 
-def _offset(shape: Polylines, distance_mm: float, setting: Setting) -> Polylines:
+def _offset(shape: Polylines, away_mm: float, setting: Setting) -> Polylines:
+    """The lines so far away from a shape, with the joins of the operation."""
     from camtool.geometry.offset import offset_shape
 
     operation = setting.operation
-    return offset_shape(
-        shape, distance_mm, joins=operation.joins, mitre_limit=operation.mitre_limit
-    )
+    return offset_shape(shape, -away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit)
 
 
 def _away(setting: Setting) -> float:
@@ -174,13 +202,20 @@ def _away(setting: Setting) -> float:
     return setting.operation.tool.radius_mm + setting.operation.allowance_mm
 
 
-def _sources(path: Polyline, shape: Polylines) -> tuple[int, ...]:
-    """The paths of the shape to which the segments of an offset path are nearest, the one that
-    is nearest to most of them first."""
-    source = Segments.of(shape)
-    of = source.path[nearest(midpoints(Segments.of(path)), source).segment]
-    which, count = np.unique(of, return_counts=True)
-    return tuple(which[np.argsort(-count, kind="stable")].tolist())
+def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
+    """For each of the offset paths those of the shape to which its segments are nearest, the one
+    that is nearest to most of them first."""
+    if len(paths) == 0:
+        return []
+    source, segments = Segments.of(shape), Segments.of(paths)
+    of = source.path[nearest(midpoints(segments), source).segment]
+    pairs, count = np.unique(segments.path * len(shape) + of, return_counts=True)
+    path, which = np.divmod(pairs, len(shape))
+    order = np.lexsort((which, -count, path))
+    found: list[tuple[int, ...]] = []
+    for begin, end in pairwise(np.searchsorted(path, np.arange(len(paths) + 1)).tolist()):
+        found.append(tuple(which[order[begin:end]].tolist()))
+    return found
 
 
 def _is_double(shape: Polylines, place: int) -> bool:
@@ -212,6 +247,8 @@ def _box_centre(chosen: Chosen, k: int) -> str:
 
 def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[Finding]:
     """Findings of a line that runs round several paths at once: between them nothing is cut."""
+    if len(of) == 1:
+        return
     room = 2.0 * _away(setting)
     lines = chosen.lines.select(of)
     for one, other in sorted(near_paths(lines, lines, room)):
@@ -248,24 +285,33 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
     return replace(line, path=path, plain=line.path)
 
 
-def _beside(line: _Line, chosen: Chosen, setting: Setting) -> Contour:
-    """The line as the operation's direction has it: climbing, what is to stay is on the right."""
+def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
+    """The lines as the operation's direction has them: climbing, what is to stay is on the
+    right."""
     wanted = setting.operation.direction
-    k = line.of[0]
-    if wanted == "drawn":
-        areas = signed_areas(Polylines.of([line.path, chosen.lines[k]]))
-        turn = bool((areas[0] > 0.0) != (areas[1] > 0.0))
-    else:
-        turn = line.left == (wanted == "climb")
-    path, left = (reverse(line.path), not line.left) if turn else (line.path, line.left)
-    return Contour(
-        path,
-        setting,
-        chosen.names[k],
-        int(chosen.source[k]),
-        starts=_starts(path, line.plain),
-        material_left=left,
+    paths, left = (
+        Polylines.of(line.path for line in lines),
+        np.array([line.left for line in lines], dtype=np.bool_),
     )
+    first = [line.of[0] for line in lines]
+    if wanted == "drawn":
+        ccw = signed_areas(chosen.lines) > 0.0
+        turn = (signed_areas(paths) > 0.0) != ccw[first]
+    else:
+        turn = left == (wanted == "climb")
+    return [
+        Contour(
+            path,
+            setting,
+            chosen.names[k],
+            int(chosen.source[k]),
+            starts=_starts(path, line.plain),
+            material_left=left_of,
+        )
+        for path, line, k, left_of in zip(
+            lines_reversed(paths, turn), lines, first, (left != turn).tolist(), strict=True
+        )
+    ]
 
 
 def _starts(path: Polyline, plain: Polyline | None) -> Ints:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.errors import GeometryError, OptionError
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.nesting import oriented
-from camtool.geometry.offset import offset_shape
+from camtool.geometry.offset import offset_each, offset_shape
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Polyline,
@@ -45,6 +45,7 @@ from tests.oracles.contours import (
 from tests.oracles.offset import distance_complaints
 from tests.oracles.offset_shapes import shape_complaints
 from tests.paths import mirrored, moved, offset, scaled
+from tests.strategies import contours
 
 FRAME = closed((-20, -20), (40, -20), (40, 40), (-20, 40))
 PLATE = [FRAME, CIRCLE, moved(SQUARE, 15, -5), moved(SLOT, 5, 20), closed((-2, 0, 1), (2, 0, 1))]
@@ -403,3 +404,42 @@ def test_thousands_of_shapes(
     assume(apart(paths))
     lines, d = shape(paths), sign * share * size
     assert shape_complaints(list(offset_shape(lines, d)), list(lines), d, rng()) == []
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.one_of(contours(), st.sampled_from([SQUARE, SLOT, comb(3)])),
+            st.tuples(st.integers(-4, 4), st.integers(-4, 4)),
+            st.booleans(),
+        ),
+        max_size=8,
+    ),
+    st.floats(-3.0, 3.0),
+    st.sampled_from(["round", "mitre", "sharp"]),
+)
+def test_paths_are_offset_each_as_if_it_were_alone(
+    drawn: list[tuple[Polyline, tuple[int, int], bool]], distance: float, joins: str
+) -> None:
+    # Some far apart, some that cross, hold or double each other.
+    paths = []
+    for path, (x, y), turned in drawn:
+        there = moved(path, 9.0 * x, 9.0 * y)
+        paths.append(reverse(there) if turned else there)
+    found, of = offset_each(Polylines.of(paths), distance, joins=joins)
+    wanted = [offset_shape(Polylines.of([path]), distance, joins=joins) for path in paths]
+    assert of.tolist() == [k for k, each in enumerate(wanted) for _ in each]
+    for one, other in zip(found, (path for each in wanted for path in each), strict=True):
+        assert one.vertices.tolist() == other.vertices.tolist()
+
+
+def test_a_path_that_touches_itself_is_offset_each_as_by_itself() -> None:
+    eight = closed((0, 0), (4, 0), (2, 2), (4, 4), (0, 4), (2, 2))
+    paths = [SQUARE, moved(eight, 40.0, 0.0), moved(SQUARE, 0.0, 40.0), moved(eight, 5.0, 3.0)]
+    for distance in (-0.4, 0.4):
+        found, of = offset_each(Polylines.of(paths), distance)
+        for k, path in enumerate(paths):
+            wanted = offset_shape(Polylines.of([path]), distance)
+            mine = found.select(np.flatnonzero(of == k).tolist())
+            assert mine.vertices.tolist() == wanted.vertices.tolist()
