@@ -13,14 +13,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.findings import Finding
 from camtool.machine.model import exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
+from . import blocks
 from .dialect import PicMmhMachine
 from .findings import BLOCK_TOO_LONG_READ, FEED_ABOVE_LIMIT
+
+LEAST_RUN: Final = 24
+"""Fewer moves in a row than these are read block by block."""
+
+BLOCKS_AT_ONCE: Final = 1 << 12
+"""So many moves are read in one go."""
+
+UNITS_PER_MM: Final = {"example": 100_000, "annex": 1_000}
 
 SHOWN_CHARS: Final = 48
 """An error message shows no more of a block than this."""
@@ -80,14 +92,28 @@ EVENTS: Final = {
 
 def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block and column when it is none."""
-    *blocks, rest = _ascii(data).split(";")
+    _check_bytes(data)
     reader = _Reader(machine)
-    for index, block in enumerate(blocks):
-        reader.block(index, block.strip(BLANKS))
-    tail = rest.strip(BLANKS)
+    octets = np.frombuffer(data, dtype=np.uint8)
+    plain = np.zeros((BLOCKS_AT_ONCE, blocks.COLUMNS), dtype=np.int64)
+    annex = machine.dialect.form == "annex"
+    index, at = 0, 0
+    while (end := data.find(b";", at)) >= 0:
+        # Python objects for each of thousands of moves in a row would be most of the time.
+        count, behind = blocks.moves_in_a_row(octets, at, annex, plain)
+        if count >= LEAST_RUN and not reader.ended:
+            reader.moves(index, plain[:count])
+            index, at = index + count, behind
+            continue
+        for _ in range(count + 1):
+            if end >= 0:
+                reader.block(index, data[at:end].decode("ascii").strip(BLANKS))
+                index, at = index + 1, end + 1
+                end = data.find(b";", at)
+    tail = data[at:].decode("ascii").strip(BLANKS)
     if tail:
-        _fail(len(blocks), len(tail), "the program breaks off inside a block", "end it with ;")
-    if not blocks:
+        _fail(index, len(tail), "the program breaks off inside a block", "end it with ;")
+    if index == 0:
         raise ProgramError("the program is empty", mend="a program has blocks such as G54;")
     return reader.path.finish(reader.findings())
 
@@ -97,8 +123,8 @@ def _fail(index: int, column: int, message: str, mend: str = "") -> NoReturn:
     raise ProgramError(message, where=f"block {index + 1}, column {column}", mend=mend)
 
 
-def _ascii(data: bytes) -> str:
-    """The text; ProgramError at the first byte that is no printable ASCII and no line end."""
+def _check_bytes(data: bytes) -> None:
+    """ProgramError at the first byte that is no printable ASCII and no line end."""
     odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
     if odd:
         before = data[: odd.start()]
@@ -109,12 +135,11 @@ def _ascii(data: bytes) -> str:
             f"the byte 0x{data[odd.start()]:02x} belongs to no program",
             "give a pic-mmh program",
         )
-    return data.decode("ascii")
 
 
 def _mm(whole: str, decimals: str) -> float:
     """µm as text, in mm by a single division, so the nearest float; `-00000.00` is 0."""
-    return int(whole + decimals) / (100_000 if decimals else 1_000)
+    return int(whole + decimals) / UNITS_PER_MM["example" if decimals else "annex"]
 
 
 @dataclass
@@ -131,6 +156,12 @@ class _Excess:
         self.most = max(self.most, value)
 
 
+def _filled(given: Bools, values: Floats, before: float) -> Floats:
+    """(N,) the value that was given last, `before` where none was yet."""
+    latest = np.maximum.accumulate(np.where(given, np.arange(1, len(given) + 1), 0))
+    return np.asarray(np.concatenate([[before], values])[latest])
+
+
 class _Reader:
     """Blocks in, rows out; knows where the tool stands and whether the program has ended."""
 
@@ -143,13 +174,14 @@ class _Reader:
         self._feeds_per_mm_min = 1.0 / machine.feed.unit_mm_min
         self._max_feed = machine.max_feed_mm_min
         self._zero = machine.controller.machine_zero_mm
-        self._ended = False
+        self.ended = False
+        self._units_per_mm = UNITS_PER_MM[dialect.form]
         self._long = _Excess()
         self._fast = _Excess()
 
     def block(self, index: int, text: str) -> None:
         """One block, without its `;` and the blanks around it."""
-        if self._ended:
+        if self.ended:
             _fail(index, 1, "a block after M30, the end of the program", "remove it")
         if self._buffer_chars is not None and len(text) >= self._buffer_chars:
             self._long.add(index, len(text) + 1)
@@ -165,6 +197,36 @@ class _Reader:
                 return
         fault = fault_of(text, self._form)
         _fail(index, fault.column, fault.message, fault.mend)
+
+    def moves(self, first: int, plain: Ints) -> None:
+        """Moves in a row (K, 9) of `blocks`, by columns; `first`: the index of the first."""
+        if self._buffer_chars is not None:
+            for at in np.flatnonzero(plain[:, blocks.LENGTH] >= self._buffer_chars).tolist():
+                self._long.add(first + at, int(plain[at, blocks.LENGTH]) + 1)
+        kind, deep = plain[:, blocks.CODE].copy(), plain[:, blocks.DEEP] != 0
+        cut, arc = kind >= Kind.LINE, kind >= Kind.ARC_CW
+        feed = np.where(cut, plain[:, blocks.FEED] / self._feeds_per_mm_min, np.nan)
+        for at in np.flatnonzero(cut & (feed > self._max_feed)).tolist():
+            if exceeds(float(feed[at]), self._max_feed):
+                self._fast.add(first + at, float(feed[at]))
+        mm = plain[:, : blocks.CENTRE_Y + 1] / self._units_per_mm
+        self.path.moves(
+            kind=kind,
+            end=np.column_stack(
+                [
+                    _filled(given, mm[:, column], before)
+                    for given, column, before in zip(
+                        (~deep, ~deep, deep),
+                        (blocks.X, blocks.Y, blocks.Z),
+                        self.path.position,
+                        strict=True,
+                    )
+                ]
+            ),
+            centre=np.where(arc[:, None], mm[:, blocks.CENTRE_X :], np.nan),
+            feed=feed,
+            block=np.arange(first, first + len(plain)),
+        )
 
     def findings(self) -> Iterator[Finding]:
         """What goes beyond the controller's limits."""
@@ -225,7 +287,7 @@ class _Reader:
                 message = "G54 away from part zero would shift all that follows"
                 _fail(index, 1, message, "set part zero once, before the first move")
             self.path.event(EVENTS[code], int(match[1]) if match.re.groups else None)
-            self._ended = code == "M30"
+            self.ended = code == "M30"
 
 
 # The grammar of a block: the patterns that match one, and the words that say where it goes wrong.

@@ -77,8 +77,9 @@ class _Writer:
         check_motion(toolpath, machine)
         # Refuses by the numbers of the rows that were given, before these are lowered.
         given = numbers_of(toolpath, machine, dialect)
-        self._feed_finding = given.feed_finding
-        lowered = self._lowered(given.grids[0])
+        self._feed_finding, grid = given.feed_finding, given.grids[0]
+        del given  # as large as the toolpath
+        lowered = self._lowered(grid)
         self._toolpath, self._row = lowered.toolpath, lowered.row
         self._numbers = numbers_of(lowered.toolpath, machine, dialect)
         self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
