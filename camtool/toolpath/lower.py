@@ -62,6 +62,8 @@ def xy_then_z(toolpath: Toolpath) -> Lowered:
     begin, end = toolpath.starts, toolpath.end
     in_xy = toolpath.is_arc | (toolpath.is_motion & (end[:, :2] != begin[:, :2]).any(axis=1))
     both = in_xy & (end[:, 2] != begin[:, 2])
+    if not both.any():
+        return _unchanged(toolpath)
     row, part = _repeated(np.where(both, 2, 1))
     up = end[:, 2] > begin[:, 2]
     # First parts: Z of a climb, XY of a descent. Second parts end where the move ended.
@@ -161,6 +163,8 @@ def _split(toolpath: Toolpath, arms: PolarArcs, parts: _Parts, *, lines: bool = 
             mend=parts.mend,
         )
     counts = parts.count.astype(np.int64)
+    if (counts == 1).all() and not (lines and len(arms.row)):
+        return _unchanged(toolpath)
     row, part = _repeated(counts)
     points = toolpath.end[row]
     inner = np.flatnonzero(part + 1 < counts[row])
@@ -176,6 +180,11 @@ def _split(toolpath: Toolpath, arms: PolarArcs, parts: _Parts, *, lines: bool = 
     if lines:
         kind[arms.row], centre[arms.row] = Kind.LINE, np.nan
     return _built(toolpath, row, kind[row], points, centre[row])
+
+
+def _unchanged(toolpath: Toolpath) -> Lowered:
+    """The very rows."""
+    return Lowered(toolpath, np.arange(len(toolpath)))
 
 
 def _repeated(counts: Ints) -> tuple[Ints, Ints]:
