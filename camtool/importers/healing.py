@@ -34,7 +34,7 @@ from camtool.geometry.polylines import (
 )
 from camtool.geometry.simplify import without_tiny
 from camtool.importers.options import ReadOptions
-from camtool.importers.pieces import MAX_COORDINATE_MM, Piece
+from camtool.importers.pieces import MAX_COORDINATE_MM, MAX_POINTS, Piece, too_many_points
 
 IS_DRAWN_TWICE = "is drawn twice"
 """Why a piece went that is another one again."""
@@ -97,6 +97,8 @@ def is_placed(piece: Piece) -> bool:
 def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
     """All vertices (N, 3) and how many each piece has; DrawingError when one is no position."""
     counts = np.array([len(piece.vertices) for piece in pieces], dtype=np.int64)
+    if counts.sum() > MAX_POINTS:
+        raise too_many_points(file)
     vertices = np.concatenate([piece.vertices for piece in pieces]).astype(np.float64)
     finite = np.asarray(np.isfinite(vertices).all(axis=1))
     near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all(axis=1)

@@ -23,6 +23,10 @@ MAX_COORDINATE_MM = 1e9
 """Beyond this, doubles cannot distinguish positions that differ by POSITION_EPS_MM."""
 
 
+MAX_POINTS = 3_000_000
+"""A drawing of more points is refused: some 500 bytes of memory are needed for each."""
+
+
 class Unusable(Exception):
     """The entity gives no piece; the text is the reason."""
 
@@ -54,6 +58,15 @@ class Piece:
     def kind(self) -> str:
         """The first word of the source."""
         return self.source.partition(" ")[0]
+
+
+def too_many_points(file: str) -> DrawingError:
+    """The error for a drawing of more than MAX_POINTS."""
+    return DrawingError(
+        f"holds more than {MAX_POINTS} points",
+        file=file,
+        mend="split the drawing, or leave out points that its tolerance does not need",
+    )
 
 
 NAMED = 12

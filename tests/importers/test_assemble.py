@@ -11,6 +11,7 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.measure import signed_areas
+from camtool.importers import healing
 from camtool.importers.assemble import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM, assemble
 from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions
@@ -213,3 +214,10 @@ def test_repeats_go_and_the_path_stays(rows: list[tuple[int, int, float]], close
         # An open path's last vertex leaves nothing, whatever bulge it has.
         assert drawn(path.vertices, closed) == wanted
     assert len(drawn(path.vertices, path.closed)) == len(path)
+
+
+def test_a_drawing_of_too_many_points_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(healing, "MAX_POINTS", 3)
+    put(piece((0, 0), (1, 0), (1, 1)))
+    with pytest.raises(DrawingError, match="holds more than 3000000 points"):
+        put(piece((0, 0), (1, 0)), piece((5, 0), (6, 0)))

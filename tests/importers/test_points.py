@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
+from camtool.importers.points import reader
 from camtool.importers.points.reader import read
 
 
@@ -214,3 +215,12 @@ def test_any_json_is_read_or_refused(value: object) -> None:
     with pytest.raises(DrawingError):
         # Random values hold no stroke of two points: only a clean error may come.
         points(text)
+
+
+def test_more_lines_than_points_may_be_are_refused_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(reader, "MAX_POINTS", 3)
+    points("0,0\n1,0\n1,1\n")
+    with pytest.raises(DrawingError, match="holds more than 3000000 points"):
+        points("0,0\n1,0\n1,1\n0,1\n")

@@ -14,6 +14,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents, path_lengths, signed_areas
 from camtool.geometry.polylines import Segments
 from camtool.importers.options import ReadOptions
+from camtool.importers.svg import shapes
 from camtool.importers.svg.reader import read
 from camtool.importers.svg.shapes import parse_path
 
@@ -815,3 +816,10 @@ WORDS = st.sampled_from(
 @given(st.lists(WORDS, max_size=12), st.sampled_from(["", PAGE, 'viewBox="0 0 5 5"']))
 def test_any_document_is_read_or_refused(words: list[str], page: str) -> None:
     drawn_or_refused("".join(words), page)
+
+
+def test_a_list_of_points_that_is_too_long_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shapes, "MAX_PATH_CHARACTERS", 11)
+    drawing = drawn('<polyline points="0 0 9 9 5 5"/><polyline points="0 0 9 9 5 55"/>')
+    assert len(drawing.paths) == 1
+    assert "points have more than 11 characters" in drawing.skipped[0].reason

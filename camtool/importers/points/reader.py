@@ -20,7 +20,7 @@ from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.fit import split_bulges
 from camtool.importers.assemble import assemble
 from camtool.importers.options import ReadOptions
-from camtool.importers.pieces import Piece
+from camtool.importers.pieces import MAX_POINTS, Piece, too_many_points
 from camtool.importers.points.matlab import is_matlab, parse_matlab
 from camtool.importers.points.tables import (
     NPY_START,
@@ -69,6 +69,8 @@ def _decoded(data: bytes, file: str) -> str:
         raise DrawingError(
             "is no text in UTF-8", file=file, where=f"line {line}", mend="save it as plain text"
         ) from error
+    if text.count("\n") > MAX_POINTS:
+        raise too_many_points(file)
     if "\x00" in text:
         raise DrawingError("holds null characters: it is no text", file=file)
     return text

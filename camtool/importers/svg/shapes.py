@@ -118,8 +118,8 @@ def _pair(z: complex) -> Floats:
 # for their grammar) and appendix F.2 (drawing up to an error).
 
 MAX_PATH_CHARACTERS = 50_000_000
-"""Longest path data of one element; longer ones would take more than some 3 GB for their
-numbers."""
+"""Longest path data, or list of points, of one element; longer ones would take more than some 3 GB
+for their numbers."""
 
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])")
 _GAP = r"[ \t\r\n\f,]*+"
@@ -425,6 +425,8 @@ def _line(node: Node, lengths: Lengths) -> list[Subpath]:
 
 def _corners(node: Node) -> tuple[list[Subpath], str]:
     text = node.get("points")
+    if len(text) > MAX_PATH_CHARACTERS:
+        raise DrawingError(f"points have more than {MAX_PATH_CHARACTERS} characters")
     match = _POINTS.match(text)
     end = match.end() if match else 0
     numbers = parse_numbers(text[:end], "points")

@@ -245,7 +245,7 @@ def _attributes(attributes: dict[str, str]) -> dict[str, str]:
 #                             and an entity that only the outside could define is an error then,
 #                             where expat would have left it out of an attribute without a word
 
-MAX_BYTES = 200_000_000
+MAX_BYTES = 100_000_000
 """A larger SVG file (unpacked) is refused: its tree would not fit into memory."""
 
 GZIP = b"\x1f\x8b"
