@@ -21,7 +21,7 @@ from camtool.progress import Progress
 from camtool.run import Run
 
 if TYPE_CHECKING:
-    from camtool.arrays import Bools
+    from camtool.arrays import Bools, Ints
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.items import Step
@@ -62,13 +62,14 @@ class Judging:
 class _Goal:
     """What a program is compared with: the wanted toolpath, the drawing in its frame, the toolpath
     compensated against the mechanics, what else the job asks for, and the moves from which the
-    program was written; None for what there is not."""
+    program was written, with the row of these of each decoded row; None for what there is not."""
 
     wanted: Toolpath | None = None
     drawing: Drawing | None = None
     compensated: Compensated | None = None
     asked: Asked | None = None
     written_from: Toolpath | None = None
+    row_from: Ints | None = None
 
 
 def post_drawing(
@@ -122,7 +123,13 @@ def post_drawing(
         program.data,
         decoded,
         target,
-        _Goal(whole.toolpath, plan.placed, compensation, written_from=written),
+        _Goal(
+            whole.toolpath,
+            plan.placed,
+            compensation,
+            written_from=written,
+            row_from=_row_from(program, decoded),
+        ),
         VerifyOptions(
             source=drawing.file,
             tool_diameter_mm=tool_mm(job),
@@ -251,7 +258,7 @@ def convert_program(
     if not check:
         return replace(run, program=program, decoded=again, findings=findings)
     options = VerifyOptions(source=file)
-    goal = _Goal(wanted, written_from=wanted)
+    goal = _Goal(wanted, written_from=wanted, row_from=_row_from(program, again))
     judged = _judged(program.data, again, target, goal, options, progress)
     findings = _merged(findings, judged.findings, without=repeated)
     return replace(
@@ -390,8 +397,17 @@ def _judged(
         compensated=goal.compensated,
         asked=goal.asked,
         written_from=goal.written_from,
+        row_from=goal.row_from,
         progress=progress,
     )
+
+
+def _row_from(program: Program, decoded: Toolpath) -> Ints:
+    """(N,) the row of the toolpath from which each decoded row was written, −1 for none."""
+    import numpy as np
+
+    last = len(program.row_of_block)
+    return np.asarray(np.append(program.row_of_block, -1)[decoded.block.clip(max=last)])
 
 
 def _asked(
@@ -408,22 +424,22 @@ def _asked(
     wanted = planned if compensation is None else compensation.toolpath
     program = target.target.write(wanted, machine)
     units = [target.target.unit_mm(machine, axis) for axis in machine.axes]
-    written, blocks = target.target.read(program.data, machine), len(program.row_of_block)
+    written = target.target.read(program.data, machine)
     return Asked(
         written=written,
         wanted=wanted,
         unit_mm=max(units[:2]),
         unit_z_mm=units[2],
-        feed_named=_feed_named(job, machine, wanted, program)[written.block.clip(max=blocks)],
+        feed_named=_feed_named(job, machine, wanted, _row_from(program, written)),
         feed_unit_mm_min=machine.feed.unit_mm_min,
         safe_z_mm=safe_z_of(job, machine),
         safe_z_named=job.safe_z_mm is not None,
     )
 
 
-def _feed_named(job: Job, machine: Machine, wanted: Toolpath, program: Program) -> Bools:
-    """(B + 1,) true for the blocks whose feed the job names, or which follows from one that it
-    names; the last item is False, for rows of no block."""
+def _feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Ints) -> Bools:
+    """(N,) true for the written rows whose feed the job names, or which follows from one that it
+    names; they were written from the rows `row_from` (N,) of `wanted`."""
     import numpy as np
 
     from camtool.planning.settings import feeds_of
@@ -435,8 +451,7 @@ def _feed_named(job: Job, machine: Machine, wanted: Toolpath, program: Program) 
             named += [feeds.cut_mm_min, feeds.plunge_mm_min]
         elif operation.plunge_feed_mm_min is not None:
             named.append(feeds.plunge_mm_min)
-    row = np.append(program.row_of_block, -1)
-    return np.asarray(np.isin(wanted.feed[row], named) & (row >= 0))
+    return np.asarray(np.isin(wanted.feed[row_from], named) & (row_from >= 0))
 
 
 def _merged(

@@ -26,9 +26,12 @@ LEVELS = 16
 """Squares are halved so often: the middles are told apart to a 65,536th of the whole."""
 
 
-def move_tree(boxes: Floats) -> tuple[Floats, Ints]:
-    """(2L, 6) nodes over `boxes` (K, 4), and the order (K,) of the rows in their L leaves."""
+def move_tree(boxes: Floats, group: Ints | None = None) -> tuple[Floats, Ints]:
+    """(2L, 6) nodes over `boxes` (K, 4), and the order (K,) of the rows in their L leaves. Rows of
+    one `group` (K,), ascending, stay together: a search among these looks at no others."""
     order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))
+    if group is not None:
+        order = order[np.argsort(group[order], kind="stable")]
     leaves = 1
     while leaves * LEAF < len(boxes):
         leaves *= 2

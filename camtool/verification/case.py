@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from camtool.arrays import Ints
 from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
 from camtool.planning.job import Job
@@ -93,7 +94,8 @@ class Case:
     """A program to judge. `compensated`: what the program should say where `wanted` is compensated
     against the mechanics. `asked`: what the job asks for besides, as the dialect would say it.
     `written_from`: the moves from which the program was written, where they are known: contours
-    must have the same direction."""
+    must have the same direction; `row_from` (N,) the row of these from which each decoded row was
+    written, −1 for none."""
 
     decoded: Toolpath
     target: LoadedTarget
@@ -103,6 +105,7 @@ class Case:
     compensated: Compensated | None = None
     asked: Asked | None = None
     written_from: Toolpath | None = None
+    row_from: Ints | None = None
 
     @property
     def machine(self) -> Machine:

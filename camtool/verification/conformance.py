@@ -275,7 +275,7 @@ def _written_from_cut(
     found, wrong_depth = nearest_at_height(part, None, wanted, limits)
     known = np.flatnonzero((found.segment >= 0) & ~wrong_depth)
     rest, move = rest[known], found.segment[known]
-    share = wanted.table.shares(part.points[known], move)
+    share = wanted.shares(part.points[known], move)
     begin, end = wanted.cuts.ends_z[move].T
     places = point_at(wanted.cuts.segments, move, share)
     point, _, distance = decoded.within(places, begin + share * (end - begin), limits)

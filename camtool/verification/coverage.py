@@ -9,6 +9,7 @@ is found. The tolerance of heights allows for slopes that a machine makes in sma
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -38,22 +39,28 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.cuts import (
     NO_LOOP,
+    NO_SAMPLES,
     CutMoves,
     Samples,
     cutting_rows,
     loops,
     moved_lengths,
     sample_cuts,
+    samples_by_parts,
 )
 from camtool.verification.figures import Figure
 from camtool.verification.matching import (
+    LEAST_MM,
     Goal,
     Match,
     match_contours,
     match_rows,
     nearest_at_height,
 )
-from camtool.verification.nearest import Found, MoveIndex
+from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex
+
+Limits = tuple[float, float]
+"""What is near, in XY and in height, mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +100,16 @@ class _Sampled:
         return np.asarray(judged & (self.wrong_depth | (self.found.distance > goal.limit_mm)))
 
 
-def cover(decoded: MoveIndex, goal: Goal, spacing_mm: float, drilled: Drilled) -> Coverage:
+def cover(
+    decoded: MoveIndex, goal: Goal, spacing_mm: float, drilled: Drilled, row_from: Ints | None
+) -> Coverage:
     """Compare decoded with wanted cutting moves, and wanted with decoded ones, on samples about
-    `spacing_mm` apart."""
+    `spacing_mm` apart; `row_from` (N,) is the wanted row from which each decoded row was written,
+    −1 for none, where that is known.
+
+    A wanted contour is compared with the decoded one that was written from it first, and only
+    where that does not fit with everything (docs/decisions/0036-own-rows-first.md).
+    """
     cuts, wanted, limits = decoded.cuts, goal.moves, (goal.limit_mm, goal.depth_mm)
     samples = sample_cuts(cuts, spacing_mm)
     found, wrong_depth = nearest_at_height(samples, None, wanted, limits)
@@ -105,12 +119,48 @@ def cover(decoded: MoveIndex, goal: Goal, spacing_mm: float, drilled: Drilled) -
     real = np.isfinite(found.distance)
     rows = cuts.segments.path[samples.segment]
     rounding.add(found.distance[real], samples.points[real], rows[real])
-    back = sample_cuts(wanted.cuts, spacing_mm)
-    found_back, wrong_back = nearest_at_height(back, None, decoded, limits)
-    wanted_samples = _Sampled(wanted.cuts, back, found_back, wrong_back, drilled.wanted)
-    missing = _uncovered(wanted_samples, goal, _MISSING)
+    became = _contours_from(cuts, wanted.cuts, row_from)[1]
+    cut = np.append(_fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
+    rest = next(
+        samples_by_parts(wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], sys.maxsize),
+        NO_SAMPLES,
+    )
+    found_back, wrong_back = nearest_at_height(rest, None, decoded, limits)
+    back = _Sampled(wanted.cuts, rest, found_back, wrong_back, drilled.wanted)
+    missing = _uncovered(back, goal, _MISSING)
     match = match_rows(cuts, samples, belongs, found, goal)
     return Coverage(match, rounding, (*missing, *extra))
+
+
+def _contours_from(cuts: CutMoves, wanted: CutMoves, row_from: Ints | None) -> tuple[Ints, Ints]:
+    """(C,) the wanted contour from which all rows of each decoded contour were written, and (W,)
+    the only decoded contour with rows of each wanted contour; ANY_CONTOUR where there is none."""
+    mine = np.full(cuts.contour_count, ANY_CONTOUR, dtype=np.int64)
+    theirs = np.full(wanted.contour_count, ANY_CONTOUR, dtype=np.int64)
+    if row_from is not None and len(theirs):
+        rows = cuts.rows
+        of = np.where(row_from[rows] >= 0, wanted.contour[row_from[rows]], ANY_CONTOUR)
+        pairs = np.unique(np.column_stack([cuts.contour[rows], of]), axis=0)
+        for here, there, found in ((0, 1, mine), (1, 0, theirs)):
+            known, first, count = np.unique(pairs[:, here], return_index=True, return_counts=True)
+            alone = (count == 1) & (known != ANY_CONTOUR)
+            found[known[alone]] = pairs[first[alone], there]
+    return mine, theirs
+
+
+def _fits(
+    cuts: CutMoves, own: Ints, others: MoveIndex, limits: Limits, spacing_mm: float
+) -> Bools:
+    """(C,) the contours of one side that lie within the limits of their `own` contour (C,) of the
+    other side, where they have one."""
+    fit = np.asarray(own != ANY_CONTOUR)
+    limit_mm, depth_mm = limits
+    for samples in samples_by_parts(cuts, spacing_mm, np.append(fit, False)[cuts.contour]):
+        mine = cuts.contour[cuts.segments.path[samples.segment]]
+        near_mm = max(limit_mm, LEAST_MM)
+        found = others.nearest(samples.points, samples.z, own[mine], (near_mm, depth_mm))
+        fit[mine[found.distance > limit_mm]] = False
+    return fit
 
 
 _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
@@ -295,8 +345,6 @@ LONG_ENOUGH = 1.5
 """The direction of moves shorter than this many times the tolerance is not certain: their ends are
 rounded by up to 1.41 units in all, which turns a longer move by no more than 32 degrees."""
 
-Limits = tuple[float, float]
-
 
 def round_trips(cuts: CutMoves, gap_mm: float) -> Bools:
     """(C,) contours that enclose an area; others (open paths, paths there and back) may be cut
@@ -305,27 +353,48 @@ def round_trips(cuts: CutMoves, gap_mm: float) -> Bools:
 
 
 def cut_other_way(
-    decoded: MoveIndex, source: MoveIndex, limits: Limits, sample_mm: float
+    decoded: MoveIndex,
+    source: MoveIndex,
+    limits: Limits,
+    sample_mm: float,
+    row_from: Ints | None,
 ) -> Iterator[Finding]:
     """CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that of
-    the moves from which it was written, `source`."""
+    the moves from which it was written, `source`; `row_from` as in `cover`.
+
+    A row whose middle lies on the contour that it came from, in the same direction, is not turned;
+    the others are compared with everything.
+    """
     cuts = decoded.cuts
     rows = cuts.rows
     here, half = cuts.first[rows], np.full(len(rows), 0.5)
     z = cuts.ends_z[here].mean(axis=1)
     middles = Samples(point_at(cuts.segments, here, half), here, z, half)
-    there = nearest_at_height(middles, None, source, limits)[0].segment
-    known = np.flatnonzero(there >= 0)
-    rows, here, there = rows[known], here[known], there[known]
-    heading = headings(cuts.segments, here, half[known])
-    share = source.table.shares(middles.points[known], there)
-    cosine = (heading * headings(source.cuts.segments, there, share)).sum(axis=1)
+    own = _contours_from(cuts, source.cuts, row_from)[0][cuts.contour[rows]]
+    known = np.flatnonzero(own != ANY_CONTOUR)
+    near = source.nearest(middles.points[known], z[known], own[known], limits)
+    rest = np.ones(len(rows), dtype=np.bool_)
+    rest[known[_cosines(cuts, middles.of(known), source, near) > ALONG]] = False
+    rows, middles = rows[rest], middles.of(np.flatnonzero(rest))
+    nearest = nearest_at_height(middles, None, source, limits)[0]
     suspect = np.zeros(len(cuts.contour), dtype=np.bool_)
-    suspect[rows[cosine < -ALONG]] = True
+    suspect[rows[_cosines(cuts, middles, source, nearest) < -ALONG]] = True
     if suspect.any():
         found = compared(cuts, suspect, source, limits, sample_mm)
         trips = round_trips(source.cuts, limits[0])[source.contour[found.move]]
         yield from other_way(found, turned(found, trips, limits))
+
+
+def _cosines(cuts: CutMoves, samples: Samples, others: MoveIndex, found: Found) -> Floats:
+    """(S,) cosine of the angle between the move of each sample and the move of the other side
+    that was found; 0 where none was."""
+    cosine = np.zeros(len(samples.points))
+    known = np.flatnonzero(found.segment >= 0)
+    part, there = samples.of(known), found.segment[known]
+    here = headings(cuts.segments, part.segment, part.share)
+    share = others.shares(part.points, there)
+    cosine[known] = (here * headings(others.cuts.segments, there, share)).sum(axis=1)
+    return cosine
 
 
 @dataclass(eq=False)
@@ -373,7 +442,7 @@ def compared(
     nearest = np.full(len(samples.points), np.inf)
     np.minimum.at(nearest, point, distance)
     here = headings(cuts.segments, samples.segment[point], samples.share[point])
-    share = others.table.shares(samples.points[point], move)
+    share = others.shares(samples.points[point], move)
     there = headings(others.cuts.segments, move, share)
     cosine = (here * there).sum(axis=1)
     return Compared(cuts, others.cuts, samples, point, move, cosine, nearest)

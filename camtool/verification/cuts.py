@@ -191,6 +191,10 @@ class Samples:
         return Samples(self.points[which], self.segment[which], self.z[which], self.share[which])
 
 
+NO_SAMPLES = Samples(np.empty((0, 2)), np.empty(0, np.int64), np.empty(0), np.empty(0))
+"""No points at all."""
+
+
 def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> Samples:
     """Points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those segments
     alone. The spacing is wider where there would be more than `MOST_SAMPLES` points, but each
@@ -198,7 +202,35 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
     which = np.arange(len(cuts.segments)) if only is None else only
     lengths = segment_lengths(cuts.segments[which])
     spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
-    parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), FEWEST_SAMPLES)
+    return _samples(cuts, which, _parts(lengths, spacing))
+
+
+def samples_by_parts(
+    cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int = MOST_SAMPLES
+) -> Iterator[Samples]:
+    """The samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows with
+    about `at_once` samples each, so that memory does not grow with the program. The spacing is
+    that of all cuts."""
+    lengths = segment_lengths(cuts.segments)
+    parts = _parts(lengths, max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES))
+    taken = np.flatnonzero(rows[cuts.segments.path])
+    many = np.cumsum(parts[taken] + 1) // at_once
+    # A row ends where its last segment does.
+    path = cuts.segments.path[taken]
+    last_of_row = np.append(np.diff(path) != 0, True)[: len(path)]
+    part = many[np.flatnonzero(last_of_row)][np.cumsum(last_of_row) - last_of_row]
+    for which in np.split(taken, np.flatnonzero(np.diff(part)) + 1):
+        if len(which):
+            yield _samples(cuts, which, parts[which])
+
+
+def _parts(lengths: Floats, spacing_mm: float) -> Ints:
+    """(K,) in how many parts each segment is sampled."""
+    return np.maximum(np.ceil(lengths / spacing_mm).astype(np.int64), FEWEST_SAMPLES)
+
+
+def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> Samples:
+    """The ends of the equal parts of the segments `which`."""
     owner = np.repeat(np.arange(len(parts)), parts + 1)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
     share, segment = within / parts[owner], which[owner]
@@ -218,9 +250,6 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
 AS_LONG = 0.98
 """A later loop replaces the longest one so far if it has at least this part of its length."""
 
-FEW_PLACES = 48
-"""Up to this many points of a contour are compared pair by pair; above, in a grid of cells."""
-
 NO_LOOP = -1
 """First and last row of a contour without a loop."""
 
@@ -233,14 +262,28 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     whole = cuts.closed(gap_mm) & _level(cuts)
     found[whole] = np.column_stack([begin, finish])[whole]
     rest = np.flatnonzero(~whole)
-    if len(rest):
+    rows = cuts.rows[np.isin(cuts.contour[cuts.rows], rest)]
+    if len(rows):
         search = _LoopSearch(cuts)
-        rows = cuts.rows
-        offsets = np.searchsorted(cuts.contour[rows], np.arange(len(begin) + 1))
-        for contour in rest.tolist():
-            mine = rows[offsets[contour] : offsets[contour + 1]]
-            found[contour] = search.longest_loop(mine, gap_mm)
+        places, run = _places(cuts.toolpath, rows, cuts.contour[rows])
+        latest = latest_before(places, run, gap_mm)
+        # Most contours without a loop are lines that come back nowhere.
+        offsets = np.searchsorted(run, np.arange(len(begin) + 1))
+        for contour in np.unique(run[latest >= 0]).tolist():
+            low, high = offsets[contour], offsets[contour + 1]
+            first = np.searchsorted(cuts.contour[rows], contour)
+            mine = rows[first : first + high - low - 1]
+            found[contour] = search.longest_loop(
+                mine, places[low:high], np.maximum(latest[low:high] - low, -1), gap_mm
+            )
     return found
+
+
+def _places(toolpath: Toolpath, rows: Ints, contour: Ints) -> tuple[Floats, Ints]:
+    """(P, 2) mm: where each contour begins, and the ends of its rows; (P,) the contour of each."""
+    begins = np.flatnonzero(np.diff(contour, prepend=-1))
+    ends, starts = toolpath.end[rows, :2], toolpath.starts[rows[begins], :2]
+    return np.insert(ends, begins, starts, axis=0), np.insert(contour, begins, contour[begins])
 
 
 def of_loops(cuts: CutMoves, found: Ints) -> Bools:
@@ -274,13 +317,17 @@ class _LoopSearch:
         square = np.where(toolpath.is_arc, (spoke**2).sum(axis=1), 0.0)
         self._area = 0.5 * (ax * by - ay * bx) + 0.5 * square * (sweep - np.sin(sweep))
 
-    def longest_loop(self, rows: Ints, gap_mm: float) -> tuple[int, int]:
-        """First and last row of the loop of one contour, whose cutting rows are `rows` (R,)."""
-        places = np.concatenate([self._begin[rows[:1]], self._end[rows]])
+    def longest_loop(
+        self, rows: Ints, places: Floats, latest: Ints, gap_mm: float
+    ) -> tuple[int, int]:
+        """First and last row of the loop of one contour, whose cutting rows are `rows` (R,), and
+        whose begin and ends of rows are `places` (R + 1, 2); `latest` (R + 1,) the latest of these
+        before each that is the same place, below 0 for none."""
         length = np.concatenate([[0.0], np.cumsum(self._length[rows])]).tolist()
         area = np.concatenate([[0.0], np.cumsum(self._area[rows])]).tolist()
         best, most = (NO_LOOP, NO_LOOP), 0.0
-        for low, high in returns_to_itself(places, gap_mm):
+        again = np.flatnonzero(latest >= 0)
+        for low, high in zip(latest[again].tolist(), again.tolist(), strict=True):
             long = length[high] - length[low]
             (ax, ay), (bx, by) = places[high], places[low]
             around = area[high] - area[low] + 0.5 * (ax * by - ay * bx)
@@ -290,45 +337,39 @@ class _LoopSearch:
         return best
 
 
-def returns_to_itself(places: Floats, gap_mm: float) -> Iterator[tuple[int, int]]:
-    """Pairs (earlier, later) of points (P, 2) within `gap_mm` of each other: for each point the
-    latest one before it."""
-    latest = (_latest_of_few if len(places) <= FEW_PLACES else _latest_before)(places, gap_mm)
-    later = np.flatnonzero(latest >= 0)
-    yield from zip(latest[later].tolist(), later.tolist(), strict=True)
+def latest_before(places: Floats, run: Ints, gap_mm: float) -> Ints:
+    """(P,) for each of the points (P, 2) the latest one before it in its run (P,) within `gap_mm`,
+    −1 for none.
 
-
-def _latest_of_few(places: Floats, gap_mm: float) -> Ints:
-    """(P,) for each point the latest one before it within `gap_mm`, −1 for none; pair by pair."""
-    off = places[:, None] - places[None]
-    near = np.tril(np.hypot(off[:, :, 0], off[:, :, 1]) <= gap_mm, -1)
-    return np.asarray(np.where(near, np.arange(len(places)), -1).max(axis=1, initial=-1))
-
-
-def _latest_before(places: Floats, gap_mm: float) -> Ints:
-    """The same, by square cells as wide as the gap. In each of the nine cells around a point the
-    latest earlier point is tried first, and points before it only where it is too far away, so
-    that a thousand passes over one point are not compared pair by pair."""
+    Points lie in square cells as wide as the gap. In each of the nine cells around a point the
+    latest earlier point of its run is tried first, and points before it only where it is too far
+    away, so that a thousand passes over one point are not compared pair by pair.
+    """
     count = len(places)
     cell = np.floor(places / gap_mm).astype(np.int64)
     cell -= cell.min(axis=0) - 1
     wide = int(cell[:, 1].max()) + 2
-    known, rank = np.unique(cell[:, 0] * wide + cell[:, 1], return_inverse=True)
-    # Sorted by cells, and within a cell by number.
+    known, code = np.unique(cell[:, 0] * wide + cell[:, 1], return_inverse=True)
+    code = code.reshape(-1)
+    # Cells of each run, and the points sorted by these, and within one by number.
+    mine, rank = np.unique(run * len(known) + code, return_inverse=True)
     sorted_ = np.sort(rank.reshape(-1) * count + np.arange(count))
     latest = np.full(count, -1, dtype=np.int64)
     for beside in (-wide, 0, wide):
         for above in (-1, 0, 1):
-            wanted = known[rank.reshape(-1)] + beside + above
+            wanted = known[code] + beside + above
             there = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
             rows = np.flatnonzero(known[there] == wanted)
-            at = np.searchsorted(sorted_, there[rows] * count + rows) - 1
+            wanted = run[rows] * len(known) + there[rows]
+            there = np.minimum(np.searchsorted(mine, wanted), len(mine) - 1)
+            rows, there = rows[mine[there] == wanted], there[mine[there] == wanted]
+            at = np.searchsorted(sorted_, there * count + rows) - 1
             while len(rows):
                 near_cell, before = np.divmod(sorted_[at], count)
-                inside = (at >= 0) & (near_cell == there[rows]) & (before > latest[rows])
-                rows, at, before = rows[inside], at[inside], before[inside]
+                inside = (at >= 0) & (near_cell == there) & (before > latest[rows])
+                rows, at, before, there = rows[inside], at[inside], before[inside], there[inside]
                 off = places[before] - places[rows]
                 near = np.hypot(off[:, 0], off[:, 1]) <= gap_mm
                 latest[rows[near]] = before[near]
-                rows, at = rows[~near], at[~near] - 1
+                rows, at, there = rows[~near], at[~near] - 1, there[~near]
     return latest

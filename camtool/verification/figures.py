@@ -271,20 +271,22 @@ def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
     np.maximum.at(inner, of, rows.interpolation[known])
     np.maximum.at(lag, of, rows.mechanics[known])
     order = known[np.lexsort((known, -rows.total[known], of))]
-    first = order[np.flatnonzero(np.diff(match.contour[order], prepend=-1))]
-    for row in first.tolist():
-        contour = int(match.contour[row])
-        yield ContourFigures(
-            contour=contour,
-            row=row,
-            at_mm=_place(rows.total_at[row]),
-            max_mm=float(rows.total[row]),
-            rms_mm=float(np.sqrt(squares[contour] / samples[contour])),
-            mean_mm=float(sums[contour] / samples[contour]),
-            interpolation_mm=float(inner[contour]),
-            mechanics_mm=float(lag[contour]),
-            fit_mm=float(off[contour]),
-        )
+    worst = order[np.flatnonzero(np.diff(match.contour[order], prepend=-1))]
+    here = match.contour[worst]
+    columns = (
+        here,
+        worst,
+        rows.total_at[worst, 0],
+        rows.total_at[worst, 1],
+        rows.total[worst],
+        np.sqrt(squares[here] / samples[here]),
+        sums[here] / samples[here],
+        inner[here],
+        lag[here],
+        off[here],
+    )
+    for contour, row, x, y, *figures in zip(*(one.tolist() for one in columns), strict=True):
+        yield ContourFigures(contour, row, (x, y), *figures)
 
 
 def mean_error_mm(rows: RowFigures) -> float:
@@ -329,12 +331,10 @@ def missed_ends(
     return MissedEnds(int(missed.sum()), row, float(far[row]))
 
 
-def contour_name(cuts: CutMoves, contour: int) -> str:
-    """`contour 3 (CUT/CIRCLE 3C)`: contours are numbered from 1."""
-    rows = np.flatnonzero(cuts.contour == contour)
-    source = cuts.toolpath.text(int(rows[0])) if len(rows) else ""
-    return f"contour {contour + 1}" + (f" ({source})" if source else "")
-
-
-def _place(point: Floats) -> tuple[float, float]:
-    return float(point[0]), float(point[1])
+def contour_names(cuts: CutMoves) -> list[str]:
+    """`contour 3 (CUT/CIRCLE 3C)` for each contour: they are numbered from 1."""
+    sources = [cuts.toolpath.text(row) for row in cuts.contour_ends()[0].tolist()]
+    return [
+        f"contour {number}" + (f" ({source})" if source else "")
+        for number, source in enumerate(sources, start=1)
+    ]

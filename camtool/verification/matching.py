@@ -16,23 +16,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.verification.circles import Circle
 from camtool.verification.cuts import CutMoves, Samples
-from camtool.verification.nearest import ANY_CONTOUR, Found, Groups, MoveIndex, ranges, run_offsets
+from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex, ranges, run_offsets
 
 MOST_TRIES = 4
 """At most this many wanted contours are tried for each decoded contour."""
 
 LEAST_MM = 1e-6
 """Moves nearer than this are found even when the tolerance is 0."""
-
-SAMPLES_PER_GROUP = 64
-"""Up to this many neighbouring samples share one search for near moves; fewer among close
-moves."""
-
-GAPS_PER_GROUP = 4.0
-"""The box of a search is this many gaps between moves long, and holds about the square of that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,48 +93,18 @@ def nearest_at_height(
     """
     limit_mm, depth_mm = limits_mm
     near_mm = max(limit_mm, LEAST_MM)
-    found, wrong_depth = _nothing(len(samples.points)), np.zeros(len(samples.points), np.bool_)
-    if len(samples.points) == 0:
-        return found, wrong_depth
-    every, together = np.arange(len(samples.points)), _samples_per_group(samples, moves)
-    for levels in (True, False):
-        rest = every[np.isinf(found.distance)]
-        if len(rest) == 0:
-            break
-        offsets = run_offsets(samples.segment[rest], together)
-        first, z = rest[offsets[:-1]], samples.z[rest]
-        count = len(first)
-        contour = np.full(count, ANY_CONTOUR) if choice is None else choice[first]
-        groups = Groups(
-            offsets,
-            np.full(count, limit_mm),
-            contour,
-            np.tile([-np.inf, np.inf], (count, 1)),
-            # Without a limit, all moves between a sample and a far contour would be searched.
-            most_mm=math.inf if choice is None else near_mm,
-        )
-        if levels:
-            low = np.minimum.reduceat(z, offsets[:-1]) - depth_mm
-            high = np.maximum.reduceat(z, offsets[:-1]) + depth_mm
-            heights = np.column_stack([low, high])
-            groups = replace(groups, z=heights, height=z, window_mm=depth_mm, most_mm=near_mm)
-        near = moves.nearest(samples.points[rest], groups)
-        found.distance[rest], found.segment[rest] = near.distance, near.segment
-        if not levels:
-            wrong_depth[rest] = near.distance <= limit_mm
+    points, z = samples.points, samples.z
+    found = moves.nearest(points, z, choice, (near_mm, depth_mm))
+    wrong_depth = np.zeros(len(points), dtype=np.bool_)
+    rest = np.flatnonzero(np.isinf(found.distance))
+    if choice is None:
+        other = moves.nearest_of_all(points[rest], z[rest], near_mm)
+    else:
+        # Without a limit, all moves between a sample and a far contour would be searched.
+        other = moves.nearest(points[rest], z[rest], choice[rest], (near_mm, math.inf))
+    found.distance[rest], found.segment[rest] = other.distance, other.segment
+    wrong_depth[rest] = other.distance <= limit_mm
     return found, wrong_depth
-
-
-def _samples_per_group(samples: Samples, moves: MoveIndex) -> int:
-    """How many samples of a segment share one search, so that its box holds few moves. Only the
-    time depends on it."""
-    steps = np.hypot(*np.diff(samples.points, axis=0).T)[np.diff(samples.segment) == 0]
-    spacing = max(float(steps.mean()) if len(steps) else 0.0, POSITION_EPS_MM)
-    return int(np.clip(GAPS_PER_GROUP * moves.gap_mm / spacing, 1.0, SAMPLES_PER_GROUP))
-
-
-def _nothing(count: int) -> Found:
-    return Found(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
 
 
 def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -> Ints:

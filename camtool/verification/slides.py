@@ -43,6 +43,10 @@ if TYPE_CHECKING:
     from camtool.kernels.judging import Sums, Task
 
 
+MANY_MOVES = 10_000
+"""Among so many moves, those of each contour stay together in the tree of moves, where every row
+is compared with the moves of one contour."""
+
 BINS_KEPT = 64
 """The bins of at most this many circles are kept for pictures, 52 kB each."""
 
@@ -192,9 +196,12 @@ def _task(decoded: MoveIndex, goal: Goal, match: Match, slot: Ints) -> Task:
 
     own = move_table(decoded.cuts)
     wanted = own if goal.moves is decoded else move_table(goal.moves.cuts)
+    known = bool((match.only[decoded.cuts.is_cut] != ANY_CONTOUR).all())
+    by_contour = known and len(wanted.moves) >= MANY_MOVES
+    tree = move_tree(wanted.boxes, wanted.contour if by_contour else None)
     return Task(
         own=own.moves,
-        moves=Moves(wanted.moves, wanted.heights, *move_tree(wanted.boxes)),
+        moves=Moves(wanted.moves, wanted.heights, *tree),
         rows=np.column_stack(
             [own.of_row, wanted.ranges(match.only), match.circle, slot[match.circle]]
             if len(slot)

@@ -20,7 +20,7 @@ from importlib.metadata import version
 import msgspec
 import numpy as np
 
-from camtool.arrays import Floats
+from camtool.arrays import Floats, Ints
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.progress import Progress
@@ -56,7 +56,7 @@ from camtool.verification.figures import (
     RowFigures,
     Tally,
     contour_figures,
-    contour_name,
+    contour_names,
     mean_error_mm,
     missed_ends,
     tally_of,
@@ -111,16 +111,19 @@ def verify(
     compensated: Compensated | None = None,
     asked: Asked | None = None,
     written_from: Toolpath | None = None,
+    row_from: Ints | None = None,
     progress: Progress | None = None,
 ) -> Verification:
     """Simulate `decoded` on the target's machine and judge it, against `wanted` if it is given.
 
-    `drawing` gives its findings; `compensated`, `asked` and `written_from` are as in `Case`.
-    `progress` is told how many rows are judged.
+    `drawing` gives its findings; `compensated`, `asked`, `written_from` and `row_from` are as in
+    `Case`. `progress` is told how many rows are judged.
     Toolpaths are in the work frame. Raises what `LoadedTarget.simulate` raises.
     """
     options = options or VerifyOptions()
-    case = Case(decoded, target, wanted, drawing, options, compensated, asked, written_from)
+    case = Case(
+        decoded, target, wanted, drawing, options, compensated, asked, written_from, row_from
+    )
     target.check_options(case.simulation)
     fused = target.model.fused_run(decoded, target.machine, case.simulation)
     return judge(case, fused or target.simulate(decoded, case.simulation), progress)
@@ -163,7 +166,7 @@ def judge(
         shape = wanted_shape(wanted.cuts, cutter, case.options.kept)
     planned = () if case.wanted is None else case.wanted.findings
     overcut = overcut_findings(shape, {finding.code for finding in planned})
-    turned = _turned(case, decoded, flat_cuts=flat_cuts)
+    turned = _turned(case, decoded, goal, flat_cuts=flat_cuts)
     findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
     result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, conformance)
     trace = slides.trace()
@@ -183,7 +186,10 @@ def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) ->
     wanted_holes = holes_of(programmed.moves.cuts.toolpath)
     missing, stand = contours_drilled(programmed.moves.cuts, holes, limits)
     extra, wanted_stand = contours_drilled(decoded.cuts, wanted_holes, limits)
-    coverage = cover(decoded, programmed, SAMPLE_MM, Drilled(missing, extra))
+    own = None
+    if programmed.moves.cuts.toolpath is case.written_from:
+        own = case.row_from
+    coverage = cover(decoded, programmed, SAMPLE_MM, Drilled(missing, extra), own)
     unpaired = hole_findings(holes, wanted_holes, limits, (stand, wanted_stand))
     match = coverage.match
     if case.compensated is not None:
@@ -191,11 +197,14 @@ def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) ->
     return replace(coverage, match=match, findings=(*coverage.findings, *unpaired))
 
 
-def _turned(case: Case, decoded: MoveIndex, *, flat_cuts: bool) -> tuple[Finding, ...]:
+def _turned(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> tuple[Finding, ...]:
     if case.written_from is None:
         return ()
-    source = MoveIndex(cut_moves(case.written_from, flat_cuts=flat_cuts))
-    return tuple(cut_other_way(decoded, source, (case.coverage_mm, case.depth_mm), SAMPLE_MM))
+    source = goal.moves
+    if source.cuts.toolpath is not case.written_from:
+        source = MoveIndex(cut_moves(case.written_from, flat_cuts=flat_cuts))
+    limits = case.coverage_mm, case.depth_mm
+    return tuple(cut_other_way(decoded, source, limits, SAMPLE_MM, case.row_from))
 
 
 def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
@@ -329,10 +338,10 @@ class Result:
             certain(float(largest.max()) * UM_PER_MM), certain(math.sqrt(mean) * UM_PER_MM)
         )
 
-    def _off_um(self, off_mm: Floats) -> float | None:
-        """The largest distance of rows (R, 2) from the drawing; None where none is known."""
+    def _off_um(self, off_mm: float) -> float | None:
+        """A distance from the drawing; None where none is known."""
         known = self.case.wanted is not None and self.case.wanted.drawn is not None
-        return certain(float(off_mm[:, 0].max(initial=0.0)) * UM_PER_MM) if known else None
+        return certain(off_mm * UM_PER_MM) if known else None
 
     def _dimensions(self, own: LoopedCuts, slides: RowSlides) -> tuple[record.Dimension, ...]:
         match, gap_mm = self.coverage.match, self.case.coverage_mm
@@ -352,6 +361,8 @@ class Result:
         )
 
     def _circles(self) -> tuple[record.CircleReport, ...]:
+        match, off_mm = self.coverage.match, np.zeros(len(self.slides.circles) + 1)
+        np.maximum.at(off_mm, match.circle, match.off_mm[:, 0])  # the last one is for none, −1
         return tuple(
             record.CircleReport(
                 centre_mm=(certain(circle.centre_mm[0]), certain(circle.centre_mm[1])),
@@ -365,7 +376,7 @@ class Result:
                 step_um=tuple(number(value, UM_PER_MM) for value in turned.step),
                 spike_um=tuple(number(value, UM_PER_MM) for value in turned.spike),
                 B_um=tuple(number(value, UM_PER_MM) for value in turned.value),
-                fit_um=self._off_um(self.coverage.match.off_mm[self.coverage.match.circle == k]),
+                fit_um=self._off_um(float(off_mm[k])),
             )
             for k, circle, figures, turned in zip(
                 range(len(self.slides.circles)),
@@ -389,9 +400,10 @@ class Result:
         )
 
     def _contours(self) -> tuple[record.ContourReport, ...]:
+        names = contour_names(self.wanted)
         return tuple(
             record.ContourReport(
-                name=contour_name(self.wanted, one.contour),
+                name=names[one.contour],
                 max_um=certain(one.max_mm * UM_PER_MM),
                 rms_um=certain(one.rms_mm * UM_PER_MM),
                 mean_um=certain(one.mean_mm * UM_PER_MM),
@@ -399,7 +411,7 @@ class Result:
                 block=_block(self.case, one.row),
                 interpolation_um=certain(one.interpolation_mm * UM_PER_MM),
                 mechanics_um=certain(one.mechanics_mm * UM_PER_MM),
-                fit_um=self._off_um(np.array([[one.fit_mm]])),
+                fit_um=self._off_um(one.fit_mm),
             )
             for one in contour_figures(self.rows, self.coverage.match)
         )
@@ -415,7 +427,7 @@ class Result:
                 interpolation_um=number(rows.interpolation[row], UM_PER_MM),
                 mechanics_um=number(rows.mechanics[row], UM_PER_MM),
                 source=self._source(row),
-                fit_um=self._off_um(self.coverage.match.off_mm[row : row + 1]),
+                fit_um=self._off_um(float(self.coverage.match.off_mm[row, 0])),
             )
             for row in worst_rows(rows, self.case.options.worst).tolist()
         )

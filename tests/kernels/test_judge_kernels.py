@@ -152,7 +152,8 @@ def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
     moves: list[Move] = [random_move(rng) for _ in range(count)]
     moves[-1] = moves[0]  # twice the same
     table = np.array([move.row() for move in moves], dtype=np.float64)
-    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
+    boxes = np.array([move.box() for move in moves], dtype=np.float64)
+    tree = move_tree(boxes, np.sort(rng.integers(0, count, count)) if size else None)
     low = rng.uniform(-1.0, 0.0, count)
     heights = np.column_stack([low, low + rng.uniform(0.0, 0.3, count)])
     for _ in range(25):
@@ -180,12 +181,15 @@ def test_the_curve_fills_a_square_by_steps_of_one() -> None:
     assert np.abs(np.diff(along, axis=0)).sum(axis=1).tolist() == [1.0] * 255
 
 
+@pytest.mark.parametrize("together", [False, True])
 @pytest.mark.parametrize("count", [0, 1, 4, 5, 61])
-def test_nodes_know_what_is_below_them(count: int) -> None:
+def test_nodes_know_what_is_below_them(count: int, together: bool) -> None:
     rng = np.random.default_rng(count)
     low = rng.uniform(-9.0, 9.0, (count, 2))
     boxes = np.column_stack([low, low + rng.uniform(0.0, 2.0, (count, 2))])
-    nodes, order = move_tree(boxes)
+    group = np.sort(rng.integers(0, count // 3 + 1, count))
+    nodes, order = move_tree(boxes, group if together else None)
+    assert not together or np.array_equal(group[order], group)
     leaves = len(nodes) // 2
     assert sorted(order.tolist()) == list(range(count))
     for node in range(1, 2 * leaves):
@@ -208,7 +212,8 @@ def test_a_search_in_a_spiral_looks_at_few_of_its_turns() -> None:
     lines = [Line(tuple(a), tuple(b)) for a, b in pairwise(places)]
     table = np.array([line.row() for line in lines], dtype=np.float64)
     heights, out = np.zeros((len(lines), 2)), np.empty(1)
-    moves = Moves(table, heights, *move_tree(np.array([line.box() for line in lines])))
+    boxes = np.array([line.box() for line in lines])
+    moves = Moves(table, heights, *move_tree(boxes))
     looked = []
     for k in range(100, 8000, 700):
         near = no_list(len(lines))
@@ -217,6 +222,26 @@ def test_a_search_in_a_spiral_looks_at_few_of_its_turns() -> None:
         assert abs(out[0]) < EPS
         looked.append(near.memo[LOOKED])
     assert max(looked) < 300.0
+
+
+def test_a_search_in_one_scribble_of_many_looks_at_no_others() -> None:
+    places = np.random.default_rng(6).uniform(0.0, 100.0, (2001, 2)).tolist()
+    lines = [Line(tuple(a), tuple(b)) for a, b in pairwise(places)]
+    table = np.array([line.row() for line in lines], dtype=np.float64)
+    heights, out = np.zeros((len(lines), 2)), np.empty(1)
+    scribble, boxes = np.arange(2000) // 40, np.array([line.box() for line in lines])
+    looked = []
+    for group in (None, scribble):
+        moves = Moves(table, heights, *move_tree(boxes, group))
+        near = no_list(len(lines))
+        for k in range(0, 2000, 97):
+            x, y = np.array([lines[k].a]).T.copy()
+            only = (40 * int(scribble[k]), 40 * int(scribble[k]) + 40, 0.0, 0.0)
+            nearest_errors_(x, y, only, moves, near, out)
+            assert abs(out[0]) < EPS
+        looked.append(near.memo[LOOKED])
+    assert looked[0] > 300.0
+    assert looked[1] < 150.0
 
 
 def test_the_bins_of_a_circle_are_those_of_a_loop() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.verification.figures import Figure
-from camtool.verification.nearest import group_boxes, ranges, run_offsets, run_peaks
+from camtool.verification.nearest import ranges, run_offsets, run_peaks
 from camtool.verification.slides import largest
 
 P95_ACCURACY = 0.004
@@ -96,10 +96,4 @@ def test_peaks_boxes_and_ranges() -> None:
     values = np.array([1.0, 3.0, 3.0, 2.0, 2.0, 0.0])
     offsets = np.array([0, 3, 5, 6])
     assert run_peaks(values, offsets).tolist() == [1, 3, 5]
-    points = np.column_stack([values, -values])
-    assert group_boxes(points, offsets).tolist() == [
-        [1.0, -3.0, 3.0, -1.0],
-        [2.0, -2.0, 2.0, -2.0],
-        [0.0, 0.0, 0.0, 0.0],
-    ]
     assert ranges(np.array([5, 1]), np.array([3, 2])).tolist() == [5, 6, 7, 1, 2]

@@ -10,17 +10,30 @@ from hypothesis import strategies as st
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Segments
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verification.cuts import cut_moves, sample_cuts
+from camtool.verification.cuts import CutMoves, cut_moves, sample_cuts
 from camtool.verification.matching import nearest_at_height
-from camtool.verification.nearest import ANY_CONTOUR, Groups, MoveIndex, SegmentTable, run_offsets
+from camtool.verification.nearest import ANY_CONTOUR, MoveIndex
 from tests.oracles.dense_moves import cut, dense_distance
+from tests.oracles.near_points import near_moves, nearest
 
 DENSE = 4000
 
 
-def distance_each(points: np.ndarray, segments: Segments) -> np.ndarray:
-    """From each point to the segment of the same row."""
-    return SegmentTable(segments).distances(points, np.arange(len(points)))
+def index_of(segments: Segments, z: np.ndarray | None = None) -> MoveIndex:
+    """The segments as moves of one row each, every one a contour of its own."""
+    count = len(segments)
+    path = ToolpathBuilder().rapid(x=0.0)
+    for _ in range(count - 1):
+        path.rapid(x=0.0)
+    own = Segments.between(segments.start, segments.end, segments.bulge, np.arange(count))
+    heights = np.full((count, 2), -1.0) if z is None else z
+    return MoveIndex(CutMoves(path.finish(), own, np.arange(count + 1), np.arange(count), heights))
+
+
+def distance_of(point: tuple[float, float], segments: Segments) -> float:
+    """From a point to the nearest of the segments."""
+    found = index_of(segments).nearest_of_all(np.array([point]), np.array([-1.0]), 1e-3)
+    return float(found.distance[0])
 
 
 def arc_or_line(
@@ -51,7 +64,7 @@ pair = st.tuples(coordinate, coordinate)
 def test_distance_is_that_of_dense_points(start, way, bulge, point) -> None:
     bulge = bulge if abs(bulge) > 1e-3 else 0.0
     segments, length = arc_or_line(start, way, bulge)
-    found = float(distance_each(np.array([point]), segments)[0])
+    found = distance_of(point, segments)
     dense = dense_distance(np.array(point), cloud_of(segments))
     assert found <= dense + 1e-9
     assert found >= dense - 0.5 * length / DENSE - 1e-9
@@ -61,11 +74,11 @@ def test_distance_is_that_of_dense_points(start, way, bulge, point) -> None:
 def test_the_share_is_that_of_the_nearest_place(start, way, bulge, point) -> None:
     bulge = bulge if abs(bulge) > 1e-3 else 0.0
     segments, _ = arc_or_line(start, way, bulge)
-    table, points, which = SegmentTable(segments), np.array([point]), np.zeros(1, dtype=np.int64)
-    share = table.shares(points, which)
+    points, which = np.array([point]), np.zeros(1, dtype=np.int64)
+    share = index_of(segments).shares(points, which)
     assert 0.0 <= share[0] <= 1.0
     place = point_at(segments, which, share)
-    found = float(table.distances(points, which)[0])
+    found = distance_of(point, segments)
     assert math.dist(place[0], point) == pytest.approx(found, abs=1e-7)
 
 
@@ -73,13 +86,13 @@ def test_the_share_is_that_of_the_nearest_place(start, way, bulge, point) -> Non
 def test_points_on_a_segment_have_no_distance(bulge: float) -> None:
     segments, _ = arc_or_line((1.0, 2.0), (0.5, -1.5), bulge)
     points = cloud_of(segments)
-    many = segments[np.zeros(len(points), dtype=np.int64)]
-    assert distance_each(points, many).max() < 1e-10
+    found = index_of(segments).nearest_of_all(points, np.full(len(points), -1.0), 1e-3)
+    assert found.distance.max() < 1e-10
 
 
 def test_the_centre_of_an_arc_is_a_radius_away() -> None:
     segments, _ = arc_or_line((1.0, 0.0), (-1.0, 1.0), math.tan(math.pi / 8))
-    assert distance_each(segments.centre, segments)[0] == pytest.approx(1.0)
+    assert distance_of(tuple(segments.centre[0]), segments) == pytest.approx(1.0)
 
 
 def drawn(seed: int) -> MoveIndex:
@@ -104,52 +117,57 @@ def drawn(seed: int) -> MoveIndex:
     return MoveIndex(cut_moves(b.finish(), flat_cuts=False))
 
 
-def grouped(count: int, margin: float, size: int = 7) -> Groups:
-    offsets = run_offsets(np.zeros(count, dtype=np.int64), size)
-    groups = len(offsets) - 1
-    return Groups(
-        offsets,
-        np.full(groups, margin),
-        np.full(groups, ANY_CONTOUR),
-        np.tile([-np.inf, np.inf], (groups, 1)),
-    )
+def places_about(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points about the strokes, half of them at a depth of these."""
+    rng = np.random.default_rng(seed + 100)
+    heights = np.where(rng.random(count) < 0.5, -0.04, rng.uniform(-0.06, 0.02, count))
+    return rng.uniform(-1, 6, (count, 2)), heights
 
 
-def everything(target: MoveIndex, points: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """Distances (P,) by comparing each point with each allowed segment."""
-    segments = target.cuts.segments[np.flatnonzero(allowed)]
-    best = np.full(len(points), np.inf)
-    for index in range(len(segments)):
-        same = segments[np.full(len(points), index)]
-        best = np.minimum(best, distance_each(points, same))
-    return best
-
-
-@pytest.mark.parametrize("margin", [0.0, 1e-3, 0.3, 100.0])
+@pytest.mark.parametrize("limit", [0.0, 1e-3, 0.3, 100.0])
 @pytest.mark.parametrize("seed", range(4))
-def test_the_search_finds_the_nearest_whatever_the_margin(seed: int, margin: float) -> None:
+def test_the_search_finds_what_a_plain_loop_finds(seed: int, limit: float) -> None:
     target = drawn(seed)
-    points = np.random.default_rng(seed + 100).uniform(-1, 6, (200, 2))
-    found = target.nearest(points, grouped(len(points), margin))
-    exact = everything(target, points, np.ones(len(target.contour), dtype=bool))
-    assert np.allclose(found.distance, exact, rtol=0, atol=1e-12)
-    named = target.cuts.segments[found.segment]
-    assert np.allclose(distance_each(points, named), found.distance, rtol=0, atol=1e-9)
+    points, heights = places_about(seed, 120)
+    for window in (0.0, 0.01, math.inf):
+        limits = limit, window
+        found = target.nearest(points, heights, None, limits)
+        point, move, distance = target.within(points, heights, limits)
+        listed = []
+        for k in range(len(points)):
+            near = near_moves(target.cuts, points[k], heights[k], limits)
+            least, segment = nearest(near)
+            assert found.distance[k] == pytest.approx(least, abs=1e-12)
+            assert found.segment[k] == segment
+            listed += [(k, which, away) for which, away in near]
+        assert list(zip(point.tolist(), move.tolist(), strict=True)) == [p[:2] for p in listed]
+        assert distance == pytest.approx(np.array([p[2] for p in listed]), abs=1e-12)
 
 
-def test_the_search_can_be_kept_to_a_contour_and_to_a_height() -> None:
-    target = drawn(1)
-    points = np.random.default_rng(5).uniform(0, 5, (60, 2))
-    groups = grouped(len(points), 0.1, 10)
-    one = Groups(groups.offsets, groups.margin, np.arange(6), groups.z)
-    found = target.nearest(points, one)
-    for group in range(6):
-        here = slice(10 * group, 10 * group + 10)
-        exact = everything(target, points[here], target.contour == group)
-        assert np.allclose(found.distance[here], exact, rtol=0, atol=1e-12)
-    deep = Groups(groups.offsets, groups.margin, groups.contour, np.tile([-0.05, -0.03], (6, 1)))
-    exact = everything(target, points, target.cuts.z[:, 0] < -0.03)
-    assert np.allclose(target.nearest(points, deep).distance, exact, rtol=0, atol=1e-12)
+@pytest.mark.parametrize("seed", range(4))
+def test_without_a_limit_the_nearest_of_all_is_found(seed: int) -> None:
+    target = drawn(seed)
+    points, heights = places_about(seed, 120)
+    for start in (1e-3, 1.0, 50.0):
+        found = target.nearest_of_all(points, heights, start)
+        for k in range(len(points)):
+            every = near_moves(target.cuts, points[k], heights[k], (math.inf, math.inf))
+            least, segment = nearest(every)
+            assert found.distance[k] == pytest.approx(least, abs=1e-12)
+            assert found.segment[k] == segment
+
+
+def test_the_search_can_be_kept_to_a_contour() -> None:
+    target, limits = drawn(1), (2.0, math.inf)
+    points, heights = places_about(5, 60)
+    choice = np.repeat([3, ANY_CONTOUR, 0, 11, 4, 5], 10)
+    found = target.nearest(points, heights, choice, limits)
+    for k in range(60):
+        near = near_moves(target.cuts, points[k], heights[k], limits)
+        allowed = [p for p in near if choice[k] in (ANY_CONTOUR, target.contour[p[0]])]
+        least, segment = nearest(allowed)
+        assert found.distance[k] == pytest.approx(least, abs=1e-12)
+        assert found.segment[k] == segment
 
 
 def test_on_a_chosen_contour_only_what_is_near_is_found() -> None:
@@ -159,33 +177,63 @@ def test_on_a_chosen_contour_only_what_is_near_is_found() -> None:
     found, wrong_depth = nearest_at_height(samples, choice, target, (limit, 0.01))
     for contour in range(target.cuts.contour_count):
         here = choice == contour
-        exact = everything(target, samples.points[here], target.contour == contour)
-        assert (np.isfinite(found.distance[here]) == (exact <= limit)).all()
+        exact = [
+            any(
+                target.contour[k] == contour
+                for k, _ in near_moves(target.cuts, point, 0.0, (limit, math.inf))
+            )
+            for point in samples.points[here]
+        ]
+        assert np.isfinite(found.distance[here]).tolist() == exact
     assert (found.segment[np.isinf(found.distance)] == -1).all()
     assert wrong_depth.any()
     assert not wrong_depth[np.isinf(found.distance)].any()
 
 
 def test_where_nothing_may_be_compared_the_distance_is_infinite() -> None:
-    target = drawn(2)
-    groups = grouped(10, 0.1, 10)
-    high = Groups(groups.offsets, groups.margin, groups.contour, np.array([[0.5, 0.6]]))
-    found = target.nearest(np.zeros((10, 2)), high)
-    assert np.isinf(found.distance).all()
-    assert (found.segment == -1).all()
+    points, heights = np.zeros((10, 2)), np.full(10, 0.5)
     none = MoveIndex(cut_moves(ToolpathBuilder().finish(), flat_cuts=True))
-    assert np.isinf(none.nearest(np.zeros((10, 2)), groups).distance).all()
+    for found in (
+        drawn(2).nearest(points, heights, None, (100.0, 0.1)),
+        none.nearest(points, heights, None, (100.0, 0.1)),
+        none.nearest_of_all(points, heights, 0.1),
+    ):
+        assert np.isinf(found.distance).all()
+        assert (found.segment == -1).all()
+    assert none.within(points, heights, (1.0, 1.0))[0].tolist() == []
 
 
-@pytest.mark.parametrize("size", [1, 16])
-def test_the_search_among_long_moves_that_all_cross(size: int) -> None:
-    rng = np.random.default_rng(8)
-    path = ToolpathBuilder()
-    for x, y, to_x, to_y in rng.uniform(0.0, 50.0, (150, 4)):
-        path.rapid(x=x, y=y, z=1.0).line(z=-1.0, feed=100.0).line(to_x, to_y, feed=100.0)
-        path.rapid(z=1.0)
-    target = MoveIndex(cut_moves(path.finish(), flat_cuts=False))
-    points = rng.uniform(0.0, 50.0, (400, 2))
-    found = target.nearest(points, grouped(len(points), 1e-3, size))
-    allowed = np.ones(len(target.boxes), dtype=np.bool_)
-    np.testing.assert_allclose(found.distance, everything(target, points, allowed), atol=1e-12)
+def crossing(rng: np.random.Generator, count: int) -> tuple[Segments, np.ndarray]:
+    """Lines and arcs between random places of a plate of 50 mm, at twenty heights, every tenth
+    sloping: everything crosses everything."""
+    ends = rng.uniform(0.0, 50.0, (2, count, 2))
+    bulge = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(-1.0, 1.0, count))
+    z = np.repeat(rng.integers(0, 20, (count, 1)).astype(float), 2, axis=1)
+    z[::10, 1] += rng.uniform(0.0, 5.0, len(z[::10]))
+    return Segments.between(ends[0], ends[1], bulge, np.arange(count)), z
+
+
+@given(st.integers(0, 1000), st.integers(1, 90), st.sampled_from([1e-9, 0.05, 2.0, 20.0]))
+def test_the_search_among_long_moves_that_all_cross(seed: int, count: int, limit: float) -> None:
+    """Whatever the order of the points, and wherever the part lies."""
+    rng = np.random.default_rng(seed)
+    segments, z = crossing(rng, count)
+    target = index_of(segments, z)
+    which = rng.integers(0, count, 40)
+    points = point_at(segments, which, rng.random(40)) + rng.normal(0.0, 0.02, (40, 2))
+    points[rng.integers(0, 40, 5)] = points[0]
+    heights = z[which, 0] + rng.normal(0.0, 0.1, 40)
+    found = target.nearest(points, heights, None, (limit, 0.3))
+    for k in range(40):
+        near = near_moves(target.cuts, points[k], heights[k], (limit, 0.3))
+        least, segment = nearest(near)
+        assert found.distance[k] == pytest.approx(least, abs=1e-9)
+        assert found.segment[k] == segment
+    order = rng.permutation(40)
+    again = target.nearest(points[order], heights[order], None, (limit, 0.3))
+    assert np.array_equal(again.distance, found.distance[order])
+    assert np.array_equal(again.segment, found.segment[order])
+    away = np.array([-64.0, 128.0])
+    elsewhere = Segments.between(segments.start + away, segments.end + away, segments.bulge)
+    moved = index_of(elsewhere, z).nearest(points + away, heights, None, (limit, 0.3))
+    assert moved.distance == pytest.approx(found.distance, abs=1e-9)

@@ -1,0 +1,285 @@
+"""The moves near points: the nearest of many at a point's height, and all within a limit.
+
+Points and moves are divided together. The box of some points is taken; moves that come no nearer
+to it than the limit are left out; the points are divided at the middle of the longest side of the
+box, and so on until few points or few moves are left, which are compared one by one. A diagonal
+across the part is a candidate only of points beside it, however large its box is, and moves far
+below the points are none at all. Nothing is stored but the candidates of the boxes around the
+present one, at most two numbers for each move: where the list has not shrunk to its half, points
+keep the list of the box before.
+
+What is found does not depend on the division: the distances of all moves within the limit are
+exact, to true lines and arcs (`camtool.verification.nearest`). Compiled; C types stand in the
+.pxd beside this file.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from camtool.arrays import Floats, Ints
+
+AX, AY, BX, BY, CX, CY, RADIUS, UX, UY, VX, VY, SWEEP, Z, RISE, SLOPE = range(15)
+"""Columns of a move: start; end; of an arc its centre, radius (0: a line), normals into its wedge
+from its two edges, and size of its sweep, rad; height of its start, rise to its end, and slope."""
+
+COLUMNS = 15
+"""Numbers of a move."""
+
+FEW_POINTS = 4
+"""So many points are not divided any more: they are compared with all their candidates."""
+
+FEW_MOVES = 8
+"""Points with so few candidates are not divided any more."""
+
+SLACK_MM = 1e-9
+"""Boxes are wider by this, so that rounding loses no move."""
+
+EQUAL_MM = 1e-6
+"""Of moves nearer than the nearest one and this, the last is taken: a later cut decides what
+remains."""
+
+DEPTH = 80
+"""Parts of the points that can wait: the smaller part comes first, so there are no more than the
+logarithm of all of them."""
+
+
+class Near:
+    """What a search needs: K moves `table` (K, 15) with their `boxes` (K, 4), P `points` (P, 3) mm
+    with their heights, the limit in XY and the window of heights (on a slope, more by the slope),
+    and room for what waits. Of each point: how many moves are within both (`count` (P,)), how far
+    the nearest of these is (`distance` (P,) mm) and its row (`move` (P,))."""
+
+    def __init__(
+        self,
+        table: Floats,
+        boxes: Floats,
+        points: Floats,
+        limits_mm: tuple[float, float],
+        found: tuple[Floats, Ints, Ints],
+    ) -> None:
+        self.table, self.boxes, self.points = table, boxes, points
+        self.limit, self.window = limits_mm
+        self.distance, self.move, self.count = found
+        self.order = np.arange(len(points))
+        self.candidates = np.empty(2 * len(table) + 2, dtype=np.int64)
+        self.apart = np.empty(len(table))
+        self.waiting = np.empty(4 * DEPTH, dtype=np.int64)
+        self.box = np.empty(6)
+
+
+def nearest(
+    table: Floats, boxes: Floats, points: Floats, runs: Ints, limits_mm: tuple[float, float]
+) -> tuple[Floats, Ints]:
+    """(P,) mm and (P,): the distance of each point from the nearest move within the limits, inf
+    for none, and the row of that, −1 for none; arguments as in `Near`. `runs` (R, 4): begin and
+    end of some points, begin and end of the moves with which they are compared."""
+    count = np.zeros(len(points), dtype=np.int64)
+    found = np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64), count
+    near = Near(table, boxes, points, limits_mm, found)
+    nothing, nowhere = np.empty(0, dtype=np.int64), np.empty(0)
+    for low, high, first, last in runs.tolist():
+        divide(low, high, first, last, near, nothing, nowhere)
+    return found[:2]
+
+
+def pairs(
+    table: Floats, boxes: Floats, points: Floats, limits_mm: tuple[float, float]
+) -> tuple[Ints, Ints, Floats]:
+    """All pairs (point, move) within the limits, in order, and their distances, mm; arguments as
+    in `Near`."""
+    count = np.zeros(len(points), dtype=np.int64)
+    place = np.empty(len(points), dtype=np.int64)
+    near = Near(table, boxes, points, limits_mm, (np.empty(len(points)), place, count))
+    divide(0, len(points), 0, len(table), near, np.empty(0, dtype=np.int64), np.empty(0))
+    move, distance = np.empty(int(count.sum()), dtype=np.int64), np.empty(int(count.sum()))
+    place[:] = np.cumsum(count) - count
+    divide(0, len(points) if len(move) else 0, 0, len(table), near, move, distance)
+    return np.repeat(np.arange(len(points)), count), move, distance
+
+
+def divide(
+    low: int, high: int, first: int, last: int, near: Near, found: Ints, distance: Floats
+) -> None:
+    """Compare the points low:high with the moves first:last; with room in `found` and `distance`
+    all moves within the limits go there, those of a point from its place in `near.move` on."""
+    candidates, waiting = near.candidates, near.waiting
+    if low >= high or first >= last:
+        return
+    for k in range(first, last):
+        candidates[k - first] = k
+    waiting[0], waiting[1], waiting[2], waiting[3] = low, high, 0, last - first
+    height = 1
+    while height > 0:
+        height -= 1
+        low, high = waiting[4 * height], waiting[4 * height + 1]
+        first, last = waiting[4 * height + 2], waiting[4 * height + 3]
+        axis, middle = _set_box(low, high, near)
+        end = _keep_near(first, last, near)
+        if end == last:
+            continue
+        if axis < 0 or high - low <= FEW_POINTS or end - last <= FEW_MOVES:
+            if len(found) > 0:
+                _list(low, high, last, end, near, found, distance)
+            else:
+                _compare(low, high, last, end, near)
+            continue
+        if 2 * (end - last) <= last - first:
+            first, last = last, end
+        split = _divided(low, high, axis, middle, near)
+        for part in range(2):
+            # The larger part waits below the smaller one.
+            larger = (split - low > high - split) == (part == 0)
+            waiting[4 * height] = low if larger else split
+            waiting[4 * height + 1] = split if larger else high
+            waiting[4 * height + 2], waiting[4 * height + 3] = first, last
+            height += 1
+
+
+def _set_box(low: int, high: int, near: Near) -> tuple[int, float]:
+    """Set the box of the points low:high; returns its longest side (−1: it is a point) and the
+    middle of that."""
+    points, order, box = near.points, near.order, near.box
+    side, longest, middle = -1, 0.0, 0.0
+    for axis in range(3):
+        least = most = points[order[low], axis]
+        for n in range(low + 1, high):
+            value = points[order[n], axis]
+            least = value if value < least else least
+            most = value if value > most else most
+        box[axis], box[axis + 3] = least, most
+        if most - least > longest:
+            side, longest = axis, most - least
+            middle = least + 0.5 * longest
+            middle = least if middle >= most else middle
+    return side, middle
+
+
+def _keep_near(first: int, last: int, near: Near) -> int:
+    """Write the candidates first:last that come within the limits of the box behind `last`;
+    returns the end of these."""
+    candidates, table, boxes, box = near.candidates, near.table, near.boxes, near.box
+    room, window, end = near.limit + SLACK_MM, near.window + SLACK_MM, last
+    low_x, low_y, high_x, high_y = box[0] - room, box[1] - room, box[3] + room, box[4] + room
+    x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
+    wide, tall = high_x - x, high_y - y
+    for n in range(first, last):
+        k = candidates[n]
+        if boxes[k, 0] > high_x or boxes[k, 2] < low_x:
+            continue
+        if boxes[k, 1] > high_y or boxes[k, 3] < low_y:
+            continue
+        z, rise = table[k, Z], table[k, RISE]
+        around = window * (1.0 + table[k, SLOPE])
+        if min(z, z + rise) > box[5] + around or max(z, z + rise) < box[2] - around:
+            continue
+        if table[k, RADIUS] == 0.0:
+            dx, dy = table[k, BX] - table[k, AX], table[k, BY] - table[k, AY]
+            side = dx * (y - table[k, AY]) - dy * (x - table[k, AX])
+            if abs(side) > (wide * abs(dy) + tall * abs(dx)) * (1.0 + SLACK_MM):
+                continue
+        else:
+            dx, dy = abs(x - table[k, CX]), abs(y - table[k, CY])
+            near_x, near_y = max(dx - wide, 0.0), max(dy - tall, 0.0)
+            radius = table[k, RADIUS] + SLACK_MM
+            if near_x * near_x + near_y * near_y > radius * radius:
+                continue
+            radius = max(table[k, RADIUS] - SLACK_MM, 0.0)
+            if (dx + wide) * (dx + wide) + (dy + tall) * (dy + tall) < radius * radius:
+                continue
+        candidates[end] = k
+        end += 1
+    return end
+
+
+def _divided(low: int, high: int, axis: int, middle: float, near: Near) -> int:
+    """Put those of the points low:high that are not above the middle before the others; returns
+    where these begin."""
+    points, order = near.points, near.order
+    split = low
+    for n in range(low, high):
+        point = order[n]
+        if points[point, axis] <= middle:
+            order[n], order[split] = order[split], point
+            split += 1
+    return split
+
+
+def _apart(near: Near, k: int, x: float, y: float, z: float) -> float:
+    """The distance of a point from a move; inf beyond the limits."""
+    table = near.table
+    rise, window = table[k, RISE], near.window * (1.0 + table[k, SLOPE])
+    if rise == 0.0 and abs(table[k, Z] - z) > window:
+        return math.inf
+    share = 0.0
+    if table[k, RADIUS] == 0.0:
+        dx, dy = table[k, BX] - table[k, AX], table[k, BY] - table[k, AY]
+        px, py = x - table[k, AX], y - table[k, AY]
+        square = dx * dx + dy * dy
+        share = (px * dx + py * dy) * (1.0 / (square if square > 0.0 else 1.0))
+        share = min(max(share, 0.0), 1.0)
+        px, py = px - share * dx, py - share * dy
+        apart = math.sqrt(px * px + py * py)
+    else:
+        px, py = x - table[k, CX], y - table[k, CY]
+        sine = table[k, UX] * py - table[k, UY] * px
+        if sine < 0.0 or px * table[k, VY] - py * table[k, VX] < 0.0:
+            to_a = (x - table[k, AX]) ** 2 + (y - table[k, AY]) ** 2
+            to_b = (x - table[k, BX]) ** 2 + (y - table[k, BY]) ** 2
+            apart = math.sqrt(min(to_a, to_b))
+        else:
+            apart = abs(math.sqrt(px * px + py * py) - table[k, RADIUS])
+        if rise != 0.0 and apart <= near.limit:
+            share = _share_of_arc(near, k, px, py, sine)
+    if apart > near.limit:
+        return math.inf
+    if rise != 0.0 and abs(table[k, Z] + share * rise - z) > window:
+        return math.inf
+    return apart
+
+
+def _share_of_arc(near: Near, k: int, px: float, py: float, sine: float) -> float:
+    """Where on an arc its point nearest to a place about its centre lies, from 0 to 1."""
+    table = near.table
+    ax, ay = table[k, AX] - table[k, CX], table[k, AY] - table[k, CY]
+    angle, sweep = math.atan2(sine, ax * px + ay * py), table[k, SWEEP]
+    angle = angle + 2.0 * math.pi if angle < 0.0 else angle
+    return 0.0 if angle > math.pi + 0.5 * sweep else min(angle / sweep, 1.0)
+
+
+def _compare(low: int, high: int, first: int, last: int, near: Near) -> None:
+    """Of each of the points low:high the nearest of the candidates first:last."""
+    points, order, candidates, apart = near.points, near.order, near.candidates, near.apart
+    for i in range(low, high):
+        point, best, count = order[i], math.inf, 0
+        x, y, z = points[point, 0], points[point, 1], points[point, 2]
+        for n in range(first, last):
+            away = _apart(near, candidates[n], x, y, z)
+            apart[n - first] = away
+            best = away if away < best else best
+            count += 1 if away < math.inf else 0
+        if count == 0:
+            continue
+        n = last - 1
+        while apart[n - first] > best + EQUAL_MM:
+            n -= 1
+        near.distance[point], near.move[point] = best, candidates[n]
+        near.count[point] = count
+
+
+def _list(
+    low: int, high: int, first: int, last: int, near: Near, found: Ints, distance: Floats
+) -> None:
+    """All of the candidates first:last that are within the limits of each of the points."""
+    points, order, candidates = near.points, near.order, near.candidates
+    for i in range(low, high):
+        point = order[i]
+        at = near.move[point]
+        x, y, z = points[point, 0], points[point, 1], points[point, 2]
+        for n in range(first, last):
+            away = _apart(near, candidates[n], x, y, z)
+            if away < math.inf:
+                found[at], distance[at] = candidates[n], away
+                at += 1
