@@ -13,7 +13,7 @@ import numpy as np
 
 from camtool.errors import ProgramError
 from camtool.findings import Finding
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import Lexing, blocks_of
 from ..gcode.read import M_CODES, ModalReader, Rules
@@ -22,6 +22,9 @@ from .findings import FEED_TOO_SLOW
 
 SLOW_GUARD: Final = 1e-6
 """Part of a feed: one below the slowest by less counts as the slowest."""
+
+ROWS_AT_ONCE: Final = 1 << 14
+"""So many moves are compared with the slowest feed at a time."""
 
 MIST: Final = 70
 """M7, tenfold: grbl's error 20 in its default configuration (ENABLE_M7 of config.h is off)."""
@@ -86,22 +89,36 @@ def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
     """
     if not isinstance(machine.controller, GrblController):
         return
+    least_hz = machine.controller.least_step_hz
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    travel = np.abs(path.end - path.starts)
-    steps = (travel / step_mm).max(axis=1, initial=0.0)
-    along = np.linalg.norm(travel, axis=1) / np.maximum(steps, 1.0)
-    along = np.where(path.is_arc, step_mm[:2].min(), along)
-    least = 60.0 * machine.controller.least_step_hz * along
-    with np.errstate(invalid="ignore"):
-        slow = np.flatnonzero(path.is_feed & (path.feed < least * (1.0 - SLOW_GUARD)))
-    if len(slow):
-        worst = int(slow[(path.feed[slow] / least[slow]).argmin()])
+    begin, count, worst, least_part, limit = path.start, 0, -1, np.inf, 0.0
+    for low in range(0, len(path), ROWS_AT_ONCE):
+        rows = slice(low, low + ROWS_AT_ONCE)
+        travel = np.abs(np.diff(path.end[rows], axis=0, prepend=begin[None, :]))
+        begin = path.end[rows][-1]
+        steps = (travel / step_mm).max(axis=1, initial=0.0)
+        along = np.linalg.norm(travel, axis=1) / np.maximum(steps, 1.0)
+        along = np.where(path.kind[rows] >= Kind.ARC_CW, step_mm[:2].min(), along)
+        least = 60.0 * least_hz * along
+        cut, feed = (
+            (path.kind[rows] >= Kind.LINE) & (path.kind[rows] <= Kind.ARC_CCW),
+            path.feed[rows],
+        )
+        with np.errstate(invalid="ignore"):
+            slow = np.flatnonzero(cut & (feed < least * (1.0 - SLOW_GUARD)))
+        count += len(slow)
+        if len(slow):
+            part = feed[slow] / least[slow]
+            if part.min() < least_part:
+                least_part, at = float(part.min()), int(slow[part.argmin()])
+                worst, limit = low + at, least[at]
+    if count:
         yield FEED_TOO_SLOW(
             where=f"block {int(path.block[worst]) + 1}",
             measured=path.feed[worst],
-            limit=least[worst],
-            count=len(slow),
-            least_hz=machine.controller.least_step_hz,
+            limit=limit,
+            count=count,
+            least_hz=least_hz,
         )
 
 
