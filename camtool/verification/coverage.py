@@ -108,7 +108,7 @@ def cover(
     −1 for none, where that is known.
 
     A wanted contour is compared with the decoded one that was written from it first, and only
-    where that does not fit with everything (docs/decisions/0036-own-rows-first.md).
+    where that does not fit with everything (docs/decisions/0037-own-rows-first.md).
     """
     cuts, wanted, limits = decoded.cuts, goal.moves, (goal.limit_mm, goal.depth_mm)
     samples = sample_cuts(cuts, spacing_mm)
