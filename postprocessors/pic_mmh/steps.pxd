@@ -114,6 +114,17 @@ cdef void _stop(
 ) noexcept
 
 @cython.locals(
+    expected=Int, end_x=Int, end_y=Int, low=Int, high=Int, first=Int, last=Int, done=Int, at=Int,
+    to_x=Int, to_y=Int, entered=Int, x=Int, y=Int, short=Int, run=Int, _=Int
+)
+cdef void _stop_by_closed_form(
+    Int[::1] leg, bint rounded, Int reading, Int[::1] state, Int[::1] out
+) noexcept
+
+@cython.locals(done=Int, x=Int, y=Int, run=Int)
+cdef Int _enter(Int[::1] state, Int count) noexcept
+
+@cython.locals(
     number=Int, method=Int, reading=Int, path_x=Int[::1], path_y=Int[::1], tracker=Int[::1],
     leg=Int[::1], state=Int[::1], stop=Int[::1], rounded=bint, registers=double[::1]
 )

@@ -663,7 +663,7 @@ def turn_round(leg: Ints, path_x: Ints, path_y: Ints, count: int) -> None:
 # A path that stands on the end on its expected turn stops there by all three: in one quadrant both
 # coordinates run one way, so no step before it has reached both.
 #
-# Exact: integers. Compiled, because it looks at every step of an arc.
+# Exact: integers. Compiled, because it looks at every step of an arc that has no closed form.
 
 
 EQUAL, FINAL_QUADRANT, NEAREST = range(3)
@@ -725,6 +725,9 @@ def _stop(
 ) -> None:
     """Fill `out` (4,) for one arc that does not start at its centre. There is room for positions,
     registers (2,) and state (8,) of an interpolator, and a tracker (6,) of `approach_start`."""
+    if method == DSM:
+        _stop_by_closed_form(leg, rounded, reading, state, out)
+        return
     end_x, end_y = leg[END_X], leg[END_Y]
     start_leg(leg, method, rounded, state)
     registers[0] = registers[1] = 0.0
@@ -758,6 +761,59 @@ def _stop(
             out[MET] = 1 if part_x[at] == end_x and part_y[at] == end_y else 0
             return
         seen += filled
+
+
+def _stop_by_closed_form(leg: Ints, rounded: bool, reading: int, state: Ints, out: Ints) -> None:
+    """As `_stop`, for direct search: no coordinate changes by more than one an iteration, so what
+    can happen no sooner than in n iterations is looked for behind the next n."""
+    end_x, end_y = leg[END_X], leg[END_Y]
+    expected = expected_quadrants(leg[A], leg[B], leg[CW] != 0, end_x, end_y)
+    start_leg(leg, DSM, rounded, state)
+    if reading == FINAL_QUADRANT:
+        done = _enter(state, expected)
+        to_x, to_y = heading(end_x, end_y, leg[CW] != 0)
+        entered = 0
+        while True:
+            x, y = state[0], state[1]
+            short = int(max(to_x * (end_x - x), to_y * (end_y - y)))
+            if done > 0 and (entered == 1 or short <= 0):
+                break
+            run = max(1, min(short, abs(x), abs(y)))
+            skip(state, run)
+            done += run
+            if (state[0] == 0 and x != 0) or (state[1] == 0 and y != 0):
+                entered = 1
+        out[STOP_SAMPLES], out[STOP_X], out[STOP_Y] = done, state[0], state[1]
+        out[MET] = 1 if state[0] == end_x and state[1] == end_y else 0
+        return
+    low, high = max(0, expected - 1), expected + 1
+    first = _enter(state, low)
+    last = first + _enter(state, high + 1 - low) - 1
+    start_leg(leg, DSM, rounded, state)
+    done = max(0, first - 1) if reading == NEAREST else 0
+    skip(state, done)
+    at = first_at(state, end_x, end_y, last - done)
+    if at > 0:
+        out[STOP_SAMPLES], out[STOP_X], out[STOP_Y], out[MET] = done + at, end_x, end_y, 1
+        return
+    start_leg(leg, DSM, rounded, state)
+    at, _ = nearest_to(state, end_x, end_y, first, last)
+    start_leg(leg, DSM, rounded, state)
+    skip(state, at)
+    out[STOP_SAMPLES], out[STOP_X], out[STOP_Y], out[MET] = at, state[0], state[1], 0
+
+
+def _enter(state: Ints, count: int) -> int:
+    """Run on until so many quadrants are entered, by direct search; the iterations to there."""
+    done = 0
+    while count > 0:
+        x, y = state[0], state[1]
+        run = int(max(1, min(abs(x), abs(y))))
+        skip(state, run)
+        done += run
+        if (state[0] == 0 and x != 0) or (state[1] == 0 and y != 0):
+            count -= 1
+    return done
 
 
 def arc_stops(legs: Ints, how: tuple[int, bool, int], out: Ints) -> None:
