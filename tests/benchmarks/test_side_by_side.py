@@ -137,7 +137,7 @@ CASES: dict[str, tuple[str, Callable[[Path], None], str, dict[str, str | None]]]
     "500 polylines of 157 random points": ("scribble.svg", scribble, "", {"vpype": VPYPE}),
     "100,000 lines that meet no other": (
         "many.dxf",
-        lambda path: lines(strays(100_000, 1500.0), path),
+        lambda path: lines(strays(100_000, 500.0), path),
         "",
         {"ezdxf.readfile": LOAD},
     ),
