@@ -5,11 +5,12 @@ makes it slower and nothing else. What could hang is bounded by `HANG_S`, which 
 any of this takes, or by processor time, which other people's work on the machine does not use up.
 """
 
+import os
 import re
 import signal
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 HANG_S = 900.0
@@ -29,6 +30,17 @@ def heard_from(running: subprocess.Popen[str], said: str) -> str:
         assert line, heard
         heard += line
     return heard
+
+
+def all_written(terminal: int) -> bytes:
+    """What is written to a pseudo-terminal until its other end is closed; this end is then closed
+    too. The caller has handed its own copy of the other end over and closed it."""
+    written = b""
+    with suppress(OSError):  # what Linux says when the other end is closed
+        while part := os.read(terminal, 65536):
+            written += part
+    os.close(terminal)
+    return written
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -17,7 +17,7 @@ import pytest
 
 from camtool.batches.manifest import NAME, Manifest, file_digest
 from tests.cli.conftest import Run
-from tests.waiting import HANG_S, heard_from
+from tests.waiting import HANG_S, all_written, heard_from
 
 COMMAND = (sys.executable, "-m", "camtool", "batch", "drawings", "-t", "pic-mmh", "-o", "build")
 
@@ -94,13 +94,9 @@ def on_a_terminal(folder: Path, code: int) -> str:
     environment = {**os.environ, "COLUMNS": "120", "TERM": "xterm"}
     environment.pop("NO_COLOR", None)
     command = [*COMMAND, "--no-verify"]
-    said = b""
     with running_in(folder, args=command, stderr=theirs, env=environment) as running:
         os.close(theirs)
-        with suppress(OSError):  # the terminal's other end is closed
-            while chunk := os.read(ours, 65536):
-                said += chunk
-        os.close(ours)
+        said = all_written(ours)
         assert running.wait() == code
     return said.decode()
 

@@ -10,6 +10,7 @@ import pytest
 
 from camtool.cli.messages import REPORT_NAMES, report_marks, show_compared, show_facts
 from camtool.findings import Code, Finding, Severity
+from tests.waiting import all_written
 
 RED = b"\x1b[31m"
 YELLOW = b"\x1b[33m"
@@ -31,16 +32,7 @@ def on_terminal(*arguments: str, **more: str) -> bytes:
     command = [sys.executable, "-m", "camtool", *arguments]
     with subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment) as process:
         os.close(theirs)
-        written = b""
-        while True:
-            try:
-                part = os.read(ours, 4096)
-            except OSError:  # Linux: the other end is closed
-                break
-            if not part:
-                break
-            written += part
-    os.close(ours)
+        written = all_written(ours)
     assert process.returncode is not None
     return SIGNS.sub(b"", written)
 

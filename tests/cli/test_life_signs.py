@@ -14,6 +14,7 @@ import pytest
 from camtool.cli import life_signs as module
 from camtool.cli.life_signs import LifeSigns, life_signs
 from camtool.progress import Progress
+from tests.waiting import all_written
 
 
 class Terminal(io.StringIO):
@@ -111,16 +112,7 @@ def on_terminal(*arguments: str, folder: Path) -> bytes:
         command, stdout=theirs, stderr=theirs, env=environment, cwd=folder
     ) as process:
         os.close(theirs)
-        written = b""
-        while True:
-            try:
-                part = os.read(ours, 65536)
-            except OSError:  # Linux: the other end is closed
-                break
-            if not part:
-                break
-            written += part
-    os.close(ours)
+        written = all_written(ours)
     assert process.returncode == 0
     return written
 

@@ -12,6 +12,7 @@ import pytest
 
 from camtool.plain import LONGEST_LINE, LONGEST_WORD, one_line, to_json
 from tests.cli.conftest import Run
+from tests.waiting import all_written
 
 EVIL = (
     "A\x1b]0;title\x07",
@@ -127,13 +128,7 @@ def test_a_terminal_is_told_no_more_than_its_own_colours(evil: Path) -> None:
         command = [sys.executable, "-m", "camtool", *line]
         run = subprocess.Popen(command, cwd=evil, stdout=theirs, stderr=theirs, stdin=theirs)
         os.close(theirs)
-        said = b""
-        try:
-            while part := os.read(ours, 4096):
-                said += part
-        except OSError:  # what Linux says when the other side is closed
-            pass
-        os.close(ours)
+        said = all_written(ours)
         assert run.wait() in (0, 1, 2), said
         # A colour ends in m and a bar moves the cursor: neither a title, nor the names' own.
         for bad in (
