@@ -6,6 +6,7 @@ import importlib
 import os
 import stat
 import sys
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Protocol, cast
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 MAX_FILE_BYTES = 500_000_000
 """A larger file is refused before it is read: its drawing would not fit into memory."""
+
+_BYTES_AT_ONCE = 1 << 20
+"""Streams are read in pieces of this size, so that a small file needs little memory."""
 
 STDIN = "<stdin>"
 """The name of what `-` gives."""
@@ -88,10 +92,13 @@ def file_bytes(path: Path) -> bytes:
 
 
 def _bounded(stream: BinaryIO, file: str) -> bytes:
-    data = stream.read(MAX_FILE_BYTES + 1)
-    if len(data) > MAX_FILE_BYTES:
-        raise _too_large(file)
-    return data
+    """All that the stream gives; DrawingError as soon as it is too much."""
+    content = BytesIO()
+    while piece := stream.read(_BYTES_AT_ONCE):
+        content.write(piece)
+        if content.tell() > MAX_FILE_BYTES:
+            raise _too_large(file)
+    return content.getvalue()
 
 
 def _too_large(file: str) -> DrawingError:

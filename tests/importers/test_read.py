@@ -5,6 +5,7 @@ import gzip
 import io
 import subprocess
 import sys
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -169,6 +170,23 @@ def test_a_file_that_is_too_large_is_refused(
     monkeypatch.setattr(sys, "stdin", Input(b"1,2\n3,4\n5,6\n"))
     with pytest.raises(DrawingError, match="is larger than"):
         read_drawing(Path("-"))
+
+
+def test_a_file_is_read_in_pieces_into_the_memory_that_it_needs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "small.csv"
+    path.write_bytes(b"1,2\n3,4\n" * 1000)
+    tracemalloc.start()
+    try:
+        assert reader.file_bytes(path) == path.read_bytes()
+        assert tracemalloc.get_traced_memory()[1] < 4_000_000
+    finally:
+        tracemalloc.stop()
+    monkeypatch.setattr(reader, "_BYTES_AT_ONCE", 7)
+    assert reader.file_bytes(path) == path.read_bytes()
+    monkeypatch.setattr(sys, "stdin", Input(path.read_bytes()))
+    assert reader.content(Path("-")) == (path.read_bytes(), reader.STDIN)
 
 
 @pytest.mark.parametrize(
