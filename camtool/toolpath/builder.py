@@ -17,6 +17,9 @@ Coordinate = float | None
 ROWS_AT_ONCE = 1 << 14
 """So many rows are Python objects at a time, no more."""
 
+GROWTH = 8
+"""A column that is full grows by this part of its rows."""
+
 
 class ToolpathBuilder:
     """Collects rows; coordinates left out (None) stay where they are.
@@ -39,12 +42,12 @@ class ToolpathBuilder:
         """Index of the run in the plan for the rows that follow; −1: links between runs."""
         self._start = start
         self._rows: list[tuple[float, ...]] = []
-        self._columns: dict[str, list[Any]] = {name: [] for name in (*COLUMNS, "run")}
+        self._columns = {name: _Column(name) for name in (*COLUMNS, "run")}
         self._texts: dict[str, int] = {}
         self._modes: dict[PathMode, int] = {}
 
     def __len__(self) -> int:
-        return sum(map(len, self._columns["kind"])) + len(self._rows)
+        return len(self._columns["kind"]) + len(self._rows)
 
     def rapid(
         self, x: Coordinate = None, y: Coordinate = None, z: Coordinate = None
@@ -94,12 +97,11 @@ class ToolpathBuilder:
         moves one by one."""
         self._gather()
         count = len(kind)
-        columns = {"kind": kind, "end": end, "centre": centre, "feed": feed, **others}
-        same = {"source": self._of_source(), "mode": self._of_mode(), "run": self.run}
-        for name, number in {"value": math.nan, "block": self.block, **same}.items():
-            columns.setdefault(name, np.full(count, number))
-        for name, column in columns.items():
-            self._columns[name].append(column)
+        of_all = {"source": self._of_source(), "mode": self._of_mode(), "run": self.run}
+        columns = {"value": math.nan, "block": self.block, **of_all, **others}
+        columns |= {"kind": kind, "end": end, "centre": centre, "feed": feed}
+        for name, column in self._columns.items():
+            column.add(columns[name], count)
         x, y, z = end[-1].tolist()
         self.position = (x, y, z)
 
@@ -110,12 +112,14 @@ class ToolpathBuilder:
     @property
     def runs(self) -> Ints:
         """(N,) index of the run of each row."""
-        return np.asarray(self._gathered("run"), dtype=np.int64)
+        self._gather()
+        return np.asarray(self._columns["run"].whole(), dtype=np.int64)
 
     def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:
         """The rows so far as a Toolpath."""
+        self._gather()
         return Toolpath(
-            **{name: self._gathered(name) for name in COLUMNS},
+            **{name: self._columns[name].whole() for name in COLUMNS},
             modes=tuple(self._modes),
             start=np.array(self._start, dtype=np.float64),
             texts=tuple(self._texts),
@@ -162,21 +166,43 @@ class ToolpathBuilder:
             table = np.array(self._rows, dtype=np.float64)
             self._rows = []
             cut = np.split(table, [1, 4, 6, 7, 8, 9, 10, 11], axis=1)
-            for name, part in zip((*COLUMNS, "run"), cut, strict=True):
-                column = part if name in ("end", "centre") else part[:, 0]
-                self._columns[name].append(column)
-
-    def _gathered(self, name: str) -> Any:
-        """A column of all rows, as one array that a Toolpath need not copy."""
-        self._gather()
-        parts = self._columns[name]
-        if len(parts) != 1 or parts[0].flags.writeable:
-            shape = (0, *{"end": (3,), "centre": (2,)}.get(name, ()))
-            dtype = np.int64 if name in (*WHOLE, "run") else np.float64
-            whole = np.concatenate(parts or [np.empty(shape)], dtype=dtype, casting="unsafe")
-            whole.flags.writeable = False
-            parts[:] = [whole]
-        return parts[0]
+            for column, part in zip(self._columns.values(), cut, strict=True):
+                column.add(part.reshape(column.shape_of(len(part))), len(part))
 
     def _index(self, text: str) -> int:
         return self._texts.setdefault(text, len(self._texts))
+
+
+class _Column:
+    """A column that grows where it stands: parts that are put together at the end would need twice
+    the room, and leave holes in the memory."""
+
+    def __init__(self, name: str) -> None:
+        self._width = {"end": (3,), "centre": (2,)}.get(name, ())
+        dtype = np.int64 if name in (*WHOLE, "run") else np.float64
+        self._rows: Any = np.empty(self.shape_of(0), dtype=dtype)
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def shape_of(self, rows: int) -> tuple[int, ...]:
+        """The shape of so many rows."""
+        return (rows, *self._width)
+
+    def add(self, rows: Ints | Floats | float, count: int) -> None:
+        """So many further rows; a single number stands for all of them."""
+        end = self._count + count
+        if end > len(self._rows):
+            if not self._rows.flags.writeable:
+                self._rows = self._rows.copy()
+            self._rows.resize(self.shape_of(end + end // GROWTH), refcheck=False)
+        self._rows[self._count : end] = rows
+        self._count = end
+
+    def whole(self) -> Any:
+        """All rows so far, which nobody can change any more."""
+        if len(self._rows) != self._count:
+            self._rows.resize(self.shape_of(self._count), refcheck=False)
+        self._rows.flags.writeable = False
+        return self._rows
